@@ -1,12 +1,15 @@
-"""How close generated homes come to HouseExpo's plans, and how long one takes.
+"""How close generated homes come to real plans, and how long one takes.
 
-    python benchmarks/synthetic_homes.py HOUSEEXPO [--homes N] [--check] [--figure P] [--json J]
+    python benchmarks/synthetic_homes.py PLANS [--edition 2] [--variety 1] [--homes N] [--plans N]
+        [--check] [--figure P] [--json J]
 
-HOUSEEXPO is a folder of plans with an INDEX.tsv. Its kinds `empty` (no rooms), `tiny` (one room of
-a few metres) and `big` (no homes: offices and floors of flats) are left out. All homes are drawn
-with default settings, seeds from 0. Compared like with like: wall corners after the outline is
-simplified to 10 cm, because HouseExpo's outlines are traced from pixels; doorways, and the graph of
-rooms that they make, as each floor plan has them.
+PLANS is a folder of plans, of which the first 1,000 by name are read. Where it has an INDEX.tsv, as
+that of HouseExpo has, the kinds `empty` (no rooms), `tiny` (one room of a few metres) and `big` (no
+homes: offices and floors of flats) are left out. All homes are drawn with default settings, seeds
+from 0. Compared like with like: wall corners after the outline is simplified to 10 cm, because
+HouseExpo's outlines are traced from pixels; doorways, and the graph of rooms that they make, as
+each floor plan has them: those of its file, where that records doors, else those found in walls.
+The last rows compare the outlines of small and large homes.
 """
 
 import argparse
@@ -22,7 +25,7 @@ import numpy as np
 import shapely
 
 from fleet2d.floorplan.checkup import checkup
-from fleet2d.floorplan.formats.houseexpo import read_houseexpo
+from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.synthetic.source import Synthetic
 
@@ -30,6 +33,8 @@ LEFT_OUT = ("empty", "tiny", "big")
 TOLERANCE_M = 0.1
 # One use under two names.
 SAME = {"toilet": "bathroom", "child_room": "bedroom", "guest_room": "bedroom", "hall": "hallway"}
+CORRIDORS = {"hallway", "hall", "entryway", "lobby", "corridor"}
+OUTLINES = ("longest side [m]", "aspect ratio", "share of box")
 SIZES_OF = ("living_room", "kitchen", "dining_room", "bedroom", "bathroom", "office", "garage")
 
 Values = dict[str, list[float]]
@@ -37,12 +42,13 @@ Values = dict[str, list[float]]
 
 def main() -> None:
     arguments = _arguments()
-    real = measures(_houseexpo(arguments.houseexpo))
-    homes, seconds = generated(arguments.homes)
+    real = measures(_plans(arguments.plans_folder, arguments.plans))
+    settings = {"edition": arguments.edition, "variety": arguments.variety}
+    homes, seconds = generated(arguments.homes, settings)
     synthetic = measures(homes)
     rows = [_row(name, real[name], synthetic[name]) for name in real if name in synthetic]
-    print(f"{len(real['area [m2]'])} plans of HouseExpo, {len(homes)} synthetic homes")
-    print(f"{'':<22}{'HouseExpo: quartiles':>26}{'synthetic: quartiles':>26}{'KS':>8}{'n':>12}")
+    print(f"{len(real['area [m2]'])} real plans, {len(homes)} synthetic homes of {settings}")
+    print(f"{'':<28}{'real plans: quartiles':>26}{'synthetic: quartiles':>26}{'KS':>8}{'n':>12}")
     for row in rows:
         print(_written(row))
     alike = len(homes) - len({plan.named("home").digest for plan in homes})
@@ -61,13 +67,13 @@ def main() -> None:
         draw(real, synthetic, arguments.figure)
 
 
-def generated(count: int) -> tuple[list[FloorPlan], list[float]]:
+def generated(count: int, settings: dict[str, Any]) -> tuple[list[FloorPlan], list[float]]:
     """Return homes by seed, and how long each took [s]; kernels are compiled before."""
-    Synthetic().load()
+    Synthetic(**settings).load()
     homes, seconds = [], []
     for seed in range(count):
         start = time.perf_counter()
-        homes.append(Synthetic(seed=seed).load())
+        homes.append(Synthetic(seed=seed, **settings).load())
         seconds.append(time.perf_counter() - start)
     return homes, seconds
 
@@ -77,8 +83,13 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
     found: Values = {name: [] for name in ("area [m2]", "rooms", "bedrooms", "bathrooms")}
     found |= {f"{kind} [m2]": [] for kind in SIZES_OF}
     found |= {
-        name: [] for name in ("doorways", "degree of rooms", "wall corners", "outline corners")
-    }
+        name: []
+        for name in (
+            "convexity of rooms", "corridor share", "doorways", "doorway width [m]",
+            "doors with a leaf", "degree of rooms", "wall corners", "outline corners",
+            *(f"{measure}, {size}" for measure in OUTLINES for size in ("<= 200 m2", "> 200 m2")),
+        )
+    }  # fmt: skip
     for plan in plans:
         kinds = [SAME.get(room.type, room.type) for room in plan.rooms]
         found["area [m2]"].append(plan.area_m2)
@@ -88,7 +99,19 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
         for kind, room in zip(kinds, plan.rooms, strict=True):
             if kind in SIZES_OF:
                 found[f"{kind} [m2]"].append(room.area_m2)
-        pairs = {frozenset(door.rooms) for door in plan.doorways if len(set(door.rooms)) == 2}
+        found["convexity of rooms"] += [convexity(plan, room.index) for room in plan.rooms]
+        halls = [room.area_m2 for room in plan.rooms if room.type in CORRIDORS]
+        found["corridor share"].append(sum(halls) / plan.area_m2)
+        size = "> 200 m2" if plan.area_m2 > 200 else "<= 200 m2"
+        x0, y0, x1, y1 = plan.bounds
+        short, long = sorted((x1 - x0, y1 - y0))
+        filled = plan.area_m2 / (short * long)
+        for measure, value in zip(OUTLINES, (long, long / short, filled), strict=True):
+            found[f"{measure}, {size}"].append(value)
+        inner = [door for door in plan.doorways if len(set(door.rooms)) == 2]
+        found["doorway width [m]"] += [door.width_m for door in inner]
+        found["doors with a leaf"].append(sum(door.leaf for door in inner))
+        pairs = {frozenset(door.rooms) for door in inner}
         if pairs:
             found["doorways"].append(len(pairs))
             found["degree of rooms"] += [
@@ -97,6 +120,13 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
         found["wall corners"].append(_corners(plan, outer=False))
         found["outline corners"].append(_corners(plan, outer=True))
     return {name: values for name, values in found.items() if values}
+
+
+def convexity(plan: FloorPlan, room: int) -> float:
+    """Return the area of a room over that of its convex hull, 1 for a rectangle."""
+    rows, columns = np.nonzero(plan.room_of_cell == room)
+    corners = [np.column_stack((columns + x, rows + y)) for x in (0, 1) for y in (0, 1)]
+    return len(rows) / float(shapely.MultiPoint(np.concatenate(corners)).convex_hull.area)
 
 
 def _corners(plan: FloorPlan, *, outer: bool) -> float:
@@ -142,7 +172,7 @@ def draw(real: Values, synthetic: Values, path: Path) -> None:
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
             for values, color, label in (
-                (real[name], "#3b4048", "HouseExpo"),
+                (real[name], "#3b4048", "real"),
                 (synthetic[name], "#c8452f", "synthetic"),
             ):
                 ordered = np.sort(values)
@@ -163,7 +193,7 @@ def _row(name: str, real: Sequence[float], synthetic: Sequence[float]) -> dict[s
 
     return {
         "measure": name,
-        "houseexpo": quartiles(real),
+        "real": quartiles(real),
         "synthetic": quartiles(synthetic),
         "ks": ks_distance(real, synthetic),
         "n": [len(real), len(synthetic)],
@@ -172,25 +202,33 @@ def _row(name: str, real: Sequence[float], synthetic: Sequence[float]) -> dict[s
 
 def _written(row: dict[str, Any]) -> str:
     def three(values: list[float]) -> str:
-        return " / ".join(f"{value:.1f}" for value in values)
+        digits = 2 if max(values) < 5 else 1
+        return " / ".join(f"{value:.{digits}f}" for value in values)
 
     n = f"{row['n'][0]}, {row['n'][1]}"
     return (
-        f"{row['measure']:<22}{three(row['houseexpo']):>26}{three(row['synthetic']):>26}"
+        f"{row['measure']:<28}{three(row['real']):>26}{three(row['synthetic']):>26}"
         f"{row['ks']:>8.2f}{n:>14}"
     )
 
 
-def _houseexpo(folder: Path) -> list[FloorPlan]:
-    with (folder / "INDEX.tsv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file, delimiter="\t"))
-    kept = [row["id"] for row in rows if row["kind"] not in LEFT_OUT]
-    return [read_houseexpo(folder / f"{name}.json") for name in kept]
+def _plans(folder: Path, most: int) -> list[FloorPlan]:
+    index = folder / "INDEX.tsv"
+    if index.exists():
+        with index.open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, delimiter="\t"))
+        paths = [folder / f"{row['id']}.json" for row in rows if row["kind"] not in LEFT_OUT]
+    else:
+        paths = sorted(path for path in folder.iterdir() if path.is_file())
+    return [load_floorplan(path) for path in paths[:most]]
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("houseexpo", type=Path, help="folder of plans with INDEX.tsv")
+    parser.add_argument("plans_folder", type=Path, metavar="PLANS", help="folder of plans")
+    parser.add_argument("--edition", type=int, choices=(1, 2), default=1)
+    parser.add_argument("--variety", type=float, default=0.0)
+    parser.add_argument("--plans", type=int, default=1000, help="the most real plans to read")
     parser.add_argument("--homes", type=int, default=1000)
     parser.add_argument("--check", action="store_true", help="give each home a check-up, too")
     parser.add_argument("--figure", type=Path, help="PNG to draw the distributions to")

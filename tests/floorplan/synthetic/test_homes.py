@@ -16,12 +16,11 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.synthetic.generator import (
     MAX_CORRIDOR_SHARE,
     House,
-    Style,
     generate,
     outline_corners,
     outline_kind,
 )
-from fleet2d.floorplan.synthetic.program import SIZES, Wishes
+from fleet2d.floorplan.synthetic.program import SIZES, Style, Wishes
 from fleet2d.floorplan.synthetic.slicing import Box, boxes_overlap, inner_walls
 from fleet2d.floorplan.synthetic.source import Synthetic
 
@@ -208,7 +207,9 @@ def test_walls_between_boxes_are_where_they_touch() -> None:
 def test_areas_spread_as_those_of_real_homes_do() -> None:
     from fleet2d.floorplan.synthetic.program import Choices, settle_wishes
 
-    areas = sorted(settle_wishes(Wishes(), Choices(seed, "wishes")).area_m2 for seed in range(800))
+    areas = sorted(
+        settle_wishes(Wishes(), Choices(seed, "wishes"), Style()).area_m2 for seed in range(800)
+    )
     quartiles = np.percentile(areas, [25, 50, 75]).tolist()
     assert [89, 141, 206] == pytest.approx(quartiles, rel=0.08)
     assert all(low <= high for low, high in pairwise(areas))

@@ -1,10 +1,17 @@
+from functools import cache
+
 import pytest
+from tests.floorplan.synthetic.test_homes import PRIVATE, content
+from tests.thorough import some
 
 import fleet2d
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.furnish import furnish
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.synthetic.generator import generate
+from fleet2d.floorplan.synthetic.program import Style, Wishes
 from fleet2d.floorplan.synthetic.source import Synthetic
 
 
@@ -71,3 +78,86 @@ def test_people_sleep_in_the_living_room_of_a_furnished_studio() -> None:
 
     assert run.metrics["room_share"]["u"]["living_room_0"] > 0.5
     assert not any("bedroom" in note for note in run.notes)
+
+
+SECOND = some(range(200), 10)
+
+
+@cache
+def second(seed: int, **settings: object) -> FloorPlan:
+    return Synthetic(seed=seed, edition=2, **settings).load()
+
+
+@pytest.mark.parametrize("seed", SECOND)
+def test_home_of_edition_2_is_whole_and_no_way_leads_through_a_private_room(seed: int) -> None:
+    plan = second(seed)
+    assert () == plan.notes
+    assert 1 == Home(plan).space(0.25).parts
+    assert not checkup(plan)
+    assert {"living_room", "kitchen", "bedroom", "bathroom"} <= {
+        kind for room in plan.rooms for kind in room.labels
+    }
+    inner = [door for door in plan.doorways if door.name != "front_door"]
+    for room in plan.rooms:
+        doors = [door for door in inner if room.index in door.rooms]
+        kinds = {plan.rooms[sum(door.rooms) - room.index].type for door in doors}
+        assert doors
+        assert (
+            room.type not in PRIVATE
+            or 1 == len(doors)
+            or (room.type == "bedroom" and len(kinds - PRIVATE) <= 1)
+            or (room.type == "bathroom" and "laundry" not in kinds)
+        )
+
+
+@pytest.mark.parametrize(("area", "bedrooms", "bathrooms"), [(62, 2, 1), (140, 3, 2), (300, 5, 3)])
+def test_home_of_edition_2_has_the_area_and_rooms_that_are_requested(
+    area: float, bedrooms: int, bathrooms: int
+) -> None:
+    for seed in range(3):
+        plan = second(seed, area_m2=area, bedrooms=bedrooms, bathrooms=bathrooms)
+        kinds = [room.type for room in plan.rooms]
+
+        assert area == pytest.approx(plan.area_m2, rel=0.05)
+        assert (bedrooms, bathrooms) == (kinds.count("bedroom"), kinds.count("bathroom"))
+
+
+def test_small_flats_of_edition_2_rarely_have_the_same_rooms_and_links() -> None:
+    graphs = {room_graph(second(seed, area_m2=50, variety=1)) for seed in range(15)}
+    assert len(graphs) >= 11
+
+
+def test_large_homes_of_edition_2_are_more_compact() -> None:
+    def longest(plan: FloorPlan) -> float:
+        x0, y0, x1, y1 = plan.bounds
+        return max(x1 - x0, y1 - y0)
+
+    usual = [longest(Synthetic(seed=seed, area_m2=250).load()) for seed in range(6)]
+    compact = [longest(second(seed, area_m2=250)) for seed in range(6)]
+
+    assert sum(compact) < 0.93 * sum(usual)
+    assert max(compact) < 28
+
+
+def test_rooms_of_edition_2_are_not_all_rectangles_and_many_homes_have_no_corridor() -> None:
+    plans = [second(seed) for seed in SECOND]
+    shares = [room.area_m2 / area_of(room.bounds) for plan in plans for room in plan.rooms]
+    without = [plan for plan in plans if not plan.rooms_of_type("hallway")]
+
+    assert sum(share < 0.9 for share in shares) > 0.1 * len(shares)
+    assert 0.2 < len(without) / len(plans) < 0.9
+
+
+def area_of(bounds: tuple[float, float, float, float]) -> float:
+    x0, y0, x1, y1 = bounds
+    return (x1 - x0) * (y1 - y0)
+
+
+@pytest.mark.parametrize(
+    ("seed", "digest"),
+    [(0, "ea8f0f5bf0708c55"), (7, "e8acd52fc9a622d5"), (133, "dc367acb73d12441")],
+)
+def test_seed_of_edition_2_gives_the_home_that_it_gives_on_every_machine(
+    seed: int, digest: str
+) -> None:
+    assert digest == content(generate(seed, Wishes(), Style(edition=2)))

@@ -10,16 +10,20 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.synthetic.plans import RoomLayout, draw_layout
 from fleet2d.floorplan.synthetic.program import (
     SIZES,
+    WIDE_FROM_M2,
     Brief,
     Choices,
+    Style,
     Wishes,
     choose_rooms,
     settle_wishes,
 )
 from fleet2d.floorplan.synthetic.slicing import (
     UNITS_PER_M,
+    WALL,
     Box,
     LayoutRequest,
+    Rectangle,
     Wall,
     boxes_overlap,
     inner_walls,
@@ -74,6 +78,12 @@ _COSTS: dict[str, dict[str, float]] = {
     },
 }  # fmt: skip
 _PAIRS = {(a, b): cost for a, row in _COSTS.items() for b, cost in row.items()}
+# As in old flats; only where edition 2 varies.
+_RARE_PAIRS = {
+    ("bathroom", "kitchen"): 1.5,
+    ("toilet", "kitchen"): 2.0,
+    ("bedroom", "kitchen"): 2.5,
+}
 COSTS: Mapping[tuple[str, str], float] = _PAIRS | {(b, a): cost for (a, b), cost in _PAIRS.items()}
 # Rooms through which the way to other rooms may lead.
 _PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
@@ -91,6 +101,7 @@ class Widths:
         bath: To bathrooms, toilets and small rooms.
         corridor: Clear width of hallways.
         open_plan: Whether living, dining and kitchen are open to each other.
+        stub: Length of wall that is left beside their openings.
         prices: The cost of a passage by the types of its two rooms.
     """
 
@@ -98,6 +109,7 @@ class Widths:
     bath: int
     corridor: int
     open_plan: bool
+    stub: int
     prices: Mapping[tuple[str, str], float] = field(default_factory=lambda: COSTS)
 
     def of(self, kinds: set[str]) -> int:
@@ -241,7 +253,7 @@ def _opening(
     """Return the jambs of an opening without a door, or None for a door."""
     if kinds <= set(_SOCIAL):
         if widths.open_plan:
-            return wall.low, wall.high
+            return wall.low + widths.stub, wall.high - widths.stub
         if choices.chance(30):
             return None
         width = min(choices.between(28, 56), wall.length - 8)
@@ -261,23 +273,27 @@ def _opening(
 
 # Rooms that need a window, and the length of outer wall that it takes [units].
 _LIT = {"bedroom": 24, "living_room": 30, "kitchen": 16, "dining_room": 20, "office": 20}
-MAX_CORRIDOR_SHARE = 0.15
+# Largest part of a home that is corridor, and the part from which on it costs points, by edition.
+MAX_CORRIDOR_SHARE, COSTLY_CORRIDOR_SHARE = {1: 0.15, 2: 0.35}, {1: 0.06, 2: 0.25}
 # A longer corridor, as in a hotel, costs points; the longest is refused [units].
 LONG_CORRIDOR = 150
 MAX_CORRIDOR = 300
 # Narrower open air between two parts of a home is a crack, not a court [units].
 MIN_COURT = 28
 # Largest ratio of the home's length to its width.
-MAX_ASPECT = 2.8
+MAX_ASPECT = {1: 2.8, 2: 2.3}
+# From this ratio on it costs points, and how many.
+LONG_ASPECT, LONG_COST = {1: 1.5, 2: 1.5}, {1: 4, 2: 12}
 _COMFORTABLE_RATIO = 1.45
 
 
-def shape_cost(layout: RoomLayout, ease: float = 1.0) -> float | None:
+def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float | None:
     """Return how far the rooms' shapes are from comfortable ones; None if one is unacceptable.
 
     Args:
         layout: The rooms.
         ease: Factor by which rooms and corridors may be longer than usual.
+        edition: Of the generator.
     """
     cost = 0.0
     for box in layout.boxes:
@@ -300,13 +316,13 @@ def shape_cost(layout: RoomLayout, ease: float = 1.0) -> float | None:
     x0, y0 = min(b.x0 for b in layout.boxes), min(b.y0 for b in layout.boxes)
     x1, y1 = max(b.x1 for b in layout.boxes), max(b.y1 for b in layout.boxes)
     short, long = sorted((x1 - x0, y1 - y0))
-    if long > MAX_ASPECT * short:
+    if long > MAX_ASPECT[edition] * short:
         return None
-    cost += 4 * max(long / short - 1.5, 0.0)
+    cost += LONG_COST[edition] * max(long / short - LONG_ASPECT[edition], 0.0)
     corridor = corridor_share(layout)
-    if corridor > MAX_CORRIDOR_SHARE:
+    if corridor > MAX_CORRIDOR_SHARE[edition]:
         return None
-    return cost + 12 * max(corridor - 0.06, 0.0)
+    return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE[edition], 0.0)
 
 
 def corridor_share(layout: RoomLayout) -> float:
@@ -379,6 +395,11 @@ def outline_kind(turns: Sequence[bool]) -> str | None:
 
 # Layouts are drawn until this many are good …
 ENOUGH_LAYOUTS = 4
+# Ducts of edition 2: range of the sides [units], probability in a rectangle of a room [%], least
+# side of that, and the least distance from passages [units].
+SHAFT_SIDE, SHAFT_PERCENT, SHAFT_ROOM_SIDE, SHAFT_CLEARANCE = (6, 16), 48, 34, 12
+# Ranges of the width of corridors [units] of edition 2, and their weights.
+CORRIDORS = (((20, 28), 25), ((28, 44), 35), ((44, 66), 40))
 # … and at most this many.
 MAX_LAYOUTS = 480
 # Layouts drawn in vain before a new list of rooms is drawn.
@@ -395,25 +416,6 @@ _FRONT = ("entryway", "hallway", "living_room", "dining_room", "kitchen")
 
 
 @dataclass(frozen=True)
-class Style:
-    """The user's request for the shape of a home; None where it is left to the generator.
-
-    Attributes:
-        outline: `rectangle`, `L`, `T` or `U`.
-        open_plan: Whether living, dining and kitchen are open to each other.
-        corridor: Clear width of corridors [units].
-        door: Width of doors between rooms [units].
-        variety: How much rooms, links and layouts differ from the usual ones [percent].
-    """
-
-    outline: str | None = None
-    open_plan: bool | None = None
-    corridor: int | None = None
-    door: int | None = None
-    variety: int = 0
-
-
-@dataclass(frozen=True)
 class House:
     """A generated home, on a grid of 5 cm.
 
@@ -423,6 +425,7 @@ class House:
         boxes: The rectangles that they are made of [units].
         gaps: The passages through inner walls.
         front_door: The passage to the outside.
+        shafts: Ducts and chimneys in corners of rooms [units].
     """
 
     wishes: Wishes
@@ -430,6 +433,7 @@ class House:
     boxes: list[Box]
     gaps: list[Gap]
     front_door: Gap
+    shafts: list[Rectangle]
 
 
 @dataclass(frozen=True)
@@ -453,9 +457,10 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     Raises:
         FloorPlanError: No home was found that meets the request.
     """
-    decided = settle_wishes(wishes, Choices(seed, "wishes"), style.variety)
-    widths = _style(style, Choices(seed, "style"))
-    widths = replace(widths, prices=_tastes(Choices(seed, "taste"), style.variety))
+    decided, used = settle_wishes(wishes, Choices(seed, "wishes"), style), style
+    is_wide = style.edition == 2 and (decided.area_m2 or 0.0) >= WIDE_FROM_M2
+    widths = _style(style, Choices(seed, "style"), is_wide)
+    widths = replace(widths, prices=_tastes(Choices(seed, "taste"), style))
     # A plain outline is only a first try; a requested outline is binding.
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
@@ -464,47 +469,58 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         if number % PATIENCE == 0 and not candidates:
             if number >= MAX_LAYOUTS // 4 and wishes.garage is None:
                 decided = replace(decided, garage=False)
+            if number >= MAX_LAYOUTS // 4 and style.edition == 2 and wishes.bedrooms is None:
+                beds, baths = decided.bedrooms or 0, decided.bathrooms or 1
+                decided = replace(decided, bedrooms=min(beds, max(beds - 1, baths, 1)))
             choices = Choices(seed, f"rooms {number // PATIENCE}")
             if number >= MAX_LAYOUTS * 3 // 4:  # rare rooms fit into no layout
-                style, widths = replace(style, variety=0), replace(widths, prices=COSTS)
-            briefs = choose_rooms(decided, choices, style.outline == "U", style.variety)
+                used = replace(
+                    style, variety=style.variety // 2 if style.edition == 2 else 0, edition=1
+                )
+                widths = replace(widths, prices=COSTS)
+            briefs = choose_rooms(decided, choices, used)
         usual = "rectangle" if plain and number < 2 * PATIENCE else None
         request = LayoutRequest(
-            briefs, decided.area_m2 or 0.0, widths.corridor, style.outline or usual
+            briefs, decided.area_m2 or 0.0, widths.corridor, style.outline or usual, used.edition
         )
         layout = draw_layout(request, Choices(seed, f"layout {number}"))
-        limit = MAX_ACCESS_COST + LINK_TASTE * style.variety / 100
-        candidate = layout and _judge(layout, widths, request.outline, _ease(number), limit)
+        limit = MAX_ACCESS_COST + LINK_TASTE * used.edition * used.variety / 100
+        candidate = layout and _judge(layout, widths, request, _ease(number), limit)
         if candidate:
-            taste = Choices(seed, f"taste {number}").below(LAYOUT_TASTE * style.variety + 1)
+            taste = Choices(seed, f"taste {number}").below(LAYOUT_TASTE * used.variety + 1)
             candidates.append(replace(candidate, cost=candidate.cost + taste / 100))
         # Where good layouts are rare, fewer are enough.
         if len(candidates) >= max(ENOUGH_LAYOUTS - number // PATIENCE, 1):
             break
     for best in sorted(candidates, key=lambda candidate: candidate.cost):
-        house = _finish(best, decided, Choices(seed, "doors"))
+        house = _finish(best, decided, Choices(seed, "doors"), style)
         if house is not None:
             return house
     raise FloorPlanError(_failure(decided, style))
 
 
-def _tastes(choices: Choices, variety: int) -> Mapping[tuple[str, str], float]:
+def _tastes(choices: Choices, style: Style) -> Mapping[tuple[str, str], float]:
     """Return costs of passages to which those of one family's taste are added."""
-    if not variety:
+    if not style.variety:
         return COSTS
-    prices = {
-        pair: cost + choices.below(LINK_TASTE * variety) / 100 for pair, cost in _PAIRS.items()
-    }
+    most = LINK_TASTE * style.edition * style.variety
+    pairs = _PAIRS | (_RARE_PAIRS if style.edition == 2 else {})
+    prices = {pair: cost + choices.below(most) / 100 for pair, cost in pairs.items()}
     return prices | {(b, a): cost for (a, b), cost in prices.items()}
 
 
-def _style(style: Style, choices: Choices) -> Widths:
+def _style(style: Style, choices: Choices, is_wide: bool) -> Widths:
     """Return the widths of a home; all are drawn, so that setting one leaves the others as is."""
     open_plan, corridor = choices.chance(45), choices.between(20, 26)
     door, bath = choices.pick((16, 17, 18)), choices.pick((14, 15, 16))
+    if style.edition == 2:
+        corridor = choices.between(*choices.weighted(CORRIDORS)) if is_wide else corridor
+        door = choices.pick((15, 15, 16, 16, 17, 18, 20))
     door = style.door or door
     open_plan = open_plan if style.open_plan is None else style.open_plan
-    return Widths(door, min(bath, door), style.corridor or corridor, open_plan)
+    return Widths(
+        door, min(bath, door), style.corridor or corridor, open_plan, 4 * style.edition - 4
+    )
 
 
 def _ease(number: int) -> float:
@@ -513,10 +529,10 @@ def _ease(number: int) -> float:
 
 
 def _judge(
-    layout: RoomLayout, widths: Widths, outline: str | None, ease: float, limit: float
+    layout: RoomLayout, widths: Widths, request: LayoutRequest, ease: float, limit: float
 ) -> _Candidate | None:
     """Return the layout with its links and its cost, or None if it is not a home."""
-    shape = shape_cost(layout, ease)
+    shape = shape_cost(layout, ease, request.edition)
     if shape is None or boxes_overlap(layout.boxes):
         return None
     walls = inner_walls(layout.boxes)
@@ -531,16 +547,19 @@ def _judge(
     if front_wall is None:
         return None
     corners = outline_corners(layout.boxes)
-    if not corners or (outline is not None and outline_kind(corners) != outline):
+    if not corners or (request.outline and outline_kind(corners) != request.outline):
         return None
     cost = shape + 2 * access.cost + light + 2 * front_wall[0] + 0.15 * max(len(corners) - 8, 0)
     return _Candidate(layout, walls, outer, access, widths, cost)
 
 
-def _finish(best: _Candidate, wishes: Wishes, choices: Choices) -> House | None:
+def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) -> House | None:
     """Turn a layout and give it its doors; None where no front door fits."""
     links = add_loops(best.access, best.layout, best.walls, best.widths, choices)
     layout = replace(best.layout, boxes=turn_boxes(best.layout.boxes, choices.below(8)))
+    if style.edition == 2:
+        layout = merge_rooms(layout, links, choices, style.variety)
+        links = [wall for wall in links if len(set(_rooms(layout, wall))) == 2]
     # The turned walls, for the same pairs of boxes.
     inner = inner_walls(layout.boxes)
     pairs = {frozenset((wall.first, wall.second)) for wall in links}
@@ -549,7 +568,63 @@ def _finish(best: _Candidate, wishes: Wishes, choices: Choices) -> House | None:
     front_door = _front_door(layout, outer_walls(layout.boxes, inner), choices)
     if front_door is None:
         return None
-    return House(wishes, layout.briefs, layout.boxes, gaps, front_door)
+    shafts = draw_shafts(layout, [*gaps, front_door], choices) if style.edition == 2 else []
+    return House(wishes, layout.briefs, layout.boxes, gaps, front_door, shafts)
+
+
+# Probability [%] that a room of edition 2 is part of one that it opens to: an alcove, or a living
+# room with a passage.
+_MERGED = {
+    ("hallway", "living_room"): 68, ("entryway", "living_room"): 65, ("entryway", "hallway"): 50,
+    ("dining_room", "living_room"): 25, ("dining_room", "kitchen"): 25,
+    ("kitchen", "living_room"): 12, ("wardrobe", "bedroom"): 70, ("storage", "kitchen"): 40,
+    ("storage", "hallway"): 30, ("laundry", "kitchen"): 35, ("laundry", "bathroom"): 50,
+    ("office", "living_room"): 20,
+}  # fmt: skip
+
+
+def merge_rooms(
+    layout: RoomLayout, links: Sequence[Wall], choices: Choices, variety: int
+) -> RoomLayout:
+    """Draw which rooms are one with another that they open to, so that not all are rectangles."""
+    room_of = [box.room for box in layout.boxes]
+    for wall in links:
+        pair = room_of[wall.first], room_of[wall.second]
+        for part, whole in (pair, pair[::-1]):
+            kinds = layout.briefs[part].kind, layout.briefs[whole].kind
+            percent = _MERGED.get(kinds, 0) * (100 - variety * 3 // 4) // 100
+            if part != whole and choices.chance(percent):
+                room_of = [whole if room == part else room for room in room_of]
+                break
+    kept = sorted(set(room_of))
+    boxes = [
+        box._replace(room=kept.index(room)) for box, room in zip(layout.boxes, room_of, strict=True)
+    ]
+    return RoomLayout([layout.briefs[room] for room in kept], boxes)
+
+
+def draw_shafts(layout: RoomLayout, gaps: Sequence[Gap], choices: Choices) -> list[Rectangle]:
+    """Draw ducts and chimneys in corners of rooms, away from all passages."""
+    shafts = []
+    for box in layout.boxes:
+        width, depth = choices.between(*SHAFT_SIDE), choices.between(*SHAFT_SIDE)
+        x = choices.pick((box.x0, box.x1 - WALL - width))
+        y = choices.pick((box.y0, box.y1 - WALL - depth))
+        if not choices.chance(SHAFT_PERCENT) or min(box.clear) < SHAFT_ROOM_SIDE:
+            continue
+        shaft = (x, y, x + width, y + depth)
+        if not any(_near(shaft, gap) for gap in gaps):
+            shafts.append(shaft)
+    return shafts
+
+
+def _near(shaft: Rectangle, gap: Gap) -> bool:
+    """Return whether a passage is less than a robot's width away from a shaft."""
+    wall = gap.wall
+    low, high = gap.low - SHAFT_CLEARANCE, gap.high + SHAFT_CLEARANCE
+    near, far = wall.at - SHAFT_CLEARANCE, wall.at + SHAFT_CLEARANCE
+    x0, y0, x1, y1 = (near, low, far, high) if wall.upright else (low, near, high, far)
+    return shaft[0] < x1 and x0 < shaft[2] and shaft[1] < y1 and y0 < shaft[3]
 
 
 def _front_door(layout: RoomLayout, outer: Sequence[Wall], choices: Choices) -> Gap | None:

@@ -7,6 +7,8 @@ from math import fsum, sqrt
 
 from fleet2d.floorplan.synthetic.program import Brief, Choices
 from fleet2d.floorplan.synthetic.slicing import (
+    MAX_DEPTH,
+    MIN_DEPTH,
     UNITS_PER_M,
     UNITS_PER_M2,
     WALL,
@@ -555,11 +557,127 @@ def columns(
     return place
 
 
+# Length of rows, squared, over the area of their rooms [%].
+LENGTH_RATIOS = (55, 70, 85, 105, 130, 160, 195)
+
+
+def rows(
+    groups: Groups,
+    request: LayoutRequest,
+    briefs: Sequence[Brief],
+    halls: Sequence[int],
+    choices: Choices,
+) -> Placing | None:
+    """A compact home: the core with the service block, along it a corridor and a strip of rooms.
+
+    With two halls there is such a strip on both of its sides.
+    """
+    areas_m2 = {i: brief.area for i, brief in enumerate(briefs)}
+    strips = _row_strips(groups, areas_m2, len(halls), request.outline, choices)
+    if not strips:
+        return None
+    core = core_trees(groups, briefs, choices)
+    service = service_block(groups, request.outline, choices)
+    if service is not None:
+        pairs = [(tree, service.trees[choices.below(len(service.trees))]) for tree in core]
+        core = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
+    width = request.corridor + WALL
+    closets = [groups.closet, None]
+    suites = [closet is None and choices.chance(65) for closet in closets]
+
+    def place(ratio: int, areas: Areas) -> list[Box] | None:
+        length = int(sqrt(fsum(areas.values()) * ratio / 100))
+        depth = int(tree_area(core[0], areas) / length + 0.5)
+        if depth < MIN_CORE_DEPTH:
+            return None
+        boxes: list[Box] = []
+        for strip, hall, suite, closet, away in zip(
+            strips, halls, suites, closets, (1, -1), strict=False
+        ):
+            side = depth if away == 1 else 0
+            beside = _corridor_row(strip, hall, suite, closet, areas, length, width)
+            if beside is None:
+                return None
+            boxes += [
+                Box(b.room, b.x0, min(side + away * b.y0, side + away * b.y1), b.x1,
+                    max(side + away * b.y0, side + away * b.y1))
+                for b in beside
+            ]  # fmt: skip
+        return boxes + choose_squarest(core, areas, (0, 0, length, depth))
+
+    gross = {i: gross_area(area) for i, area in areas_m2.items() if area}
+    for ratio in choices.shuffled(LENGTH_RATIOS)[:TRIES]:
+        boxes = place(ratio, gross)
+        if boxes is not None and is_promising(boxes, briefs):
+            return partial(place, ratio)
+    return None
+
+
+def _row_strips(
+    groups: Groups, areas: Areas, count: int, outline: str | None, choices: Choices
+) -> list[Strip]:
+    """Divide the private rooms among strips, at most two; an empty list where one has none."""
+    parts: list[list[RoomGroup]] = [[] for _ in range(count)]
+    # Groups of about one area share a strip, so that none is much narrower than it is deep.
+    ordered = sorted(choices.shuffled(groups.private), key=lambda group: _area([group], areas))
+    half = _area(ordered, areas) / len(parts)
+    for group in ordered if choices.chance(50) else ordered[::-1]:
+        part = next((part for part in parts if _area(part, areas) < half), parts[-1])
+        part.append(group if choices.chance(50) else group[::-1])
+    parts = [choices.shuffled(part) for part in parts]
+    if not all(parts):
+        return []
+    if groups.entry:
+        parts[-1].insert(0, groups.entry)
+    strips = [_strip(part) for part in parts]
+    if outline is None:
+        strips = [
+            add_bays(strip, choices, False) if choices.chance(40) else strip for strip in strips
+        ]
+    return strips
+
+
+def _corridor_row(
+    strip: Strip,
+    hall: int,
+    suite: bool,
+    closet: int | None,
+    areas: Areas,
+    length: int,
+    width: int,
+) -> list[Box] | None:
+    """Return a corridor from y = 0 on and the strip of rooms above it.
+
+    With `suite` the last room reaches over the end of the corridor; a closet ends it, too.
+    """
+    if suite and len(strip.slots) > 1:
+        strip = replace(strip, bays=(*strip.bays[:-1], strip.bays[-1] + width))
+    else:
+        suite = False
+    depth = strip.depth(areas, length)
+    if not MIN_DEPTH <= depth <= MAX_DEPTH:
+        return None
+    boxes = strip.boxes(areas, length, depth, width, 1)
+    end = length
+    if suite:
+        end = boxes[-1].x0
+        boxes = [
+            b if b.x0 < end else Box(b.room, b.x0, b.y0 - width, b.x1, b.y1 - width) for b in boxes
+        ]
+    if closet is not None:
+        end -= min(max(int(areas[closet] / width + 0.5), 24), 52)
+        boxes.append(Box(closet, end, 0, length, width))
+    return None if end < 24 else [*boxes, Box(hall, 0, 0, end, width)]
+
+
 # Share of the home's clear area that is in rooms; the rest is in door gaps.
 ROOMS_SHARE = 0.992
 # How far the area may be from the requested one, as a share of it, and the tries to get there.
 TOLERANCE = 0.012
 ROUNDS = 7
+# Probabilities [%] of edition 2, by the number of bedrooms up to four: that a home is made of rows,
+# and has rooms on both sides of its core.
+ROWS_PERCENT, TWO_ROWS_PERCENT = {1: 25, 2: 40, 3: 65, 4: 80}, {1: 5, 2: 20, 3: 55, 4: 75}
 
 
 @dataclass(frozen=True)
@@ -583,7 +701,17 @@ def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
     bedrooms = sum(brief.kind == "bedroom" for brief in request.briefs)
     briefs = [*request.briefs, Brief("hallway", 0.0)]
     hall = len(briefs) - 1
-    if groups.closet is None and bedrooms <= 2 and choices.chance(70 if bedrooms == 1 else 25):
+    if (
+        request.edition == 2
+        and request.outline in (None, "rectangle")
+        and choices.chance(ROWS_PERCENT[min(bedrooms, 4)])
+    ):
+        halls = [hall]
+        if choices.chance(TWO_ROWS_PERCENT[min(bedrooms, 4)]):
+            briefs.append(Brief("hallway", 0.0))
+            halls.append(hall + 1)
+        placing = rows(groups, request, briefs, halls, choices)
+    elif groups.closet is None and bedrooms <= 2 and choices.chance(70 if bedrooms == 1 else 25):
         briefs.pop()
         placing = columns(groups, request, briefs, choices)
     elif bedrooms > 3 and choices.chance(65 if bedrooms < 6 else 90):

@@ -121,7 +121,7 @@ SIZES = {
 
 
 # Smallest and largest area, in percent of the typical one.
-SPREAD = {
+SPREAD: dict[str, tuple[int, int]] = {
     "kitchen": (70, 185),
     "bathroom": (50, 165),
     "living_room": (75, 140),
@@ -129,6 +129,16 @@ SPREAD = {
     "garage": (72, 130),
 }
 DEFAULT_SPREAD = (78, 130)
+# Of edition 2, whose bedrooms are either small or large, as those of real plans.
+WIDE_SPREAD: dict[str, tuple[int, int]] = {
+    "kitchen": (60, 240),
+    "bathroom": (45, 190),
+    "living_room": (50, 125),
+}
+WIDE_FROM_M2 = 60.0  # in smaller flats hardly any rooms would fit beside a large one
+SMALL_BEDROOM, LARGE_BEDROOM, SMALL_BEDROOM_PERCENT = (46, 72), (95, 145), 40
+# Probability of each bedroom of edition 2 to have a wardrobe [%].
+WARDROBE_PERCENT = 40
 
 
 @dataclass(frozen=True)
@@ -163,6 +173,27 @@ class Wishes:
     garage: bool | None = None
 
 
+@dataclass(frozen=True)
+class Style:
+    """The user's request for the shape of a home; None where it is left to the generator.
+
+    Attributes:
+        outline: `rectangle`, `L`, `T` or `U`.
+        open_plan: Whether living, dining and kitchen are open to each other.
+        corridor: Clear width of corridors [units].
+        door: Width of doors between rooms [units].
+        variety: How much rooms, links and layouts differ from the usual ones [percent].
+        edition: 2 for homes nearer to real plans; 1 for those that stored runs and models have.
+    """
+
+    outline: str | None = None
+    open_plan: bool | None = None
+    corridor: int | None = None
+    door: int | None = None
+    variety: int = 0
+    edition: int = 1
+
+
 def minimum_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
     """Return the minimum area [m²] of a home with these rooms."""
     kinds = [*_base(bedrooms, bathrooms), *["garage"] * garage]
@@ -192,13 +223,14 @@ OPTIONAL = (
 )
 
 
-def settle_wishes(wishes: Wishes, choices: Choices, variety: int = 0) -> Wishes:
+def settle_wishes(wishes: Wishes, choices: Choices, style: Style) -> Wishes:
     """Draw what the wishes leave open.
 
     Args:
         wishes: The wishes.
         choices: The stream to draw from.
-        variety: By how many percent more the number of bedrooms for an area varies.
+        style: The wishes for its shape. `variety` is by how many percent more the number of
+            bedrooms for an area varies.
 
     Raises:
         FloorPlanError: The wishes contradict each other.
@@ -216,20 +248,12 @@ def settle_wishes(wishes: Wishes, choices: Choices, variety: int = 0) -> Wishes:
         area = round(min(max(area, 1.25 * minimum_area(beds, baths, garage)), most), 1)
     _check(area, wishes)
     if wishes.bedrooms is None:
-        least = beds
-        beds = min(
-            max(
-                (
-                    round(area)
-                    + choices.between(-36 - 36 * variety // 100, 36 + 36 * variety // 100)
-                    + 38
-                )
-                // 66,
-                least,
-            ),
-            6,
-        )
-        while beds > least and minimum_area(beds, baths, garage) > 0.8 * area:
+        least, most_off = beds, 36 + 36 * style.variety // 100
+        usual = (round(area) + choices.between(-most_off, most_off) + 38) // 66
+        beds = min(max(usual, least), 6)
+        # Two small bedrooms fit 50 m2, if tightly.
+        full = 0.8 + 0.3 * style.variety / 100 if style.edition == 2 and beds == 2 else 0.8
+        while beds > least and minimum_area(beds, baths, garage) > full * area:
             beds -= 1
         while beds < MAX_ROOMS_PER_TYPE and maximum_area(beds, baths) < area:
             beds += 1
@@ -281,18 +305,16 @@ def _base(bedrooms: int, bathrooms: int) -> list[str]:
     return ["living_room", "kitchen", *["bedroom"] * bedrooms, *["bathroom"] * bathrooms]
 
 
-def choose_rooms(
-    wishes: Wishes, choices: Choices, porch: bool = False, variety: int = 0
-) -> list[Brief]:
+def choose_rooms(wishes: Wishes, choices: Choices, style: Style) -> list[Brief]:
     """Return the rooms of a home, largest uses first, with areas that add up.
 
     Args:
         wishes: Settled wishes.
         choices: The stream to draw from.
-        porch: Whether the home must have an entryway.
-        variety: How far further rooms may make others smaller than typical, from 0 to 100 percent
-            of what their least sizes allow.
+        style: The wishes for its shape. With `variety` further rooms may make others smaller than
+            typical, up to what their least sizes allow.
     """
+    variety = style.variety
 
     def needed(kinds: Sequence[str]) -> float:
         sizes = [SIZES[kind] for kind in kinds]
@@ -307,7 +329,7 @@ def choose_rooms(
     # Another room is added only while the typical sizes of all leave space for it.
     fill = choices.between(70, 104) / 100
     for kind, from_area, percent in OPTIONAL:
-        if porch and kind == "entryway":
+        if style.outline == "U" and kind == "entryway":  # its porch makes the U
             kinds.append(kind)
             continue
         is_likely = 100 * area >= (100 - variety) * from_area and choices.chance(percent)
@@ -316,8 +338,11 @@ def choose_rooms(
     for kind, _, _ in OPTIONAL:  # a very large home takes more rooms
         if 0.85 * fsum(SIZES[k].max_area for k in kinds) < total and kinds.count(kind) < 2:
             kinds.append(kind)
+    wardrobes = beds if style.edition == 2 and area >= WIDE_FROM_M2 else 0
+    chosen = [choices.chance(WARDROBE_PERCENT) for _ in range(wardrobes)]
+    kinds += ["wardrobe"] * sum(chosen)
     briefs = [Brief(kind, SIZES[kind].typical_area) for kind in kinds]
-    return scale_areas(_assign_partners(briefs), total, choices)
+    return scale_areas(_assign_partners(briefs, style.edition), total, choices, style.edition)
 
 
 def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
@@ -335,7 +360,7 @@ def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
     ]
 
 
-def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:
+def _assign_partners(briefs: Sequence[Brief], edition: int) -> list[Brief]:
     """Assign bathrooms beyond the first, and wardrobes, to bedrooms."""
     paired = list(briefs)
     beds = [i for i, brief in enumerate(paired) if brief.kind == "bedroom"]
@@ -346,14 +371,24 @@ def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:
     shared = 1 + (len(baths) > 3)
     for bath, bed in zip(baths[shared:], beds, strict=False):
         paired[bath] = replace(paired[bath], partner=bed)
-    for wardrobe in wardrobes:
-        paired[wardrobe] = replace(paired[wardrobe], partner=beds[0])
+    for number, wardrobe in enumerate(wardrobes):
+        bed = beds[number % len(beds)] if edition == 2 else beds[0]
+        paired[wardrobe] = replace(paired[wardrobe], partner=bed)
     return paired
 
 
-def scale_areas(briefs: Sequence[Brief], total: float, choices: Choices) -> list[Brief]:
+def scale_areas(
+    briefs: Sequence[Brief], total: float, choices: Choices, edition: int
+) -> list[Brief]:
     """Draw areas that add up to `total` [m²] as far as the sizes of the types allow."""
-    spreads = [SPREAD.get(brief.kind, DEFAULT_SPREAD) for brief in briefs]
+    is_wide = edition == 2 and total * TYPICAL_AREA_FACTOR >= WIDE_FROM_M2
+    spread_of = WIDE_SPREAD if is_wide else SPREAD
+    spreads = [spread_of.get(brief.kind, DEFAULT_SPREAD) for brief in briefs]
+    if is_wide:
+        for i, brief in enumerate(briefs):
+            if brief.kind == "bedroom":
+                is_small = choices.chance(SMALL_BEDROOM_PERCENT)
+                spreads[i] = SMALL_BEDROOM if is_small else LARGE_BEDROOM
     usual = [
         brief.area * choices.between(*spread) / 100
         for brief, spread in zip(briefs, spreads, strict=True)

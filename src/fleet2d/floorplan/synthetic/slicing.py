@@ -15,6 +15,10 @@ WALL = 2  # 0.10 m: an inner wall
 OUTER_WALL = 6  # 0.30 m: the depth of the front door's reveal
 
 
+Rectangle = tuple[int, int, int, int]
+"""x0, y0, x1, y1 [units]."""
+
+
 class Box(NamedTuple):
     """A rectangle of a room [units], its low sides included in the clear space.
 
@@ -431,12 +435,14 @@ class LayoutRequest:
         area_m2: Area of the free space.
         corridor: Clear width of corridors [units].
         outline: One of `rectangle`, `L`, `T`, `U`, or None for any.
+        edition: Of the generator.
     """
 
     briefs: list[Brief]
     area_m2: float
     corridor: int
     outline: str | None
+    edition: int
 
 
 def is_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:

@@ -12,11 +12,23 @@ from fleet2d.configuration.units import Length, Share
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.floorplan.synthetic.generator import Gap, House, Style, generate
-from fleet2d.floorplan.synthetic.program import LARGEST_M2, MAX_ROOMS_PER_TYPE, SMALLEST_M2, Wishes
-from fleet2d.floorplan.synthetic.slicing import OUTER_WALL, UNIT_M, UNITS_PER_M, WALL, Box, Wall
-
-Rectangle = tuple[int, int, int, int]
+from fleet2d.floorplan.synthetic.generator import Gap, House, generate
+from fleet2d.floorplan.synthetic.program import (
+    LARGEST_M2,
+    MAX_ROOMS_PER_TYPE,
+    SMALLEST_M2,
+    Style,
+    Wishes,
+)
+from fleet2d.floorplan.synthetic.slicing import (
+    OUTER_WALL,
+    UNIT_M,
+    UNITS_PER_M,
+    WALL,
+    Box,
+    Rectangle,
+    Wall,
+)
 
 
 def floor_plan(
@@ -35,10 +47,17 @@ def floor_plan(
     through = [_hole(gap) for gap in [*house.gaps, house.front_door]]
     doors = [_line(gap) for gap in house.gaps if gap.leaf is not None]
     doors.append(_line(house.front_door, "front_door"))
+    regions, air = _regions(house), _metres([*spaces, *through])
+    holes = [shapely.Polygon(ring) for part in shapely.get_parts(air) for ring in part.interiors]
+    # No post stands where rectangles of one room meet.
+    posts = [hole for hole in holes if any(region.shape.covers(hole) for region in regions)]
+    shafts = shapely.union_all([_metres([shaft]) for shaft in house.shafts])
+    free = shapely.difference(shapely.union_all([air, *posts]), shafts)
+    assert isinstance(free, shapely.Polygon | shapely.MultiPolygon)
     return FloorPlan.build(
         name,
-        _metres([*spaces, *through]),
-        _regions(house),
+        free,
+        regions,
         cell,
         source=source,
         entrance=_entrance(house.front_door),
@@ -94,16 +113,15 @@ def _regions(house: House) -> list[LabelledRegion]:
         wall = house.front_door.wall
         if house.boxes[max(wall.first, wall.second)].room == index:
             shapes.append(_hole(house.front_door))
-        labels = _studio_uses(house) if brief.kind == "living_room" else (brief.kind,)
+        labels = _living_uses(house) if brief.kind == "living_room" else (brief.kind,)
         regions.append(LabelledRegion(labels, _metres(shapes), None, brief.kind))
     return regions
 
 
-def _studio_uses(house: House) -> tuple[str, ...]:
-    """Return the types that the living room has: in a studio those of rooms that it lacks, too."""
+def _living_uses(house: House) -> tuple[str, ...]:
+    """Return the types that the living room has: also those of rooms that people need and lack."""
     kinds = {brief.kind for brief in house.briefs}
-    lacking = ("bedroom", "kitchen") if house.wishes.bedrooms == 0 else ()
-    return ("living_room", *(kind for kind in lacking if kind not in kinds))
+    return ("living_room", *(kind for kind in ("bedroom", "kitchen") if kind not in kinds))
 
 
 def _to_middle(box: Box) -> Rectangle:
@@ -134,6 +152,7 @@ class Synthetic(FloorPlanSource):
         corridor_width: Clear width of hallways, 0.9 m to 2 m, rounded to 5 cm.
         door_width: Width of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm.
         variety: How much rooms and their links differ from the usual ones.
+        edition: 2 for homes nearer to real plans; 1 keeps those of stored runs and models.
 
     Example:
         >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()
@@ -151,6 +170,7 @@ class Synthetic(FloorPlanSource):
     corridor_width: Length | None = None
     door_width: Length | None = None
     variety: Share = 0.0
+    edition: Literal[1, 2] = 1
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -173,6 +193,7 @@ class Synthetic(FloorPlanSource):
             _units(self.corridor_width),
             _units(self.door_width),
             round(self.variety * 100),
+            self.edition,
         )
         house = generate(self.seed, wishes, style)
         name = f"synthetic_{self.seed}"
