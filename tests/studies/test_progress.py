@@ -127,6 +127,27 @@ def test_runs_that_differ_are_measured_until_their_mean_is_known() -> None:
     assert low_s < 10 * 2 + 30 * (20.25 + 2) < high_s
 
 
+class ShortestFirst(Measured):
+    """Runs all at a time: the shortest end first."""
+
+    def __init__(self, plan: StudyPlan) -> None:
+        super().__init__([0.0])
+        self.plan = plan
+
+    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        events = list(super().run(job, tasks))
+        yield from sorted(events, key=lambda e: self.plan.variants[e.task.index].simulated_s)
+
+
+def test_runs_of_several_lengths_are_all_part_of_a_forecast() -> None:
+    axes = {"simulation.duration": ["2 h", "20 h"]}
+    specification = read_specification(small(base=base("2 h"), axes=axes, replicates=20))
+    plan = make_plan(build_design(specification))
+    truth_s = 2 + 20 * (2 + 20)
+    said = forecast(plan, ShortestFirst(plan))
+    assert (0.9 * truth_s, 1.1 * truth_s) == pytest.approx(seconds(said), abs=0.1)
+
+
 def test_variants_that_fail_are_no_part_of_a_forecast() -> None:
     broken = base()
     broken["robots"]["astro"]["radius"] = 2.0  # wider than the rooms

@@ -30,6 +30,7 @@ MIN_RUNS = 5  # that have finished before the time left is estimated
 CONFIDENCE = 2.0  # standard errors: 95 %
 MIN_SAMPLES, MAX_SAMPLES = 4, 24  # variants that are measured for a forecast
 MEASURING_S = 15.0  # wall time after which MIN_SAMPLES are enough
+STRATA = 32  # of equal size, from which variants are drawn; a power of 2
 PRECISION = 0.1  # relative error at which they are enough, too
 MODEL_ERROR = 0.1  # of a forecast: the first days of a run differ from the others
 
@@ -83,34 +84,42 @@ def forecast(plan: StudyPlan, executor: Executor, checked_s: float = 0.0) -> For
     """
     variants, begin_s = plan.variants, time.perf_counter()
     count, start_s = len(variants), 0.0
-    random = np.random.Generator(np.random.Philox(0))
-    places = random.choice(count, min(count, MAX_SAMPLES), replace=False)
-    tasks = [WorkerTask(i, variants[i].index, "") for i in places.tolist()]
-    speeds: list[RunSpeed] = []
-    runs_s: list[float] = []
+    places = _spread(count)
+    # Groups of one task each start in their order.
+    tasks = [WorkerTask(i, variants[at].index, "", str(i)) for i, at in enumerate(places)]
+    speeds, simulated_s = list[RunSpeed](), list[float]()
+    mean_simulated_s = variants.total_simulated_s / count
+    finished, tried = dict[int, RunSpeed | None](), 0
     with closing(executor.run(SpeedJob(plan.design), TaskSchedule(tasks))) as events:
-        for event in events:
+        for number, event in enumerate(events):
             speed = event.payload if isinstance(event, FinishedTask) else None
-            if speed is None:
-                continue
             elapsed_s = time.perf_counter() - begin_s
-            if not speeds:
+            if not number and speed is not None:
                 start_s = max(elapsed_s - speed.wall_s, 0.0)
-            speeds.append(speed)
-            runs_s.append(speed.seconds(variants[event.task.number].simulated_s))
-            is_late = elapsed_s - start_s > MEASURING_S
-            if len(runs_s) >= MIN_SAMPLES and (is_late or _error(runs_s, count) < PRECISION):
+            finished[event.task.number] = speed
+            # Those that finish early are short: a sample has all that began before its last.
+            while (speed := finished.get(tried)) is not None or tried in finished:
+                if speed is not None:
+                    speeds.append(speed)
+                    simulated_s.append(variants[places[tried]].simulated_s)
+                tried += 1
+            if len(speeds) < MIN_SAMPLES:
+                continue
+            _, error = _mean_run(speeds, simulated_s, mean_simulated_s, count)
+            if error < PRECISION or elapsed_s - start_s > MEASURING_S:
                 break
     if not speeds:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
-    run_s, workers = float(np.mean(runs_s)), min(executor.workers, count)
+    run_s, error = _mean_run(speeds, simulated_s, mean_simulated_s, count)
+    workers = min(executor.workers, count)
     # The first variant finds its home built by the warm-up.
     homes_s = len(variants.home_keys) * max(speed.home_s for speed in speeds)
     wall_s = checked_s + start_s + (homes_s + count * run_s) / workers
-    last_s = max(runs_s) * (1 - 1 / workers)  # the others wait for the last worker
+    longest_s = max(map(RunSpeed.seconds, speeds, simulated_s))
+    last_s = longest_s * (1 - 1 / workers)  # the others wait for the last worker
     core_share = float(np.mean([speed.core_share for speed in speeds]))
     core_share = min(core_share * max(workers / cores(), 1.0), 1.0)  # not what workers share
-    error = MODEL_ERROR + _error(runs_s, count)
+    error += MODEL_ERROR
     return Forecast(
         timedelta(seconds=variants.total_simulated_s),
         timedelta(seconds=wall_s * core_share * max(1 - error, 0.0)),
@@ -119,11 +128,36 @@ def forecast(plan: StudyPlan, executor: Executor, checked_s: float = 0.0) -> For
     )
 
 
-def _error(runs_s: list[float], count: int) -> float:
-    """Return the relative error of the mean of some of `count` runs."""
-    n = len(runs_s)
-    deviation = float(np.std(runs_s, ddof=1)) if n > 1 else 0.0
-    return CONFIDENCE * deviation / float(np.mean(runs_s)) * math.sqrt(1 / n - 1 / count)
+def _spread(count: int) -> list[int]:
+    """Return places of at most MAX_SAMPLES of `count` variants; the first few are far apart."""
+    parts = min(count, STRATA)
+    order = sorted(range(parts), key=lambda i: f"{i:b}".zfill(STRATA.bit_length())[::-1])
+    edges = np.arange(parts + 1) * count // parts
+    places = np.random.Generator(np.random.Philox(0)).integers(edges[:-1], edges[1:])
+    return [int(places[i]) for i in order[:MAX_SAMPLES]]
+
+
+def _mean_run(
+    speeds: list[RunSpeed], simulated_s: list[float], mean_simulated_s: float, count: int
+) -> tuple[float, float]:
+    """Return the mean wall time of `count` runs [s] from some of them, and its relative error.
+
+    The lengths of all runs are known, so only the time for a simulated second is estimated, by
+    the ratio estimator (Cochran 1977, Sampling Techniques, chapter 6), beside that of a set-up.
+
+    Args:
+        speeds: Of the measured runs.
+        simulated_s: The lengths of the measured runs [s].
+        mean_simulated_s: The mean length of all runs [s].
+        count: The number of all runs.
+    """
+    setups_s, lengths_s = np.array([each.setup_s for each in speeds]), np.array(simulated_s)
+    moves_s = lengths_s / [each.speedup for each in speeds]
+    setup_s, ratio = float(setups_s.mean()), float(moves_s.sum() / lengths_s.sum())
+    mean_s, n = setup_s + ratio * mean_simulated_s, len(speeds)
+    residuals_s = setups_s - setup_s + moves_s - ratio * lengths_s
+    deviation_s = float(np.linalg.norm(residuals_s)) / math.sqrt(max(n - 1, 1))
+    return mean_s, CONFIDENCE * deviation_s / mean_s * math.sqrt(1 / n - 1 / count)
 
 
 @dataclass
