@@ -148,7 +148,7 @@ def test_own_components_run_in_a_study() -> None:
         ({"keep": {"metrics": ["sigthin*"]}}, "no variant has a metric 'sigthin'"),
         (
             {"compare": [{"metric": "sightigns.ana", "against": {SPEED: 0.3}}]},
-            "compare: no variant has a metric 'sightigns': did you mean 'sightings'",
+            "compare.0.metric: no variant has a metric 'sightigns': did you mean 'sightings'",
         ),
         (
             {
@@ -166,6 +166,22 @@ def test_what_no_variant_has_is_refused_before_the_first_run(
     """`keep: {metrics: [sigthings.*]}` kept nothing, and the study ended without a word."""
     with pytest.raises(ScenarioError, match=message):
         check_study(small(**keys))
+
+
+@pytest.mark.parametrize(
+    ("keys", "place"),
+    [
+        ("keep:\n  metrics:\n    - distance.*\n    - sigthings.*\n", r"4: keep\.metrics\.1: no"),
+        ("keep:\n  tables: [lpt]\n", r"2: keep\.tables\.0: no"),
+        ("compare:\n- metric: sigthings.ana\n  against: {seed: 4}\n", r"2: compare\.0\.metric: no"),
+    ],
+)
+def test_a_name_that_no_variant_has_is_told_with_its_line(
+    tmp_path: Path, keys: str, place: str
+) -> None:
+    (tmp_path / "study.yaml").write_text(keys)
+    with pytest.raises(ScenarioError, match=rf"study\.yaml:{place} variant has"):
+        check_study(tmp_path / "study.yaml")
 
 
 @pytest.mark.parametrize("pattern", ["*", "sight*", "*.ana", "sightings.a*", "[sd]*.ana", "d*.as*"])

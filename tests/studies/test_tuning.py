@@ -314,7 +314,9 @@ def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
 
 def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> None:
     """It showed only when all trials had failed."""
-    with pytest.raises(ScenarioError, match=r"tune\.objectives: no variant has .*'happiness'"):
+    with pytest.raises(
+        ScenarioError, match=r"tune\.objectives\.happiness: no variant has .*'happiness'"
+    ):
         tuned(tmp_path, objectives={"happiness": "maximize"}, trials=1)
     assert not (tmp_path / "tune").exists()
 

@@ -402,11 +402,8 @@ def _check_conditions(specification: Specification, design: Design) -> None:
             labels = design.labels[column]
             for value in _values(condition, column):
                 if not any(same_label(label, value) for label in labels):
-                    place = specification.places.place((*location, column))
-                    raise ScenarioError(
-                        f"{place}{': ' * bool(place)}{'.'.join(map(str, location))}.{column}: no"
-                        f" variant has {value!r}{suggest(value, labels)}"
-                    )
+                    message = f"no variant has {value!r}{suggest(value, labels)}"
+                    raise specification.error((*location, column), message)
 
 
 def _artifacts(tables: Sequence[str]) -> Document:

@@ -259,7 +259,7 @@ def check_study(
     design = build_design(specification)
     on_size(len(design))
     plan = make_plan(design, on_scenario)
-    names.check(specification.file)
+    names.check(specification)
     return CheckedStudy(specification, plan, scenarios, names.facts)
 
 

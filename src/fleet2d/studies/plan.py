@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.configuration.problems import did_you_mean, suggest
+from fleet2d.configuration.problems import Location, did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import (
@@ -43,7 +43,7 @@ from fleet2d.studies.executors import (
 )
 from fleet2d.studies.records import VARIANT, array_of, numbers_of
 from fleet2d.studies.simulator import check_setup, is_kept
-from fleet2d.studies.specification import SEED, StudyFile
+from fleet2d.studies.specification import SEED, Specification
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -211,55 +211,50 @@ class KnownNames:
                 description = (kind.__doc__ or "").strip().partition("\n")[0]
                 self.facts[name] = MetricFacts(description, kind.unit, kind.units)
 
-    def check(self, file: StudyFile) -> None:
+    def check(self, specification: Specification) -> None:
         """Check the names in a study file.
 
         Raises:
             ScenarioError: No variant has a table or a metric, or a metric isn't kept.
         """
-        for name in file.keep.tables:
+        file = specification.file
+        for i, name in enumerate(file.keep.tables):
             if name not in self._tables and not name.startswith(LAYERS):
-                raise ScenarioError(
-                    f"keep.tables: no variant has a table {name!r}"
-                    f"{suggest(name, sorted(self._tables))}"
-                )
-        for pattern in file.keep.metrics:
-            self._check_metric("keep.metrics", pattern)
-        used = [("compare", comparison.metric) for comparison in file.compare]
-        used += [("adapt", file.adapt.metric)] if file.adapt else []
-        for key, metric in used:
-            self._check_metric(key, metric)
-            if not is_kept(metric, file.keep.metrics):
-                raise ScenarioError(
-                    f"{key}: the metric {metric!r} isn't kept: add it to keep.metrics"
-                )
-        for name in file.tune.objectives if file.tune else ():
-            self._check_metric("tune.objectives", name)
+                hint = suggest(name, sorted(self._tables))
+                message = f"no variant has a table {name!r}{hint}"
+                raise specification.error(("keep", "tables", i), message)
+        # Where a metric is named, and whether it has to be kept.
+        named: list[tuple[Location, str, bool]] = []
+        named += [(("keep", "metrics", i), each, False) for i, each in enumerate(file.keep.metrics)]
+        named += [(("compare", i, "metric"), c.metric, True) for i, c in enumerate(file.compare)]
+        named += [(("adapt", "metric"), file.adapt.metric, True)] if file.adapt else []
+        objectives = file.tune.objectives if file.tune else ()
+        named += [(("tune", "objectives", name), name, False) for name in objectives]
+        for location, metric, must_be_kept in named:
+            problem = self._problem(metric)
+            if not problem and must_be_kept and not is_kept(metric, file.keep.metrics):
+                problem = f"the metric {metric!r} isn't kept: add it to keep.metrics"
+            if problem:
+                raise specification.error(location, problem)
 
-    def _check_metric(self, key: str, name: str) -> None:
-        """Refuse a metric, or the pattern of some, of which no variant can have one."""
+    def _problem(self, name: str) -> str:
+        """Return why no variant can have a metric, or one of a pattern; empty if some can."""
         prefix = re.split(r"[*?[]", name)[0]  # the part that has to be there as it is
         entry, dot, rest = prefix.partition(".")
         if not dot and prefix != name:
             if any(known.startswith(entry) for known in self._metrics):
-                return
+                return ""
         elif dot and entry in self._metrics:
             body, dot, _ = rest.partition(".")
             is_whole = dot or prefix == name
             typo = did_you_mean(body, sorted(self._bodies))
             # Metrics of users' own may have numbers of any name.
             if not (is_whole and self._metrics[entry]) or body in self._bodies or typo == ".":
-                return
-            raise ScenarioError(
-                f"{key}: {name!r} is of a body {body!r}, which no variant has{typo}"
-            )
+                return ""
+            return f"{name!r} is of a body {body!r}, which no variant has{typo}"
         elif entry in self._metrics:
-            raise ScenarioError(
-                f"{key}: {name!r} is not a number: write {name}.* for all of its numbers"
-            )
-        raise ScenarioError(
-            f"{key}: no variant has a metric {entry!r}{suggest(entry, sorted(self._metrics))}"
-        )
+            return f"{name!r} is not a number: write {name}.* for all of its numbers"
+        return f"no variant has a metric {entry!r}{suggest(entry, sorted(self._metrics))}"
 
 
 def make_plan(

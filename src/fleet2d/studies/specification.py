@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from fleet2d.bounds import one_line
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
-from fleet2d.configuration.problems import problem, problem_at, suggest
+from fleet2d.configuration.problems import Location, problem, problem_at, suggest
 from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, folder_of
 from fleet2d.errors import ScenarioError
@@ -287,6 +287,11 @@ class Specification:
     def name(self) -> str:
         """The name of the study: as the file says, else the name of the file."""
         return self.file.name or (self.source.stem if self.source else "study")
+
+    def error(self, location: Location, message: str) -> ScenarioError:
+        """Return the error about a key, with its file and line."""
+        texts = (self.places.place(location), ".".join(map(str, location)), message)
+        return ScenarioError(": ".join(filter(None, texts)))
 
 
 def read_specification(source: str | Path | Mapping[str, Any] | Specification) -> Specification:
