@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from tests.studies.scenes import SPEED, base, digests, run, small
 
+import fleet2d
 from fleet2d.errors import ScenarioError
 from fleet2d.studies.driver import Observer
 from fleet2d.studies.executors import LocalExecutor
@@ -66,6 +67,22 @@ def test_it_continues_with_the_same_decisions(tmp_path: Path) -> None:
     counts, more = run(study(width=1e-9), tmp_path / "study")
     assert 24 == counts.complete
     assert set(digests(first)) < set(digests(more))
+
+
+def test_results_of_later_rounds_do_not_change_earlier_decisions(tmp_path: Path) -> None:
+    """A study that was interrupted amid a round, and continued, gave up other values."""
+    _, opened = run(study(width=1e-9), tmp_path / "study")
+    table = opened.paired("distance.astro", AGAINST)
+    width = 1.1 * (table["high"] - table["low"]).max()  # narrow enough with all eight seeds
+    _, continued = run(study(width=width), tmp_path / "study")
+    assert min(seeds(continued).values()) > 2  # two seeds alone have wide intervals
+
+
+def test_remarks_are_printed_without_a_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fleet2d.study(study(width=1e9), tmp_path / "study", executor="serial")
+    assert "note: no more than 2 seeds" in capsys.readouterr().err
 
 
 @pytest.mark.slow

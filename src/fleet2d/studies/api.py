@@ -1,7 +1,6 @@
 """Studies from Python: `fleet2d.study` and `fleet2d.map_runs`."""
 
 import pickle
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -66,7 +65,7 @@ def study(
     """
     specification = read_specification(source)
     location = out or default_location(specification.name)
-    with observing(show=sys.stderr.isatty()) as observer:
+    with observing() as observer:
         options = RunOptions(fail_fast, changed, observer)
         run_study(check_study(specification), location, make_executor(executor, workers), options)
     return open_study(location)

@@ -89,8 +89,11 @@ def run(  # noqa: PLR0913 - options of the command line
             return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    show = sys.stderr.isatty() and not quiet
-    with _interruptible(location), restrict_to(trust, trust_dir), observing(show=show) as observer:
+    with (
+        _interruptible(location),
+        restrict_to(trust, trust_dir),
+        observing(quiet=quiet) as observer,
+    ):
         options = RunOptions(fail_fast, changed, observer)
         counts = run_study(
             checked, location, make_executor(executor, workers, slurm_parameters(slurm)), options
@@ -261,10 +264,13 @@ def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str,
         InputError: `against` is not AXIS=VALUE, or the study compares no such metric.
     """
     if against is None:
-        for comparison in study.comparisons:
-            if comparison.metric == metric:
-                return comparison.against
-        raise InputError(f"the study doesn't compare {metric!r}: give --against AXIS=VALUE")
+        references = {each.metric: each.against for each in reversed(study.comparisons)}
+        if metric in references:
+            return references[metric]
+        hint = suggest(metric, references, "It compares")
+        raise InputError(
+            f"the study doesn't compare {metric!r}{hint}; or give --against AXIS=VALUE"
+        )
     from fleet2d.studies.answers import check_axes
 
     axis, _, text = against.partition("=")

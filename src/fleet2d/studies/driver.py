@@ -135,8 +135,10 @@ class AdaptiveSchedule(TaskSchedule):
         """Give up values that are clearly worse, and all further rounds if intervals are narrow."""
         settings, study = self._settings, Study(self._directory)
         ((axis, _),) = settings.against.items()
-        seeds = len(set(study.complete["seed"].to_list()))
-        table = study.paired(settings.metric, settings.against).to_dicts()
+        # Not those of later rounds, which an interrupted or larger study may have.
+        numbers = self._planned.number[self._places].tolist()
+        seeds = len(np.unique(self._planned.index[self._places] % len(self._design.seeds)))
+        table = study.paired(settings.metric, settings.against, variants=numbers).to_dicts()
         open_rows = [row for row in table if row[axis] not in self._dropped]
         sign = -1 if settings.goal == "maximize" else 1
         for row in open_rows if settings.goal else ():

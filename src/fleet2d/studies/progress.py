@@ -1,6 +1,7 @@
 """How long a study takes: a forecast before it runs, and a bar with the time left while it does."""
 
 import math
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -289,11 +290,23 @@ def progress_bar(*, show: bool) -> "Iterator[Progress | None]":
         yield progress
 
 
+class NoteObserver(Observer):
+    """Prints remarks on stderr."""
+
+    def on_note(self, text: str) -> None:
+        """Print a remark."""
+        sys.stderr.write(f"note: {text}\n")
+
+
 @contextmanager
-def observing(*, show: bool) -> Iterator[Observer]:
-    """Yield an observer of a study; it shows a bar if `show`, else nothing."""
-    with progress_bar(show=show) as progress:
-        yield BarObserver(progress) if progress else Observer()
+def observing(*, quiet: bool = False) -> Iterator[Observer]:
+    """Yield an observer of a study: it prints remarks, and shows a bar on a terminal.
+
+    Args:
+        quiet: Show nothing.
+    """
+    with progress_bar(show=sys.stderr.isatty() and not quiet) as progress:
+        yield BarObserver(progress) if progress else Observer() if quiet else NoteObserver()
 
 
 def in_words(time_span: timedelta) -> str:

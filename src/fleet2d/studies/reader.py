@@ -256,6 +256,8 @@ class Study:
         against: Mapping[str, Any],
         by: Sequence[str] | None = None,
         within: Sequence[str] = (),
+        *,
+        variants: Sequence[int] | None = None,
     ) -> "pl.DataFrame":
         """Compare the values of an axis with one of them, pair by pair.
 
@@ -268,6 +270,7 @@ class Study:
             by: Columns of the units over which intervals hold; None: homes, people and seeds.
             within: Axes with a comparison for each of their values; over other axes the differences
                 are averaged.
+            variants: Numbers of the variants to compare; None: all.
 
         Returns:
             A row for each other value: mean, reference, difference, low and high (95 %), relative
@@ -278,9 +281,10 @@ class Study:
         Raises:
             InputError: There is no such metric, axis or value.
         """
-        return answers.paired(
-            self._with_metric(metric), self.columns, metric, against, self._units(by), within
-        )
+        frame = self._with_metric(metric)
+        if variants is not None:
+            frame = frame.filter(_polars().col(VARIANT).is_in(list(variants)))
+        return answers.paired(frame, self.columns, metric, against, self._units(by), within)
 
     def differences(self, metric: str, against: Mapping[str, Any], unit: str) -> "pl.DataFrame":
         """Return the mean difference to the reference in each unit, such as each home.
