@@ -29,6 +29,10 @@ studying = typer.Typer(
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
 ]
+ExecutorName = Annotated[
+    Literal["local", "ray", "slurm", "serial"],
+    typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
+]
 SlurmParameters = Annotated[
     list[str] | None,
     typer.Option(
@@ -56,10 +60,7 @@ def run(  # noqa: PLR0913 - options of the command line
         str | None, typer.Option(help="A folder or s3://…; left out: studies/NAME.")
     ] = None,
     workers: Workers = None,
-    executor: Annotated[
-        Literal["local", "ray", "slurm", "serial"],
-        typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
-    ] = "local",
+    executor: ExecutorName = "local",
     slurm: SlurmParameters = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check all, and print the variants and their time.")
@@ -367,9 +368,7 @@ def tune(  # noqa: PLR0913 - options of the command line
     source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="A study that tunes.")],
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
-    executor: Annotated[
-        Literal["local", "ray", "slurm", "serial"], typer.Option(help="Where the workers are.")
-    ] = "local",
+    executor: ExecutorName = "local",
     slurm: SlurmParameters = None,
     changed: Annotated[
         Literal["redo"] | None,
