@@ -12,7 +12,7 @@ from tests.scenes import digests, run, table
 
 import fleet2d
 from fleet2d import Algorithm, InputError
-from fleet2d.entities.home_object import Sensor, SensorState, SensorView
+from fleet2d.entities.sensor import Sensor, SensorState, SensorView
 from fleet2d.floorplan.home import Home
 
 

@@ -309,7 +309,16 @@ class Page:
         self.frames = 0
 
     def order(self, action: str, target: str = "", value: float = 0, **place: float) -> None:
-        content = {"action": action, "target": target, "value": value, "x": 2.0, "y": 2.0, **place}
+        content = {
+            "action": action,
+            "target": target,
+            "value": value,
+            "x": 2.0,
+            "y": 2.0,
+            "key": "",
+            "text": "",
+            **place,
+        }
         origin = "/".join(self.address.split("/")[:3])
         headers = {"content-type": "application/json", "Origin": origin}
         url, data = f"{self.address}/live/0/order", json.dumps(content).encode()

@@ -12,7 +12,7 @@ from fleet2d.algorithms.history import SensorRow
 from fleet2d.configuration.problems import check_known
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.body import Bodies
-from fleet2d.entities.home_object import (
+from fleet2d.entities.sensor import (
     Sensor,
     SensorFault,
     SensorReading,

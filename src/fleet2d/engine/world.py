@@ -24,7 +24,7 @@ from fleet2d.engine.intervention_queue import (
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
-from fleet2d.entities.home_object import SensorFault
+from fleet2d.entities.sensor import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home, HomeChange
 from fleet2d.floorplan.slow_area import SlowArea

@@ -18,8 +18,8 @@ from fleet2d.configuration.units import (
     PositiveLength,
     micros,
 )
-from fleet2d.entities.home_object import FurnitureSensor, Sensor, SensorView, first_cause
 from fleet2d.entities.place import Point
+from fleet2d.entities.sensor import FurnitureSensor, Sensor, SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, TURN, Bool, half_sine, region_contains_points, visible_region

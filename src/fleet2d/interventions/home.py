@@ -6,8 +6,8 @@ from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, suggest
-from fleet2d.entities.home_object import SensorFault
 from fleet2d.entities.place import Point
+from fleet2d.entities.sensor import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.slow_area import SlowArea

@@ -42,7 +42,7 @@ from fleet2d.configuration.units import (
 )
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.home_object import SensorFault
+from fleet2d.entities.sensor import SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home, HomeChange, format_moment, parse_moment
 from fleet2d.floorplan.slow_area import SlowArea

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from fleet2d.configuration.components import lookup
 from fleet2d.configuration.problems import refusal
-from fleet2d.entities.home_object import SensorFault
+from fleet2d.entities.sensor import SensorFault
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions.intervention import Intervention

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.configuration.trust import current_trust
 from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
-from fleet2d.entities.home_object import Sensor
+from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import InputError, extra, os_errors_as
 from fleet2d.live.bridge import LiveStep, Peer, Post, sources_of
 from fleet2d.live.messages import MAX_BYTES

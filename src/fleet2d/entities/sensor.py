@@ -1,0 +1,179 @@
+"""What all sensors are: how they notice bodies, their readings, and their state between spans."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.configuration.units import Duration, micros
+from fleet2d.entities.home_object import HomeObject
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels import I64, Bool
+
+SensorFault = Literal["on", "off", "silent"]
+"""How a sensor fails: it is always triggered, never triggered, or reports nothing."""
+
+
+class SensorReading(NamedTuple):
+    """A change of a sensor's state.
+
+    Attributes:
+        step: The step at which it goes on or off.
+        on: Whether it goes on.
+        user: The index of the user that it noticed; -1: none.
+    """
+
+    step: int
+    on: bool
+    user: int
+
+
+@dataclass(frozen=True)
+class SensorView:
+    """The bodies over a span, as sensors see them: row u is user u, then come the robots.
+
+    Attributes:
+        first: First step of the span.
+        x: Positions [lattice], int64 (bodies, steps + 1). Column 0 is the step before the span (at
+            the first step of a run, that step itself), column j + 1 is step first + j.
+        y: Likewise.
+        present: Whether the body is at home, bool (bodies, steps + 1).
+        users: How many of the rows are users.
+    """
+
+    first: int
+    x: I64
+    y: I64
+    present: Bool
+    users: int
+
+    @property
+    def steps(self) -> int:
+        """The number of steps in the span."""
+        return int(self.x.shape[1]) - 1
+
+
+class Sensor(HomeObject):
+    """Base of sensors: a subclass implements `sense`, which returns the steps that trigger it.
+
+    The readings follow from that: the sensor goes on with the first of those steps, and off after
+    its `hold` without any.
+
+    Attributes:
+        room: The room that its readings name; left out: where it is.
+    """
+
+    room: str | None = Field(default=None, min_length=1)
+
+    # Names of its two states in the table of readings.
+    words: ClassVar[tuple[str, str]] = ("ON", "OFF")
+
+    def start(self, home: Home, step_us: int) -> None:
+        """Prepare for a run; check here that the object that it watches exists."""
+
+    def place(self, home: Home) -> str:
+        """Return the name of the room that its readings name."""
+        raise NotImplementedError
+
+    def hold_us(self) -> int:
+        """Return how long it stays on after the last step that triggers it [us]."""
+        return 0
+
+    def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
+        """Return the steps that trigger it, ascending, and the user of each; int64 (n,) each."""
+        raise NotImplementedError
+
+
+def first_cause(triggered: Bool, first: int) -> tuple[I64, I64]:
+    """Return the steps in which a body triggers a sensor, and the lowest row of those that do.
+
+    Args:
+        triggered: Whether each body triggers it at each step, bool (bodies, steps).
+        first: The step of the first column.
+
+    Example:
+        >>> steps, bodies = first_cause(np.array([[0, 0, 1], [0, 1, 1]], bool), 100)
+        >>> steps.tolist(), bodies.tolist()
+        ([101, 102], [1, 0])
+    """
+    columns = np.flatnonzero(triggered.any(axis=0))
+    return columns + first, np.argmax(triggered[:, columns], axis=0).astype(np.int64)
+
+
+class SensorState:
+    """The state of a sensor between spans.
+
+    Attributes:
+        hold: How many steps it stays on after the last one that triggers it.
+        on: Whether it is on.
+        last: The last step that triggered it.
+        user: The index of the user that switched it on; -1: none.
+    """
+
+    def __init__(self, hold_steps: int) -> None:
+        self.hold = hold_steps
+        self.on = False
+        self.last = 0
+        self.user = -1
+
+    def read(self, steps: I64, users: I64, end: int) -> list[SensorReading]:
+        """Return the readings before step `end`, given the steps that trigger it, and their users.
+
+        Args:
+            steps: Ascending, int64 (n,).
+            users: Index of the user of each step, int64 (n,).
+            end: The step after the span.
+        """
+        readings: list[SensorReading] = []
+        # It stays on between steps no farther apart than its hold.
+        quiet = np.flatnonzero(np.diff(steps) > self.hold + 1)
+        begins = [0, *(quiet + 1).tolist()] if len(steps) else []
+        ends = [*quiet.tolist(), len(steps) - 1]
+        for i, j in zip(begins, ends, strict=False):
+            if self.on and steps[i] > self.last + self.hold + 1:
+                readings.append(self._off())
+            if not self.on:
+                self.on, self.user = True, int(users[i])
+                readings.append(SensorReading(int(steps[i]), True, self.user))
+            self.last = int(steps[j])
+        if self.on and self.last + self.hold + 1 < end:
+            readings.append(self._off())
+        return readings
+
+    def _off(self) -> SensorReading:
+        self.on = False
+        return SensorReading(self.last + self.hold + 1, False, self.user)
+
+
+def in_order(readings: Sequence[tuple[int, SensorReading]]) -> list[tuple[int, SensorReading]]:
+    """Return (sensor number, reading) pairs ordered by step, then by sensor."""
+    return sorted(readings, key=lambda item: (item[1].step, item[0]))
+
+
+class FurnitureSensor(Sensor):
+    """Base of sensors of an object of the floor plan, in whose room they are.
+
+    Attributes:
+        of: The object of the floor plan that it is in, by name.
+        hold: It turns off when nobody has been there for this long.
+    """
+
+    of: str
+    hold: Duration = timedelta(seconds=0)
+
+    def start(self, home: Home, step_us: int) -> None:
+        """Check that the object exists."""
+        home.object(self.of)
+
+    def place(self, home: Home) -> str:
+        """Return the room that the object stands in; empty if it is in none."""
+        middle = home.object(self.of).footprint.centroid
+        room = home.plan.room_at(middle.x, middle.y)
+        return room.name if room else ""
+
+    def hold_us(self) -> int:
+        """Return how long it stays on [us]."""
+        return micros(self.hold)
