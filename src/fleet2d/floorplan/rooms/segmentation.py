@@ -36,6 +36,7 @@ from fleet2d.kernels import (
     spread_labels,
     squared_distance,
 )
+from fleet2d.runtime.determinism import sum_in_order
 
 Corners = NDArray[np.intp]
 
@@ -102,11 +103,12 @@ class WallDirections:
         sides = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
         length, degrees = np.sqrt((sides * sides).sum(axis=1)), _degrees(sides)
         square = np.bincount(degrees, weights=length * length, minlength=90)
-        shares = [1 - abs(k) / SPREAD_DEG for k in range(1 - SPREAD_DEG, SPREAD_DEG)]
-        weight = np.convolve(np.tile(square, 3), shares, mode="same")[90:180]
+        weight = np.zeros(90)
+        for k in range(1 - SPREAD_DEG, SPREAD_DEG):  # in this order on every machine
+            weight += (1 - abs(k) / SPREAD_DEG) * np.roll(square, k)
         weight = np.minimum(2 * weight / weight.max(), 1)
-        main = length[weight[degrees] >= 0.5].sum()
-        return cls(weight, bool(main >= STRAIGHT_SHARE * length.sum()))
+        main = sum_in_order(length[weight[degrees] >= 0.5].tolist())
+        return cls(weight, main >= STRAIGHT_SHARE * sum_in_order(length.tolist()))
 
     def are_main(self, lines: I64) -> Bool:
         """Return which lines (x0, y0, x1, y1) run in a main direction of the walls."""
