@@ -1,6 +1,45 @@
 #include "points.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
 namespace fleet2d {
+namespace {
+
+// The ways from a place to the points in range [lattice units], and how much of each has to be ahead.
+struct Gaps {
+    std::vector<f64> x, y, least;
+
+    void clear() {
+        x.clear();
+        y.clear();
+        least.clear();
+    }
+
+    void add(i64 dx, i64 dy, f64 cosine) {
+        x.push_back(static_cast<f64>(dx));
+        y.push_back(static_cast<f64>(dy));
+        least.push_back(std::sqrt(x.back() * x.back() + y.back() * y.back()) * cosine);
+    }
+
+    // The direction that has most of them within the angle; `place` is passed on.
+    BestView best(i64 place, View<const f64, 2> halves) const {
+        BestView best{place};
+        const std::size_t size = x.size();
+        for (const bool is_opposite : {false, true}) {
+            for (i64 k = 0; k < halves.size(); ++k) {
+                const f64 sign = is_opposite ? -1.0 : 1.0, along = sign * halves(k, 0), up = sign * halves(k, 1);
+                i64 count = 0;
+                for (std::size_t i = 0; i < size; ++i) count += x[i] * along + y[i] * up >= least[i];
+                if (count > best.count) best = {place, k + (is_opposite ? halves.size() : 0), count};
+            }
+        }
+        return best;
+    }
+};
+
+}  // namespace
 
 Array<bool> points_in_sight(const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points) {
     auto visible = Array<bool>::empty({points.size()});
@@ -9,6 +48,39 @@ Array<bool> points_in_sight(const Mesh& mesh, i64 x, i64 y, View<const i64, 2> p
         visible[i] = line_of_sight(mesh, x, y, triangle, points(i, 0), points(i, 1));
     }
     return visible;
+}
+
+BestView best_view(const Mesh& mesh, View<const i64, 2> places, View<const i64, 2> points, f64 range_squared,
+                   View<const f64, 2> halves, f64 cosine) {
+    // What would be in view without walls is the most that can be, so few places need lines of sight.
+    std::vector<BestView> bounds;
+    std::vector<std::size_t> near;
+    Gaps gaps;
+    const auto collect = [&](i64 place, auto is_in_sight) {
+        gaps.clear();
+        for (i64 i = 0; i < points.size(); ++i) {
+            const i64 dx = points(i, 0) - places(place, 0), dy = points(i, 1) - places(place, 1);
+            if (static_cast<f64>(dx * dx + dy * dy) <= range_squared && is_in_sight(i)) gaps.add(dx, dy, cosine);
+        }
+    };
+    for (i64 place = 0; place < places.size(); ++place) {
+        collect(place, [](i64) { return true; });
+        bounds.push_back(gaps.best(place, halves));
+        near.push_back(gaps.x.size());
+    }
+    std::vector<BestView> ordered = bounds;
+    std::ranges::stable_sort(ordered, std::greater(), &BestView::count);
+    BestView best;
+    for (const BestView& bound : ordered) {
+        if (bound.count < best.count || bound.count == 0) break;
+        if (bound.count == best.count && bound.place > best.place) continue;
+        const i64 x = places(bound.place, 0), y = places(bound.place, 1), triangle = locate(mesh, x, y);
+        collect(bound.place, [&](i64 i) { return line_of_sight(mesh, x, y, triangle, points(i, 0), points(i, 1)); });
+        const bool is_all = gaps.x.size() == near[static_cast<std::size_t>(bound.place)];
+        const BestView view = is_all ? bound : gaps.best(bound.place, halves);
+        if (view.count > best.count || (view.count == best.count && view.place < best.place)) best = view;
+    }
+    return best;
 }
 
 Array<bool> points_in_reach(Pose eye, i64 near_squared, i64 far_squared, i64 half_angle, View<const i64, 2> points) {

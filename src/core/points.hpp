@@ -16,6 +16,18 @@ namespace fleet2d {
 // Which of the points, (n, 2), have a line of sight from (x, y), (n,).
 Array<bool> points_in_sight(const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points);
 
+// A place and a direction, and how many points are in view from there.
+struct BestView {
+    i64 place = 0, direction = 0, count = 0;
+};
+
+// The place, of (m, 2), and the direction from which most of the points, (n, 2), are in view: in sight, no farther
+// than the range [lattice units, squared], and within the angle of a camera, which is given by the cosine of its
+// half. `halves`, (d, 2), are unit vectors of the first half of the directions; the others, from number d on, are
+// opposite to these. Ties: the first place, then the first direction.
+BestView best_view(const Mesh& mesh, View<const i64, 2> places, View<const i64, 2> points, f64 range_squared,
+                   View<const f64, 2> halves, f64 cosine);
+
 // Which of the points, (n, 2), are in range and within the angle of a camera, regardless of walls, (n,).
 Array<bool> points_in_reach(Pose eye, i64 near_squared, i64 far_squared, i64 half_angle, View<const i64, 2> points);
 

@@ -698,6 +698,24 @@ def points_in_sight(mesh: Mesh, x: int, y: int, points: numpy.typing.NDArray[num
     Return which of the points, int64 (n, 2), a line of sight leads to from (x, y): bool (n,).
     """
 
+def best_view(mesh: Mesh, places: numpy.typing.NDArray[numpy.int64], points: numpy.typing.NDArray[numpy.int64], range_squared: float, halves: numpy.typing.NDArray[numpy.float64], cosine: float) -> tuple[int, int] | None:
+    """
+    Return the place and the direction from which a camera has most points in view.
+
+    Args:
+        mesh: Free space.
+        places: int64 (m, 2), lattice points.
+        points: int64 (n, 2), lattice points.
+        range_squared: The range of the camera, squared [lattice units].
+        halves: float64 (d, 2), unit vectors of the first half of the directions; the others, from
+            number d on, are opposite to these.
+        cosine: The cosine of half the angle of the camera.
+
+    Returns:
+        The number of the place and of the direction, the first ones if tied; None where no point is in
+        view from any place.
+    """
+
 def points_in_reach(x: int, y: int, heading: int, reach: tuple[int, int, int], points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:
     """
     Return which points are in range and within the angle, regardless of walls.

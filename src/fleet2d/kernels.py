@@ -69,6 +69,7 @@ from fleet2d._core import (
     advance as advance,
     ANY_ROOM as ANY_ROOM,
     BELL_STD as BELL_STD,
+    best_view as best_view,
     BINS as BINS,
     CELL_CENTRE as CELL_CENTRE,
     cells_in_view as cells_in_view,

@@ -1,4 +1,4 @@
-"""Many points from one place: which are in sight, and which in range and angle."""
+"""Many points from one place: which are in sight, which in range and angle; and the best place."""
 
 from pathlib import Path
 
@@ -10,7 +10,16 @@ from tests.homes import all_homes, awkward_points, behind_corners, home_of
 from tests.reference.line_of_sight import visible
 from tests.strategies import homes, quick, seeds
 
-from fleet2d.kernels import I64, Reach, half_sine, points_in_reach, points_in_sight
+from fleet2d.kernels import (
+    F64,
+    I64,
+    Mesh,
+    Reach,
+    best_view,
+    half_sine,
+    points_in_reach,
+    points_in_sight,
+)
 
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 
@@ -68,6 +77,47 @@ def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data:
             assert np.array_equal(expected, points_in_sight(home.mesh, *eye.tolist(), points))
             seen += int(expected.sum())
     assert seen > 200
+
+
+HALVES_OF_EIGHT = np.array([(1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7)])
+
+
+def best_by_counting(
+    mesh: Mesh, places: I64, points: I64, far: float, cosine: float
+) -> tuple[int, int] | None:
+    """Return what `best_view` does, by the counts at all places and in all directions."""
+    directions: F64 = np.concatenate([HALVES_OF_EIGHT, -HALVES_OF_EIGHT])
+    counts = []
+    for x, y in places.tolist():
+        x_gaps, y_gaps = (points - (x, y)).T.astype(np.float64)
+        length = np.sqrt(x_gaps * x_gaps + y_gaps * y_gaps)
+        is_seen = points_in_sight(mesh, x, y, points) & (length * length <= far + 0.5)
+        for along, up in directions:
+            is_ahead = x_gaps * along + y_gaps * up >= length * cosine
+            counts.append(int((is_seen & is_ahead).sum()))
+    best = int(np.argmax(counts))
+    return divmod(best, len(directions)) if counts[best] else None
+
+
+@quick
+@given(homes(), seeds())
+def test_best_view_is_the_first_of_those_that_show_most(polygons: list[Polygon], seed: int) -> None:
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    places, points = awkward_points(home, rng, 3), awkward_points(home, rng, 8)
+    for far in (0.0, 300.0**2, 1e9):
+        for cosine in (1.5, 0.9, 0.0, -0.6):
+            expected = best_by_counting(home.mesh, places, points, far, cosine)
+            assert expected == best_view(home.mesh, places, points, far, HALVES_OF_EIGHT, cosine)
+
+
+def test_best_view_is_the_place_past_the_wall_that_hides_points_from_the_others() -> None:
+    hook = Polygon([(0, 0), (900, 0), (900, 900), (600, 900), (600, 300), (0, 300)])
+    mesh = home_of([hook]).mesh
+    points = np.array([[750, y] for y in range(400, 900, 50)])
+    places = np.array([[10, 10], [550, 290], [750, 310], [750, 380]])
+
+    assert best_view(mesh, places, points, 1e9, HALVES_OF_EIGHT, 0.9) == (2, 2)
+    assert best_view(mesh, places[:1], points, 1e9, HALVES_OF_EIGHT, 0.9) is None
 
 
 @pytest.mark.parametrize("points", [np.array([[33, 33, 1]]), np.array([[33, 2**40]])])

@@ -41,6 +41,32 @@ void bind_points(nb::module_& m) {
         "mesh"_a, "x"_a, "y"_a, "points"_a, Unlocked(),
         "Return which of the points, int64 (n, 2), a line of sight leads to from (x, y): bool (n,).");
     m.def(
+        "best_view",
+        [](const Mesh& mesh, View<const i64, 2> places, View<const i64, 2> points, f64 range_squared,
+           View<const f64, 2> halves, f64 cosine) -> std::optional<std::pair<i64, i64>> {
+            check_points(places);
+            check_points(points);
+            require(halves.shape[1] == 2, "halves must be (d, 2)");
+            const BestView best = best_view(mesh, places, points, range_squared, halves, cosine);
+            if (best.count == 0) return std::nullopt;
+            return std::pair(best.place, best.direction);
+        },
+        "mesh"_a, "places"_a, "points"_a, "range_squared"_a, "halves"_a, "cosine"_a, Unlocked(),
+        R"(Return the place and the direction from which a camera has most points in view.
+
+Args:
+    mesh: Free space.
+    places: int64 (m, 2), lattice points.
+    points: int64 (n, 2), lattice points.
+    range_squared: The range of the camera, squared [lattice units].
+    halves: float64 (d, 2), unit vectors of the first half of the directions; the others, from
+        number d on, are opposite to these.
+    cosine: The cosine of half the angle of the camera.
+
+Returns:
+    The number of the place and of the direction, the first ones if tied; None where no point is in
+    view from any place.)");
+    m.def(
         "points_in_reach",
         [](i64 x, i64 y, i64 heading, std::tuple<i64, i64, i64> reach, View<const i64, 2> points) {
             check_point(x, y);

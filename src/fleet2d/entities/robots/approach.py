@@ -232,14 +232,18 @@ def visible_from(actor: Actor, place: I64, goals: I64, reach: float | None = Non
 
 
 def spread(cells: I64, most: int) -> I64:
-    """Return the cells (row, column) on the finest square grid that has no more than `most`."""
+    """Return the cells (row, column) on the finest square grid that has no more than `most`.
+
+    The cells must be listed row by row, and are listed so again.
+    """
     if len(cells) <= most:
         return cells
-    pitch, is_cell = 1, np.zeros(cells.max(axis=0) + 1, np.bool_)
-    is_cell[cells[:, 0], cells[:, 1]] = True
+    rows, columns = cells.T
+    pitch, is_cell = 1, np.zeros((rows[-1] + 1, columns.max() + 1), np.bool_)
+    is_cell[rows, columns] = True
     while np.count_nonzero(is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]) > most:
         pitch += 1
-    on_grid = cells[(cells[:, 0] % pitch == pitch // 2) & (cells[:, 1] % pitch == pitch // 2)]
+    on_grid = cells_of(is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]) * pitch + pitch // 2
     return on_grid if len(on_grid) else cells[:: max(1, len(cells) // most)]
 
 

@@ -31,7 +31,6 @@ from fleet2d.entities.robots.approach import (
     room_belief,
     sight_range,
     spread,
-    visible_from,
 )
 from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, extra
@@ -47,6 +46,7 @@ from fleet2d.kernels import (
     Bool,
     RoomMemory,
     ShownMemory,
+    best_view,
     cosine,
     remember,
     rooms_at,
@@ -105,8 +105,11 @@ MAX_OVERDUE_H = 24.0
 MINUTE = timedelta(minutes=1)
 SATURDAY = 5
 
-# Unit vectors of the headings in which a robot may wait, (n, 2).
-DIRECTIONS = np.array([(cosine(h), sine(h)) for h in range(0, TURN, TURN // 16)]) / UNIT
+# Number of headings in which a robot may wait, and unit vectors of the first half of them, (n, 2).
+DIRECTIONS = 16
+HALF_DIRECTIONS = (
+    np.array([(cosine(h), sine(h)) for h in range(0, TURN // 2, TURN // DIRECTIONS)]) / UNIT
+)
 
 # A time t ago counts 1 / (1 + t / scale) [s].
 SHORT_S, SEEN_S, LONG_S = 20 * 60, 30 * 60, 6 * HOUR_S
@@ -174,23 +177,14 @@ class WaitingPoses:
         actor, plan = self._actor, self._actor.home.plan
         stands = centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
         goals = centres(spread(cells_of(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
-        reach, limit = sight_range(actor), cosine(self._half_angle) / UNIT
-        views = [(place, goals[visible_from(actor, place, goals, reach)]) for place in stands]
-        views = [(place, seen - place) for place, seen in views if len(seen)]
-        if not views:
+        limit = cosine(self._half_angle) / UNIT
+        reach = sight_range(actor)
+        best = best_view(actor.home.walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit)
+        if best is None:
             return *actor.middle(room), 0
-        first = np.cumsum([0, *(len(gaps) for _, gaps in views[:-1])])
-        x, y = np.concatenate([gaps for _, gaps in views]).T.astype(np.float64)
-        half = DIRECTIONS[: len(DIRECTIONS) // 2]  # the others are opposite to these
-        ahead, least = x * half[:, :1] + y * half[:, 1:], np.sqrt(x * x + y * y) * limit
-        is_shown = np.concatenate([ahead >= least, ahead <= -least])
-        counts = is_shown.view(np.int8)
-        shown = np.add.reduceat(counts, first, axis=1, dtype=np.int32).T  # (views, directions)
-        view, facing = divmod(int(shown.argmax()), len(DIRECTIONS))
-        if shown[view, facing] == 0:  # by a camera with a narrow angle
-            return *actor.middle(room), 0
-        (at_x, at_y), _ = views[view]
-        return int(at_x), int(at_y), facing * TURN // len(DIRECTIONS)
+        place, facing = best
+        at_x, at_y = stands[place].tolist()
+        return at_x, at_y, facing * TURN // DIRECTIONS
 
     def ways(self, actions: int) -> "RoomWays":
         """Return the ways from where the robot is to each room, for a number of actions."""
