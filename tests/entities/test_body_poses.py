@@ -68,7 +68,7 @@ def test_a_plan_holds_from_the_present_step_on() -> None:
     assert [7, 7, 7, 23, 24, 25] == bodies.block(0, 6).x[1].tolist()
     bodies.hold(1, Pose(1, 2, 3, 1))
     assert [7, 7, 7, 1, 1, 1] == bodies.block(0, 6).x[1].tolist()
-    assert Pose(1, 2, 3, 1) == bodies.pose(1)
+    assert Pose(1, 2, 3, 1) == bodies.pose_at(1, bodies.step)
 
 
 def test_postures_are_taken_and_forgotten_when_a_plan_has_none() -> None:

@@ -90,7 +90,7 @@ class PeopleSwitches:
             return []
         pose, clock, before = actor.state, self._clock, self._awake_in[row]
         is_awake = not pose.away and actor.posture_code(step * clock.step_us) != LYING
-        room = self._home.plan.room_at(*self._home.plan.lattice.xy_of(pose.x, pose.y))
+        room = self._home.plan.room_of_point(pose.x, pose.y)
         now = NOWHERE if room is None or not is_awake else room.index
         self._awake_in[row] = now
         events: list[Event] = []

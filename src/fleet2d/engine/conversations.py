@@ -319,8 +319,8 @@ class Conversations(Watcher):
         """Return the index of the room that a body is in at the begin of a block."""
         if block.away[row, 0]:
             return None
-        plan = self.actors[row].home.plan
-        room = plan.room_at(*plan.lattice.xy_of(int(block.x[row, 0]), int(block.y[row, 0])))
+        x, y = int(block.x[row, 0]), int(block.y[row, 0])
+        room = self.actors[row].home.plan.room_of_point(x, y)
         return None if room is None else room.index
 
     def _activity_at(self, row: int, step: int) -> str:

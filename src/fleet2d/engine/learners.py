@@ -81,6 +81,7 @@ class Learners:
     Attributes:
         outputs: The latest output of each algorithm, by name.
         fresh: The outputs of the last update.
+        known: The names of all algorithms.
         replaced: Outputs that all but metrics read instead, by name; WITHHELD for none.
         readable_outputs: The outputs for behaviors.
     """
@@ -94,7 +95,7 @@ class Learners:
         self.fresh: dict[str, Any] = {}
         self.replaced: dict[str, Any] = {}
         self.all: list[Learner] = []
-        self._names = tuple(algorithms)
+        self.known = tuple(algorithms)
         for name, metric in metrics.items():
             for algorithm in metric.reads():
                 check_known(algorithm, "algorithm", algorithms, where=f"metrics.{name}: ")
@@ -109,12 +110,7 @@ class Learners:
 
     def _show_outputs(self) -> None:
         """Set the outputs that behaviors read, after some have changed."""
-        self.readable_outputs = Outputs(self._as_read(self.outputs), self._names)
-
-    @property
-    def known(self) -> tuple[str, ...]:
-        """The names of all algorithms."""
-        return self._names
+        self.readable_outputs = Outputs(self._as_read(self.outputs), self.known)
 
     def _as_read(self, outputs: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return outputs as all but metrics read them."""
@@ -253,7 +249,7 @@ class Learners:
         history = History(log, learner.since, end, step_s, visible, learner.oldest, needs)
         state = Present(
             learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
-            self.users, self.robots, Outputs({**outputs}, self._names), self.seed
+            self.users, self.robots, Outputs({**outputs}, self.known), self.seed
         )  # fmt: skip
         with blame(learner.path, end - 1):
             output = learner.component.update(history, state)

@@ -656,7 +656,7 @@ class Simulation(InterventionMethods):
         Raises:
             ScenarioError: There is no such body.
         """
-        row = list(self.actors).index(self._body(name).name)
+        row = self._body(name).row
         self._do("drive", entity=name)
         self._state.driven.add(row)
         self._state.bodies.ask_at[row] = self.step
@@ -684,7 +684,7 @@ class Simulation(InterventionMethods):
             ScenarioError: There is no such body.
             InputError: The body isn't driven.
         """
-        row = list(self.actors).index(self._body(name).name)
+        row = self._body(name).row
         if row not in self._state.driven:
             raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
         self._do("decide", entity=name, plan=data_of(plan))

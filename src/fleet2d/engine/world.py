@@ -26,7 +26,7 @@ from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
 from fleet2d.entities.sensor import SensorFault
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home import Home, HomeChange
+from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.interventions.intervention import (
     ENTRY_KEYS,
@@ -47,16 +47,9 @@ class EngineWorld:
 
     def __init__(self, state: State, step: int) -> None:
         self._state, self.step = state, step
-
-    @property
-    def home(self) -> Home:
-        """The home, as it is at present."""
-        return self._state.home
-
-    @property
-    def clock(self) -> Clock:
-        """The steps of the run."""
-        return self._state.changes.clock
+        self.home, self.clock = state.home, state.changes.clock
+        self.doors, self.sensors = state.changes.names, state.sensors.names
+        self.algorithms = state.learners.known
 
     @cached_property
     def users(self) -> dict[str, DecidingActor]:
@@ -67,21 +60,6 @@ class EngineWorld:
     def robots(self) -> dict[str, DecidingActor]:
         """The robots, by name."""
         return {actor.name: actor for actor in self._state.actors[self._state.bodies.users :]}
-
-    @property
-    def doors(self) -> Sequence[str]:
-        """The names of the doors."""
-        return self._state.changes.names
-
-    @property
-    def sensors(self) -> Sequence[str]:
-        """The names of the sensors."""
-        return self._state.sensors.names
-
-    @property
-    def algorithms(self) -> Sequence[str]:
-        """The names of the algorithms."""
-        return self._state.learners.known
 
     @property
     def acts(self) -> Sequence[Mapping[str, Any]]:

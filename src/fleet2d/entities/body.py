@@ -196,10 +196,6 @@ class Bodies:
         """Leave out caches, which follow from the timelines."""
         return {**self.__dict__, "_window": None, "_block": None}
 
-    def pose(self, row: int) -> Pose:
-        """Return the pose of a body at the present step."""
-        return new_pose(self._timelines.pose(row, self.step))
-
     def pose_at(self, row: int, step: int) -> Pose:
         """Return the pose of a body at a step that isn't forgotten."""
         return new_pose(self._timelines.pose(row, step))
@@ -328,7 +324,7 @@ class Body:
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
         self.kept_out: frozenset[int] = frozenset()
-        self._space: tuple[Arrangement, Space] = self.arrangement, self._present_space()
+        self._space: tuple[Arrangement, Space] = self.arrangement, self.space_without()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         drive: Drive | None = getattr(self.entity, "drive", None)
@@ -352,7 +348,7 @@ class Body:
         """Where it is at the present step."""
         bodies = self._bodies
         if bodies is not None and self._state_step != bodies.step:
-            self._state, self._state_step = bodies.pose(self.row), bodies.step
+            self._state, self._state_step = bodies.pose_at(self.row, bodies.step), bodies.step
         return self._state
 
     @state.setter
@@ -371,7 +367,7 @@ class Body:
             if costs_version == costs:
                 return space
         if self._space[0] != self.arrangement:
-            self._space = self.arrangement, self._present_space()
+            self._space = self.arrangement, self.space_without()
             self.part = self._present_part()
         return self._space[1]
 
@@ -386,10 +382,7 @@ class Body:
         """Whether routes may be closed to it that were open before, or will be."""
         return self.home.may_block_routes or bool(self.kept_out)
 
-    def _present_space(self) -> Space:
-        return self.space_without(frozenset())
-
-    def space_without(self, rooms: frozenset[int]) -> Space:
+    def space_without(self, rooms: frozenset[int] = frozenset()) -> Space:
         """Return where its body can be at present outside of some rooms, by their indices."""
         entity = self.entity
         space = self.home.space(

@@ -415,8 +415,7 @@ class DecidingActor(Actor):
         self.follow_order(LeaveRoom(about) if is_here else self.order, step)
 
     def _room_index(self) -> int | None:
-        x, y = self.home.plan.lattice.xy_of(self.state.x, self.state.y)
-        room = self.home.plan.room_at(x, y)
+        room = self.home.plan.room_of_point(self.state.x, self.state.y)
         return None if room is None else room.index
 
     def _keep_to_bans(self, step: int) -> None:

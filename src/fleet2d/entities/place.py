@@ -209,8 +209,7 @@ def room_of_furniture(body: "Body", place: RoomChoice | Point) -> list[Room]:
     thing = furniture_of(body, place)
     if thing is None:
         return []
-    plan = body.home.plan
-    room = plan.room_at(*plan.lattice.to_metres(body.place_at(thing, 0).approach).tolist())
+    room = body.home.plan.room_of_point(*body.place_at(thing, 0).approach)
     return [] if room is None else [body.home.rooms[room.index]]
 
 
@@ -313,8 +312,7 @@ def avoided_rooms(body: "Body", key: str, names: tuple[str, ...]) -> frozenset[i
 
 def lies_in(body: "Body", point: tuple[int, int], rooms: frozenset[int]) -> bool:
     """Return whether a lattice point lies in one of some rooms, by their indices."""
-    plan = body.home.plan
-    room = plan.room_at(*plan.lattice.to_metres(point).tolist()) if rooms else None
+    room = body.home.plan.room_of_point(*point) if rooms else None
     return room is not None and room.index in rooms
 
 
@@ -345,13 +343,12 @@ def points_at_distance(
         directions: How many directions are tried, evenly spaced.
     """
     plan, space = body.home.plan, body.space
-    room = plan.room_at(*plan.lattice.to_metres(center).tolist())
+    room = plan.room_of_point(*center)
     for i in range(directions):
         heading = i * TURN // directions
         x = center[0] + distance * cosine(heading) // UNIT
         y = center[1] + distance * sine(heading) // UNIT
-        is_in_room = plan.room_at(*plan.lattice.to_metres((x, y)).tolist()) == room
-        if is_in_room and space.part_at(x, y) == body.part:
+        if plan.room_of_point(x, y) == room and space.part_at(x, y) == body.part:
             yield x, y
 
 

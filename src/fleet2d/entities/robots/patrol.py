@@ -212,8 +212,7 @@ class Scheduled(Behavior):
 
     def _room_name(self, actor: Actor, number: int) -> str:
         """Return the name of the room of a visit; empty for a point between two rooms."""
-        plan = actor.home.plan
-        room = plan.room_at(*plan.lattice.to_metres(self.stops[number]).tolist())
+        room = actor.home.plan.room_of_point(*self.stops[number])
         return room.name if room else ""
 
     def _due(self, since: datetime) -> Iterator[tuple[datetime, int]]:

@@ -329,8 +329,7 @@ class RoomFollower:
 
     def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
         """Return the place in the room of a spot that is nearest to the body."""
-        plan_of_home = self.actor.home.plan
-        room = plan_of_home.room_at(*plan_of_home.lattice.to_metres(spot).tolist())
+        room = self.actor.home.plan.room_of_point(*spot)
         if room is None:
             return spot
         if room.index not in self._nearest:

@@ -33,7 +33,7 @@ from fleet2d.runtime.determinism import Draws
 
 if TYPE_CHECKING:
     from fleet2d.entities.behavior import Actor
-    from fleet2d.entities.place import Point, RoomChoice
+    from fleet2d.entities.place import RoomChoice
     from fleet2d.floorplan.home import Home
     from fleet2d.floorplan.placed_objects import UsePlace
     from fleet2d.floorplan.plan import Room
@@ -108,17 +108,9 @@ class Spots:
             return rooms
         return [room for room in rooms if len(actor.space.cells(room.index, actor.part))]
 
-    def in_metres(self, x: int, y: int) -> "Point":
-        """Return a lattice point [m]."""
-        return self._actor.home.plan.lattice.xy_of(x, y)
-
-    def room_at(self, x: int, y: int) -> "Room | None":
-        """Return the room that holds a lattice point."""
-        return self._actor.home.plan.room_of_point(x, y)
-
     def nearest(self, rooms: list["Room"], x: int, y: int) -> "Room":
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
-        x_m, y_m = self.in_metres(x, y)
+        x_m, y_m = self._actor.home.plan.lattice.xy_of(x, y)
 
         def distance(room: "Room") -> float:
             across, along = room.anchor_xy[0] - x_m, room.anchor_xy[1] - y_m
@@ -392,7 +384,7 @@ class KnownHome:
 
     def room_at(self, x: int, y: int) -> int:
         """Return the room that holds a lattice point; -1 for none."""
-        room = self._person.spots.room_at(x, y)
+        room = self._actor.home.plan.room_of_point(x, y)
         return -1 if room is None else room.index
 
     def wait(self, room: int, now_us: int, takes_us: int) -> int | None:
