@@ -1,11 +1,11 @@
 """How often off-policy intervals from one life contain what other policies have in simulated lives.
 
-    python benchmarks/off_policy_coverage.py [--lives 200] [--days 7] [--jobs 2]
+    python benchmarks/off_policy_coverage.py [--lives 120] [--days 14] [--jobs 2]
 
 Each life is lived under a policy that asks with probability 1/2. From its log three estimators tell
-how many yeses a policy that asks mostly by day, or mostly by night, would get for each opportunity.
-The truth is the mean over as many other lives, lived under that policy. A row is a way of answering
-and a policy, a cell the share of lives whose 95 % interval contains the truth, and the mean error.
+how many yeses a policy that asks mostly by day, or mostly by night, would get in a day. The truth
+is the mean over as many other lives, lived under that policy. A row is a way of answering and a
+policy, a cell the share of lives whose 95 % interval contains the truth, and the mean error.
 """
 
 import argparse
@@ -18,14 +18,14 @@ import numpy as np
 
 import fleet2d
 from fleet2d.algorithms.timing import HOURS, TimingPolicy
-from fleet2d.interactions.off_policy import (
-    Estimate,
+from fleet2d.kernels import F64
+from fleet2d.studies.intervals import MeanEstimate
+from fleet2d.studies.off_policy import (
     LoggedOpportunities,
     doubly_robust,
     inverse_propensity,
     read_opportunities,
 )
-from fleet2d.kernels import F64
 
 DAY_HOURS = range(8, 21)
 # Answers that leave no trace: opportunities are independent given the person's life.
@@ -37,7 +37,13 @@ WITHOUT_MEMORY = {
 }
 ANSWERS: dict[str, dict[str, Any]] = {"without memory": WITHOUT_MEMORY, "default": {}}
 # Probabilities of asking by day and by night.
-LOGGED, TARGETS = (0.5, 0.5), {"mostly by day": (0.9, 0.1), "mostly by night": (0.1, 0.9)}
+LOGGED = (0.5, 0.5)
+TARGETS = {
+    "mostly by day": (0.9, 0.1),
+    "rather by day": (0.7, 0.3),
+    "rather by night": (0.3, 0.7),
+    "mostly by night": (0.1, 0.9),
+}
 
 
 class DayAndNight(TimingPolicy):
@@ -85,7 +91,7 @@ def live(days: int, answers: str, policy: tuple[float, float], seed: int) -> Log
     return read_opportunities(run)
 
 
-def estimates(log: LoggedOpportunities, policy: tuple[float, float]) -> dict[str, Estimate]:
+def estimates(log: LoggedOpportunities, policy: tuple[float, float]) -> dict[str, MeanEstimate]:
     """Return what each estimator tells about another policy."""
     hour = log.step // 3600 % HOURS
     # Before the first answer every policy asks.
@@ -106,8 +112,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--lives", type=int, default=200)
-    parser.add_argument("--days", type=int, default=7)
+    parser.add_argument("--lives", type=int, default=120)
+    parser.add_argument("--days", type=int, default=14)
     parser.add_argument("--jobs", type=int, default=2)
     arguments = parser.parse_args()
     with ProcessPoolExecutor(arguments.jobs) as pool:
@@ -120,16 +126,15 @@ def main() -> None:
             logs = lives(answers, LOGGED, 1)
             for name, policy in TARGETS.items():
                 other = lives(answers, policy, 1 + arguments.lives)
-                count = sum(len(log.reward) for log in other)
-                truth = sum(float(log.reward.sum()) for log in other) / count
+                truth = float(np.mean([log.reward.sum() / log.days for log in other]))
                 told = [estimates(log, policy) for log in logs]
                 cells = []
                 for method in told[0]:
                     own = [each[method] for each in told]
                     covered = np.mean([each.low <= truth <= each.high for each in own])
                     error = np.mean([each.mean for each in own]) - truth
-                    cells.append(f"{method} {100 * covered:.1f} % ({error:+.3f})")
-                print(f"{answers}, {name}, truth {truth:.3f}: {', '.join(cells)}", flush=True)
+                    cells.append(f"{method} {100 * covered:.1f} % ({error:+.2f})")
+                print(f"{answers}, {name}, truth {truth:.2f}: {', '.join(cells)}", flush=True)
 
 
 if __name__ == "__main__":

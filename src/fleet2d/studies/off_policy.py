@@ -2,29 +2,26 @@
 
 Each opportunity has a context, the action that was drawn, the probability with which it was, and a
 reward. The estimates are those of Horvitz and Thompson (1952), its self-normalized form (Hájek),
-and the doubly robust one (Dudík, Langford and Li, 2011). Opportunities count as independent.
+and the doubly robust one (Dudík, Langford and Li, 2011).
+
+How many opportunities there are depends on the policy: a person who gave no answer isn't looked for
+for hours. So the mean reward of a day is estimated, not that of an opportunity, and intervals take
+days, not opportunities, for independent. What an answer changes beyond that, such as annoyance that
+lasts for days, is no part of the estimates. `benchmarks/off_policy_coverage.py` measures how often
+the intervals contain the truth.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fleet2d.errors import InputError
-from fleet2d.kernels import F64
-
-# Of a normal variable: 95 % lie within so many standard errors.
-Z_95 = 1.959963984540054
-
-
-class StoredRun(Protocol):
-    """A run with its tables: `fleet2d.Run`."""
-
-    @property
-    def tables(self) -> Mapping[str, Any]:
-        """Its tables, as Arrow tables by name."""
+from fleet2d.kernels import F64, I64
+from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import DAY, midnight_of
+from fleet2d.studies.intervals import MeanEstimate, estimate
 
 
 @dataclass(frozen=True)
@@ -39,33 +36,25 @@ class LoggedOpportunities:
         asked: bool, whether the robot went to ask.
         chance: float64, the probability with which it would.
         reward: float64, what came of it: 1 for a yes, 0 for anything else, or another reward.
+        day: int64, the day of the log that it is in, from 0 on; another unit that is independent of
+            the others can stand in its place, such as the opportunity itself.
+        days: Number of days of the log, those without opportunities, too.
     """
 
     text: Sequence[str]
-    step: np.ndarray[tuple[int], np.dtype[np.int64]]
+    step: I64
     asked: np.ndarray[tuple[int], np.dtype[np.bool_]]
     chance: F64
     reward: F64
+    day: I64
+    days: int
 
 
-class Estimate(NamedTuple):
-    """An estimated mean reward for each opportunity, and its 95 % interval.
-
-    Attributes:
-        mean: The mean.
-        low: Lower end of the interval.
-        high: Upper end of the interval.
-    """
-
-    mean: float
-    low: float
-    high: float
-
-
-def read_opportunities(run: StoredRun) -> LoggedOpportunities:
+def read_opportunities(run: Run) -> LoggedOpportunities:
     """Return the opportunities of a stored run: what robots considered and drew, and the answers.
 
-    A reward belongs to the last opportunity of the same interaction and person before it.
+    A reward belongs to the last opportunity of the same interaction and person before it. Days are
+    those of the calendar.
     """
     events = run.tables["events"]
     wanted = {"opportunity", "accepted"}
@@ -97,44 +86,54 @@ def read_opportunities(run: StoredRun) -> LoggedOpportunities:
         chances.append(float(chance))
         asked.append(action == "asks")
         rewards.append(0.0)
+    clock = run.clock
+    first = midnight_of(clock.start)
     return LoggedOpportunities(
-        texts, np.array(steps, np.int64), np.array(asked), np.array(chances), np.array(rewards)
+        texts,
+        np.array(steps, np.int64),
+        np.array(asked, bool),
+        np.array(chances),
+        np.array(rewards),
+        np.array([(clock.time(step) - first) // DAY for step in steps], np.int64),
+        (clock.time(clock.steps - 1) - first) // DAY + 1,
     )
 
 
 def inverse_propensity(
     log: LoggedOpportunities, target: ArrayLike, *, normalized: bool = False
-) -> Estimate:
-    """Estimate the mean reward of another policy by weights.
+) -> MeanEstimate:
+    """Estimate the reward that another policy has in a day, by weights.
 
     Args:
         log: What a policy drew.
         target: Probability of asking of the other policy at each opportunity, (n,).
         normalized: Divide by the sum of the weights: less variance, a small bias.
 
+    Returns:
+        The mean and its 95 % interval, in which days count as independent.
+
     Raises:
-        InputError: An action was drawn that the log says can't be.
+        InputError: An action was drawn that the log says can't be, or the log has no opportunity.
 
     Example:
         >>> log = LoggedOpportunities(
         ...     ["tea ana"] * 4, np.arange(4), np.array([True, True, False, False]),
-        ...     np.full(4, 0.5), np.array([1.0, 0.0, 0.0, 0.0]),
+        ...     np.full(4, 0.5), np.array([1.0, 0.0, 0.0, 0.0]), np.array([0, 0, 1, 1]), 2,
         ... )
         >>> inverse_propensity(log, np.ones(4)).mean
-        0.5
+        1.0
     """
     weights = _weights(log, target)
-    terms = weights * log.reward
     if not normalized:
-        return _interval(terms)
-    mean = float(terms.sum() / weights.sum())
-    return _interval(mean + weights * (log.reward - mean) / weights.mean())
+        return _mean_of_days(log, weights * log.reward)
+    mean = float((weights * log.reward).sum() / weights.sum())
+    return _mean_of_days(log, mean + weights * (log.reward - mean) / weights.mean())
 
 
 def doubly_robust(
     log: LoggedOpportunities, target: ArrayLike, if_asked: ArrayLike, if_not: ArrayLike = 0.0
-) -> Estimate:
-    """Estimate the mean reward of another policy by a model of rewards, corrected by weights.
+) -> MeanEstimate:
+    """Estimate the reward of another policy in a day by a model, corrected by weights.
 
     It is right if either the model or the probabilities in the log are.
 
@@ -144,18 +143,26 @@ def doubly_robust(
         if_asked: The model's reward of asking at each opportunity, (n,) or a number.
         if_not: The model's reward of waiting.
 
+    Returns:
+        The mean and its 95 % interval, in which days count as independent.
+
     Raises:
-        InputError: An action was drawn that the log says can't be.
+        InputError: An action was drawn that the log says can't be, or the log has no opportunity.
     """
     probability = np.asarray(target, np.float64)
     asked, waited = np.asarray(if_asked, np.float64), np.asarray(if_not, np.float64)
     expected = probability * asked + (1 - probability) * waited
     predicted = np.where(log.asked, asked, waited)
-    return _interval(expected + _weights(log, target) * (log.reward - predicted))
+    return _mean_of_days(log, expected + _weights(log, target) * (log.reward - predicted))
 
 
 def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
     """Return how much likelier each action is with another policy than it was."""
+    if not len(log.text):
+        raise InputError(
+            "the log has no opportunity: `interact` records them with timing: NAME, an algorithm of"
+            " type timing"
+        )
     probability = np.asarray(target, np.float64)
     drawn = np.where(log.asked, log.chance, 1 - log.chance)
     if (drawn <= 0).any():
@@ -166,8 +173,6 @@ def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
     return np.where(log.asked, probability, 1 - probability) / drawn
 
 
-def _interval(terms: F64) -> Estimate:
-    """Return the mean of independent terms and its 95 % interval."""
-    mean = float(terms.mean())
-    error = float(terms.std(ddof=1) / np.sqrt(len(terms))) if len(terms) > 1 else np.inf
-    return Estimate(mean, mean - Z_95 * error, mean + Z_95 * error)
+def _mean_of_days(log: LoggedOpportunities, terms: F64) -> MeanEstimate:
+    """Return the mean of the days' sums of terms, and its interval."""
+    return estimate(np.bincount(log.day, terms, log.days))

@@ -13,13 +13,13 @@ from fleet2d.errors import InputError
 from fleet2d.interactions.answers import Answers, Circumstances
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome
-from fleet2d.interactions.off_policy import (
+from fleet2d.kernels import F64
+from fleet2d.studies.off_policy import (
     LoggedOpportunities,
     doubly_robust,
     inverse_propensity,
     read_opportunities,
 )
-from fleet2d.kernels import F64
 
 SONG = Interaction(do="offer", to="ana", every=timedelta(hours=1), worth=2)
 ACTIVITIES = ("sleep", "breakfast", "work_at_home", "tv", "rest", "phone_call")
@@ -60,7 +60,10 @@ def world(number: int) -> tuple[LoggedOpportunities, np.ndarray[Any, Any]]:
     ]
     said_yes = np.array([r is not None and r.outcome == Outcome.ACCEPTED for r in replies])
     steps = np.arange(COUNT)
-    return LoggedOpportunities(["song ana"] * COUNT, steps, asked, chance, asked * said_yes), kinds
+    log = LoggedOpportunities(
+        ["song ana"] * COUNT, steps, asked, chance, asked * said_yes, steps, COUNT
+    )
+    return log, kinds
 
 
 @pytest.mark.parametrize(
@@ -95,9 +98,34 @@ def test_a_good_model_narrows_the_interval() -> None:
 
 
 def test_a_log_without_chance_is_refused() -> None:
-    log = LoggedOpportunities(["a b"], np.zeros(1), np.array([True]), np.zeros(1), np.zeros(1))  # type: ignore[arg-type]
+    first = np.zeros(1, np.int64)
+    log = LoggedOpportunities(["a b"], first, np.array([True]), np.zeros(1), np.zeros(1), first, 1)
     with pytest.raises(InputError, match="let the policy that is logged explore"):
         inverse_propensity(log, np.ones(1))
+
+
+def test_a_log_without_opportunities_is_refused() -> None:
+    log = read_opportunities(fleet2d.run(home("20 min")))
+    with pytest.raises(InputError, match="the log has no opportunity"):
+        inverse_propensity(log, [])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_day_counts_what_it_has_however_many_opportunities(seed: int) -> None:
+    """Days with many opportunities differ from those with few: the interval is that of the days."""
+    rng = np.random.default_rng(seed)
+    days = 40
+    day = np.repeat(np.arange(days), rng.choice([0, 2, 30], days))
+    n = len(day)
+    asked, said_yes = rng.uniform(size=n) < 0.5, rng.uniform(size=n) < 0.4
+    log = LoggedOpportunities(
+        ["a b"] * n, np.arange(n), asked, np.full(n, 0.5), asked * said_yes, day, days
+    )
+    told = doubly_robust(log, np.full(n, 0.9), 0.4)
+
+    assert 0.9 * 0.4 * n / days == pytest.approx(told.mean, abs=0.8)
+    per_day = np.bincount(day, minlength=days)
+    assert told.error > 0.9 * 0.9 * 0.4 * per_day.std() / np.sqrt(days)
 
 
 def test_opportunities_of_a_run_are_read_with_what_came_of_them() -> None:
@@ -111,6 +139,7 @@ def test_opportunities_of_a_run_are_read_with_what_came_of_them() -> None:
                 "when": {"type": "timing", "policy": {"type": "thompson", "min_chance": 0.5}}
             },
             interactions={"pill": PILL | {"at": [], "every": "1 h"}},
+            simulation={**home()["simulation"], "start": "2026-01-05T22:30", "duration": "3 h"},
         )
     )
     log = read_opportunities(run)
@@ -120,3 +149,4 @@ def test_opportunities_of_a_run_are_read_with_what_came_of_them() -> None:
     assert ((log.chance >= 0) & (log.chance <= 1)).all()
     assert (log.reward[~log.asked] == 0).all()
     assert log.reward.sum() >= 1
+    assert (2, {0, 1}) == (log.days, set(log.day))
