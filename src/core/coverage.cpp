@@ -163,6 +163,10 @@ void CoverageRecorder::look_from(i64 slot, i64 step) {
     for (i64 camera = 0; camera < setup_.cameras(); ++camera) {
         for (const Span& span : cells_.of(camera, cache_.pose[slot], step)) mark(span, step, cells);
     }
+    i64 first = 0, end = cells.size();
+    while (first < end && cells[first] == 0) ++first;
+    while (end > first && cells[end - 1] == 0) --end;
+    cache_.shown(slot, 0) = static_cast<i32>(first), cache_.shown(slot, 1) = static_cast<i32>(end);
 }
 
 void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
@@ -189,27 +193,22 @@ void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
 void CoverageRecorder::add_held(i64 bin) {
     if (slot_ < 0) return;
     cache_.last[slot_] = last_look_;
-    const i64 steps = looks_ * setup_.every, patches = record_.patches();
+    const i64 steps = looks_ * setup_.every, first = cache_.shown(slot_, 0), end = cache_.shown(slot_, 1);
+    if (first < 0 || end > record_.patches()) throw std::invalid_argument("shown must hold ranges of patches");
     const View<i32> cells = cache_.cells[slot_];
     if (!record_.keeps_bins()) {
-        for (i64 patch = 0; patch < patches; ++patch) record_.exposure[patch] += steps * cells[patch];
+        for (i64 patch = first; patch < end; ++patch) record_.exposure[patch] += steps * cells[patch];
         return;
     }
     if (steps == 0) return;
+    if (begun_ <= bin) leave_empty(bin + 1);
     const View<i64> binned = record_.binned[bin], peak = record_.peak[bin];
-    if (begun_ <= bin) {
-        leave_empty(bin);
-        begun_ = bin + 1;
-        for (i64 patch = 0; patch < patches; ++patch) binned[patch] = steps * cells[patch];
-        for (i64 patch = 0; patch < patches; ++patch) peak[patch] = cells[patch];
-        return;
-    }
     if (steps == 1) {  // a robot that walks
-        for (i64 patch = 0; patch < patches; ++patch) binned[patch] += cells[patch];
+        for (i64 patch = first; patch < end; ++patch) binned[patch] += cells[patch];
     } else {
-        for (i64 patch = 0; patch < patches; ++patch) binned[patch] += steps * cells[patch];
+        for (i64 patch = first; patch < end; ++patch) binned[patch] += steps * cells[patch];
     }
-    for (i64 patch = 0; patch < patches; ++patch) peak[patch] = std::max(peak[patch], i64{cells[patch]});
+    for (i64 patch = first; patch < end; ++patch) peak[patch] = std::max(peak[patch], i64{cells[patch]});
 }
 
 void CoverageRecorder::leave_empty(i64 bin) {

@@ -19,6 +19,7 @@ struct PoseCache {
     View<i64> last;      // (slots,) the last step with the pose; NEVER for an empty slot
     View<i64> settled;   // (slots,) the last such step that is in CoverageRecord::last
     View<i32, 2> cells;  // (slots, patches) cells of each patch in view
+    View<i32, 2> shown;  // (slots, 2) the first patch in view, and one past the last
     View<i64> used;      // (1,) number of used slots
 
     i64 slots() const { return last.size(); }

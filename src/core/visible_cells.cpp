@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace fleet2d {
 namespace {
@@ -83,6 +84,21 @@ struct VisibleRows {
             for (i64 row = first_row; row <= last_row; ++row, most.next_row()) {
                 high[row] = std::min(high[row], most.column);
             }
+        }
+    }
+
+    // Keep the rows that a point between two directions from (x, y), less than half a turn apart, may have; at most
+    // two rows more than needed. A direction is a half plane's border, `to_right` and `to_left` of what is kept.
+    void limit_rows(const HalfPlane& to_right, const HalfPlane& to_left, i64 y, i64 far) {
+        const auto rise = [far](i64 sine) { return far * std::abs(sine) / UNIT + SUB; };
+        const i64 sine_right = -to_right.a, sine_left = to_left.a;
+        if (!(to_right.b >= 0 && to_left.b >= 0)) {  // it doesn't hold the direction of +y
+            const i64 highest = std::max(sine_right, sine_left);
+            last_row = std::min(last_row, last_up_to(y + (highest > 0 ? rise(highest) : SUB)));
+        }
+        if (!(to_right.b <= 0 && to_left.b <= 0)) {
+            const i64 lowest = std::min(sine_right, sine_left);
+            first_row = std::max(first_row, first_from(y - (lowest < 0 ? rise(lowest) : SUB)));
         }
     }
 
@@ -299,13 +315,16 @@ const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& rea
     const i64 parts = 2 * QUARTER < half && half < TURN ? 2 : 1;
     for (i64 part = 0; part < parts; ++part) {
         VisibleRows window{bottom, top, low_, high_};
-        window.limit_to_range(x, y, reach.far_squared, columns_);
         HalfPlane from_right{0, 0}, to_left{0, 0};  // everything
         if (half < TURN) {
             from_right = left_of(part == 0 ? 2 * heading - half : 2 * heading);
             from_right.bound = part;  // the heading itself belongs to the first part
             const HalfPlane behind = left_of(part == parts - 1 ? 2 * heading + half : 2 * heading);
             to_left = {-behind.a, -behind.b};
+            if (half > 0) window.limit_rows(from_right, to_left, y, far);
+        }
+        window.limit_to_range(x, y, reach.far_squared, columns_);
+        if (half < TURN) {
             window.limit_to(from_right, x, y);
             window.limit_to(to_left, x, y);
         }

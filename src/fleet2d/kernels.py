@@ -436,6 +436,7 @@ class PoseCache(NamedTuple):
         last: int64 (slots,), last step with the pose, -1 for an empty slot.
         settled: int64 (slots,), the last of these steps that `CoverageRecord.last` has counted.
         cells: int32 (slots, patches), number of cells of each patch in view.
+        shown: int32 (slots, 2), the first patch in view, and one past the last.
         used: int64 (1,), number of used slots.
     """
 
@@ -443,6 +444,7 @@ class PoseCache(NamedTuple):
     last: I64
     settled: I64
     cells: I32
+    shown: I32
     used: I64
 
 
@@ -493,12 +495,13 @@ class CoverageSetup(NamedTuple):
 
 
 def empty_pose_cache(slots: int, patches: int) -> PoseCache:
-    """Return an empty cache; `slots` is a power of two, each of 48 bytes and 4 per patch."""
+    """Return an empty cache; `slots` is a power of two, each of 56 bytes and 4 per patch."""
     return PoseCache(
         pose=np.zeros((slots, 4), np.int64),
         last=np.full(slots, NEVER, np.int64),
         settled=np.full(slots, NEVER, np.int64),
         cells=np.zeros((slots, patches), np.int32),
+        shown=np.zeros((slots, 2), np.int32),
         used=np.zeros(1, np.int64),
     )
 

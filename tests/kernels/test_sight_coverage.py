@@ -258,5 +258,12 @@ def test_tables_that_do_not_fit_are_refused() -> None:
     ]:
         with pytest.raises(ValueError, match=message):
             record_coverage(*arguments)
+    known, poses = empty_pose_cache(8, ROOMS), random_poses(np.random.default_rng(1), 1)
+    still = window_of(Poses(*[np.repeat(column, 60) for column in poses]))
+    record_coverage(setup, still, 0, 0, 60, known, record)
+    for wrong in ([-1, 1], [0, ROOMS + 1]):
+        known.shown[:] = wrong
+        with pytest.raises(ValueError, match="shown must hold ranges"):
+            record_coverage(setup, still, 0, 0, 60, known, record)
     with pytest.raises(ValueError, match="seen must be"):
         settle_coverage(setup, cache, record.last)

@@ -9,8 +9,8 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<PoseCache> =
-    std::tuple(&PoseCache::pose, &PoseCache::last, &PoseCache::settled, &PoseCache::cells, &PoseCache::used);
+inline constexpr auto border::members_of<PoseCache> = std::tuple(
+    &PoseCache::pose, &PoseCache::last, &PoseCache::settled, &PoseCache::cells, &PoseCache::shown, &PoseCache::used);
 
 template <>
 inline constexpr auto border::members_of<CoverageRecord> =
@@ -40,9 +40,11 @@ void check_watched(const CoverageSetup& setup) {
 void check_glances(const PoseCache& cache) {
     const i64 slots = cache.slots();
     require(slots > 0 && (slots & (slots - 1)) == 0, "cache must have a power of two of slots");
-    require(cache.pose.size() == slots && cache.pose.shape[1] == 4 && cache.settled.size() == slots &&
-                cache.cells.size() == slots && cache.used.size() == 1,
-            "all arrays of cache must have one length, that of the slots; pose (slots, 4), used (1,)");
+    require(
+        cache.pose.size() == slots && cache.pose.shape[1] == 4 && cache.settled.size() == slots &&
+            cache.cells.size() == slots && cache.shown.size() == slots && cache.shown.shape[1] == 2 &&
+            cache.used.size() == 1,
+        "all arrays of cache must have one length, that of the slots; pose (slots, 4), shown (slots, 2), used (1,)");
     require(0 <= cache.used[0] && cache.used[0] <= slots, "used must be the number of slots that are");
 }
 
