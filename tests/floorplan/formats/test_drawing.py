@@ -209,6 +209,55 @@ def test_scanned_floor_with_gaps_is_whole(shared_data: Path, name: str) -> None:
         read_image(folder / f"{name}.png", scale, close_gaps=0)
 
 
+def test_building_whose_ground_has_several_shades_of_grey_is_whole(shared_data: Path) -> None:
+    path = shared_data / "captured" / "clutter" / "photo_2020-01-08_09-53-31.png"
+    if not path.exists():
+        pytest.skip(f"there is no {path}")
+
+    plan = read_image(path, 0.05)
+
+    assert "grey 212 is taken for unknown, and so are shades up to 220" in plan.notes[0]
+    assert plan.area_m2 > 700  # 332 m2 if the grey ground is floor that gaps lead to
+
+
+def test_compressed_picture_whose_ground_is_as_light_as_the_floor_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "flat.jpg"
+    shades = np.where(HOME == WALL, 0, 254).astype(np.uint8)
+    Picture.fromarray(shades).save(path, quality=40)  # with lighter pixels beside the walls
+
+    plan = read_image(path, 0.05)
+
+    assert read(tmp_path).area_m2 == pytest.approx(plan.area_m2, rel=0.02)
+    assert not any("unknown_grey" in note for note in plan.notes)
+
+
+def test_photograph_is_turned_as_its_camera_was_held(tmp_path: Path) -> None:
+    turned = Picture.Exif()
+    turned[0x0112] = 6  # orientation: a quarter turn clockwise
+    path = tmp_path / "flat.jpg"
+    Picture.fromarray(HOME).save(path, quality=95, exif=turned)
+
+    x0, y0, x1, y1 = read_image(path, 0.05).bounds
+
+    assert y1 - y0 == pytest.approx(92 * 0.05)
+    assert x1 - x0 == pytest.approx(52 * 0.05)
+
+
+def test_room_that_is_open_to_the_outside_is_told_with_the_line_that_closes_it(
+    tmp_path: Path,
+) -> None:
+    pixels = HOME.copy()
+    pixels[10:14, 27:45] = PAPER  # 1.44 m; the door is narrower, so the other room is a home alone
+    path = draw(tmp_path, pixels)
+
+    plan = read_image(path, 0.08)
+
+    (note,) = [note for note in plan.notes if "taken for outside" in note]
+    assert "a gap of at most 1.6 m in their outer wall" in note
+    assert "close_gaps: 1.6" in note
+    assert read_image(path, 0.08, close_gaps=1.6).area_m2 > plan.area_m2 + 10
+
+
 def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
     path = draw(tmp_path)
 

@@ -261,8 +261,8 @@ def home_pixels(free: Bool, pixel: float, ray_width: float) -> Bool:
     core = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= reach**2
     if not core.any():
         raise FloorPlanError(
-            f"the free space is nowhere {ray_width:g} m wide: check the resolution, or set"
-            " floorplan.ray_width lower"
+            f"the free space is nowhere {ray_width:g} m wide: check the resolution, and whether"
+            " light and dark are exchanged (negate), or set floorplan.ray_width lower"
         )
     part = label_parts(core, False)
     opened = squared_distance(part != np.argmax(np.bincount(part[core]))) < reach**2

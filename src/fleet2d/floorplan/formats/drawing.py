@@ -12,7 +12,7 @@ from pydantic import Field, TypeAdapter
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.cleaning import USUAL_DOOR_M, OccupancyMap
+from fleet2d.floorplan.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyMap
 from fleet2d.floorplan.formats.drawn_walls import (
     LINE_M,
     find_gaps,
@@ -254,6 +254,7 @@ def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> B
                         f" only {lost:.1f} m2 of {whole:.1f} m2 would be inside; one is at pixel"
                         f" ({column}, {row}); close_gaps: 0 leaves them open"
                     )
+                    notes += _note_wide_gap(light, closed, close_gaps, pixel)
                     return closed
     if inside.any():
         return inside
@@ -276,6 +277,21 @@ def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> B
         " Draw the outer walls without gaps, the front door shut; if walls are grey, set threshold"
         " higher"
     )
+
+
+def _note_wide_gap(light: Bool, closed: Bool, close_gaps: float, pixel: float) -> list[str]:
+    """Return a note if a wider gap in an outer wall than is closed leaves out a whole room."""
+    for width in (width for width in WIDE_GAPS[:2] if width > close_gaps):
+        whole = _enclosed(light, width / pixel)
+        room = _largest_part(whole & ~closed)
+        if (room_m2 := np.count_nonzero(room) * pixel**2) >= ROOM_M2:
+            row, column = _first_gap(light, closed, room)
+            return [
+                f"{room_m2:.1f} m2 with a gap of at most {width:g} m in their outer wall, at pixel"
+                f" ({column}, {row}), are taken for outside; close_gaps: {width:g} makes them a"
+                " part of the home"
+            ]
+    return []
 
 
 def _enclosed(light: Bool, gap: float) -> Bool:

@@ -30,6 +30,8 @@ UnknownGrey = Literal["auto", "none"] | Annotated[int, Field(ge=0, le=255)]
 SAVED_UNKNOWN = 205
 # The ground around a home covers at least this share of the edge of a picture.
 EDGE_SHARE = 0.5
+# Shades of one ground differ by up to this in a JPEG picture or one that was enlarged.
+SPREAD = 8
 # Share of a picture that is unknown, at least.
 UNKNOWN_SHARE = 0.05
 # A shade is unknown, too, up to this share of the way from that of unknown to that of the floor.
@@ -115,12 +117,16 @@ class PictureSource(OccupancySource):
             return free
         if self.unknown_grey == "auto":
             edge, share = picture.edge_grey()
+            spread = 0 if share >= EDGE_SHARE else SPREAD
+            _, share = picture.edge_grey(spread)
             greys = [edge] if share >= EDGE_SHARE else []
             if saved:
                 greys += [SAVED_UNKNOWN] * (picture.share(SAVED_UNKNOWN) > 0)
                 greys += picture.filled_greys(free)
-            greys = [g for g in greys if picture.count(free, g + 1) * pixel**2 >= FLOOR_M2]
+            greys = [g for g in greys if picture.count(free, g + SPREAD) * pixel**2 >= FLOOR_M2]
             grey = limit = max(greys, default=0)
+            if grey == edge:
+                limit += spread
             if grey == SAVED_UNKNOWN and picture.share(grey) >= UNKNOWN_SHARE:
                 # What a robot saw rarely, such as rays, is nearer to unknown than to the floor.
                 limit = grey + int((picture.floor_grey(free, grey + 1) - grey) * RARE_SHARE)

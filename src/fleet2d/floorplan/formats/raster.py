@@ -56,12 +56,16 @@ class GreyPicture:
         shades = (np.arange(self.white + 1) * 255 + self.white // 2) // self.white
         return shades.astype(np.uint8)[self.values]
 
-    def edge_grey(self) -> tuple[int, float]:
-        """Return the most frequent shade along the edge of the picture, and its share of it."""
+    def edge_grey(self, spread: int = 0) -> tuple[int, float]:
+        """Return the most frequent shade along the edge of the picture, and its share of it.
+
+        Args:
+            spread: Shades that differ by at most so much count for the share, too.
+        """
         greys = self.greys
         edge = np.concatenate([greys[0], greys[-1], greys[1:-1, 0], greys[1:-1, -1]])
-        counts = np.bincount(edge, minlength=256)
-        return int(counts.argmax()), float(counts.max() / len(edge))
+        grey = int(np.bincount(edge, minlength=256).argmax())
+        return grey, float(np.mean((edge >= grey - spread) & (edge <= grey + spread)))
 
     def count(self, light: Bool, first: int, last: int = 255) -> int:
         """Return the number of some pixels whose shade is between two, inclusively."""
@@ -220,7 +224,7 @@ def _read_png(content: bytes) -> GreyPicture:
 def _read_by_pillow(content: bytes, kind: str) -> GreyPicture:
     """Read a PNG or JPEG picture, the mean of its colours."""
     try:
-        from PIL import Image
+        from PIL import Image, ImageOps
     except ImportError:
         raise FloorPlanError(
             f'is {kind}, which only Pillow can read: pip install "fleet2d[viz]", or convert the'
@@ -235,7 +239,7 @@ def _read_by_pillow(content: bytes, kind: str) -> GreyPicture:
             _check_rows(content)
         if picture.mode.startswith("I"):  # 16 bits, grey only
             return GreyPicture(np.asarray(picture).astype(np.uint16), 65535)
-        channels = np.asarray(picture.convert("RGBA"))
+        channels = np.asarray(ImageOps.exif_transpose(picture).convert("RGBA"))
     except Image.DecompressionBombError as error:
         raise FloorPlanError(f"is too large: {error}") from error
     except (OSError, SyntaxError, ValueError, zlib.error) as error:
