@@ -55,6 +55,31 @@ def test_part_that_nothing_joins_is_found() -> None:
     )
 
 
+def test_doorway_that_ends_before_the_wall_does_is_told_with_the_gap() -> None:
+    short = shapely.box(5, 1.5, 5.19, 2.4)
+
+    part = checkup(home(shapely.union_all([LEFT, RIGHT, short])))[0]
+
+    assert "though they are only 0.009 m apart at (5.20, " in part.text  # 0.01 m on the lattice
+
+
+def test_no_go_areas_over_most_of_the_floor_are_found() -> None:
+    finding = only(checkup(home(no_go=[shapely.box(0, 0, 10, 3)])))
+
+    assert ("no_go", "wrong") == (finding.kind, finding.severity)
+    assert "robots keep out of 75 % of the floor" in finding.text
+    assert [] == checkup(home(no_go=[shapely.box(0, 0, 4, 4)]))
+
+
+def test_misspelled_type_of_a_room_is_found_with_the_nearest_one() -> None:
+    kichen = LabelledRegion(("Kichen",), shapely.box(0, 0, 5.1, 4))
+    studio = LabelledRegion(("Yoga studio",), shapely.box(5.1, 0, 10, 4))
+
+    finding = only(checkup(home(regions=[kichen, studio])))
+
+    assert "kichen_0 has the unusual type 'kichen': did you mean 'kitchen'?" == finding.text
+
+
 def test_small_parts_are_one_odd_finding() -> None:
     bits = [shapely.box(11 + i, 0, 11.3 + i, 0.5) for i in range(3)]
     findings = checkup(home(shapely.union_all([FREE, *bits])))

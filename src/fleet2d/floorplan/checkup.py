@@ -10,12 +10,13 @@ import shapely
 from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import UNITS
 from fleet2d.floorplan.placed_objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
-from fleet2d.floorplan.rooms.room import UNKNOWN, LabelledRegion
+from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, LabelledRegion
 from fleet2d.floorplan.space import Space, grown_cells, with_approaches
 from fleet2d.kernels import Bool
 from fleet2d.runtime.determinism import sum_in_order
@@ -36,6 +37,8 @@ ROOM_M2 = (0.8, 200.0)  # median area of a home's rooms
 TINY_ROOM_M2 = 0.5
 SPECK_M2 = 0.02  # minimum area of a pillar
 PART_M2 = 0.5  # minimum area of floor whose loss matters
+NEARLY_JOINED_M = 0.05  # parts so near to each other were likely meant to touch
+MAX_NO_GO_SHARE = 0.5  # share of the floor that robots keep out of, from which on it is reported
 DOOR_M = (0.5, 1.6)  # median width of a home's doors
 # Usual median, the fewest doors that tell a scale, and how near to the usual width they must be.
 USUAL_DOOR_M, FEWEST_DOORS, DOOR_FACTOR = 0.85, 3, 1.4
@@ -94,6 +97,7 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
     findings = [
         *_scale(plan),
         *_parts(plan),
+        *_no_go(plan),
         *_specks(plan),
         *_labels(plan),
         *_doors(plan),
@@ -114,7 +118,7 @@ def errors_in(home: Home, radii: Iterable[float]) -> list[str]:
         radii: The radii of its robots [m].
     """
     plan, open_home = home.plan, Home(home.plan, home.doors)
-    findings = [*_scale(plan), *_doors(plan), *_standing_in_walls(plan)]
+    findings = [*_scale(plan), *_no_go(plan), *_doors(plan), *_standing_in_walls(plan)]
     for radius in sorted(set(radii)):
         findings += _routes(open_home, radius)
     return [finding.text for finding in findings if finding.severity != "odd"]
@@ -193,6 +197,10 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
         if part.area >= PART_M2:
             at = part.representative_point()
             text = f"nothing joins a part of {part.area:.2f} m2 at {_place(at)} to the rest"
+            others = shapely.difference(plan.free_space, part)
+            if (apart := shapely.distance(part, others)) <= NEARLY_JOINED_M:
+                near = shapely.get_point(shapely.shortest_line(part, others), 0)
+                text += f", though they are only {apart:.3f} m apart at {_place(near)}"
             yield Finding("parts", "wrong", text, (at.x, at.y), part)
     small = [part for part in parts if part.area < PART_M2]
     if small:
@@ -203,6 +211,15 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
             f" the rest, {'' if lone else 'the largest '}at {_place(at)}"
         )
         yield Finding("parts", "odd", text, (at.x, at.y), shapely.MultiPolygon(small))
+
+
+def _no_go(plan: FloorPlan) -> Iterator[Finding]:
+    covered = shapely.intersection(shapely.union_all(plan.no_go), plan.free_space)
+    if covered.area > MAX_NO_GO_SHARE * plan.area_m2:
+        at = covered.representative_point()
+        share = 100 * covered.area / plan.area_m2
+        text = f"robots keep out of {share:.0f} % of the floor: no_go covers it, at {_place(at)}"
+        yield Finding("no_go", "wrong", text, (at.x, at.y), covered)
 
 
 def _specks(plan: FloorPlan) -> Iterator[Finding]:
@@ -228,6 +245,10 @@ def _labels(plan: FloorPlan) -> Iterator[Finding]:
         if room.area_m2 < TINY_ROOM_M2 and room.type != UNKNOWN:
             text = f"{room.name} has only {room.area_m2:.2f} m2"
             yield Finding("room", "odd", text, room.anchor_xy)
+        meant = did_you_mean(room.type, PRIORITY)
+        if room.type not in (UNKNOWN, "room", *PRIORITY) and "?" in meant:
+            text = f"{room.name} has the unusual type {room.type!r}{meant}"
+            yield Finding("labels", "odd", text, room.anchor_xy)
     unlabelled = sum_in_order(room.area_m2 for room in plan.rooms if room.type == UNKNOWN)
     share = unlabelled / sum_in_order(room.area_m2 for room in plan.rooms)
     if share > MAX_UNLABELLED_SHARE:

@@ -486,7 +486,8 @@ def glazed(
         else:
             at = area.centroid
             notes.append(
-                f"the glass at ({at.x:.2f}, {at.y:.2f}) m is in no wall beside free space: ignored"
+                f"the glass at ({at.x:.2f}, {at.y:.2f}) m is in no wall beside free space: ignored;"
+                " glass is part of a wall, so leave its area out of the free space"
             )
     if outer:
         notes.append(f"windows in outer walls, through which nobody is seen: {outer}")

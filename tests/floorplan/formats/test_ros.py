@@ -436,6 +436,7 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
         ({"origin": "here"}, "a list [x, y, yaw]"),
         ({"origin": "[0, .nan, 0]"}, "origin[1] is nan"),
         ({"origin": [1e9, 0, 0]}, "too far out"),
+        ({"origin": [0, 0, 90]}, "more than a whole turn: 1.5708 if it is in degrees"),
         ({"negate": 2}, "negate is 2"),
         ({"negate": "maybe"}, 'negate is "maybe"'),
         ({"mode": "raw", "negate": 1}, "negate is 1 in mode raw"),
@@ -457,6 +458,8 @@ def test_wrong_settings_are_refused_with_the_reason(
         (b"[1, 2]", "holds a list: a floor plan is a YAML mapping"),
         (b"image: [", "not YAML"),
         (b"P5\n4 3\n255\n\xff\xfe\x00", "not a YAML text file"),
+        (b"image: map.pgm\n# Gr\xf6\xdfe", "line 2: byte 0xf6 is not UTF-8: save the file"),
+        ("image: map.pgm".encode("utf-16"), "line 1: byte 0xff is not UTF-8"),
         (b"mode: inorder\nposes: []\n", "not a ROS map: the key 'image' is missing"),
     ],
 )

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -116,8 +117,14 @@ def _read_text(path: Path, language: str) -> str:
         raise FloorPlanError(f"there is no file {path}: check floorplan.path") from None
     except OSError as error:
         raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
-    except UnicodeDecodeError:
+    except UnicodeDecodeError as error:
         _refuse_foreign(path, content[:65536])
+        if b"\0" not in content or content.startswith((BOM_UTF16_BE, BOM_UTF16_LE)):
+            line = content[: error.start].count(b"\n") + 1
+            raise FloorPlanError(
+                f"{path}, line {line}: byte {content[error.start]:#04x} is not UTF-8: save the file"
+                " with the encoding UTF-8"
+            ) from None
         raise FloorPlanError(
             f"{path} is not a {language} text file: check floorplan.path"
         ) from None

@@ -181,6 +181,11 @@ def _origin(value: object) -> tuple[float, float, float]:
         raise FloorPlanError(
             f"origin is {shown_value(value)}: too far out for coordinates in metres"
         )
+    if abs(yaw) > 2 * math.pi:
+        raise FloorPlanError(
+            f"origin turns the map by {yaw:g} radians, which is more than a whole turn:"
+            f" {math.radians(yaw):.6g} if it is in degrees"
+        )
     return x, y, yaw
 
 
