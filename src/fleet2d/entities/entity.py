@@ -136,11 +136,10 @@ class User(Entity):
     uses_furniture: ClassVar[bool] = True
     uses_portals: ClassVar[bool] = True
 
-    @model_validator(mode="after")
-    def _sees_what_is_there(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse errors of perception."""
         if self.camera is not None and self.camera.perception is not None:
             raise problem_at(("camera", "perception"), "users see robots as they are: leave it out")
-        return self
 
     @property
     def tall(self) -> float:

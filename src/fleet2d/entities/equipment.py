@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from datetime import timedelta
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem_at
@@ -186,8 +186,8 @@ class Localization(Settings):
     left: Length = Field(default=0.0, ge=0, le=10)
     relocalizes: PositiveDuration | None = None
 
-    @model_validator(mode="after")
-    def _jumps_at_most_once(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse jumps more frequent than corrections."""
         if self.corrected_every > MAX_CORRECTION_INTERVAL:
             raise problem_at(("corrected_every",), "at most a day is between two corrections")
         expected = self.jumps_per_hour * self.corrected_every / timedelta(hours=1)
@@ -197,7 +197,6 @@ class Localization(Settings):
                 f"{expected:g} jumps between two corrections: at most one is possible;"
                 " correct more often, or have fewer",
             )
-        return self
 
 
 class Displacement(NamedTuple):

@@ -1,8 +1,8 @@
 """Objects of a home that have a state during a run, and doors."""
 
-from typing import ClassVar, Self
+from typing import ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Component, Settings, register
 from fleet2d.configuration.problems import did_you_mean, problem
@@ -36,11 +36,10 @@ class Turn(Settings):
     open: bool | None = None
     locked: bool | None = None
 
-    @model_validator(mode="after")
-    def _does_something(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse a turn without effect."""
         if self.open is None and self.locked is None:
             raise problem("nothing happens then: give 'open' or 'locked', true or false")
-        return self
 
 
 @register("object", "door")
@@ -66,12 +65,11 @@ class Door(HomeObject):
     closes_after: PositiveDuration | None = Field(default=None, examples=["10 s"])
     schedule: tuple[Turn, ...] = ()
 
-    @model_validator(mode="after")
-    def _opens_by_day(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse a schedule that goes beyond midnight."""
         late = [turn.at for turn in self.schedule if turn.at >= DAY]
         if late:
             raise problem("a door's schedule ends at 23:59:59: write 00:00 for midnight")
-        return self
 
     def find(self, plan: FloorPlan) -> Doorway:
         """Return its doorway in a floor plan.

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 import shapely
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from shapely import Polygon
 
 from fleet2d.configuration.components import Settings
@@ -467,8 +467,8 @@ class HomeChange(Settings):
     lights: str | None = None
     turn: Literal["on", "off"] | None = None
 
-    @model_validator(mode="after")
-    def _is_one_change(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require exactly one change, with the key that belongs to it."""
         verbs = [verb for verb in VERBS if getattr(self, verb) is not None]
         if len(verbs) != 1:
             listed = " and ".join(verbs) or "nothing"
@@ -476,7 +476,6 @@ class HomeChange(Settings):
         for verb, further in (("move", "to"), ("room", "type"), ("lights", "turn")):
             if (verbs[0] == verb) != (getattr(self, further) is not None):
                 raise problem(f"'{verb}' and '{further}' go together")
-        return self
 
     @property
     def verb(self) -> str:

@@ -5,10 +5,10 @@ from datetime import timedelta
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.configuration.components import Settings
@@ -35,13 +35,12 @@ class SlowArea(Settings):
     speed: Share = Field(default=1.0, ge=0.01)
     stop: Duration = timedelta(0)
 
-    @model_validator(mode="after")
-    def _has_effect(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse sides that cross, and an area without effect."""
         if not Polygon(self.area).is_valid:
             raise problem_at(("area",), "the sides cross: give the corners in their order")
         if self.speed == 1 and not self.stop:
             raise problem("it slows nobody down: give 'speed' below 100 %, or 'stop'")
-        return self
 
     def on(self, lattice: Lattice) -> "SlowRegion":
         """Return the area on the lattice."""

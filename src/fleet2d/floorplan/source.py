@@ -7,7 +7,7 @@ from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -71,8 +71,8 @@ class RoomCorrection(Settings):
     name: str | None = Field(default=None, min_length=1)
     type: str | None = Field(default=None, min_length=1)
 
-    @model_validator(mode="after")
-    def _says_where_and_what(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a place or an outline, and something to correct."""
         if (self.at is None) == (self.polygon is None):
             raise problem("a room needs either 'at' (a point in it) or 'polygon' (its corners)")
         if self.at is not None and self.name is None and self.type is None:
@@ -81,7 +81,6 @@ class RoomCorrection(Settings):
             raise problem(
                 "polygon is not a valid outline: at least 3 corners, and no crossing sides"
             )
-        return self
 
 
 def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
@@ -253,15 +252,14 @@ class FurniturePiece(Settings):
     blocks: Blocks | None = None
     height: Length | None = Field(default=None, ge=0, le=MAX_HEIGHT_M)
 
-    @model_validator(mode="after")
-    def _check_type(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a known type, and a height that it can have."""
         error = partial(problem_at, ("type",), value=self.type)
         check_known(self.type, "furniture of type", sorted(FURNITURE), error)
         if self.height is not None and (self.blocks or FURNITURE[self.type].blocks) == "sight":
             raise problem_at(
                 ("height",), "what blocks sight reaches the ceiling: give blocks: path, too"
             )
-        return self
 
     def stand(self) -> PlacedObject:
         """Return the piece as an object, with unchecked places to use it from."""

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from enum import StrEnum
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
@@ -93,13 +93,12 @@ class Interaction(Settings):
     retry: Duration = timedelta(minutes=10)
     seek: bool = True
 
-    @model_validator(mode="after")
-    def _comes_up(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require one way in which it comes up."""
         if bool(self.at) == (self.every is not None):
             raise problem("it comes up by 'at' (times of day) or 'every' (a duration): give one")
         if self.fetch_from is not None and (self.do != "deliver" or self.fetch_from == self.to):
             raise problem("'fetch_from' is for `do: deliver`, and names another person than 'to'")
-        return self
 
     @property
     def people(self) -> list[str]:

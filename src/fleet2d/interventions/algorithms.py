@@ -1,8 +1,8 @@
 """Interventions on algorithms: what they have learned, and what others read of them."""
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
 from fleet2d.configuration.components import register
@@ -57,8 +57,8 @@ class Replace(Lasting):
     frozen: bool = False
     withheld: bool = False
 
-    @model_validator(mode="after")
-    def _is_one_output(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require exactly one replacement, without negative weights."""
         if sum(map(bool, (self.rooms, self.values, self.frozen, self.withheld))) != 1:
             raise problem(
                 "give exactly one of 'rooms', 'values', 'frozen: true' and 'withheld: true'"
@@ -66,7 +66,6 @@ class Replace(Lasting):
         for room, weight in self.rooms.items():
             if weight < 0:
                 raise problem(f"rooms.{room}: weight {weight:g} is negative")
-        return self
 
     def check(self, world: World) -> None:
         """Refuse an unknown algorithm or room."""

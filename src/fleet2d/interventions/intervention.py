@@ -525,8 +525,8 @@ class Entry(Settings):
             line["loc"] = line["loc"][1:]
         return line
 
-    @model_validator(mode="after")
-    def _has_one_time(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require one time or event, and keys that go with it."""
         if (self.at is None) == (self.on is None):
             raise problem("give exactly one of 'at' (a time) and 'on' (an event)")
         if self.on is None and self.delay:
@@ -536,7 +536,6 @@ class Entry(Settings):
                 "'each' goes with an event, or a time that comes again, like '19:00' or 'monday"
                 " 07:30'"
             )
-        return self
 
     @model_serializer(mode="wrap")
     def _flatten_act(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """Interventions on robots: calls, batteries, faults, and what they perceive."""
 
 from datetime import timedelta
-from typing import ClassVar, Self
+from typing import ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem, suggest
@@ -61,12 +61,11 @@ class Call(RobotIntervention):
     dock: bool = False
     command: str | None = Field(default=None, min_length=1)
 
-    @model_validator(mode="after")
-    def _is_one_command(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require exactly one command."""
         is_set = (self.to is not None, self.find is not None, self.dock, self.command is not None)
         if sum(is_set) != 1:
             raise problem("give exactly one of 'to', 'find', 'dock: true' and 'command'")
-        return self
 
     @property
     def order(self) -> Command:
@@ -191,11 +190,10 @@ class Switch(Lasting):
     camera: bool | str | None = None
     behavior: str | None = None
 
-    @model_validator(mode="after")
-    def _has_one_subject(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require exactly one subject."""
         if (self.behavior is None) == (not self.camera):
             raise problem("give exactly one of 'camera' (true, or a camera's name) and 'behavior'")
-        return self
 
     def check(self, world: World) -> None:
         """Refuse an unknown camera or behavior."""
@@ -275,14 +273,13 @@ class Fault(RobotIntervention, Lasting):
     detection: Share = 1.0
     errs: Perception | None = None
 
-    @model_validator(mode="after")
-    def _has_effect(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse a fault without effect."""
         body_fails = self.immobilizes or self.charger
         if not (body_fails or self.dark or self.detection < 1 or self.errs):
             raise problem(
                 "nothing fails: give 'wheels', 'lost', 'charger', 'dark', 'detection' or 'errs'"
             )
-        return self
 
     @property
     def immobilizes(self) -> bool:

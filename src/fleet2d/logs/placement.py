@@ -2,10 +2,10 @@
 
 import difflib
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, suggest
@@ -78,13 +78,12 @@ class LogFrame(Settings):
     origin: tuple[Length, Length] = (0.0, 0.0)
     matches: tuple[Match, ...] = ()
 
-    @model_validator(mode="after")
-    def _is_defined_in_one_way(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require one definition of the frame."""
         if self.matches and {"scale", "rotation_deg", "origin"} & self.model_fields_set:
             raise problem("give matches, or scale, rotation_deg and origin, and not both")
         if self.matches and len({match.log for match in self.matches}) < 2:
             raise problem("matches: two different places are needed at least")
-        return self
 
     def to_plan(self, xy: F64) -> F64:
         """Return positions of the log, float64 (n, 2), as positions in the plan [m]."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from pydantic import GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
@@ -93,8 +93,8 @@ class DurationDistribution(Settings):
             return {"law": "uniform", "at_least": data[0], "at_most": data[1]}
         return data
 
-    @model_validator(mode="after")
-    def _can_be_drawn(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require the parameters of the distribution, and durations that are possible."""
         if self.law == "uniform" and (self.at_least is None or self.at_most is None):
             raise problem("law uniform needs at_least and at_most")
         if self.law == "measured" and (
@@ -108,7 +108,6 @@ class DurationDistribution(Settings):
             )
         if (self.at_most or self.mean) < SECOND:
             raise problem("the longest duration is below one second: make it longer")
-        return self
 
     def table(self) -> Distribution:
         """Return the distribution as a table of quantiles [s]."""

@@ -73,15 +73,14 @@ class Period(Settings):
             return {"begins": data[0], "ends": data[1]}
         return data
 
-    @model_validator(mode="after")
-    def _goes_forward(self) -> "Period":
+    def model_post_init(self, _: object, /) -> None:
+        """Require local times in order."""
         if self.begins.tzinfo or self.ends.tzinfo:
             raise problem("times of a scenario are local: leave out the time zone")
         if self.ends <= self.begins:
             raise problem(
                 f"it begins at {self.begins}, which is not before its end at {self.ends}: swap them"
             )
-        return self
 
     def seconds_since(self, midnight: datetime) -> tuple[int, int]:
         """Return its beginning and end [s since a midnight]."""
@@ -213,8 +212,8 @@ class Household(Settings):
     welcome: Share = 0.0
     year: dict[str, YearEvent] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _names_members(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse names of people who are no members, and events of the year without effect."""
         named: list[tuple[Location, str]] = []
         named += [(("couples", i), n) for i, pair in enumerate(self.couples) for n in pair]
         named += [(("together", k, "who"), n) for k, t in self.together.items() for n in t.who]
@@ -238,7 +237,6 @@ class Household(Settings):
                 find_activity(joint.activity or name, {})
             except ValueError as error:
                 raise problem_at(("together", name), str(error)) from None
-        return self
 
     def bedrooms(self) -> dict[str, int]:
         """Return the number of each member's bedroom, from 0; couples share one."""

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
@@ -76,12 +76,11 @@ class Need(Settings):
     patience: Duration = timedelta(minutes=10)
     source: str = ""
 
-    @model_validator(mode="after")
-    def _leaves_time(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse needs that leave no time between two."""
         for key, waits in (("every", self.every), ("asleep", self.asleep)):
             if waits is not None and waits.table().mean() < seconds(SHORTEST_INTERVAL):
                 raise problem(f"'{key}' is less than 5 min on average: make it 5 min or longer")
-        return self
 
 
 class Errand(Settings):

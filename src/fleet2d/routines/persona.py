@@ -325,8 +325,8 @@ class YearEvent(Settings):
             return data
         return {**data, "dates": public_holidays(str(data["holidays"]))}
 
-    @model_validator(mode="after")
-    def _is_one_thing_at_one_time(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require one time and one change."""
         times = ("every", "yearly", "once", "season", "holidays")
         times_given = [name for name in times if getattr(self, name) is not None]
         if len(times_given) != 1 and times_given != ["every", "season"]:
@@ -339,7 +339,6 @@ class YearEvent(Settings):
             raise problem("a season and a holiday have their own length: leave out 'lasts'")
         if isinstance(self.once, tuple) and self.once[0] > self.once[1]:
             raise problem_at(("once",), f"{self.once[0]} is after {self.once[1]}: swap them")
-        return self
 
 
 class Persona(Settings):
@@ -375,10 +374,8 @@ class Persona(Settings):
         keys = ("leisure", "days", "activities", "needs", "errands", "year")
         return _without_nulls(data, keys)
 
-    @model_validator(mode="after")
-    def _is_complete(self) -> Self:
-        if any(self is loaded for loaded in _LOADED.values()):  # it was checked then
-            return self
+    def model_post_init(self, _: object, /) -> None:
+        """Require that every activity, day and event that is named exists."""
         for name, day in self.days.items():
             for task, fields in day.do.items():
                 self._check_activity(fields.activity or task, ("days", name, "do", task))
@@ -398,7 +395,6 @@ class Persona(Settings):
                 ("days",), f"no day is described for {', '.join(missing)}: add them to 'on'"
             )
         check(self)
-        return self
 
     def _check_year(self) -> None:
         for name, event in self.year.items():

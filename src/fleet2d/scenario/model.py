@@ -153,22 +153,17 @@ class SimulationSettings(Settings):
     speedup: float | None = Field(default=None, ge=0.001)
     daylight: Daylight | None = None
 
-    @model_validator(mode="after")
-    def _fits_the_calendar(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a start that calendars know, and at least one step."""
         # Agendas look a week back and a day ahead.
         if not 1900 <= self.start.year <= 7900:
             raise problem_at(("start",), f"expected a year from 1900 to 7900, got {self.start}")
-        return self
-
-    @model_validator(mode="after")
-    def _lasts_a_step(self) -> Self:
         if self.duration < self.step:
             raise problem_at(
                 ("duration",),
                 f"{format_duration(self.duration)} is shorter than one step, "
                 f"{format_duration(self.step)}",
             )
-        return self
 
     @property
     def steps(self) -> int:

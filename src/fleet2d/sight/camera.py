@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from decimal import Decimal
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import OneOf, Settings
 from fleet2d.configuration.problems import check_known, problem, problem_at
@@ -150,8 +150,8 @@ class Camera(Settings):
     body_points: int = Field(default=0, ge=0, le=MAX_POINTS)
     perception: Perception | None = None
 
-    @model_validator(mode="after")
-    def _range_is_ordered(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a range and a position within a home, and looks more frequent than forgetting."""
         near, far = self.range
         if not 0 <= near < far:
             raise problem(
@@ -161,10 +161,6 @@ class Camera(Settings):
             raise problem(f"range ends at {far:g} m: {MAX_DISTANCE_M:g} m is beyond any home")
         if max(map(abs, self.offset)) > MAX_DISTANCE_M:
             raise problem_at(("offset",), f"{MAX_DISTANCE_M:g} m from its body is beyond any home")
-        return self
-
-    @model_validator(mode="after")
-    def _looks_before_it_forgets(self) -> Self:
         patience = DEFAULT_PATIENCE if self.lost_after is None else self.lost_after
         if self.period is not None and self.period > patience:
             raise problem_at(
@@ -172,7 +168,6 @@ class Camera(Settings):
                 f"{format_duration(self.period)} is longer than lost_after,"
                 f" {format_duration(patience)}: each user would be lost between two looks",
             )
-        return self
 
     def lens(self, units_per_m: float, step_us: int) -> Lens:
         """Convert the camera to integer units: lattice units, parts of a turn, and steps.

@@ -6,12 +6,12 @@ from abc import abstractmethod
 from collections import OrderedDict
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Component, register
 from fleet2d.configuration.problems import problem_at
@@ -243,11 +243,10 @@ class VisibilityPolygon(FieldOfView):
     path: Path | None = None
     keep: int = Field(default=4096, ge=1)
 
-    @model_validator(mode="after")
-    def _path_goes_with_file(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a path if the regions are in a file, and only then."""
         if (self.path is not None) != (self.precompute == "file"):
             raise problem_at(("path",), "give 'path' with precompute: file, and only with it")
-        return self
 
     def start(self, home: Home) -> None:
         """Compute the regions of all cells, if configured."""

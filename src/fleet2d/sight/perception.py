@@ -232,15 +232,14 @@ class Detection(Settings):
     unlit: Curve = DARK_NIGHT
     memory: Duration = timedelta(0)
 
-    @model_validator(mode="after")
-    def _is_within_a_day(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require hours of the day."""
         for key, curve in (("light", self.light), ("unlit", self.unlit)):
             for hour, _ in curve.points:
                 if not 0 <= hour <= 24:
                     raise problem_at(
                         (key,), f"expected an hour of the day from 0 to 24, got {hour:g}"
                     )
-        return self
 
 
 class MistakenSpot(Settings):
@@ -270,10 +269,9 @@ class FalsePositives(Settings):
     spots: tuple[MistakenSpot, ...] = Field(default=(), max_length=64)
     looks_like: dict[str, Share] = Field(default={})
 
-    @model_validator(mode="after")
-    def _is_a_share(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require shares of identities that add up to at most 1."""
         _check_sum(("looks_like",), sum_in_order(self.looks_like.values()))
-        return self
 
 
 class Identity(Settings):
@@ -294,8 +292,8 @@ class Identity(Settings):
     confusion: dict[str, dict[str, Share]] = Field(default={})
     per_track: bool = False
 
-    @model_validator(mode="after")
-    def _are_distributions(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require distributions over other users."""
         for user, others in self.confusion.items():
             if user in others:
                 raise problem_at(
@@ -304,7 +302,6 @@ class Identity(Settings):
             total = sum_in_order(others.values())
             if abs(total - 1) > SUM_ERROR:
                 raise problem_at(("confusion", user), f"the shares add up to {total:g}, not to 1")
-        return self
 
 
 class Attributes(Settings):
@@ -329,8 +326,8 @@ class Attributes(Settings):
         default=None, examples=[{"cook": {"breakfast": 0.2}}]
     )
 
-    @model_validator(mode="after")
-    def _are_distributions(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require shares of mistakes that add up to at most 1."""
         confusions: dict[str, Mapping[Any, Mapping[Any, float]]] = {
             "posture": self.posture,
             "activity": self.activity or {},
@@ -342,7 +339,6 @@ class Attributes(Settings):
                         (key, true), f"{true!r} can't be mistaken for itself: leave it out"
                     )
                 _check_sum((key, true), sum_in_order(others.values()))
-        return self
 
 
 class Perception(Settings):
@@ -398,14 +394,13 @@ class Confusable(Settings):
         short = [{"type": "number"}, {"type": "string"}]
         return {"anyOf": [*short, super().__get_pydantic_json_schema__(schema, handler)]}
 
-    @model_validator(mode="after")
-    def _has_a_rate(self) -> "Confusable":
+    def model_post_init(self, _: object, /) -> None:
+        """Require one way to state the rate, and shares that add up to 1."""
         if sum(value is not None for value in (self.rate, self.kind, self.height)) != 1:
             raise problem("give one of rate, kind and height")
         total = sum_in_order(self.others.values())
         if self.others and abs(total - 1) > SUM_ERROR:
             raise problem_at(("others",), f"the shares add up to {total:g}, not to 1")
-        return self
 
     @property
     def share(self) -> float:
@@ -428,14 +423,13 @@ class TakenFor(PerceptionError):
     users: dict[str, Confusable] = Field(min_length=1)
     lasts: Duration = timedelta(seconds=5)
 
-    @model_validator(mode="after")
-    def _names_others(self) -> "TakenFor":
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse users who are taken for nobody or for themselves."""
         for name, confusable in self.users.items():
             if name == UNKNOWN:
                 raise problem_at(("users", name), "unknown is nobody: false_positives are for that")
             if name in confusable.others:
                 raise problem_at(("users", name, "others"), f"{name!r} is itself: leave it out")
-        return self
 
     def distort(self, sightings: CameraSightings) -> CameraSightings:
         """Give sightings of these users the names of others."""

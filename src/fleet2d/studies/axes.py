@@ -5,10 +5,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from fleet2d.bounds import VARIANTS
 from fleet2d.configuration.components import Settings
@@ -156,17 +156,16 @@ class Parameter(Settings):
     unit: str = ""
     choices: tuple[Any, ...] = ()
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a range or choices, not both."""
         if self.choices:
             if self.low is not None or self.high is not None:
                 raise problem("give low and high, or choices, not both")
-            return self
+            return
         if self.low is None or self.high is None or not self.low < self.high:
             raise problem("give low and high, low below high; or choices")
         if self.log and self.low <= 0:
             raise problem(f"low is {self.low:g}; with log it must be above 0")
-        return self
 
     def at(self, share: float) -> Any:
         """Return the value at a share of the range, from 0 to 1.
@@ -377,11 +376,10 @@ class ValuesAxis(Axis):
     values: tuple[Any, ...] = Field(min_length=1)
     labels: tuple[str, ...] = ()
 
-    @model_validator(mode="after")
-    def _as_many_labels(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require as many labels as values."""
         if self.labels and len(self.labels) != len(self.values):
             raise problem(f"there are {len(self.labels)} labels for {len(self.values)} values")
-        return self
 
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each value."""
@@ -413,8 +411,8 @@ class RangeAxis(Axis):
     log: bool = False
     unit: str = ""
 
-    @model_validator(mode="after")
-    def _step_or_count(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a step or a count, and a range that it fits."""
         first, last = self.range
         if (self.step is None) == (self.count is None):
             raise problem("give step, or count")
@@ -424,7 +422,6 @@ class RangeAxis(Axis):
             check_count((last - first) / self.step)
         if self.log and (first <= 0 or self.count is None):
             raise problem("log needs a count, and numbers above 0")
-        return self
 
     def numbers(self) -> list[float]:
         """Return the numbers, rounded so that 0.1 + 0.2 is 0.3.

@@ -53,15 +53,14 @@ class TuneSettings(Settings):
     batch: int = Field(default=4, ge=1)
     sampler: Annotated[dict[str, Any], BeforeValidator(_with_type)] = Field(default={})
 
-    @model_validator(mode="after")
-    def _prunes_by_one_objective(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse pruning by several objectives, and times that are not in order."""
         if self.prune_at and len(self.objectives) > 1:
             raise problem(
                 "prune_at needs one objective: with several objectives no trial can end early"
             )
         if list(self.prune_at) != sorted(set(self.prune_at)):
             raise problem("prune_at needs times in ascending order")
-        return self
 
 
 SEED = "seed"
@@ -114,11 +113,10 @@ class AdaptSettings(Settings):
     width: float | None = Field(default=None, gt=0)
     goal: Literal["minimize", "maximize"] | None = None
 
-    @model_validator(mode="after")
-    def _decides_something(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a criterion by which values are decided."""
         if self.width is None and self.goal is None:
             raise problem("give width, or goal, or both: else every value gets all seeds")
-        return self
 
 
 class PairedComparison(Settings):

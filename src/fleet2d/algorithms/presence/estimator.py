@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present, array_of, check_numbers
 from fleet2d.algorithms.evidence import Evidence
@@ -442,8 +442,8 @@ class LongTermPresence(PresenceAlgorithm):
     half_life: PositiveDuration | None = None
     interval: Share | None = Field(default=None, gt=0, lt=1)
 
-    @model_validator(mode="after")
-    def _check_interval(self) -> "LongTermPresence":
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse an interval that the estimator cannot give."""
         if self.interval is not None and self.by != "overall":
             raise problem(f"'interval' can't be combined with 'by: {self.by}': leave one out")
         if self.interval is not None and not self.estimator.has_interval:
@@ -451,7 +451,6 @@ class LongTermPresence(PresenceAlgorithm):
                 f"'interval: {self.interval:g}' needs an estimator that has intervals, and"
                 f" {self.estimator.type_name} has none: leave it out, or choose another"
             )
-        return self
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""

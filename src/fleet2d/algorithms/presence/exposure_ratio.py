@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
@@ -171,13 +171,12 @@ class AuditOnly(ExposureRatio):
     every: PositiveDuration = timedelta(hours=2)
     length: PositiveDuration = timedelta(minutes=15)
 
-    @model_validator(mode="after")
-    def _check_length(self) -> "AuditOnly":
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse audits that are longer than the time between two."""
         if self.length > self.every:
             raise problem(
                 f"length is {self.length}, but audits come every {self.every}: it can't be longer"
             )
-        return self
 
     def is_counted(self, evidence: Evidence) -> Bool:
         """Return whether each bin begins in an audit: bool (bins,)."""

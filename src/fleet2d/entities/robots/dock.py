@@ -1,9 +1,7 @@
 """Dock: drive to the charger before the battery is empty, and charge."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar, Self
-
-from pydantic import model_validator
+from typing import ClassVar
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -42,14 +40,13 @@ class Dock(Behavior):
     rest: bool = False
     avoid: tuple[str, ...] = ()
 
-    @model_validator(mode="after")
-    def _charges(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse a robot that would leave the charger and return at once."""
         if self.threshold >= self.until:
             raise problem(
                 f"it would leave the charger with {self.until:g}, but go there at"
                 f" {self.threshold:g}: 'until' must be above 'threshold'"
             )
-        return self
 
     def start(self, actor: Actor) -> None:
         """Check that there is a battery.

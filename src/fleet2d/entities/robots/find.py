@@ -2,10 +2,10 @@
 
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -199,11 +199,10 @@ class Find(BeliefBehavior):
     stay: Duration = timedelta(minutes=1)
     avoid: tuple[str, ...] = ()
 
-    @model_validator(mode="after")
-    def _begins(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse two ways to begin."""
         if self.at and self.every is not None:
             raise problem("it begins by 'at' (times of day) or 'every' (a duration), not by both")
-        return self
 
     def takes(self, command: Command) -> bool:
         """Return whether it looks for the person of a command."""

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem
@@ -60,13 +60,12 @@ class Patrol(Behavior):
     avoid: tuple[str, ...] = ()
     stop_at: Literal["middle", "view"] = "middle"
 
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require rooms or waypoints, not both."""
         if self.waypoints and self.rooms != "all":
             raise problem("rooms and waypoints are both given: keep one of them")
         if not self.waypoints and not self.rooms:
             raise problem("there is nowhere to go: name rooms, or waypoints, or leave out 'rooms'")
-        return self
 
     def start(self, actor: Actor) -> None:
         """Find the stops, and note what a robot that does nothing else never sees from them."""

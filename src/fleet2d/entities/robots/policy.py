@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -284,11 +284,10 @@ class Policy(BeliefBehavior):
     every: PositiveDuration = timedelta(hours=2)
     deadline: PositiveDuration = timedelta(minutes=10)
 
-    @model_validator(mode="after")
-    def _can_be_read(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require the format ONNX."""
         if self.file is not None and self.file.suffix != ".onnx":
             raise problem(f"expected a file with the suffix .onnx, got {self.file.name}")
-        return self
 
     def start(self, actor: Actor) -> None:
         """Choose where it stands in each room.

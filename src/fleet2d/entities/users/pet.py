@@ -1,9 +1,9 @@
 """Pet: a cat or a dog that sleeps most of the day, and roams through the home in between."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -48,12 +48,11 @@ class Pet(Behavior):
     spots: tuple[int, int] = (3, 12)
     stays_in_room: float = Field(default=0.6, ge=0, le=1)
 
-    @model_validator(mode="after")
-    def _has_a_range(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a range of spots."""
         least, most = self.spots
         if not 0 <= least <= most:
             raise problem(f"spots: expected [least, most] like [3, 12], got {list(self.spots)}")
-        return self
 
     def start(self, actor: "Actor") -> None:
         """Find the rooms that it may enter."""

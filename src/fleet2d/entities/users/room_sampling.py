@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from datetime import timedelta
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -70,14 +70,13 @@ class RoomSampling(Behavior):
         law="gamma", mean=timedelta(minutes=30), std=timedelta(minutes=20)
     )
 
-    @model_validator(mode="after")
-    def _makes_a_distribution(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require shares of which at least one is above 0."""
         for name, share in self.shares.items():
             if share < 0:
                 raise problem(f"the share of {name} is {share:g}: a share is 0 or more")
         if sum_in_order(self.shares.values()) <= 0:
             raise problem("all shares are 0: give one room a share above that")
-        return self
 
     def start(self, actor: "Actor") -> None:
         """Find the rooms; those of a kind have equal parts of its share."""

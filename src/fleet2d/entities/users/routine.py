@@ -5,9 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple, Self
-
-from pydantic import model_validator
+from typing import TYPE_CHECKING, NamedTuple
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
@@ -326,8 +324,8 @@ class Routine(ResidentBehavior):
     away: tuple[AnyPeriod, ...] = ()
     visits: tuple[AnyPeriod, ...] = ()
 
-    @model_validator(mode="after")
-    def _is_one_person(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse keys that belong in the household of a member."""
         if self.persona is not None and self.household is not None:
             raise problem(
                 "a member of a household has the persona that the household gives it: leave out"
@@ -340,7 +338,6 @@ class Routine(ResidentBehavior):
             )
         if self.household is not None and self.own_places:
             raise problem("members of a household have places of their own: leave out own_places")
-        return self
 
     def start(self, actor: "Actor") -> None:
         """Set up the days of the person, and find where the activities are done in the home."""

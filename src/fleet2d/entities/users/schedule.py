@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem, problem_at
@@ -37,11 +37,10 @@ class Item(Settings):
     dwell: Duration | None = None
     activity: str = ""
 
-    @model_validator(mode="after")
-    def _is_somewhere(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require a place, or to be away."""
         if self.away == (self.place is not None):
             raise problem("an item needs a place, or 'away: true', and not both")
-        return self
 
 
 class Agenda(Settings):
@@ -91,11 +90,10 @@ class Schedule(Behavior):
     days: tuple[Agenda, ...] = Field(min_length=1)
     rest: Place = ("living_room", "any")
 
-    @model_validator(mode="after")
-    def _days_are_possible(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse days that overlap or are not in order."""
         for number, day in enumerate(self.days):
             _entries(day, self.rest, number)
-        return self
 
     def start(self, actor: "Actor") -> None:
         """Resolve the week, and check that every place exists and can be reached."""
