@@ -361,8 +361,8 @@ class PartWriter:
             partial_file(Path(self.folder) / _part_name(planned)) as path,
             pa.OSFile(str(path), "wb") as file,
         ):
-            for name, schema in SCHEMAS.items():
-                with pa.ipc.new_stream(file, schema) as stream:
+            for name in SCHEMAS:
+                with pa.ipc.new_stream(file, tables[name].schema) as stream:
                     stream.write_table(tables[name])
 
 
@@ -385,7 +385,7 @@ def _join(
     records = {}
     for name, path in _files_of(root, shard).items():
         path.parent.mkdir(exist_ok=True)
-        table = pa.concat_tables(tables[name])
+        table = pa.concat_tables(tables[name]).unify_dictionaries()
         with partial_file(path) as partial:
             pq.write_table(table, partial, **_encoding(table))
         content = path.read_bytes()
@@ -398,15 +398,25 @@ def _join(
 
 
 def _encoding(table: pa.Table) -> dict[str, Any]:
-    """Return how a table is stored: steps and times as differences, other columns by their values.
+    """Return how a table is stored: steps and times as differences, texts by their values.
 
-    Most rows follow the one before by the same time, so this takes a third less room.
+    Most rows follow the one before by the same time, so this takes a third less room. The values of
+    a belief hardly repeat: their bytes are stored one place after the other.
     """
     moments = {"step", "next_step", "time"} & {*table.column_names}
+    beliefs = {"probability"} & {*table.column_names}
     return {
         "compression": "zstd",
-        "column_encoding": dict.fromkeys(moments, "DELTA_BINARY_PACKED"),
-        "use_dictionary": [name for name in table.column_names if name not in moments],
+        "compression_level": 3,
+        "column_encoding": {
+            **dict.fromkeys(moments, "DELTA_BINARY_PACKED"),
+            **dict.fromkeys(beliefs, "BYTE_STREAM_SPLIT"),
+        },
+        "use_dictionary": [
+            name for name in table.column_names if name not in moments and name not in beliefs
+        ],
+        "write_statistics": ["run", "step"],  # by which readers leave out parts of a file
+        "store_schema": False,  # that of the dictionaries: readers get texts
     }
 
 

@@ -108,19 +108,32 @@ class Whereabouts(NamedTuple):
         """Return the labels of some steps: place, next place and the step at which it begins."""
         k = np.searchsorted(self.begin, steps, side="right") - 1
         is_last = k + 1 == len(self.begin)
-        following = np.minimum(k + 1, len(self.begin) - 1)
-        a = np.searchsorted(self.since, steps, side="right") - 1
-        names = np.array([*self.activity, None], object)  # the last, at -1, is before the first
+        following = np.where(is_last, -1, k + 1)
         return {
-            "place": self.place[k],
-            "next_place": np.where(is_last, None, self.place[following]),
+            "place": text_array(self.place, k),
+            "next_place": text_array(self.place, following),
             "next_step": np.where(is_last, np.nan, self.begin[following]),
-            "activity": names[a],
+            "activity": text_array(
+                self.activity, np.searchsorted(self.since, steps, side="right") - 1
+            ),
         }
 
 
+def text_array(names: Sequence[str], index: I64) -> pa.DictionaryArray:
+    """Return names by their index, null where that is negative, without a copy of each.
+
+    Example:
+        >>> text_array(["office", "away", "office"], np.array([2, 1, 0, -1])).to_pylist()
+        ['office', 'away', 'office', None]
+    """
+    codes = {name: code for code, name in enumerate(dict.fromkeys(names))}
+    code_of = np.array([codes[name] for name in names] or [0], np.int32)
+    indices = pa.array(code_of[index], mask=index < 0)
+    return pa.DictionaryArray.from_arrays(indices, pa.array(np.array([*codes], object), pa.string()))
+
+
 def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, pa.Table]:
-    """Return the tables of a run of a data set.
+    """Return the tables of a run of a data set, with texts as dictionaries.
 
     Args:
         run: The run, in memory or stored.
@@ -136,8 +149,8 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         values = {"run": np.full(rows, number, np.int32), **columns}
         if "step" in columns:
             values["time"] = start + np.asarray(columns["step"], np.int64) * step_us
-        schema = SCHEMAS[name]
-        return pa.table([_array(values[field.name], field.type) for field in schema], schema=schema)
+        arrays = [_array(values[field.name], field.type) for field in SCHEMAS[name]]
+        return pa.table(arrays, names=SCHEMAS[name].names)
 
     rooms = run.plan.rooms
     made = {
@@ -155,7 +168,7 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         ),
     }
     bin_steps = max(1, 60_000_000 // step_us)
-    made["evidence"] = SCHEMAS["evidence"].empty_table()
+    made["evidence"] = empty_table("evidence")
     if EVIDENCE in run.tables:
         looks = run.arrow(EVIDENCE)
         columns = {name: looks[name] for name in ("room", "kind", "user", "watched", "seen")}
@@ -163,24 +176,33 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         made["evidence"] = table("evidence", columns, len(looks))
     every = max(1, labels // timedelta(microseconds=step_us))
     steps = np.arange(every - 1, int(manifest["steps"]), every)
-    parts = {user: whereabouts(run, user).at(steps) for user in users}
-    joined = {
-        name: np.concatenate([part[name] for part in parts.values()])
-        for name in ("place", "next_place", "next_step", "activity")
-        if parts
-    } or {name: np.array([]) for name in ("place", "next_place", "next_step", "activity")}
-    joined |= {"step": np.tile(steps, len(users)), "user": np.repeat(users, len(steps))}
-    made["labels"] = table("labels", joined, len(steps) * len(users))
-    made["beliefs"] = pa.concat_tables(
-        [SCHEMAS["beliefs"].empty_table()]
-        + [
-            table("beliefs", columns, len(columns["step"])).filter(
-                pc.not_equal(columns["user"], ANYONE)
-            )
-            for columns in (_belief(run, name) for name in run.tables if name.startswith(BELIEF))
-        ]
+    of_users = [
+        {"step": steps, "user": text_array([user], np.zeros(len(steps), np.int64))}
+        | whereabouts(run, user).at(steps)
+        for user in users
+    ]
+    made["labels"] = _joined("labels", [table("labels", own, len(steps)) for own in of_users])
+    of_models = [_belief(run, name) for name in run.tables if name.startswith(BELIEF)]
+    made["beliefs"] = _joined(
+        "beliefs",
+        [
+            table("beliefs", own, len(own["step"])).filter(pc.not_equal(own["user"], ANYONE))
+            for own in of_models
+        ],
     )
     return made
+
+
+def _joined(name: str, parts: Sequence[pa.Table]) -> pa.Table:
+    return pa.concat_tables(parts).unify_dictionaries() if parts else empty_table(name)
+
+
+def empty_table(name: str) -> pa.Table:
+    """Return a table of a run that has no rows."""
+    return pa.table(
+        [_array(np.array([], object), field.type) for field in SCHEMAS[name]],
+        names=SCHEMAS[name].names,
+    )
 
 
 def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") -> dict[str, Any]:
@@ -229,15 +251,21 @@ def _belief(run: "Run", name: str) -> dict[str, Any]:
     at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`
     return {
         "step": values_of(rows[at]),
-        "model": pa.repeat(name.removeprefix(BELIEF), len(rows)),
-        "user": _array(rows["user"], pa.string()),
+        "model": text_array([name.removeprefix(BELIEF)], np.zeros(len(rows), np.int64)),
+        "user": rows["user"],
         "place": rows["room"],
         "probability": share.ravel(),
     }
 
 
 def _array(values: Any, kind: pa.DataType) -> Any:
-    """Return values as an array of a type; NaN as null."""
+    """Return values as an array of a type, a dictionary for text; NaN as null."""
     if isinstance(values, pa.Array | pa.ChunkedArray):
-        return values.cast(kind)
-    return pa.array(values, kind, from_pandas=True)
+        if kind != pa.string():
+            return values.cast(kind)
+        return values if pa.types.is_dictionary(values.type) else values.dictionary_encode()
+    # Arrays, as Arrow imports pandas if it gets a list.
+    if isinstance(values, list):
+        values = np.array([*values, None], object)[:-1]
+    made = pa.array(values, kind, from_pandas=True)
+    return made.dictionary_encode() if kind == pa.string() else made

@@ -5,6 +5,7 @@ from datetime import timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
 
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.presence.belief import ANYONE, AWAY
@@ -17,8 +18,6 @@ from fleet2d.kernels import F64, I64, TracedEvidence, trace_evidence, trace_size
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     from fleet2d.runs.run import Run
 
 MIN_BELIEF = 1e-6
@@ -56,7 +55,7 @@ class Windows(NamedTuple):
         return np.expm1(self.features[:, -1, GAP].astype(np.float64)).round(1)
 
 
-def windows_of(tables: Mapping[str, "pa.Table"]) -> Iterator[Windows]:
+def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
     """Yield the windows of each person in the tables of a data set, in order of runs.
 
     There is a window for each stored belief of `routine` that has a label. Its features use
@@ -177,7 +176,7 @@ def _windows(
     )
 
 
-def _by_run(table: "pa.Table") -> dict[int, dict[str, Any]]:
+def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:
     """Return the columns of each run as arrays; runs are in order, and each in one piece."""
     run = table["run"].to_numpy()
     first = np.flatnonzero(np.diff(run, prepend=-1))
@@ -190,9 +189,15 @@ def _by_run(table: "pa.Table") -> dict[int, dict[str, Any]]:
 
 
 def _array(column: Any) -> Any:
-    if str(column.type) in ("string", "list<item: string>", "list<element: string>"):
+    if pa.types.is_list(column.type):
         return np.array([*column.to_pylist(), None], object)[:-1]
-    return column.to_numpy()
+    if pa.types.is_string(column.type):
+        column = column.dictionary_encode()
+    if not pa.types.is_dictionary(column.type):
+        return column.to_numpy()
+    whole = column.combine_chunks()
+    names = np.array([*whole.dictionary.to_pylist(), None], object)  # the last, at -1, is null
+    return names[whole.indices.fill_null(-1).to_numpy()]
 
 
 def joined(parts: Iterable[Windows]) -> dict[int, list[Windows]]:
