@@ -109,19 +109,19 @@ def _head(data: Dataset, file: DatasetFile) -> dict[str, Any]:
 
 def _count(data: Dataset, split: str) -> dict[str, Any]:
     """Return how much there is in a split, and how it is distributed."""
-    runs, labels = data.arrow("runs", split), data.arrow("labels", split)
+    runs = data.arrow("runs", split)
+    labels = data.polars("labels", split).group_by("run", "place", maintain_order=True).len()
     rooms = {
         (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
     }
     kinds: Counter[str] = Counter()
-    by_place = labels.group_by(["run", "place"], use_threads=False)
-    for row in by_place.aggregate([([], "count_all")]).to_pylist():
-        kinds[rooms.get((row["run"], row["place"]), AWAY)] += row["count_all"]
+    for run, place, count in labels.collect().iter_rows():
+        kinds[rooms.get((run, place), AWAY)] += count
     return {
         "runs": len(runs),
         "days": sum(runs["days"].to_pylist()),
         "homes": len(set(runs["home"].to_pylist())),
-        "labels": len(labels),
+        "labels": kinds.total(),
         "evidence": sum(
             record["rows"]
             for name, record in data.manifest["files"].items()

@@ -109,7 +109,7 @@ def _read(path: Path) -> "pa.Table":
     import pyarrow.parquet as pq
 
     try:
-        return pq.read_table(path, partitioning=None)
+        return pq.ParquetFile(path).read()  # `read_table` imports pandas
     except (OSError, pa.ArrowException) as error:
         raise InputError(f"{path} can't be read: {error}; make the data set again") from None
 

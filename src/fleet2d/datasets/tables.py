@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from fleet2d.algorithms.presence.belief import ANYONE
-from fleet2d.artifacts.arrow import values_of
+from fleet2d.artifacts.arrow import number_array, string_array, values_of
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.kernels import I64
 from fleet2d.runtime.clock import DAY_S
@@ -128,8 +127,8 @@ def text_array(names: Sequence[str], index: I64) -> pa.DictionaryArray:
     """
     codes = {name: code for code, name in enumerate(dict.fromkeys(names))}
     code_of = np.array([codes[name] for name in names] or [0], np.int32)
-    indices = pa.array(code_of[index], mask=index < 0)
-    return pa.DictionaryArray.from_arrays(indices, pa.array(np.array([*codes], object), pa.string()))
+    indices = number_array(code_of[index], pa.int32(), index < 0)
+    return pa.DictionaryArray.from_arrays(indices, string_array([*codes]))
 
 
 def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, pa.Table]:
@@ -186,7 +185,9 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
     made["beliefs"] = _joined(
         "beliefs",
         [
-            table("beliefs", own, len(own["step"])).filter(pc.not_equal(own["user"], ANYONE))
+            table("beliefs", own, len(own["step"])).filter(
+                number_array(values_of(own["user"]) != ANYONE, pa.bool_())
+            )
             for own in of_models
         ],
     )
@@ -200,7 +201,7 @@ def _joined(name: str, parts: Sequence[pa.Table]) -> pa.Table:
 def empty_table(name: str) -> pa.Table:
     """Return a table of a run that has no rows."""
     return pa.table(
-        [_array(np.array([], object), field.type) for field in SCHEMAS[name]],
+        [_array(np.zeros(0, np.int64), field.type) for field in SCHEMAS[name]],
         names=SCHEMAS[name].names,
     )
 
@@ -213,7 +214,9 @@ def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") 
         "home": [str(planned.labels["home"])],
         "household": [str(planned.labels["household"])],
         "varied": ["; ".join(varied)],
-        "users": [list(users)],
+        "users": pa.ListArray.from_arrays(
+            number_array(np.array([0, len(users)], np.int32), pa.int32()), string_array(users)
+        ),
         "seed": [planned.seed],
         "start": np.array([start]),
         "days": [float(run.manifest["simulated_s"]) / DAY_S],
@@ -235,11 +238,9 @@ def whereabouts(run: "Run", user: str) -> Whereabouts:
     is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
     since, activity = np.zeros(0, np.int64), np.zeros(0, object)
     if "events" in run.tables:
-        events = run.arrow("events")
-        is_own = pc.equal(events["event"].cast(pa.string()), "activity")
-        is_own = pc.and_(is_own, pc.equal(events["entity"].cast(pa.string()), user))
-        since = values_of(events.filter(is_own)["step"])
-        activity = np.array(events.filter(is_own)["detail"].to_pylist(), object)
+        events = columns_of(run, "events", ["event", "entity", "step", "detail"])
+        is_own = (events["event"] == "activity") & (events["entity"] == user)
+        since, activity = events["step"][is_own], events["detail"][is_own]
     return Whereabouts(begin[is_new], place[is_new], int(end[-1]), since, activity)
 
 
@@ -259,13 +260,15 @@ def _belief(run: "Run", name: str) -> dict[str, Any]:
 
 
 def _array(values: Any, kind: pa.DataType) -> Any:
-    """Return values as an array of a type, a dictionary for text; NaN as null."""
+    """Return values as an array of a type, a dictionary for text; NaN as null in whole numbers."""
     if isinstance(values, pa.Array | pa.ChunkedArray):
         if kind != pa.string():
             return values.cast(kind)
         return values if pa.types.is_dictionary(values.type) else values.dictionary_encode()
-    # Arrays, as Arrow imports pandas if it gets a list.
-    if isinstance(values, list):
-        values = np.array([*values, None], object)[:-1]
-    made = pa.array(values, kind, from_pandas=True)
-    return made.dictionary_encode() if kind == pa.string() else made
+    if kind == pa.string():
+        return text_array(values, np.arange(len(values)))
+    numbers = np.asarray(values)
+    missing = np.isnan(numbers) if kind in (pa.int32(), pa.int64()) else None
+    if missing is not None and missing.any():
+        numbers = np.where(missing, 0, numbers)
+    return number_array(numbers.astype(kind.to_pandas_dtype()), kind, missing)
