@@ -372,6 +372,23 @@ def test_nearest_is_the_nearest_cell_of_the_part() -> None:
     assert space.nearest(x, y, 7) is None
 
 
+@pytest.mark.parametrize("at", [(-3.0, -2.0), (0.0, 0.9), (2.5, 0.01), (6.9, 1.99), (9.0, 4.0)])
+@pytest.mark.parametrize("most", [1, 7, 200, 100_000])
+def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(
+    at: tuple[float, float], most: int
+) -> None:
+    space = Space(
+        build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
+    )
+    x, y = space.plan.lattice.point_at(at)
+    cells = np.argwhere(space.part_of_cell >= 0)
+    away = ((cells[:, ::-1] * 64 + 33 - [x, y]) ** 2).sum(axis=1)
+
+    found = space._by_distance(x, y, most)
+
+    assert cells[np.argsort(away, kind="stable")[:most]].tolist() == found.tolist()
+
+
 def test_copy_of_a_space_is_itself() -> None:
     space = Space(build_plan(shapely.box(0, 0, 2, 2)), 0.2)
 

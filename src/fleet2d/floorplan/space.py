@@ -39,6 +39,8 @@ from fleet2d.kernels import (
 ROUNDING = 3
 # Number of free cells that are tried for a way back into the space, nearest first.
 ESCAPE_ATTEMPTS = 200
+# The free cells nearest to a point are sought so many rows and columns round it first.
+NEAR_CELLS = 16
 # How far from the end of a portal a body may have to stand [m].
 PORTAL_REACH_M = 1.0
 SECOND_US = 1_000_000
@@ -238,16 +240,32 @@ class Space:
         self, x: int, y: int, most: int, part: int | None = None, room: int | None = None
     ) -> I64:
         """Return the free cells (row, column) nearest to a point, at most so many, in order."""
-        mask = self.part_of_cell >= 0 if part is None else self.part_of_cell == part
-        if room is not None:
-            mask = mask & (self.plan.room_of_cell == room)
-        cells = cells_of(mask)
-        xs, ys = self.plan.lattice.centre_axes()
-        away = (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
+        row, column = y // SUB, x // SUB
+        near = (
+            slice(max(0, row - NEAR_CELLS), max(0, row + NEAR_CELLS + 1)),
+            slice(max(0, column - NEAR_CELLS), max(0, column + NEAR_CELLS + 1)),
+        )
+        cells, away = self._distances_in(near, x, y, part, room)
+        # All others are farther away than the border of these.
+        if np.count_nonzero(away <= (NEAR_CELLS * SUB) ** 2) < most:
+            cells, away = self._distances_in((slice(0, None), slice(0, None)), x, y, part, room)
         if len(cells) > most:
-            near = away <= np.partition(away, most - 1)[most - 1]
-            cells, away = cells[near], away[near]
+            is_near = away <= np.partition(away, most - 1)[most - 1]
+            cells, away = cells[is_near], away[is_near]
         return cells[np.argsort(away, kind="stable")[:most]]
+
+    def _distances_in(
+        self, window: tuple[slice, slice], x: int, y: int, part: int | None, room: int | None
+    ) -> tuple[I64, I64]:
+        """Return the free cells (row, column) of some rows and columns; squared distances."""
+        parts = self.part_of_cell[window]
+        mask = parts >= 0 if part is None else parts == part
+        if room is not None:
+            mask = mask & (self.plan.room_of_cell[window] == room)
+        corner = np.array([window[0].start, window[1].start])
+        cells = cells_of(mask) + corner
+        xs, ys = self.plan.lattice.centre_axes()
+        return cells, (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
 
     def _corners(self) -> Corners:
         """Return the reflex vertices of the border, round which shortest ways bend."""

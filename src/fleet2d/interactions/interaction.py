@@ -229,6 +229,8 @@ class RequestQueue:
                 came_up.append(Request(name, each, due, due))
                 due = next(each.times(self.start, due + timedelta(microseconds=1)))
             self._next[name] = due
+        if not came_up and all(request.until > time for request in self.open):
+            return []
         requests = [*self.open, *came_up]
         self.open = [request for request in requests if request.until > time]
         self.open.sort(key=lambda request: (request.since, request.name))

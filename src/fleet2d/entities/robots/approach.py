@@ -293,6 +293,8 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     if route is None or _distance(person, position) <= reach:
         return position
     for start, end, length in zip(route[:-1], route[1:], _legs(route), strict=True):
+        if _distance(person, start) - length > reach + 2:  # rounded points are a little off the leg
+            continue
         steps = max(1, int(length / (lattice.units_per_m / 20)))
         points = start + (end - start) * np.arange(1, steps + 1)[:, None] // steps
         gaps = points - person
