@@ -152,7 +152,7 @@ class metric(_Value):
 
 
 class likeliest(WordSignal):
-    """The room that an algorithm's newest output gives the highest probability, for a user or not.
+    """The likeliest room by an algorithm's latest output: for one user, or of all its rows.
 
     None before the first output.
     """

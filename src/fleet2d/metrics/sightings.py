@@ -1,4 +1,4 @@
-"""Metrics of sightings: what of the home robots observe, and whom they see or confuse."""
+"""Metrics of sightings: how much of the home robots observe, whom they see, and mistake."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar

@@ -298,7 +298,7 @@ class Recording(NamedTuple):
 
 
 def to_recording(days: Sequence[RecordedDay]) -> Recording:
-    """Return recorded days with the index of their endings."""
+    """Return recorded days, indexed by when their activities end."""
     ends: dict[str, list[tuple[int, tuple[int, int]]]] = {}
     for d, day in enumerate(days):
         for i, name in enumerate(day.activities[:-1]):

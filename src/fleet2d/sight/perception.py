@@ -257,7 +257,7 @@ class MistakenSpot(Settings):
 
 
 class FalsePositives(Settings):
-    """People that are perceived but aren't there, at random with a rate per time of looking.
+    """People who are perceived but aren't there, at random, at a rate per unit of looking time.
 
     Attributes:
         per_hour: Rate per hour of looking, uniform over what is in view.

@@ -157,7 +157,7 @@ def doubly_robust(
 
 
 def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
-    """Return how much likelier each action is with another policy than it was."""
+    """Return importance weights: each action's probability by another policy over that logged."""
     if not len(log.text):
         raise InputError(
             "the log has no opportunity: `interact` records them with timing: NAME, an algorithm of"

@@ -203,7 +203,7 @@ def _training(plan: StudyPlan, settings: TuneSettings) -> list[tuple[int, str]]:
 
 
 def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
-    """Refuse to hold out what the training has under another name, such as a copy of a home's file.
+    """Refuse held-out variants that training has under another name, such as a copied home.
 
     Raises:
         ScenarioError: A held-out variant and one of the training differ by names of files only.

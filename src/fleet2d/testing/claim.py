@@ -158,7 +158,7 @@ def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, f
     ]
 
     def at_least(count: int, rate: float) -> float:
-        """Return the probability of that many trials that hold, or more, at a rate."""
+        """Return the probability that at least so many trials hold, at a given rate."""
         log_rate, log_rest = math.log(rate), math.log1p(-rate)
         terms = (logs[k] + k * log_rate + (number - k) * log_rest for k in counts[count:])
         return math.fsum(map(math.exp, terms))
@@ -368,7 +368,7 @@ class Claim:
 
     @cached_property
     def variants(self) -> tuple[Variant, ...]:
-        """The variants of the scenario along its axes, checked; without axes only itself."""
+        """The checked variants of the scenario along its axes; without axes, it alone."""
         if not self.varies:
             return (Variant(self.scenario),)
         from fleet2d.studies.design import build_design

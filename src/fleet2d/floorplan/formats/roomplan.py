@@ -76,7 +76,7 @@ class _Surface(BaseModel):
         return self.transform[13] - self.dimensions[1] / 2
 
     def height(self, floor_m: float) -> float | None:
-        """Return its height above the floor [m]: 0 for what hangs, None for that of its type."""
+        """Return its height above the floor [m]: 0 if it hangs; None: the usual one of its type."""
         if self.low_m - floor_m > RAISED_M:
             return 0.0
         return measured_height(self.kind, self.low_m + self.dimensions[1] - floor_m)

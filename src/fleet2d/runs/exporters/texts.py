@@ -201,7 +201,7 @@ class _Ways:
 
 
 def _event(row: dict[str, Any], poses: dict[str, Trajectory]) -> dict[str, Any]:
-    """Return an event at its place; without one if its entity isn't a body, or is away."""
+    """Return an event at the position of its body; without one if it has none, or is away."""
     way = poses.get(row["entity"])
     place = None
     if way is not None and len(way.step):
