@@ -229,9 +229,12 @@ def test_who_is_addressed_in_place_of_another_has_less_trust_in_the_robot() -> N
             "perception": {"identity": {"mistaken": 1.0}},  # it takes each for the other
         }
     }
-    run = fleet2d.run(home(users=users, robots=robots))
+    run = fleet2d.run(home(users=users, robots=robots, metrics={"interactions": {}}))
+    rows = table(run, "interactions")
+    (trust,) = rows["trust"][rows["outcome"] == "mistaken"][:1]
 
     assert "mistaken" in {event for _, event in events_of(run)}
+    assert 0.5 * 0.7 == pytest.approx(trust)
 
 
 def test_a_run_that_is_branched_goes_on_the_same() -> None:
