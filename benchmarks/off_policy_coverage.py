@@ -4,8 +4,8 @@
 
 Each life is lived under a policy that asks with probability 1/2. From its log three estimators tell
 how many yeses a policy that asks mostly by day, or mostly by night, would get in a day. The truth
-is the mean over as many other lives, lived under that policy. A row is a way of answering and a
-policy, a cell the share of lives whose 95 % interval contains the truth, and the mean error.
+is the mean over the same lives, lived under that policy. A row is a way of answering and a policy,
+a cell the share of lives whose 95 % interval contains the truth, and the mean error.
 """
 
 import argparse
@@ -118,14 +118,14 @@ def main() -> None:
     arguments = parser.parse_args()
     with ProcessPoolExecutor(arguments.jobs) as pool:
 
-        def lives(answers: str, policy: tuple[float, float], first: int) -> list[Any]:
+        def lives(answers: str, policy: tuple[float, float]) -> list[Any]:
             one: Callable[[int], Any] = partial(live, arguments.days, answers, policy)
-            return list(pool.map(one, range(first, first + arguments.lives), chunksize=4))
+            return list(pool.map(one, range(1, 1 + arguments.lives), chunksize=4))
 
         for answers in ANSWERS:
-            logs = lives(answers, LOGGED, 1)
+            logs = lives(answers, LOGGED)
             for name, policy in TARGETS.items():
-                other = lives(answers, policy, 1 + arguments.lives)
+                other = lives(answers, policy)
                 truth = float(np.mean([log.reward.sum() / log.days for log in other]))
                 told = [estimates(log, policy) for log in logs]
                 cells = []
