@@ -109,7 +109,9 @@ PIXELS = Bound("PIXELS", 1 << 24, "pixels")
 POLYGONS = Bound("POLYGONS", 5_000, "polygons and lines")
 """Polygons of a floor plan: rooms, furniture, features, doorways."""
 CORNERS = Bound("CORNERS", 25_000, "corners")
-"""Corners of all polygons of a floor plan."""
+"""Corners of the free space and the furniture of a floor plan, or of all polygons of a drawing."""
+ROOM_CORNERS = Bound("ROOM_CORNERS", 100_000, "corners of rooms")
+"""Corners of the rooms of a floor plan, which in a map are the corners of pixels on both sides."""
 CROSSINGS = Bound("CROSSINGS", 100_000, "places where it crosses itself")
 """Crossings of the outline of one room, wall or home with itself, which are repaired."""
 LOG_ROWS = Bound("LOG_ROWS", 5_000_000, "rows")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.bounds import CORNERS, POLYGONS
+from fleet2d.bounds import CORNERS, POLYGONS, ROOM_CORNERS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice, unit_hint
 from fleet2d.floorplan.mesh import (
@@ -256,8 +256,11 @@ class FloorPlan:
             entrance, doorways = _scaled(entrance, scale), _scaled(doorways, scale)
         lines = list(doorways or ())
         POLYGONS.check(len(regions) + len(objects) + len(lines), "it", FloorPlanError)
-        shapes = [free, *(region.shape for region in regions), *(o.footprint for o in objects)]
-        CORNERS.check(int(shapely.get_num_coordinates(shapes).sum()), "it", FloorPlanError)
+        for bound, shapes in (
+            (CORNERS, [free, *(thing.footprint for thing in objects)]),
+            (ROOM_CORNERS, [region.shape for region in regions]),
+        ):
+            bound.check(int(shapely.get_num_coordinates(shapes).sum()), "it", FloorPlanError)
         lattice, polygons = free_on_lattice(name, free, cell)
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
         passages: Passages | None = None

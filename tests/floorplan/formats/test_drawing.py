@@ -258,6 +258,20 @@ def test_room_that_is_open_to_the_outside_is_told_with_the_line_that_closes_it(
     assert read_image(path, 0.08, close_gaps=1.6).area_m2 > plan.area_m2 + 10
 
 
+def test_drawing_with_too_many_corners_is_straightened_by_a_pixel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pixels = HOME.copy()
+    y, x = np.indices(pixels.shape)
+    pixels[(x - 14) + 2 * (y - 14) < 60] = WALL  # a slanted wall of 30 steps
+    monkeypatch.setenv("FLEET2D_MAX_CORNERS", "40")
+
+    plan = read(tmp_path, pixels)
+
+    assert any("straightened by up to a pixel" in note for note in plan.notes)
+    assert shapely.count_coordinates(plan.polygons) < 40
+
+
 def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
     path = draw(tmp_path)
 

@@ -12,7 +12,7 @@ import fleet2d
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.ros import Ros
-from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.load import load_floorplan, save_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import U8
@@ -507,6 +507,23 @@ def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path: Path) -> None
 
     with pytest.raises(FloorPlanError, match="resolution is 0"):
         source.load()
+
+
+def test_home_found_in_a_map_that_is_just_not_too_large_is_read_after_it_is_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its rooms have twice the corners of its walls: runs in such homes could not be opened."""
+    y, x = np.indices((120, 60))
+    pixels = np.where((x > 1) & (y > 1) & (x + 2 * y < 260), FREE, OCCUPIED).astype(np.uint8)
+    pixels[60:62, :24] = pixels[60:62, 36:] = OCCUPIED
+    plan = read_ros(write(tmp_path, pixels))
+    walls = int(shapely.get_num_coordinates(plan.polygons).sum())
+    monkeypatch.setenv("FLEET2D_MAX_CORNERS", str(walls))
+
+    save_floorplan(plan, tmp_path / "home.json")
+
+    assert len(plan.rooms) == 2
+    assert plan == load_floorplan(tmp_path / "home.json")
 
 
 def test_map_with_too_many_corners_is_straightened_by_a_pixel(

@@ -8,6 +8,7 @@ import shapely
 from pydantic import Field
 from shapely import Polygon
 
+from fleet2d.bounds import CORNERS
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import (
@@ -52,12 +53,15 @@ class OccupancySource(PixelSource):
             and gaps in walls; 0 keeps all that is connected.
         bridge_pixels: Width of the widest gap between two parts of the home that opens, as at a
             threshold or a shut door; 0 opens none.
+        simplify: How far straightened walls may be from the pixels; 0: exact walls, or a pixel
+            where they have more corners than are read.
         path: The file.
     """
 
     speck_area_m2: float = Field(default=0.02, ge=0)
     ray_width: Length = Field(default=0.3, ge=0)
     bridge_pixels: int = Field(default=2, ge=0, le=10)
+    simplify: Length = Field(default=0.0, ge=0)
 
     path: InputPath
 
@@ -79,6 +83,15 @@ class OccupancySource(PixelSource):
 
     def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
         """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
+        tolerance, corners = self.simplify, shapely.get_num_coordinates(free)
+        if tolerance == 0 and corners > CORNERS.limit:
+            tolerance = pixel
+            notes.append(
+                f"walls are straightened by up to a pixel, since they have {corners} corners;"
+                f" {CORNERS.variable}={corners} in the environment keeps them exact"
+            )
+        if tolerance > 0:
+            free = _simplify(free, tolerance, notes)
         return FloorPlan.build(
             self.path.stem,
             free,
@@ -269,3 +282,17 @@ def _open_border(raw: OccupancyMap, home: Bool) -> list[str]:
             " is taken for a wall"
         )
     return notes
+
+
+def _simplify(free: Polygon, tolerance: float, notes: list[str]) -> Polygon:
+    """Return the polygon with fewer corners, if it stays valid."""
+    simple: Polygon = shapely.simplify(free, tolerance, preserve_topology=True)
+    if simple.is_empty or not simple.is_valid:
+        notes.append(f"walls are exact: straightening them within {tolerance:g} m would cross them")
+        return free
+    before, after = (shapely.count_coordinates(polygon) for polygon in (free, simple))
+    notes.append(
+        f"walls were straightened within {tolerance:g} m: {after} corners instead of {before}, and"
+        f" {simple.area - free.area:+.2f} m2"
+    )
+    return simple

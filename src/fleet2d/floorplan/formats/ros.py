@@ -7,13 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
-from pydantic import Field
-from shapely import Polygon
 
-from fleet2d.bounds import CORNERS
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import InputPath, Length
+from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
@@ -39,12 +35,9 @@ class Ros(PictureSource):
 
     Attributes:
         path: The map's YAML file; it names the image.
-        simplify: How far straightened walls may be from the map's pixels; 0: exact walls, or a
-            pixel where they have more corners than are read.
     """
 
     path: InputPath
-    simplify: Length = Field(default=0.0, ge=0)
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
@@ -68,15 +61,6 @@ class Ros(PictureSource):
             file, notes = _image_file(settings.image, self.path)
             picture = read_grey(file)
             free = self.home(self._occupancy(settings, picture, notes), picture, notes)
-            tolerance, corners = self.simplify, shapely.get_num_coordinates(free)
-            if tolerance == 0 and corners > CORNERS.limit:
-                tolerance = settings.resolution
-                notes.append(
-                    f"walls are straightened by up to a pixel, since they have {corners} corners;"
-                    f" {CORNERS.variable}={corners} in the environment keeps them exact"
-                )
-            if tolerance > 0:
-                free = _simplify(free, tolerance, notes)
             return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
 
     def _occupancy(
@@ -220,17 +204,3 @@ def _opaque(shades: Bool, picture: GreyPicture) -> Bool:
     """Return the opaque pixels of some shades, bool (rows, columns)."""
     pixels: Bool = shades[picture.values]
     return pixels if picture.clear is None else pixels & ~picture.clear
-
-
-def _simplify(free: Polygon, tolerance: float, notes: list[str]) -> Polygon:
-    """Return the polygon with fewer corners, if it stays valid."""
-    simple: Polygon = shapely.simplify(free, tolerance, preserve_topology=True)
-    if simple.is_empty or not simple.is_valid:
-        notes.append(f"walls are exact: straightening them within {tolerance:g} m would cross them")
-        return free
-    before, after = (shapely.count_coordinates(polygon) for polygon in (free, simple))
-    notes.append(
-        f"walls were straightened within {tolerance:g} m: {after} corners instead of {before}, and"
-        f" {simple.area - free.area:+.2f} m2"
-    )
-    return simple
