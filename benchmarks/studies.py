@@ -9,7 +9,9 @@ Run it on a machine that does nothing else.
 """
 
 import argparse
+import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -31,8 +33,6 @@ from fleet2d.studies.executors import (
     WorkerJob,
     WorkerTask,
 )
-from fleet2d.studies.plan import check_setups
-from fleet2d.studies.progress import forecast
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.records import VariantRecord, record_of
 from fleet2d.studies.simulator import VariantOutcome
@@ -89,20 +89,21 @@ def speedup(folder: Path, days: int = 5, seeds: int = 40) -> None:
 
 
 def driver(folder: Path, variants: int = 100_000) -> None:
-    """Print time and memory of a driver of many variants, in a process of its own."""
+    """Print time and memory of a driver of many variants: its first run, and going on with it."""
     speeds = [round(0.1 + i / 1000, 3) for i in range(variants // 1000)]
     study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 1000}
-    seconds = run(study, folder / "many", InstantExecutor())
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    files = sum(path.is_file() for path in (folder / "many").rglob("*"))
-    size = sum(path.stat().st_size for path in (folder / "many").rglob("*") if path.is_file())
-    print(
-        f"driver of {variants:,} variants: {seconds:.0f} s, {1000 * seconds / variants:.2f} ms"
-        f" each, {peak:.0f} MB at most, {files} files of {size / 1e6:.0f} MB"
-    )
-    start_s = time.perf_counter()
-    run_study(check_study(study), folder / "many", InstantExecutor(), RunOptions())
-    print(f"  going on with nothing to do: {time.perf_counter() - start_s:.1f} s")
+    for name in (f"driver of {variants:,} variants", "  going on with nothing to do"):
+        start_core_s = time.process_time()
+        seconds = run(study, folder / "many", InstantExecutor())
+        core_s = time.process_time() - start_core_s
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f"{name}: {seconds:.0f} s, {core_s:.0f} s of a core, {1000 * core_s / variants:.3f} ms"
+            f" each, {peak:.0f} MB at most",
+            flush=True,
+        )
+    sizes = [path.stat().st_size for path in (folder / "many").rglob("*") if path.is_file()]
+    print(f"  {len(sizes)} files of {sum(sizes) / 1e6:.0f} MB")
 
 
 def reading(folder: Path) -> None:
@@ -121,13 +122,10 @@ def reading(folder: Path) -> None:
         "again.summary('metric_1.ana.value', ['robots.astro.speed'])\n"
         "print(first - start_s, core_s, time.perf_counter() - first)\n"
     )
-    # As installed: pip compiles modules to bytecode unless it is told not to.
-    bytecode = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
-    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     command = [sys.executable, "-c", code]
     times = []
     for _ in range(6):  # the first compiles
-        text = subprocess.check_output(command, env={**os.environ, **bytecode, **paths})
+        text = subprocess.check_output(command, env={**os.environ, **_as_installed(folder)})
         times.append([float(seconds) for seconds in text.split()])
     first_s, core_s, again_s = map(min, zip(*times[1:], strict=True))
     print(
@@ -155,11 +153,13 @@ def forecast_cases() -> dict[str, dict[str, Any]]:
         return {"base": base, "axes": axes, "replicates": seeds, **keys}
 
     return {
-        "short": case("1 h", speeds, 200),
-        "long": case("90 d", speeds, 6),
-        "many homes": case("2 d", homes, 5),
-        "mixed": case("2 d", mixed, 15),
-        "tables": case("7 d", speeds, 30, keep={"tables": ["observations", "events"]}),
+        "400 runs of an hour": case("1 h", speeds, 200),
+        "12 runs of 90 days": case("90 d", speeds, 6),
+        "150 runs of 2 days in 30 homes": case("2 d", homes, 5),
+        "60 runs of 2 and of 20 days, two robots": case("2 d", mixed, 15),
+        "60 runs of 7 days with all observations": case(
+            "7 d", speeds, 30, keep={"tables": ["observations", "events"]}
+        ),
     }
 
 
@@ -177,21 +177,52 @@ def busy(processes: int) -> Iterator[None]:
 
 
 def forecasts(folder: Path, workers: int, cases: list[str]) -> None:
-    """Print how long studies are said to take, and how long they take."""
-    print("| study | other programs | said | taken |\n| --- | ---: | ---: | ---: |")
-    for name in cases:
+    """Print how long studies are said to take, and how long they take, as rows of docs/studies.md.
+
+    Each is a command of its own, with compiled modules, as it is for users.
+    """
+    folder.mkdir()
+    environment = {**os.environ, **_as_installed(folder)}
+    commands = [sys.executable, "-c", "from fleet2d.cli import main; main()", "study", "run"]
+
+    def command(*arguments: str | Path) -> tuple[str, float]:
+        start_s = time.perf_counter()
+        line = [*commands, *map(str, arguments), "--workers", str(workers)]
+        text = subprocess.check_output(line, env=environment, text=True)
+        return text, time.perf_counter() - start_s
+
+    ratios, inside = list[float](), 0
+    print("| study | said | taken | said, two programs more | taken |")
+    print("| --- | ---: | ---: | ---: | ---: |")
+    for number, name in enumerate(cases):
+        file, cells = folder / "study.yaml", list[str]()
+        file.write_text(json.dumps(forecast_cases()[name]))
+        if not number:
+            command(file, "--dry-run")  # compiles the modules
         for others in (0, workers):
             with busy(others):
-                start_s = time.perf_counter()
-                checked = check_study(forecast_cases()[name])
-                executor = LocalExecutor(workers)
-                check_setups(checked.plan, executor)
-                said = forecast(checked.plan, executor, time.perf_counter() - start_s)
-                seconds = run(forecast_cases()[name], folder / f"{name}{others}", executor)
-            low, high = said.shortest.total_seconds(), said.longest.total_seconds()
-            print(
-                f"| {name} | {others} | {low:.0f} to {high:.0f} s | {seconds:.0f} s |", flush=True
-            )
+                said, _ = command(file, "--dry-run")
+                _, taken_s = command(file, "--out", folder / f"{number}-{others}")
+            match = re.search(r"time: ([\d.]+) (\w+) to ([\d.]+) (\w+) by", said)
+            assert match, said
+            units = {"s": 1, "min": 60, "h": 3600}
+            low_s = float(match[1]) * units[match[2]]
+            high_s = float(match[3]) * units[match[4]]
+            cells += [f"{low_s:.0f} to {high_s:.0f} s", f"{taken_s:.0f} s"]
+            ratios.append((low_s + high_s) / 2 / taken_s)
+            inside += low_s <= taken_s <= high_s
+        print(f"| {' | '.join([name, *cells])} |", flush=True)
+    texts = ", ".join(f"{ratio:.2f}" for ratio in ratios)
+    print(f"\nmiddle of what is said over what is taken: {texts}; {inside} of {len(ratios)} inside")
+
+
+def _as_installed(folder: Path) -> dict[str, str]:
+    """Return the environment of commands whose modules are compiled, as pip installs them."""
+    return {
+        "PYTHONDONTWRITEBYTECODE": "",
+        "PYTHONPYCACHEPREFIX": str(folder / "bytecode"),
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+    }
 
 
 def months(folder: Path, workers: int) -> None:
@@ -229,8 +260,8 @@ def main() -> None:
             elif name == "driver":
                 driver(folder_of, 1_000 if arguments.small else arguments.variants)
             elif name == "forecasts":
-                cases = ["short"] if arguments.small else [*forecast_cases()]
-                forecasts(folder_of, arguments.workers, cases)
+                cases = [*forecast_cases()]
+                forecasts(folder_of, arguments.workers, cases[:1] if arguments.small else cases)
             else:
                 reading(folder_of)
 

@@ -44,6 +44,16 @@ def test_a_dry_run_prints_axes_variants_and_time_and_writes_nothing(fleet2d: Cli
     assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
 
 
+def test_a_dry_run_tells_the_line_of_a_number_that_no_run_has(fleet2d: Cli) -> None:
+    study = small(replicates=1, keep={"metrics": ["sightings.*", "room_share.ana.kitchn"]})
+    text = yaml.safe_dump(study, sort_keys=False)
+    Path("speeds.yaml").write_text(text)
+    code, _, err = fleet2d("study", "run", "speeds.yaml", "--dry-run", "--workers", "1")
+    line = 1 + text[: text.index("kitchn")].count("\n")
+    assert (0, True) == (code, f"note: speeds.yaml:{line}: 2 of 2 complete variants have" in err)
+    assert "no metric room_share.ana.kitchn" in err
+
+
 def test_status_tells_how_far_it_is(fleet2d: Cli) -> None:
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     expected = (0, "speeds: 4 of 4 variants complete, 0 failed, 0 to run\n", "")

@@ -67,6 +67,11 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
             r"exclude.0.b: there is no axis 'b'",
         ),
         ("rules: [{when: {b: 1}, set: {a.b: 1}}]\n", r"rules.0.when.b: there is no axis 'b'"),
+        (
+            "tune:\n  search: {s: {key: a.b, low: 0, high: 1}}\n  objectives: {m: minimize}\n"
+            "  held_out: {hme: [1]}\n",
+            r"study.yaml:4: tune.held_out.hme: there is no axis 'hme'",
+        ),
         ("compare: [{metric: x, against: {a: 1}}]\n", r"compare.0.against.a: there is no axis"),
         ("axes: {a: {key: a.b, values: [1], when: {b: 1}}}\n", r"no axis 'b'. The axes before it"),
     ],

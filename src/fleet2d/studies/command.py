@@ -293,7 +293,7 @@ def _print_plan(checked: "CheckedStudy", workers: int | None, begin_s: float) ->
     """Print the axes, the first variants, and the time that all will take."""
     from fleet2d.studies.executors import LocalExecutor, cores
     from fleet2d.studies.plan import check_setups
-    from fleet2d.studies.progress import forecast, in_words
+    from fleet2d.studies.progress import NoteObserver, forecast, in_words
 
     plan = checked.plan
     executor = LocalExecutor(workers or cores())
@@ -308,15 +308,16 @@ def _print_plan(checked: "CheckedStudy", workers: int | None, begin_s: float) ->
         _print(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
-    expected = forecast(plan, executor, checked_s)
+    expected = forecast(checked, executor, checked_s, NoteObserver())
     _print(
         f"\n{len(plan.variants)} variants, {len(plan.variants.home_keys)} homes,"
         f" {in_words(expected.simulated)} of simulated time: {in_words(expected.shortest)} to"
         f" {in_words(expected.longest)} by {executor.workers} workers here"
     )
     if expected.core_share < BUSY:
+        alone = in_words((expected.shortest + expected.longest) / 2 * expected.core_share)
         others = f"{100 * (1 - expected.core_share):.0f} %"
-        _print(f"other programs use {others} of the cores; the shorter time is without them")
+        _print(f"other programs use {others} of the cores: without them it takes about {alone}")
 
 
 def _print_failures(location: str) -> None:

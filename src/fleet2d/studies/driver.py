@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.problems import Location, did_you_mean
 from fleet2d.configuration.trust import Trust, current_trust, restrict
-from fleet2d.errors import Fleet2DError
+from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import (
     Design,
@@ -184,14 +184,23 @@ class StudyJob:
         with restrict(self.trust):
             return record_of(task, self._outcome(task))
 
+    def scenario(self, task: WorkerTask) -> Scenario:
+        """Return the scenario of a variant.
+
+        Raises:
+            Fleet2DError: It is wrong, or not as it was planned, since a file changed.
+        """
+        scenario = self.design.scenario(task.index)
+        inputs = input_hash(scenario, self._files)
+        if identity(content_hash(scenario_content(scenario)), inputs) != task.identity:
+            raise ComponentError(CHANGED_MESSAGE)
+        return scenario
+
     def _outcome(self, task: WorkerTask) -> VariantOutcome:
         try:
-            scenario = self.design.scenario(task.index)
-            inputs = input_hash(scenario, self._files)
+            scenario = self.scenario(task)
         except Fleet2DError as error:  # a file changed after the study was planned
             return VariantOutcome("failed", error=describe_error(error))
-        if identity(content_hash(scenario_content(scenario)), inputs) != task.identity:
-            return VariantOutcome("failed", error=CHANGED_MESSAGE)
         return execute(scenario, self.metrics, self.tables)
 
     def __post_init__(self) -> None:
@@ -349,8 +358,14 @@ class VariantSummary:
         file = checked.specification.file
         self.counts = Counts(0, 0, 0)
         self._others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
-        patterns = dict.fromkeys([*(c.metric for c in file.compare), *file.keep.metrics])
-        self._lacking = {pattern: 0 for pattern in patterns if pattern != "*"}
+        named: list[tuple[Location, str]] = [
+            *((("compare", i, "metric"), each.metric) for i, each in enumerate(file.compare)),
+            *((("keep", "metrics", i), each) for i, each in enumerate(file.keep.metrics)),
+        ]
+        named += [(("adapt", "metric"), file.adapt.metric)] if file.adapt else []
+        place = checked.specification.places.place
+        self._places = {name: place(location) for location, name in reversed(named)}
+        self._lacking = {name: 0 for _, name in named if name != "*"}
         self._metrics: list[str] = []
 
     def add(self, variants: "pa.Table") -> None:
@@ -379,8 +394,10 @@ class VariantSummary:
         for pattern, lacking in self._lacking.items():
             if lacking:
                 hint = did_you_mean(pattern, self._metrics) if lacking == complete else ""
+                place = self._places[pattern]
                 observer.on_note(
-                    f"{lacking} of {complete} complete variants have no metric {pattern}{hint}"
+                    f"{place}{': ' * bool(place)}{lacking} of {complete} complete variants have no"
+                    f" metric {pattern}{hint}"
                 )
 
 

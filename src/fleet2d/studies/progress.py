@@ -1,11 +1,13 @@
 """How long a study takes: a forecast before it runs, and a bar with the time left while it does."""
 
+import itertools
 import math
 import sys
+import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
@@ -13,37 +15,40 @@ import numpy as np
 
 from fleet2d.configuration.trust import restrict
 from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.kernels import F64
 from fleet2d.runtime.clock import DAY_S, HOUR_S
-from fleet2d.studies.driver import Observer
+from fleet2d.studies.directory import StudyDirectory
+from fleet2d.studies.driver import CheckedStudy, Observer, StudyJob, VariantSummary
 from fleet2d.studies.executors import Executor, FinishedTask, TaskSchedule, WorkerTask, cores
-from fleet2d.studies.plan import SetupJob, StudyPlan
-from fleet2d.studies.simulator import RunSpeed, measure
+from fleet2d.studies.plan import PlannedVariants
+from fleet2d.studies.records import VariantRecord, record_of, results_table
+from fleet2d.studies.simulator import RunSpeed, VariantOutcome, measure
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from fleet2d.studies.directory import Counts
-    from fleet2d.studies.records import VariantRecord
     from fleet2d.studies.tuning import TuneObserver
 
 
 MIN_RUNS = 5  # that have finished before the time left is estimated
 CONFIDENCE = 2.0  # standard errors: 95 %
 MIN_SAMPLES, MAX_SAMPLES = 4, 24  # variants that are measured for a forecast
+WARM_UP_S = 0.3  # processor time until a worker is as fast as in the middle of a study
 MEASURING_S = 15.0  # wall time after which MIN_SAMPLES are enough
-STRATA = 32  # of equal size, from which variants are drawn; a power of 2
 PRECISION = 0.1  # relative error at which they are enough, too
-MODEL_ERROR = 0.1  # of a forecast: the first days of a run differ from the others
+MODEL_ERROR = 0.15  # of a forecast: machines change their speed, runs their first days
+MIN_FREEDOM = 3  # of the differences within strata
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """The time that a study will take.
+    """The time that a study will take if other programs go on as they do now.
 
     Attributes:
         simulated: The simulated time of all variants.
-        shortest: The wall time if nothing else runs on this machine.
-        longest: The wall time if other programs use the machine as now.
+        shortest: The lower end of the wall time.
+        longest: The upper end.
         core_share: The share of a core that each worker got, 0 to 1.
     """
 
@@ -53,112 +58,206 @@ class Forecast:
     core_share: float
 
 
-@dataclass
-class SpeedJob(SetupJob):
-    """Measures the speed of variants, after a warm-up that loads all code."""
+@dataclass(frozen=True)
+class SpeedSample:
+    """What one variant of a study takes.
 
-    is_warm: bool = False
+    Attributes:
+        speed: The speed of its run.
+        home_s: The wall time of building its home; 0 if the worker had it [s].
+        warm_s: The wall time for which its worker was warmed up beyond loading all code [s].
+        record: Its results so far.
+    """
+
+    speed: RunSpeed
+    home_s: float
+    warm_s: float
+    record: VariantRecord
+
+
+@dataclass
+class SpeedJob(StudyJob):
+    """Does for some seconds what workers of a study do, after a warm-up that loads all code.
+
+    Attributes:
+        homes: The home of each task, by its number.
+    """
+
+    homes: Sequence[str] = ()
+    _built: set[str] = field(default_factory=set)
 
     def __call__(self, task: WorkerTask) -> Any:
-        """Return the speed of a variant; None if it fails."""
+        """Return the sample of a variant; None if it fails."""
+        home, is_first, first_s, warm_s = self.homes[task.number], not self._built, 0.0, 0.0
         try:
             with restrict(self.trust):
-                scenario = self.design.scenario(task.index)
-                if not self.is_warm:
-                    measure(scenario, max_s=0.0)
-                    self.is_warm = True
-                return measure(scenario)
+                if home not in self._built:
+                    first_s = self._measure(task, max_s=0.0)[0].setup_s
+                begin_s, begin_core_s = time.perf_counter(), time.process_time()
+                while is_first and time.process_time() - begin_core_s < WARM_UP_S:
+                    self._measure(task, max_s=0.0)
+                    warm_s = time.perf_counter() - begin_s
+                speed, outcome = self._measure(task)
         except Fleet2DError:  # a variant may fail without ending the study
             return None
+        self._built.add(home)
+        # The first set-up of a worker loads all code.
+        home_s = 0.0 if is_first else max(first_s - speed.setup_s, 0.0)
+        return SpeedSample(speed, home_s, warm_s, record_of(task, outcome))
+
+    def _measure(self, task: WorkerTask, max_s: float = 2.0) -> tuple[RunSpeed, VariantOutcome]:
+        return measure(lambda: self.scenario(task), self.metrics, self.tables, max_s)
 
 
-def forecast(plan: StudyPlan, executor: Executor, checked_s: float = 0.0) -> Forecast:
+def forecast(
+    checked: CheckedStudy,
+    executor: Executor,
+    checked_s: float = 0.0,
+    observer: Observer | None = None,
+) -> Forecast:
     """Measure the speed of some variants, on as many workers as will run the study.
 
     Args:
-        plan: The study.
+        checked: The study.
         executor: Its workers.
         checked_s: The wall time of all checks, which come before the runs of a study [s].
+        observer: Receives remarks about metrics that the measured variants lack.
 
     Raises:
         ComponentError: All measured variants fail.
     """
-    variants, begin_s = plan.variants, time.perf_counter()
-    count, start_s = len(variants), 0.0
-    places = _spread(count)
+    variants, begin_s, start_s = checked.plan.variants, time.perf_counter(), 0.0
+    strata = Strata(variants)
+    places = strata.places()
+    planned = [variants.task(place) for place in places]
     # Groups of one task each start in their order.
-    tasks = [WorkerTask(i, variants[at].index, "", str(i)) for i, at in enumerate(places)]
-    speeds, simulated_s = list[RunSpeed](), list[float]()
-    mean_simulated_s = variants.total_simulated_s / count
-    finished, tried = dict[int, RunSpeed | None](), 0
-    with closing(executor.run(SpeedJob(plan.design), TaskSchedule(tasks))) as events:
+    tasks = [replace(task, number=i, home=str(i)) for i, task in enumerate(planned)]
+    finished, measured, tried = dict[int, SpeedSample | None](), list[int](), 0
+    samples, speeds, total_s, error_s = list[SpeedSample](), list[RunSpeed](), 0.0, 0.0
+    job, homes = checked.job, [task.home for task in planned]
+    speed_job = SpeedJob(job.design, job.metrics, job.tables, job.trust, homes)
+    with closing(executor.run(speed_job, TaskSchedule(tasks))) as events:
         for number, event in enumerate(events):
-            speed = event.payload if isinstance(event, FinishedTask) else None
+            sample = event.payload if isinstance(event, FinishedTask) else None
             elapsed_s = time.perf_counter() - begin_s
-            if not number and speed is not None:
-                start_s = max(elapsed_s - speed.wall_s, 0.0)
-            finished[event.task.number] = speed
+            if not number and sample is not None:
+                measured_s = sample.warm_s + sample.speed.fixed_s + sample.speed.moving_s
+                start_s = max(elapsed_s - measured_s, 0.0)
+            finished[event.task.number] = sample
             # Those that finish early are short: a sample has all that began before its last.
-            while (speed := finished.get(tried)) is not None or tried in finished:
-                if speed is not None:
-                    speeds.append(speed)
-                    simulated_s.append(variants[places[tried]].simulated_s)
+            while tried in finished:
+                if (sample := finished[tried]) is not None:
+                    measured.append(places[tried])
+                    samples.append(sample)
+                    speeds.append(sample.speed)
                 tried += 1
-            if len(speeds) < MIN_SAMPLES:
+            if not samples:
                 continue
-            _, error = _mean_run(speeds, simulated_s, mean_simulated_s, count)
-            if error < PRECISION or elapsed_s - start_s > MEASURING_S:
+            total_s, error_s = strata.total(measured, speeds)
+            is_late = elapsed_s - start_s > MEASURING_S
+            if len(samples) >= MIN_SAMPLES and (is_late or error_s < PRECISION * total_s):
                 break
-    if not speeds:
+    if not samples:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
-    run_s, error = _mean_run(speeds, simulated_s, mean_simulated_s, count)
-    workers = min(executor.workers, count)
-    # The first variant finds its home built by the warm-up.
-    homes_s = len(variants.home_keys) * max(speed.home_s for speed in speeds)
-    wall_s = checked_s + start_s + (homes_s + count * run_s) / workers
-    longest_s = max(map(RunSpeed.seconds, speeds, simulated_s))
-    last_s = longest_s * (1 - 1 / workers)  # the others wait for the last worker
+    if observer is not None:
+        summary = VariantSummary(checked)
+        summary.add(results_table(sample.record.header for sample in samples))
+        summary.note_missing(observer)
+    workers = min(executor.workers, len(variants))
+    homes_s = max(len(variants.home_keys), workers) * max(sample.home_s for sample in samples)
+    wall_s = checked_s + start_s + (homes_s + total_s) / workers
+    if job.tables:
+        wall_s += _storing_s(samples) * variants.total_simulated_s
+    longest_s = float(strata.seconds(measured, speeds).max())
     core_share = float(np.mean([speed.core_share for speed in speeds]))
-    core_share = min(core_share * max(workers / cores(), 1.0), 1.0)  # not what workers share
-    error += MODEL_ERROR
+    error_s = error_s / workers + MODEL_ERROR * wall_s
     return Forecast(
         timedelta(seconds=variants.total_simulated_s),
-        timedelta(seconds=wall_s * core_share * max(1 - error, 0.0)),
-        timedelta(seconds=wall_s * (1 + error) + last_s),
-        core_share,
+        timedelta(seconds=max(wall_s - error_s, 0.0)),
+        timedelta(seconds=wall_s + error_s + longest_s * (1 - 1 / workers)),  # the last runs alone
+        min(core_share * max(workers / cores(), 1.0), 1.0),  # not what workers share
     )
 
 
-def _spread(count: int) -> list[int]:
-    """Return places of at most MAX_SAMPLES of `count` variants; the first few are far apart."""
-    parts = min(count, STRATA)
-    order = sorted(range(parts), key=lambda i: f"{i:b}".zfill(STRATA.bit_length())[::-1])
-    edges = np.arange(parts + 1) * count // parts
-    places = np.random.Generator(np.random.Philox(0)).integers(edges[:-1], edges[1:])
-    return [int(places[i]) for i in order[:MAX_SAMPLES]]
+class Strata:
+    """The variants of a study in blocks, from each of which some are measured.
 
-
-def _mean_run(
-    speeds: list[RunSpeed], simulated_s: list[float], mean_simulated_s: float, count: int
-) -> tuple[float, float]:
-    """Return the mean wall time of `count` runs [s] from some of them, and its relative error.
-
-    The lengths of all runs are known, so only the time for a simulated second is estimated, by
-    the ratio estimator (Cochran 1977, Sampling Techniques, chapter 6), beside that of a set-up.
-
-    Args:
-        speeds: Of the measured runs.
-        simulated_s: The lengths of the measured runs [s].
-        mean_simulated_s: The mean length of all runs [s].
-        count: The number of all runs.
+    A block has the variants of one combination, or of some that follow each other if there are
+    more than MAX_SAMPLES.
     """
-    setups_s, lengths_s = np.array([each.setup_s for each in speeds]), np.array(simulated_s)
-    moves_s = lengths_s / [each.speedup for each in speeds]
-    setup_s, ratio = float(setups_s.mean()), float(moves_s.sum() / lengths_s.sum())
-    mean_s, n = setup_s + ratio * mean_simulated_s, len(speeds)
-    residuals_s = setups_s - setup_s + moves_s - ratio * lengths_s
-    deviation_s = float(np.linalg.norm(residuals_s)) / math.sqrt(max(n - 1, 1))
-    return mean_s, CONFIDENCE * deviation_s / mean_s * math.sqrt(1 / n - 1 / count)
+
+    def __init__(self, variants: PlannedVariants) -> None:
+        """Divide variants into blocks."""
+        combination = variants.index // variants.seeds
+        _, block = np.unique(combination, return_inverse=True)
+        count = int(block[-1]) + 1
+        self._stratum = block * min(count, MAX_SAMPLES) // count
+        self._sizes = np.bincount(self._stratum)
+        self._lengths_s = variants.simulated_s[combination]
+
+    def places(self) -> list[int]:
+        """Return the places of at most MAX_SAMPLES variants, of all blocks in turn."""
+        random, count = np.random.Generator(np.random.Philox(0)), len(self._sizes)
+        # By reversed bits the first few blocks are far apart.
+        order = sorted(range(count), key=lambda i: f"{i:b}".zfill(count.bit_length())[::-1])
+        begins = np.cumsum(self._sizes) - self._sizes
+        drawn = [
+            (begin + random.choice(size, min(size, MAX_SAMPLES), replace=False)).tolist()
+            for begin, size in zip(begins.tolist(), self._sizes.tolist(), strict=True)
+        ]
+        rounds = itertools.zip_longest(*(drawn[stratum] for stratum in order))
+        places = (place for each in rounds for place in each if place is not None)
+        return list(itertools.islice(places, MAX_SAMPLES))
+
+    def total(self, places: Sequence[int], speeds: Sequence[RunSpeed]) -> tuple[float, float]:
+        """Return the wall time of all runs one after the other, and its error [s].
+
+        Lengths are known, so all runs are estimated from the mean time of a set-up and that of a
+        simulated second, and each block is corrected by what its measured runs differ from that:
+        the difference estimator of stratified samples (Särndal, Swensson and Wretman 1992, Model
+        Assisted Survey Sampling, chapter 6).
+
+        Args:
+            places: The places of the measured variants.
+            speeds: Their speeds.
+        """
+        fixed_s = np.array([speed.fixed_s for speed in speeds])
+        lengths_s, seconds = self._lengths_s[places], self.seconds(places, speeds)
+        fixed_mean_s = float(fixed_s.mean())
+        ratio = float((seconds - fixed_s).sum() / lengths_s.sum())
+        residuals_s = seconds - fixed_mean_s - ratio * lengths_s
+        stratum, sizes = self._stratum[places], self._sizes
+        counts = np.bincount(stratum, minlength=len(sizes))
+        means_s = np.bincount(stratum, residuals_s, len(sizes)) / np.maximum(counts, 1)
+        within_s, freedom = residuals_s - means_s[stratum], len(speeds) - int((counts > 0).sum())
+        deviation_s = float(np.linalg.norm(residuals_s)) / math.sqrt(max(len(speeds) - 2, 1))
+        within = np.linalg.norm(within_s) / math.sqrt(max(freedom, 1))
+        of_measured_s = float(within) if freedom >= MIN_FREEDOM else deviation_s
+        inverse = 1 / np.maximum(counts, 1) - 1 / sizes
+        errors_s = np.where(counts > 0, of_measured_s * np.sqrt(inverse), deviation_s)
+        total_s = len(self._stratum) * fixed_mean_s + ratio * float(self._lengths_s.sum())
+        total_s += float((sizes * means_s).sum())
+        return total_s, CONFIDENCE * float(np.linalg.norm(sizes * errors_s))
+
+    def seconds(self, places: Sequence[int], speeds: Sequence[RunSpeed]) -> F64:
+        """Return the wall time of each measured variant, whole and in a home that is there [s]."""
+        moving = [speed.moving_s / max(speed.simulated_s, 1e-6) for speed in speeds]
+        fixed_s = np.array([speed.fixed_s for speed in speeds])
+        return np.asarray(fixed_s + self._lengths_s[places] * moving)
+
+
+def _storing_s(samples: Sequence[SpeedSample]) -> float:
+    """Return the wall time of storing the tables of a simulated second [s]."""
+    storing_s = 0.0
+    for part in (samples[:1], samples):  # the first loads all code
+        with tempfile.TemporaryDirectory() as folder:
+            directory, begin_s = StudyDirectory(folder), time.perf_counter()
+            journal = directory.open_journal(())
+            for sample in part:
+                journal.append(sample.record)
+            directory.commit(journal, ())
+            storing_s = time.perf_counter() - begin_s
+    return storing_s / max(sum(sample.speed.simulated_s for sample in samples), 1e-6)
 
 
 @dataclass

@@ -3,7 +3,7 @@
 import copy
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -138,6 +138,13 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
             error=describe_error(error),
             trace="".join(traceback.format_exception(error)),
         )
+    return _outcome_of(run, metrics, tables, start_s)
+
+
+def _outcome_of(
+    run: "Run", metrics: Iterable[str], tables: Iterable[str], start_s: float
+) -> VariantOutcome:
+    """Return the results to keep of a run that began at a time of `perf_counter`."""
     wall_s: dict[str, float] = {**run.manifest["wall_s"], "total": time.perf_counter() - start_s}
     numbers = dict(flat_numbers(run.metrics))
     patterns = tuple(metrics)
@@ -180,51 +187,50 @@ class RunSpeed:
     """How fast a scenario runs on this machine.
 
     Attributes:
-        home_s: Wall time of building its home, which the variants of a home share [s].
-        setup_s: Wall time of setting it up in a home that is there, and of closing the run [s].
-        speedup: Simulated time over wall time between the two.
-        wall_s: Wall time of measuring it [s].
+        fixed_s: Wall time of building the scenario, setting it up, and closing the run [s].
+        moving_s: Wall time of the simulated time [s].
+        simulated_s: The simulated time that was run [s].
+        setup_s: Wall time of the set-up alone [s].
         core_share: Processor time over wall time: below 1 as far as other programs run.
     """
 
-    home_s: float
-    setup_s: float
-    speedup: float
-    wall_s: float = 0.0
+    fixed_s: float
+    moving_s: float
+    simulated_s: float
+    setup_s: float = 0.0
     core_share: float = 1.0
 
-    def seconds(self, simulated_s: float) -> float:
-        """Return the wall time of a run in a home that is there [s]."""
-        return self.setup_s + simulated_s / self.speedup
 
-
-def measure(scenario: Scenario, max_s: float = 2.0) -> RunSpeed:
-    """Run a scenario for some time to measure its speed.
+def measure(
+    build: Callable[[], Scenario],
+    metrics: Iterable[str],
+    tables: Iterable[str],
+    max_s: float = 2.0,
+) -> tuple[RunSpeed, VariantOutcome]:
+    """Run a scenario for some time to measure its speed; return the results so far, too.
 
     Args:
-        scenario: The scenario.
+        build: Returns the scenario.
+        metrics: Patterns of the numbers to keep.
+        tables: Names of the tables to keep.
         max_s: The longest wall time between set-up and end [s].
 
     Raises:
         Fleet2DError: The scenario is wrong, or a component failed.
     """
     start_s, start_core_s = time.perf_counter(), time.process_time()
-    Simulation(scenario)
+    scenario = build()
     built_s = time.perf_counter()
     simulation = Simulation(scenario)
     ready_s = time.perf_counter()
     hour = max(1, int(HOUR_S * 1e6 / simulation.clock.step_us))
     while not simulation.done and time.perf_counter() - ready_s < max_s:
         simulation.advance(min(hour, simulation.clock.steps - simulation.step))
-    end_s = time.perf_counter()
-    done_s = simulation.step * simulation.clock.step_us / 1e6
-    simulation.finish("interrupted")
-    setup_s, finished_s = ready_s - built_s, time.perf_counter()
-    wall_s = finished_s - start_s
-    return RunSpeed(
-        max(built_s - start_s - setup_s, 0.0),
-        setup_s + finished_s - end_s,
-        done_s / max(end_s - ready_s, 1e-6),
-        wall_s,
-        min((time.process_time() - start_core_s) / wall_s, 1.0),
+    moving_s = time.perf_counter() - ready_s
+    outcome = _outcome_of(simulation.finish("interrupted"), metrics, tables, start_s)
+    wall_s, core_s = time.perf_counter() - start_s, time.process_time() - start_core_s
+    simulated_s = simulation.step * simulation.clock.step_us / 1e6
+    speed = RunSpeed(
+        wall_s - moving_s, moving_s, simulated_s, ready_s - built_s, min(core_s / wall_s, 1.0)
     )
+    return speed, outcome

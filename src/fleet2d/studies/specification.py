@@ -220,6 +220,9 @@ class StudyFile(Settings):
                 _check_columns(columns, [*known, SEED], ("compare", i, key), "axes")
         if self.adapt is not None:
             _check_columns(self.adapt.against, known, ("adapt", "against"), "axes")
+        if self.tune is not None:
+            columns = [*known, SEED]
+            _check_columns(self.tune.held_out, columns, ("tune", "held_out"), "axes")
         return self
 
     @property
