@@ -50,23 +50,7 @@ GLOSSARY = {
     "effect": "mean of the value less the mean of all values of its axis, within units",
     "share": f"share of the variance of runs; {RESIDUAL}: what axes and their pairs don't explain",
 }
-STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#2d3138}
-h1{font-size:1.6em}
-h2{font-size:1.25em;margin-top:2.2em;border-top:1px solid #d8dbe0;padding-top:1em}
-h3{font-size:1em;margin:1.4em 0 .3em}table{border-collapse:collapse;font-size:.85em;margin:.6em 0}
-th,td{padding:.2em .8em .2em 0;text-align:right;border-bottom:1px solid #e6e8ec}
-td{white-space:nowrap}td.text{white-space:normal}
-th:first-child,td:first-child,td.text,th.text{text-align:left}img{max-width:100%}
-th[title]{text-decoration:underline dotted #b0b5bd}dt{font-weight:600;float:left;margin-right:.5em}
-.warning{background:#fdf3e1;padding:.5em .8em;border-left:4px solid #c26a12}
-.files{font-size:.75em;color:#6b7078;margin:-.3em 0 1em}
-code,pre{font-size:.85em;background:#f4f5f7}pre{padding:.8em;overflow:auto}
-@page{margin:16mm}
-@media print{body{max-width:none;margin:0;font-size:10pt}h2,h3{break-after:avoid}
-table,img,dl{break-inside:avoid}pre{white-space:pre-wrap}.files{display:none}
-.warning{border:1px solid #c26a12}}
-"""
+STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def write_report(study: "Study", folder: Path) -> Path:

@@ -22,19 +22,7 @@ from fleet2d.viewer.run_facts import run_title
 
 MAX_TIMELINE_CHARS = 20_000_000
 """The maximum number of characters of a page that is embedded in a report."""
-STYLE = """
-:root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
-body { max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
-figure { margin: 1rem 0; background: #fff; border-radius: 6px; padding: .5rem; }
-img { width: 100%; height: auto; display: block; }
-figcaption { color: #555; }
-table { border-collapse: collapse; }
-th, td { text-align: left; padding: .15rem 1rem .15rem 0; border-bottom: 1px solid #8884; }
-td { font-variant-numeric: tabular-nums; }
-pre { overflow: auto; background: #8881; padding: .8rem; border-radius: 6px; }
-iframe { width: 100%; height: 48rem; border: 1px solid #8884; border-radius: 6px; }
-@media (prefers-color-scheme: dark) { figure { background: #181818; } figcaption { color: #aaa; } }
-"""
+STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def write_report(run: Run, path: Path) -> None:
