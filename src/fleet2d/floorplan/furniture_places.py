@@ -22,7 +22,7 @@ from fleet2d.floorplan.space import (
     BODY_RADIUS,
     Space,
     Window,
-    grow_shape,
+    grow_polygons,
     grown_cells,
     shrink,
     with_approaches,
@@ -396,15 +396,16 @@ class Interior:
         pieces of floor may in fact be connected, and too large to be cut off together.
         """
         plan, fixed = self.plan, len(self.plan.objects)
+        solid = [_solid(plan, plan.objects), *(_solid(plan, group) for group in self.groups)]
 
         @cache
         def before(radius: float) -> list[Polygon]:
-            return self._empty.get(radius) or _exact_space(plan, plan.objects, radius)
+            return self._empty.get(radius) or _exact_space(plan, solid[0], radius)
 
         def is_open(count: int) -> bool:
-            things = [*plan.objects, *chain.from_iterable(self.groups[:count])]
+            standing = list(chain.from_iterable(solid[: count + 1]))
             for radius in RADII:
-                large = _large(plan, _exact_space(plan, things, radius))
+                large = _large(plan, _exact_space(plan, standing, radius))
                 if len(large) > 1:
                     inside = shapely.point_on_surface(large)
                     if any(shapely.contains(part, inside).sum() > 1 for part in before(radius)):
@@ -414,7 +415,7 @@ class Interior:
         while not is_open(len(self.groups)):
             # The more furniture, the less is connected: find the first group too many.
             first = bisect_left(range(1, len(self.groups) + 1), True, key=lambda n: not is_open(n))
-            del self.groups[first]
+            del self.groups[first], solid[first + 1]
         self.objects = [*self.objects[:fixed], *chain.from_iterable(self.groups)]
 
     def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
@@ -479,8 +480,11 @@ class Interior:
         no two neighboring cells are free.
         """
         spaces: BodySpaces = {}
+        solid = _solid(self.plan, things)
         for radius, parts in self._spaces.items():
-            blocked = _blocked(self.plan, things, radius)
+            # Further by the rounding of a space, so that what is connected here is connected there.
+            reach = radius * self.plan.lattice.units_per_m + GRID
+            blocked = shapely.union_all(grow_polygons(solid, reach))
             spaces[radius] = []
             for part in parts:
                 pieces = _pieces(part, blocked)
@@ -526,21 +530,25 @@ def _body_spaces(plan: FloorPlan, widest: list[Polygon]) -> BodySpaces:
         plan: The plan.
         widest: The space of a body of `BODY_RADIUS` between its walls.
     """
-    thin = _exact_space(plan, plan.objects, THIN_RADIUS)
-    if plan.objects:
-        widest = _exact_space(plan, plan.objects, BODY_RADIUS)
+    solid = _solid(plan, plan.objects)
+    thin = _exact_space(plan, solid, THIN_RADIUS)
+    if solid:
+        widest = _exact_space(plan, solid, BODY_RADIUS)
     spaces = {BODY_RADIUS: widest, THIN_RADIUS: thin}
     if _has_narrow_places(plan, spaces):
-        spaces |= {radius: _exact_space(plan, plan.objects, radius) for radius in NARROW_RADII}
+        spaces |= {radius: _exact_space(plan, solid, radius) for radius in NARROW_RADII}
     return spaces
 
 
-def _exact_space(plan: FloorPlan, things: Iterable[PlacedObject], radius: float) -> list[Polygon]:
-    """Return the space of a body among objects, exactly as `Space` computes it [lattice]."""
+def _solid(plan: FloorPlan, things: Iterable[PlacedObject]) -> list[Polygon]:
+    """Return the footprints of the objects that bodies can't pass [lattice]."""
+    return [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
+
+
+def _exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> list[Polygon]:
+    """Return the space of a body among footprints, exactly as `Space` computes it [lattice]."""
     reach = radius * plan.lattice.units_per_m
-    solid = [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
-    blocked = [grow_shape(shapely.get_coordinates(shape), reach) for shape in solid]
-    return shrink(plan.polygons, reach, blocked)
+    return shrink(plan.polygons, reach, grow_polygons(solid, reach))
 
 
 def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
@@ -553,14 +561,6 @@ def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
     reach = (1.09 * BODY_RADIUS - THIN_RADIUS) * plan.lattice.units_per_m
     near = MultiPolygon(wide).buffer(reach, join_style="mitre")
     return any(_large(plan, _pieces(part, near)) for part in thin)
-
-
-def _blocked(plan: FloorPlan, things: Iterable[PlacedObject], radius: float) -> BaseGeometry:
-    """Return where the middle of a body can't be because of objects [lattice]."""
-    # Further by the rounding of a space, so that what is connected here is connected in the space.
-    reach = radius * plan.lattice.units_per_m + GRID
-    solid = [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
-    return shapely.union_all([grow_shape(shapely.get_coordinates(s), reach) for s in solid])
 
 
 def _pieces(polygon: Polygon, without: BaseGeometry) -> list[Polygon]:

@@ -94,9 +94,9 @@ class Space:
         self.key: tuple[Any, ...] = ()  # the home's key of this space
         lattice = plan.lattice
         reach = radius * lattice.units_per_m
-        blocks = [np.asarray(o.exterior.coords) for o in obstacles]
-        blocks += [np.array(segment, np.float64) for segment in shut]
-        polygons = shrink(plan.polygons, reach, [grow_shape(block, reach) for block in blocks])
+        blocks = grow_polygons([Polygon(o.exterior) for o in obstacles], reach)
+        blocks += [grow_shape(np.array(segment, np.float64), reach) for segment in shut]
+        polygons = shrink(plan.polygons, reach, blocks)
         if not polygons:
             raise FloorPlanError(
                 f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
@@ -473,19 +473,33 @@ def grow_shape(corners: F64, radius: float) -> BaseGeometry:
         corners: Two ends, or the closed ring of an outline, float64 (n, 2).
         radius: The radius of the body [lattice].
     """
-    octagon = _octagon(radius)
     if len(corners) < 4:
-        return shapely.union_all(_grow_walls(corners, octagon))
-    solid = Polygon(corners)
-    if is_convex(solid):
-        ends = (corners[:-1, None] + octagon).reshape(-1, 2)
-        return MultiPoint(ends).convex_hull
-    return shapely.union_all([*_grow_walls(corners, octagon), solid])
+        return shapely.union_all(_grow_walls(corners, _octagon(radius)))
+    return grow_polygons([Polygon(corners)], radius)[0]
+
+
+def grow_polygons(polygons: Sequence[Polygon], radius: float) -> list[BaseGeometry]:
+    """Grow polygons without holes [lattice] by the octagon of a body; see `grow_shape`."""
+    octagon, solid = _octagon(radius), np.array(polygons, np.object_)
+    grown = np.empty(len(solid), np.object_)
+    is_round = shapely.area(solid) >= shapely.area(shapely.convex_hull(solid)) * (1 - CONVEX_SLACK)
+    corners, number = shapely.get_coordinates(solid[is_round], return_index=True)
+    ends = (corners[:, None] + octagon).reshape(-1, 2)
+    ends_of = shapely.multipoints(ends, indices=np.repeat(number, len(octagon)))
+    grown[is_round] = shapely.convex_hull(ends_of)
+    for i in np.flatnonzero(~is_round):
+        walls = _grow_walls(shapely.get_coordinates(solid[i]), octagon)
+        grown[i] = shapely.union_all([*walls, solid[i]])
+    return list(grown)
+
+
+# What an area may lack of that of its hull, by rounding.
+CONVEX_SLACK = 1e-9
 
 
 def is_convex(polygon: Polygon) -> bool:
     """Return whether a polygon is convex, but for rounding."""
-    return not polygon.interiors and polygon.area >= polygon.convex_hull.area * (1 - 1e-9)
+    return not polygon.interiors and polygon.area >= polygon.convex_hull.area * (1 - CONVEX_SLACK)
 
 
 def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:
