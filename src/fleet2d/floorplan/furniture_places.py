@@ -112,10 +112,10 @@ class RoomView:
         self._may_hold = self._whole & self.inside & ~doors
         self._from_doors = squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1]
         reach = max(1, count_cells(lattice.cell, WALL_REACH))
-        solid = [np.rot90(~self._whole, turn) for turn in range(4)]
-        self._behind = [_sums(cells_after(mask, reach, 0)) for mask in solid]
-        self._right = [_sums(cells_after(mask, reach, 1)) for mask in solid]
-        self._left = [_sums(cells_after(mask, -reach, 1)) for mask in solid]
+        # What is before walls in the direction of the rows of each turn: those on the left of a turn
+        # are behind the next one.
+        ahead = ((reach, 0), (-reach, 1), (-reach, 0), (reach, 1))
+        self._before_walls = [_sums(cells_after(~self._whole, *way)) for way in ahead]
 
     def places(
         self, group: FurnitureGroup, occupied: Bool, draws: Draws, score: Score | None = None
@@ -130,9 +130,10 @@ class RoomView:
                 returns points for each first cell, or None where no place has that turn.
         """
         empty = ~occupied[self.window]
+        sums = _sums(self._may_hold & empty), _sums(self._whole & empty)
         turns, rows, columns, points = [], [], [], []
         for turn in range(4):
-            options = self._options(group, turn, empty, score)
+            options = self._options(group, turn, sums, score)
             if options is not None:
                 turns.append(np.full(len(options[0]), turn))
                 rows.append(options[0])
@@ -158,28 +159,33 @@ class RoomView:
         return count_cells(self.lattice.cell, 0.2)
 
     def _options(
-        self, group: FurnitureGroup, turn: int, empty: Bool, score: Score | None
+        self, group: FurnitureGroup, turn: int, sums: tuple[I64, I64], score: Score | None
     ) -> tuple[I64, I64, I64] | None:
-        """Return the rows and columns of first cells where the group can be, and their points."""
+        """Return the rows and columns of first cells where the group can be, and their points.
+
+        Args:
+            group: The group.
+            turn: The turn.
+            sums: Of the cells that may hold furniture, and of those that may stay empty before it.
+            score: See `places`.
+        """
         width, depth = self._size(group)
         front = count_cells(self.lattice.cell, group.front)
-        free = np.rot90(self._may_hold & empty, turn)
-        high, wide = free.shape
+        high, wide = self.inside.shape[:: -1 if turn % 2 else 1]
         if depth + front > high or width > wide:
             return None
         extra = None if score is None else score(turn, (high, wide), (width, depth))
         if score is not None and extra is None:
             return None
-        possible = _count(free, depth, width) == depth * width
+        possible = _is_full(sums[0], turn, depth, width)
         if front:
-            before = _count(np.rot90(self._whole & empty, turn), front, width) == front * width
-            possible[: before.shape[0] - depth] &= before[depth:][: possible.shape[0]]
-            possible[max(before.shape[0] - depth, 0) :] = False
+            before = _is_full(sums[1], turn, front, width)[depth:]
+            possible = possible[: len(before)] & before
         if not possible.any():
             return None
         rows, columns = np.nonzero(possible)
         if group.wall:
-            touching = _in_box(self._behind[turn], rows, columns, 1, width)
+            touching = self._beside_wall(turn, turn, rows, columns, 1, width)
             backed = 10 * touching >= MIN_WALL_TENTHS * width
             rows, columns = rows[backed], columns[backed]
         points = self._points(group, turn, rows, columns)
@@ -193,14 +199,28 @@ class RoomView:
         width, depth = self._size(group)
         points = np.zeros(len(rows), np.int64)
         if group.corner:
-            right = _in_box(self._right[turn], rows, columns, depth, 1)
-            left = _in_box(self._left[turn], rows, columns + width - 1, depth, 1)
+            right = self._beside_wall(turn - 1, turn, rows, columns, depth, 1)
+            left = self._beside_wall(turn + 1, turn, rows, columns + width - 1, depth, 1)
             points += group.corner * np.maximum(left, right) // depth
         if group.away:
             far = count_cells(self.lattice.cell, FAR_M)
             distance = np.rot90(self._from_doors, turn)[rows + depth // 2, columns + width // 2]
             points += np.minimum(distance, far * far) * group.away // (far * far)
         return points
+
+    def _beside_wall(
+        self, side: int, turn: int, rows: I64, columns: I64, high: int, wide: int
+    ) -> I64:
+        """Return how many cells of boxes of the turned window are before a wall on a side of it."""
+        height, width = self.inside.shape
+        if turn == 1:
+            rows, columns = columns, width - rows - high
+        elif turn == 2:
+            rows, columns = height - rows - high, width - columns - wide
+        elif turn == 3:
+            rows, columns = height - columns - wide, rows
+        size = (wide, high) if turn % 2 else (high, wide)
+        return _in_box(self._before_walls[side % 4], rows, columns, *size)
 
     def _size(self, group: FurnitureGroup) -> tuple[int, int]:
         cell = self.lattice.cell
@@ -294,10 +314,12 @@ def _in_box(sums: I64, rows: I64, columns: I64, high: int, wide: int) -> I64:
     return sums[top, right] - sums[rows, right] - sums[top, columns] + sums[rows, columns]
 
 
-def _count(mask: Bool, high: int, wide: int) -> I64:
-    """Return how many cells of the mask are in the rectangle that begins at each cell."""
-    sums = _sums(mask)
-    return sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]
+def _is_full(sums: I64, turn: int, high: int, wide: int) -> Bool:
+    """Return whether a rectangle of the turned window has only cells of a mask, by first cell."""
+    if turn % 2:
+        high, wide = wide, high
+    counts = sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]
+    return np.rot90(counts == high * wide, turn)
 
 
 def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
