@@ -17,12 +17,18 @@ from tests.thorough import some
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furnish import RULES, furnish
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
-from fleet2d.floorplan.furniture_places import DOOR_CLEARANCE
+from fleet2d.floorplan.furniture_places import (
+    DOOR_CLEARANCE,
+    FurnitureGroup,
+    RoomView,
+    whole_cells,
+)
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import PRIORITY
 from fleet2d.floorplan.space import BODY_RADIUS, Space
+from fleet2d.runtime.determinism import Draws, stream_key
 
 # Cells of less than this may become a pocket beside furniture: no body's length fits into it.
 POCKET_M2 = 0.1
@@ -168,6 +174,43 @@ def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa() -> None:
     plan = furnish(one_room("living_room"))
     sofa, tv = plan.objects_of_type("sofa")[0], plan.objects_of_type("tv")[0]
     assert pytest.approx(np.pi) == abs(sofa.heading - tv.heading)
+
+
+def test_group_for_a_corner_is_tried_at_both_ends_of_every_wall() -> None:
+    plan = one_room("bedroom")
+    whole = whole_cells(plan)
+    nothing = np.zeros_like(whole)
+    view = RoomView(plan, plan.rooms[0], whole, nothing)
+    group = FurnitureGroup(1.0, 0.5, (), front=0.6, corner=40, away=0)
+    places = list(view.places(group, nothing, Draws(stream_key(1, "test", "corners"), 0)))
+    corners = set()
+    for turn, row, column in places[:8]:
+        high, wide = view.inside.shape[:: -1 if turn % 2 else 1]
+        ends = np.flatnonzero(np.rot90(view.inside, turn).any(axis=0))
+        side = "left" if column + 10 < wide / 2 else "right"
+        beside = column - ends[0] if side == "left" else ends[-1] + 1 - (column + 20)
+        assert row < high / 2
+        assert beside <= 3
+        corners.add((turn, side))
+
+    assert {(turn, side) for turn in range(4) for side in ("left", "right")} == corners
+
+
+def test_group_is_tried_only_where_it_and_the_floor_before_it_are_empty() -> None:
+    plan = one_room("bedroom")
+    whole = whole_cells(plan)
+    view = RoomView(plan, plan.rooms[0], whole, np.zeros_like(whole))
+    group = FurnitureGroup(1.4, 0.5, (), wall=False, front=0.9, corner=0, away=0)
+    draws, turns = Draws(stream_key(1, "test", "empty"), 0), set()
+    for seed in range(12):
+        occupied = np.random.default_rng(seed).random(whole.shape) < 0.0008
+        for turn, row, column in view.places(group, occupied, draws):
+            area = view.rectangle(group, turn, row, column)
+            assert sorted(np.shape(whole[area])) == [28, 28]
+            assert (whole & ~occupied)[area].all()
+            turns.add(turn)
+
+    assert {0, 1, 2, 3} == turns
 
 
 def test_rooms_of_no_known_type_get_nothing() -> None:

@@ -21,7 +21,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.space import ROUNDING, PointDistances, Space
+from fleet2d.floorplan.space import ROUNDING, PointDistances, Space, grow_polygons, grow_shape
 from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280
@@ -387,6 +387,19 @@ def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(
     found = space._by_distance(x, y, most)
 
     assert cells[np.argsort(away, kind="stable")[:most]].tolist() == found.tolist()
+
+
+def test_polygons_grow_together_as_each_does_alone() -> None:
+    hook = Polygon([(0, 0), (600, 0), (600, 600), (500, 600), (500, 100), (0, 100)])
+    polygons = [shapely.box(0, 0, 90, 40), hook, Polygon([(0, 0), (80, 10), (20, 70)])]
+    together = grow_polygons(polygons, 100)
+
+    alone = [grow_shape(shapely.get_coordinates(polygon), 100) for polygon in polygons]
+    assert together == alone
+    for polygon, grown in zip(polygons, together, strict=True):
+        assert grown.covers(polygon.buffer(100))
+        assert polygon.buffer(120).covers(grown)
+    assert [] == grow_polygons([], 100)
 
 
 def test_copy_of_a_space_is_itself() -> None:

@@ -112,8 +112,8 @@ class RoomView:
         self._may_hold = self._whole & self.inside & ~doors
         self._from_doors = squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1]
         reach = max(1, count_cells(lattice.cell, WALL_REACH))
-        # What is before walls in the direction of the rows of each turn: those on the left of a turn
-        # are behind the next one.
+        # Cells before walls, in the direction of the rows of each turn: the wall on the left of a
+        # turn is behind the next one.
         ahead = ((reach, 0), (-reach, 1), (-reach, 0), (reach, 1))
         self._before_walls = [_sums(cells_after(~self._whole, *way)) for way in ahead]
 
