@@ -2,6 +2,7 @@
 
 import copy
 import io
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -11,8 +12,14 @@ from tests.algorithms.presence.worlds import MONDAY, any_evidence, evidence_of, 
 
 import fleet2d
 from fleet2d.algorithms.presence.belief import BeliefSeries
-from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights
+from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights, shipped_weights
+from fleet2d.datasets.specification import plan_dataset
+from fleet2d.datasets.tables import tables_of
+from fleet2d.datasets.training import predict
+from fleet2d.datasets.windows import windows_of
 from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.kernels import F64
+from fleet2d.metrics.rtp_score import calibration_error
 
 LEARNED = {"rtp": {"type": "rtp", "model": "learned"}}
 
@@ -72,6 +79,45 @@ def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
 
     assert scores["log_loss"] < 0.9 * scores["reference_log_loss"]
     assert scores["ece"] < 0.1
+
+
+@pytest.mark.slow
+def test_it_is_calibrated_in_unseen_homes_with_unseen_people() -> None:
+    """The error is below 0.05; of beliefs that are too sure, too unsure or late it isn't."""
+    people = {
+        "runs": 6,
+        "homes": [{"synthetic": 6, "first": 4100, "settings": {"furnish": True}}],
+        "households": [["works_from_home"], ["night_shift"]],
+    }
+    base = {
+        "extends": "bundled:base",
+        "simulation": {"duration": {"days": 3}},
+        "robots": {
+            "astro": {"behaviors": [{"type": "patrol", "order": "random", "dwell": "10 min"}]}
+        },
+        "algorithms": {"ltp": None},
+    }
+    plan = plan_dataset({"base": base, "splits": {"test": people}, "beliefs": ["routine"]})
+    parts = [
+        (predict(shipped_weights(), part), part.truth)
+        for planned in plan.runs("test")
+        for part in windows_of(tables_of(fleet2d.run(planned.scenario), planned, plan.file.labels))
+    ]
+
+    def error(change: Callable[[F64], F64]) -> float:
+        width = max(belief.shape[1] for belief, _ in parts)
+        changed = [change(belief) for belief, _ in parts]
+        beliefs = [np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in changed]
+        return calibration_error(np.concatenate(beliefs), np.concatenate([t for _, t in parts]))
+
+    def tempered(belief: F64, temperature: float) -> F64:
+        power = belief ** (1 / temperature)
+        return np.asarray(power / power.sum(axis=1, keepdims=True))
+
+    assert error(lambda belief: belief) < 0.05
+    assert error(lambda belief: tempered(belief, 1.5)) > 0.08
+    assert error(lambda belief: tempered(belief, 1 / 1.5)) > 0.08
+    assert error(lambda belief: np.roll(belief, 5, axis=0)) > 0.08
 
 
 def test_a_branch_and_a_learned_state_go_on_alike(tmp_path: Path) -> None:
