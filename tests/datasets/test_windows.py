@@ -43,18 +43,23 @@ def test_there_is_a_window_for_each_belief_of_each_user(tables: dict[str, Any]) 
         assert np.abs(part.beliefs["routine"].sum(axis=1) - 1).max() < 1e-5
 
 
-def test_evidence_after_a_moment_changes_nothing_before(tables: dict[str, Any]) -> None:
-    """Every column of evidence is changed after three hours; features until then are the same."""
-    late = tables["evidence"]["step"].to_numpy() >= 3 * 3600
+@pytest.mark.parametrize("last", [8, 19, 25, 38])
+def test_evidence_after_a_window_changes_nothing_in_it(tables: dict[str, Any], last: int) -> None:
+    """Every column of evidence is changed from the step after a window on; features until then are
+    the same.
+    """
+    cut = int(features(tables)[0].step[last])
+    late = tables["evidence"]["step"].to_numpy() > cut
     assert late.any()
     evidence = tables["evidence"]
-    for column, value in (("watched", 0.123), ("seen", 59), ("user", "ana")):
+    for column, value in (("watched", 0.987), ("seen", 59), ("user", "ana")):
         evidence = changed(evidence, column, late, value)
 
     for one, other in zip(
         features(tables), features({**tables, "evidence": evidence}), strict=True
     ):
-        early = one.step < 3 * 3600
+        early = one.step <= cut
+        assert last + 1 == early.sum()
         assert np.array_equal(one.features[early], other.features[early])
         assert not np.array_equal(one.features, other.features)
 
