@@ -85,6 +85,14 @@ def test_remarks_are_printed_without_a_terminal(
     assert "note: no more than 2 seeds" in capsys.readouterr().err
 
 
+def test_rounds_that_a_study_did_not_need_are_not_called_new(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(2):
+        fleet2d.study(study(width=1e9), tmp_path / "study", executor="serial")
+    assert "new" not in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_workers_in_processes_decide_the_same(tmp_path: Path) -> None:
     content = study(width=1e9)

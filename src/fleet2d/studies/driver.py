@@ -312,12 +312,12 @@ def run_study(
         _write_plan(directory, checked, reconciled.plan)
         status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
         missing = np.flatnonzero(status[variants.number] != COMPLETE)
-        _describe(reconciled, directory, options.observer)
+        adapt = checked.specification.file.adapt
+        _describe(reconciled, directory, options.observer, is_adaptive=adapt is not None)
         keeper = _ResultKeeper(directory, parts)
         counts = Counts(len(variants), len(variants) - len(missing), 0)
         options.observer.on_start(counts, executor.workers)
         failed, is_checked = 0, False
-        adapt = checked.specification.file.adapt
         schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
         try:
             if adapt is not None:
@@ -469,8 +469,11 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
     directory.write_meta(meta)
 
 
-def _describe(reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer) -> None:
-    if 0 < reconciled.new < len(reconciled.plan.variants):
+def _describe(
+    reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer, *, is_adaptive: bool
+) -> None:
+    # Of an adaptive study they may be those of rounds that it doesn't need.
+    if 0 < reconciled.new < len(reconciled.plan.variants) and not is_adaptive:
         observer.on_note(f"{reconciled.new} variants are new in {directory.location}")
     if reconciled.set_aside:
         observer.on_note(f"{reconciled.set_aside} results no longer belong to the study: set aside")
