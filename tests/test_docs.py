@@ -51,7 +51,11 @@ def pages_with(language: str) -> list[object]:
 
 def scenarios() -> list[object]:
     found = [block for page in PAGES for block in blocks(page, "yaml")]
-    whole = [block for block in found if re.search(r"^simulation:", block.text, re.MULTILINE)]
+    whole = [
+        block
+        for block in found
+        if re.search(r"^(simulation:|extends: \w+\.yaml)", block.text, re.MULTILINE)
+    ]
     return [pytest.param(block, id=block.where) for block in whole]
 
 
