@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -203,16 +203,12 @@ class Robot(Entity):
             cameras = {f"camera_{i:02}": camera for i, camera in enumerate(cameras)}
         return {**data, "camera": None, "cameras": cameras}
 
-    @model_validator(mode="after")
-    def _localizes_by_sight(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Require cameras for what needs them, and one way to perceive."""
         if self.localization is not None and self.localization.relocalizes and not self.eyes:
             raise problem_at(("localization", "relocalizes"), "it needs a camera")
-        return self
-
-    @model_validator(mode="after")
-    def _perceives_in_one_way(self) -> Self:
         if self.perceives is None:
-            return self
+            return
         if not self.eyes:
             raise problem_at(
                 ("perceives",), "it needs a camera, from whose view follows what it watched"
@@ -223,7 +219,6 @@ class Robot(Entity):
                 ("perceives",),
                 "give 'perceives' or 'perception', not both, or perceives.besides_cameras: true",
             )
-        return self
 
     @property
     def eyes(self) -> dict[str, Camera]:

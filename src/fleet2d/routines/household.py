@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import (
     BeforeValidator,
@@ -151,13 +151,13 @@ class JointActivity(Timing):
     takes: AnyDurationDistribution | None = None
     probability: Share = 1.0
 
-    @model_validator(mode="after")
-    def _has_a_time(self) -> Self:
+    def model_post_init(self, context: object, /) -> None:
+        """Require a time and days."""
+        super().model_post_init(context)
         if self.at is None and self.between is None:
             raise problem("a joint activity needs 'at' or 'between'")
         if self.on is None and not self.dates:
             raise problem("a joint activity needs its days: 'on' or 'dates'")
-        return self
 
 
 class RandomVisits(Timing):
@@ -171,13 +171,13 @@ class RandomVisits(Timing):
     every: PositiveDuration
     takes: AnyDurationDistribution = DurationDistribution(mean=timedelta(hours=3))
 
-    @model_validator(mode="after")
-    def _has_a_time(self) -> Self:
+    def model_post_init(self, context: object, /) -> None:
+        """Require a time, and a day or more between two."""
+        super().model_post_init(context)
         if self.at is None and self.between is None:
             raise problem("visits need 'at' or 'between'")
         if self.every < DAY:
             raise problem_at(("every",), "visits come once a day at most: give 1 d or more")
-        return self
 
 
 def _check_size(members: Any) -> Any:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import date, timedelta
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import (
     BeforeValidator,
@@ -134,8 +134,8 @@ class Timing(Settings):
     spread: Duration = timedelta(minutes=15)
     between: tuple[TimeOfDay, TimeOfDay] | None = None
 
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse a mean outside of its limits."""
         if self.at is not None and self.between is not None:
             first, last = self.between
             at, last = self.at - first, last - first
@@ -145,7 +145,6 @@ class Timing(Settings):
                     f" {format_time_of_day(self.between[0])} to"
                     f" {format_time_of_day(self.between[1])}"
                 )
-        return self
 
 
 class Wake(Timing):
@@ -194,8 +193,9 @@ class Task(Timing):
     probability: Share = 1.0
     fixed: bool = False
 
-    @model_validator(mode="after")
-    def _has_one_time(self) -> Self:
+    def model_post_init(self, context: object, /) -> None:
+        """Require one time, and that of a fixed appointment."""
+        super().model_post_init(context)
         timed = self.at is not None or self.between is not None
         if timed + self.on_waking + self.before_bed > 1:
             raise problem(
@@ -205,7 +205,6 @@ class Task(Timing):
             raise problem("a fixed appointment needs 'at'")
         if self.fixed and self.between is not None:
             raise problem("a fixed appointment begins at 'at': leave out 'between'")
-        return self
 
 
 class Pastime(Settings):
@@ -252,14 +251,10 @@ class DayTemplate(Settings):
     def _drop_deleted(cls, data: Any) -> Any:
         return _without_nulls(data, ("do", "leisure"))
 
-    @model_validator(mode="after")
-    def _is_of_one_kind(self) -> Self:
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse recorded days beside drawn ones, and tasks that wait for each other."""
         if self.recorded and (self.do or self.leisure):
             raise problem_at(("recorded",), "give recorded days, or do and leisure: not both")
-        return self
-
-    @model_validator(mode="after")
-    def _order_is_possible(self) -> Self:
         for name, task in self.do.items():
             for other in task.after:
                 check_known(other, "task", self.do, partial(problem_at, ("do", name, "after")))
@@ -270,7 +265,6 @@ class DayTemplate(Settings):
                 waiting = ", ".join(n for n in self.do if n not in done)
                 raise problem_at(("do",), f"these tasks wait for each other: {waiting}")
             done.update(ready)
-        return self
 
     @property
     def weekdays(self) -> set[int]:
