@@ -110,6 +110,13 @@ def test_a_log_without_opportunities_is_refused() -> None:
         inverse_propensity(log, [])
 
 
+@pytest.mark.parametrize("target", [np.ones(3), np.full(COUNT, 1.2), np.full(COUNT, np.nan)])
+def test_a_target_that_is_no_probability_of_each_opportunity_is_refused(target: F64) -> None:
+    log, _ = world(1)
+    with pytest.raises(InputError, match="a probability from 0 to 1 for each of 150 opportunities"):
+        doubly_robust(log, target, 0.5)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_day_counts_what_it_has_however_many_opportunities(seed: int) -> None:
     """Days with many opportunities differ from those with few: the interval is that of the days."""

@@ -113,7 +113,8 @@ def inverse_propensity(
         The mean and its 95 % interval, in which days count as independent.
 
     Raises:
-        InputError: An action was drawn that the log says can't be, or the log has no opportunity.
+        InputError: An action was drawn that the log says can't be, the log has no opportunity, or
+            `target` isn't a probability for each.
 
     Example:
         >>> log = LoggedOpportunities(
@@ -147,13 +148,14 @@ def doubly_robust(
         The mean and its 95 % interval, in which days count as independent.
 
     Raises:
-        InputError: An action was drawn that the log says can't be, or the log has no opportunity.
+        InputError: An action was drawn that the log says can't be, the log has no opportunity, or
+            `target` isn't a probability for each.
     """
-    probability = np.asarray(target, np.float64)
+    weights, probability = _weights(log, target), np.asarray(target, np.float64)
     asked, waited = np.asarray(if_asked, np.float64), np.asarray(if_not, np.float64)
     expected = probability * asked + (1 - probability) * waited
     predicted = np.where(log.asked, asked, waited)
-    return _mean_of_days(log, expected + _weights(log, target) * (log.reward - predicted))
+    return _mean_of_days(log, expected + weights * (log.reward - predicted))
 
 
 def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
@@ -164,6 +166,12 @@ def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
             " type timing"
         )
     probability = np.asarray(target, np.float64)
+    fits = probability.shape in ((), log.chance.shape)
+    if not (fits and (probability >= 0).all() and (probability <= 1).all()):
+        raise InputError(
+            f"target: expected a probability from 0 to 1 for each of {len(log.text)} opportunities,"
+            f" or one for all, got an array of shape {probability.shape}"
+        )
     drawn = np.where(log.asked, log.chance, 1 - log.chance)
     if (drawn <= 0).any():
         raise InputError(
