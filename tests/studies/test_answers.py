@@ -94,6 +94,12 @@ def test_an_axis_that_applies_on_one_side_only_needs_no_partner() -> None:
     assert 64 == table["pairs"][0]
 
 
+@pytest.mark.parametrize("keys", [{"by": ("home", "method")}, {"within": ("method",)}])
+def test_what_is_compared_is_no_unit_and_no_group(keys: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="method is what is compared"):
+        compare(variants(), **keys)
+
+
 def test_without_pairs_there_is_no_answer() -> None:
     frame = variants().filter((pl.col("method") == "new") == (pl.col("home") < 4))
     with pytest.raises(InputError, match="no two variants differ by method alone"):

@@ -146,6 +146,13 @@ def test_paired_compares_the_same_seeds(study: Study) -> None:
     assert row["low"] < row["difference"] < row["high"]
 
 
+def test_values_of_a_population_can_be_compared(study: Study) -> None:
+    """Seeds are units of every other comparison, but not of one between seeds."""
+    table = study.paired("sightings.ana", {"seed": 0})
+    assert "n_seed" not in table.columns
+    assert len(table) == study.variants["seed"].n_unique() - 1
+
+
 def test_a_summary_has_a_row_for_each_value(study: Study) -> None:
     table = study.summary(SIGHTINGS, [SPEED])
     assert [0.3, 0.6] == table[SPEED].to_list()

@@ -72,6 +72,10 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
             "  held_out: {hme: [1]}\n",
             r"study.yaml:4: tune.held_out.hme: there is no axis 'hme'",
         ),
+        (
+            "axes: {a: {key: b.c, values: [1]}}\ncompare: [{metric: x, against: {a: 1}, by: [a]}]\n",
+            r"study.yaml:2: compare.0: a is what is compared: leave it out of by",
+        ),
         ("compare: [{metric: x, against: {a: 1}}]\n", r"compare.0.against.a: there is no axis"),
         ("axes: {a: {key: a.b, values: [1], when: {b: 1}}}\n", r"no axis 'b'. The axes before it"),
     ],

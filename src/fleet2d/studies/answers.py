@@ -58,6 +58,8 @@ def paired(
 
     ((axis, reference),) = against.items()
     check_axes((axis, *within), columns)
+    if axis in (*by, *within):
+        raise InputError(f"{axis} is what is compared: leave it out of `by` and `within`")
     rows = []
     for value, pairs in _all_pairs(frame, columns, metric, axis, reference):
         groups = pairs.partition_by(list(within), as_dict=True) if within else {(): pairs}

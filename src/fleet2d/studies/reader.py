@@ -284,7 +284,8 @@ class Study:
         frame = self._with_metric(metric)
         if variants is not None:
             frame = frame.filter(_polars().col(VARIANT).is_in(list(variants)))
-        return answers.paired(frame, self.columns, metric, against, self._units(by), within)
+        units = self._units(by, against)
+        return answers.paired(frame, self.columns, metric, against, units, within)
 
     def differences(self, metric: str, against: Mapping[str, Any], unit: str) -> "pl.DataFrame":
         """Return the mean difference to the reference in each unit, such as each home.
@@ -317,7 +318,7 @@ class Study:
         Raises:
             InputError: There is no such metric, axis or value, or less than two units.
         """
-        frame, units = self._with_metric(metric), self._units(by)
+        frame, units = self._with_metric(metric), self._units(by, against)
         return answers.power_table(
             frame, self.columns, metric, against, units, effect=effect, power=power
         )
@@ -353,8 +354,10 @@ class Study:
     def _fixed_axes(self) -> tuple[str, ...]:
         return tuple(c for c in self.columns if c not in self.meta.populations)
 
-    def _units(self, by: Sequence[str] | None) -> tuple[str, ...]:
-        units = tuple(self.meta.populations if by is None else by)
+    def _units(self, by: Sequence[str] | None, compared: Iterable[str] = ()) -> tuple[str, ...]:
+        units = tuple(by or ())
+        if by is None:
+            units = tuple(c for c in self.meta.populations if c not in compared)
         answers.check_axes(units, self.columns)
         return units
 

@@ -134,6 +134,14 @@ class PairedComparison(Settings):
     by: tuple[str, ...] | None = None
     within: tuple[str, ...] = ()
 
+    @model_validator(mode="after")
+    def _compares_an_axis_once(self) -> Self:
+        (axis,) = self.against
+        for key in ("by", "within"):
+            if axis in (getattr(self, key) or ()):
+                raise problem(f"{axis} is what is compared: leave it out of {key}")
+        return self
+
 
 def _numbers_or_count(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
