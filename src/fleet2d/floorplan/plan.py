@@ -224,6 +224,7 @@ class FloorPlan:
         glass: Sequence[Polygon] = (),
         notes: Sequence[str] = (),
         scale: float | None = None,
+        pixel: float = 0.0,
     ) -> Self:
         """Make a floor plan of free space and labels, both in metres.
 
@@ -244,6 +245,8 @@ class FloorPlan:
             glass: Areas of glass in walls, which may reach into the free space on both sides [m].
             notes: Sentences on anomalies in the source.
             scale: What all lengths but the cell and heights are multiplied by; None for 1.
+            pixel: Side of a pixel of the map that the free space was traced from [m]; 0 if from
+                none. Walls of coarse maps are thicker.
 
         Raises:
             FloorPlanError: There is no free space at this cell size, it would lose more area than
@@ -265,7 +268,7 @@ class FloorPlan:
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
         passages: Passages | None = None
         if doorways is None or regions_are != "exact":
-            polygons, passages = search_passages(lattice, polygons, regions_are)
+            polygons, passages = search_passages(lattice, polygons, regions_are, pixel)
         polygons = canonical_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         cells: Bool = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0

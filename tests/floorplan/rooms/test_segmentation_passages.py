@@ -234,3 +234,17 @@ def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(
     assert {frozenset(link.rooms) for link in plan.room_graph} == {
         frozenset(doorway.rooms) for doorway in plan.doorways
     }
+
+
+@pytest.mark.parametrize(("pixel", "rooms"), [(0.1, 2), (0.05, 1)])
+def test_doorway_in_a_wall_that_a_coarse_map_made_thicker_is_found(
+    pixel: float, rooms: int
+) -> None:
+    """A wall that is thicker than 0.6 m, since its pixels are wall if anything in them is."""
+    free = shapely.union_all(
+        [shapely.box(0, 0, 4, 4), shapely.box(4, 1.5, 4.65, 2.4), shapely.box(4.65, 0, 9, 4)]
+    )
+
+    plan = FloorPlan.build("flat", free, doorways=None, regions_are="none", pixel=pixel)
+
+    assert rooms == len(plan.rooms)

@@ -100,6 +100,7 @@ class OccupancySource(PixelSource):
             doorways=None,
             regions_are="none",
             notes=notes,
+            pixel=pixel,
         )
 
 

@@ -343,9 +343,9 @@ class Passages:
 
 
 def search_passages(
-    lattice: Lattice, polygons: list[Polygon], kind: RegionKind
+    lattice: Lattice, polygons: list[Polygon], kind: RegionKind, pixel: float = 0.0
 ) -> tuple[list[Polygon], Passages]:
-    """Find the passages of free space.
+    """Find the passages of free space, traced from a map of pixels [m] or, if 0, from none.
 
     Returns:
         The free space [lattice], with corners added where passages meet slanted walls; and the
@@ -357,7 +357,7 @@ def search_passages(
     directions = WallDirections.of(walls, lattice.units_per_m) if kind == "none" else None
     walls = _with_few_corners(walls, lattice.units_per_m)
     mesh = build_mesh(walls, lattice.columns, lattice.rows)
-    narrow = find_passages(mesh, walls, lattice.units_per_m, directions)
+    narrow = find_passages(mesh, walls, lattice.units_per_m, directions, pixel)
     lines = [_line(lattice, segment) for segment in narrow]
     polygons, fitted, _ = fit_lines(lattice, polygons, lines)
     segments = [segment for segment in fitted if segment is not None]

@@ -47,7 +47,9 @@ MAX_OPENING_M = 2.8
 MAX_LEAN = 0.2
 """Largest sine of the angle between a passage and the shortest line, since traced walls lean."""
 OFFSETS_M = (0.15, 0.3, 0.45, 0.6)
-"""Distances behind a passage at which the space is checked; the last is the thickest wall."""
+"""Distances behind a passage at which the space is checked; the last is the thickest wall …"""
+USUAL_PIXEL_M = 0.05
+"""… in a map of such pixels. Walls of a coarser map are up to a pixel thicker on either side."""
 WIDENINGS_M = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 """Amounts of widening, on either side of a passage, that are checked behind it."""
 MIN_WIDENING_M, WIDENING_SHARE = 0.3, 0.2
@@ -148,6 +150,7 @@ def find_passages(
     polygons: Sequence[Polygon],
     units_per_m: float,
     directions: WallDirections | None = None,
+    pixel: float = 0.0,
 ) -> list[Segment]:
     """Return the lines at which free space narrows and opens out on both sides, likeliest first.
 
@@ -158,6 +161,7 @@ def find_passages(
         directions: Main directions of the walls. In straight walls, openings wider than a doorway
             must run in these or between the ends of two walls, and passages in main directions rank
             before others. None if such openings must be gaps in a wall.
+        pixel: Side of a pixel of the map that the walls were traced from [m]; 0 if from none.
 
     Returns:
         Lines that don't touch each other [lattice]; their ends have even coordinates, and are on
@@ -181,8 +185,11 @@ def find_passages(
         straight,
     )  # fmt: skip
     lines = lines[_all_free(mesh, lines)]
+    offsets = OFFSETS_M
+    if pixel > USUAL_PIXEL_M:
+        offsets += (OFFSETS_M[-1] + 2 * (pixel - USUAL_PIXEL_M),)
     for side in (1, -1):
-        lines = lines[_opens(mesh, lines, side, units_per_m)]
+        lines = lines[_opens(mesh, lines, side, offsets, units_per_m)]
     if directions is None:
         lines = lines[_in_a_wall(mesh, walls, lines, units_per_m)]
     apart = lines[_one_of_each(lines, units_per_m)].tolist()
@@ -314,7 +321,7 @@ def _all_free(mesh: Mesh, lines: I64) -> Bool:
     return free
 
 
-def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> Bool:
+def _opens(mesh: Mesh, lines: I64, side: int, offsets: Sequence[float], units_per_m: float) -> Bool:
     """Return which lines have wider space behind them on a side (1: left, -1: right)."""
     span = (lines[:, 2:] - lines[:, :2]).astype(np.float64)
     length = np.sqrt((span * span).sum(axis=1))
@@ -324,7 +331,7 @@ def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> Bool:
     needed = np.maximum(MIN_WIDENING_M, WIDENING_SHARE * length / units_per_m)
     opens = np.zeros(len(lines), np.bool_)
     undecided = np.arange(len(lines))
-    for offset in OFFSETS_M:
+    for offset in offsets:
         behind = middle + np.rint(away * (offset * units_per_m)).astype(np.int64)
         undecided = undecided[pairs_in_sight(mesh, middle[undecided], behind[undecided])]
         targets = [
