@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.features import choose_level
 from fleet2d.floorplan.formats.sweethome import SweetHome
 from fleet2d.floorplan.load import load_floorplan
 
@@ -139,3 +140,15 @@ def test_one_sees_through_low_windows_between_rooms_only(tmp_path: Path) -> None
     assert (3.94, -1.25, 4.06, -0.35) == pytest.approx(pane.bounds, abs=0.011)
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
     assert () == high.glass
+
+
+def test_levels_of_one_name_are_told_apart_by_their_ids() -> None:
+    levels, notes = [("a", "Floor", 0.0), ("b", "Floor", 262.0)], list[str]()
+
+    assert choose_level(levels, None, notes) == "a"
+    assert notes == ["of its levels, Floor (id a, at 0) is used, not Floor (id b, at 262)"]
+    assert choose_level(levels, "b", []) == "b"
+    with pytest.raises(FloorPlanError, match="2 levels are called 'Floor'; its levels are: Floor"):
+        FloorPlanError, match="2 levels are called 'Floor'; its levels are: Floor .id"
+    ):
+        choose_level(levels, "Floor", [])

@@ -397,19 +397,21 @@ def choose_level(
         notes: A note is added if others are left out.
 
     Raises:
-        FloorPlanError: There is no such storey.
+        FloorPlanError: There is no such storey, or several have that name.
 
     Example:
         >>> choose_level([("a", "Cellar", -2.5), ("c", "Up", 2.8), ("b", "Ground", 0)], None, [])
         'b'
     """
-    names = {key: name for key, name, _ in levels}
+    called = [name for _, name, _ in levels]
+    names = {k: n if called.count(n) == 1 else f"{n} (id {k}, at {z:g})" for k, n, z in levels}
     if level is not None:
-        matches = [key for key, name in names.items() if level in (key, name)]
-        if not matches:
+        matches = [key for key, name, _ in levels if level in (key, name)]
+        if len(matches) != 1 and level not in names:
             known = ", ".join(names.values()) or "none"
-            raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
-        return matches[0]
+            problem = f"{len(matches)} levels are called" if matches else "there is no level"
+            raise FloorPlanError(f"{problem} {level!r}; its levels are: {known}")
+        return level if level in names else matches[0]
     if len(levels) < 2:
         return None
     chosen = min(levels, key=lambda entry: (entry[2] < 0, entry[2]))[0]
