@@ -1,6 +1,6 @@
 """How close generated homes come to real plans, and how long one takes.
 
-    python benchmarks/synthetic_homes.py PLANS [--edition 2] [--variety 1] [--homes N] [--plans N]
+    python benchmarks/synthetic_homes.py PLANS [--edition 1 2] [--variety 1] [--homes N] [--plans N]
         [--check] [--figure P] [--json J]
 
 PLANS is a folder of plans, of which the first 1,000 by name are read. Where it has an INDEX.tsv, as
@@ -43,7 +43,21 @@ Values = dict[str, list[float]]
 def main() -> None:
     arguments = _arguments()
     real = measures(_plans(arguments.plans_folder, arguments.plans))
-    settings = {"edition": arguments.edition, "variety": arguments.variety}
+    editions = {
+        edition: _compare(real, {"edition": edition, "variety": arguments.variety}, arguments)
+        for edition in arguments.edition
+    }
+    if arguments.json:
+        reports = {edition: report for edition, (report, _) in editions.items()}
+        arguments.json.write_text(json.dumps(reports, indent=1) + "\n", encoding="utf-8")
+    if arguments.figure:
+        draw(real, {edition: values for edition, (_, values) in editions.items()}, arguments.figure)
+
+
+def _compare(
+    real: Values, settings: dict[str, Any], arguments: argparse.Namespace
+) -> tuple[dict[str, Any], Values]:
+    """Print how close homes of some settings come to real plans; return the table and measures."""
     homes, seconds = generated(arguments.homes, settings)
     synthetic = measures(homes)
     rows = [_row(name, real[name], synthetic[name]) for name in real if name in synthetic]
@@ -60,11 +74,7 @@ def main() -> None:
     slow = float(np.percentile(seconds, 95))
     print(f"ms per home: {1e3 * middle:.1f} median, {1e3 * low:.1f} to {1e3 * high:.1f},", end=" ")
     print(f"95 % below {1e3 * slow:.1f}")
-    if arguments.json:
-        report = {"rows": rows, "seconds": {"min": low, "median": middle, "max": high}}
-        arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    if arguments.figure:
-        draw(real, synthetic, arguments.figure)
+    return {"rows": rows, "seconds": {"min": low, "median": middle, "max": high}}, synthetic
 
 
 def generated(count: int, settings: dict[str, Any]) -> tuple[list[FloorPlan], list[float]]:
@@ -158,27 +168,28 @@ def ks_distance(first: Sequence[float], second: Sequence[float]) -> float:
     return float(np.abs(shares[0] - shares[1]).max())
 
 
-def draw(real: Values, synthetic: Values, path: Path) -> None:
-    """Draw the distributions of both, one panel a measure."""
+def draw(real: Values, editions: dict[int, Values], path: Path) -> None:
+    """Draw the distributions of real plans and of each edition, one panel a measure."""
     from matplotlib.figure import Figure
 
     from fleet2d.pictures.floorplan import drawing_style
 
-    names = [name for name in real if name in synthetic]
+    names = [name for name in real if all(name in values for values in editions.values())]
+    colors = dict(zip(editions, ("#c8452f", "#2f6fc8"), strict=False))
     columns = 5
     rows = -(-len(names) // columns)
     with drawing_style():
         figure = Figure(figsize=(2.9 * columns, 2.2 * rows), dpi=110, layout="constrained")
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
-            for values, color, label in (
-                (real[name], "#3b4048", "real"),
-                (synthetic[name], "#c8452f", "synthetic"),
-            ):
+            drawn = [(real[name], "#3b4048", "real")]
+            drawn += [(v[name], colors[e], f"edition {e}") for e, v in editions.items()]
+            for values, color, label in drawn:
                 ordered = np.sort(values)
                 shares = np.arange(1, len(ordered) + 1) / len(ordered)
                 axes.step(ordered, shares, color=color, label=label)
-            axes.set_title(f"{name}  KS {ks_distance(real[name], synthetic[name]):.2f}", fontsize=9)
+            distances = [f"{ks_distance(real[name], v[name]):.2f}" for v in editions.values()]
+            axes.set_title(f"{name}  KS {', '.join(distances)}", fontsize=9)
             axes.set_xlim(0, 1.05 * float(np.percentile([*real[name]], 98)) + 1)
             axes.tick_params(labelsize=7)
             if not number:
@@ -226,7 +237,7 @@ def _plans(folder: Path, most: int) -> list[FloorPlan]:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("plans_folder", type=Path, metavar="PLANS", help="folder of plans")
-    parser.add_argument("--edition", type=int, choices=(1, 2), default=1)
+    parser.add_argument("--edition", type=int, choices=(1, 2), nargs="+", default=[1])
     parser.add_argument("--variety", type=float, default=0.0)
     parser.add_argument("--plans", type=int, default=1000, help="the most real plans to read")
     parser.add_argument("--homes", type=int, default=1000)

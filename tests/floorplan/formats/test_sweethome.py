@@ -149,6 +149,4 @@ def test_levels_of_one_name_are_told_apart_by_their_ids() -> None:
     assert notes == ["of its levels, Floor (id a, at 0) is used, not Floor (id b, at 262)"]
     assert choose_level(levels, "b", []) == "b"
     with pytest.raises(FloorPlanError, match="2 levels are called 'Floor'; its levels are: Floor"):
-        FloorPlanError, match="2 levels are called 'Floor'; its levels are: Floor .id"
-    ):
         choose_level(levels, "Floor", [])
