@@ -185,7 +185,7 @@ def find_passages(
         straight,
     )  # fmt: skip
     lines = lines[_all_free(mesh, lines)]
-    offsets = OFFSETS_M
+    offsets: tuple[float, ...] = OFFSETS_M
     if pixel > USUAL_PIXEL_M:
         offsets += (OFFSETS_M[-1] + 2 * (pixel - USUAL_PIXEL_M),)
     for side in (1, -1):
