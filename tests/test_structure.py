@@ -95,7 +95,11 @@ def test_files_that_contributing_names_are_there() -> None:
     page = page[
         page.index("## How a step is computed") : page.index("## Add a function to the core")
     ]
-    names = [name for name in re.findall(r"`([\w/]+(?:/|\.(?:[chp]pp|md|py|tsx?|yaml)))`", page) if "NAME" not in name]
+    names = [
+        name
+        for name in re.findall(r"`([\w/]+(?:/|\.(?:[chp]pp|md|py|tsx?|yaml)))`", page)
+        if "NAME" not in name
+    ]
 
     assert len(names) > 40
     places = [ROOT, ROOT / "src" / "fleet2d"]
