@@ -76,7 +76,7 @@ class SlowHome(KnownHome):
         place: AnyPlace
         if kind == "here":
             plan.come_home()
-            room = spots.room_at(plan.x, plan.y)
+            room = self._actor.home.plan.room_of_point(plan.x, plan.y)
             seats = [] if room is None else self.seats_in(venue, room)
             place = draws.choice(seats) if seats else Spot(plan.x, plan.y)
         else:
