@@ -1,6 +1,6 @@
 """What learning when to ask is worth, and the loop of a greedy learner: tables and pictures.
 
-    python benchmarks/timing.py [--out timing] [--workers 2] [--pictures docs/images]
+    python benchmarks/timing.py [--out timing] [--lives 30] [--workers 2] [--pictures docs/images]
 
 Runs `examples/studies/timing.yaml` in OUT/policies (270 runs) and, for the same lives, learners by
 logistic regression that differ in one thing at a time in OUT/loop (180 runs); both go on where they
@@ -10,6 +10,7 @@ the loop ask in each week; draws timing.png and timing_loop.png.
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import yaml
@@ -42,13 +43,21 @@ COLORS = (
 WEEK_STEPS, WEEKS = 7 * 24 * 3600, 4
 
 
-def loop_study() -> dict[str, object]:
-    """Return a study of learners in the lives of `timing.yaml`."""
-    study = yaml.safe_load((STUDIES / "timing.yaml").read_text())
+def policy_study(lives: int) -> dict[str, Any]:
+    """Return `timing.yaml` with its first lives."""
+    study: dict[str, Any] = yaml.safe_load((STUDIES / "timing.yaml").read_text())
+    life = study["axes"]["life"]
+    life["options"] = dict(list(life["options"].items())[:lives])
+    return study | {"base": str(STUDIES / study["base"])}
+
+
+def loop_study(lives: int) -> dict[str, Any]:
+    """Return a study of learners in the first lives of `timing.yaml`."""
+    study = policy_study(lives)
     options = {name: {"algorithms.when.policy": policy} for name, policy in LEARNERS.items()}
     return {
         "name": "the loop of a greedy learner",
-        "base": str(STUDIES / study["base"]),
+        "base": study["base"],
         "axes": {"policy": {"options": options}, "life": study["axes"]["life"]},
         "replicates": 1,
         "keep": {"metrics": ["interactions.*"], "tables": ["interactions"]},
@@ -109,13 +118,15 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=Path("timing"))
+    parser.add_argument("--lives", type=int, default=30)
     parser.add_argument("--workers", type=int, default=None)
     parser.add_argument("--pictures", type=Path, default=None)
     arguments = parser.parse_args()
     out = arguments.out
-    policies = fleet2d.study(STUDIES / "timing.yaml", out / "policies", workers=arguments.workers)
+    study = policy_study(arguments.lives)
+    policies = fleet2d.study(study, out / "policies", workers=arguments.workers)
     tell(policies, PAIRS["policies"])
-    loop = fleet2d.study(loop_study(), out / "loop", workers=arguments.workers)
+    loop = fleet2d.study(loop_study(arguments.lives), out / "loop", workers=arguments.workers)
     tell(loop, PAIRS["loop"])
     weeks = asked_by_week(loop)
     print("questions in weeks 1 to 4, and lives with at most one question in the last week")
@@ -125,6 +136,7 @@ def main() -> None:
         quiet = rows.filter(pl.col(str(WEEKS - 1)) <= 1).height
         print(f"  {name:26}" + "".join(f"{mean:7.1f}" for mean in means) + f"{quiet:5}")
     if arguments.pictures:
+        arguments.pictures.mkdir(parents=True, exist_ok=True)
         for name, draw in {
             "timing": lambda axes: draw_policies(policies, axes),
             "timing_loop": lambda axes: draw_loop(weeks, axes),
