@@ -52,7 +52,7 @@ def main() -> None:
     for task in ("hangout", "find", "patrol"):
         print(f"{task:<8} {decisions_a_second(task):7.0f} decisions a second")
     env = RobotEnv("hangout")
-    known_s = best_s(lambda: env.reset(seed=1, options={"values": HOME}), 20)
+    known_s = best_s(lambda: env.reset(seed=1, options={"values": HOME}), 200)
     seeds = iter(range(100, 200))
     new_s = best_s(
         lambda: env.reset(options={"values": {**HOME, "floorplan.seed": next(seeds)}}), 10

@@ -141,6 +141,46 @@ def test_damaged_shards_are_found(data: Dataset, tmp_path: Path, damage: str) ->
             again.arrow("labels", "train")
 
 
+def test_a_deleted_file_is_made_again_with_its_shard_only(data: Dataset, tmp_path: Path) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    (root / "train" / "labels-00001.parquet").unlink()
+    written = {path: path.stat().st_ino for path in root.rglob("*-00000.parquet")}
+
+    assert [] == make(root).verify()
+
+    assert written == {path: path.stat().st_ino for path in root.rglob("*-00000.parquet")}
+    assert not (root / "unfinished").exists()
+
+
+def test_a_deleted_file_of_another_version_is_not_made_again(data: Dataset, tmp_path: Path) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    manifest = json.loads((root / "dataset.json").read_text())
+    manifest["versions"]["fleet2d"] = "0.0.1"
+    (root / "dataset.json").write_text(json.dumps(manifest))
+    (root / "test" / "rooms-00000.parquet").unlink()
+
+    with pytest.raises(
+        InputError, match=r"lacks test/rooms-00000.parquet, which Fleet2D 0\.0\.1 can"
+    ):
+        make(root)
+
+
+def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(
+    data: Dataset, tmp_path: Path
+) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    manifest = json.loads((root / "dataset.json").read_text())
+    manifest["files"]["test/rooms-00000.parquet"]["sha256"] = "0" * 64
+    (root / "dataset.json").write_text(json.dumps(manifest))
+    (root / "test" / "rooms-00000.parquet").unlink()
+
+    with pytest.raises(InputError, match="differ now from those that were written"):
+        make(root)
+
+
 def test_a_day_takes_little_room(data: Dataset) -> None:
     """Bytes of evidence and labels for a day of one person, beside the fixed part of each file."""
     table = data.arrow("labels", "train")

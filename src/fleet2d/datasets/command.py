@@ -38,7 +38,7 @@ def dataset(
     trust: TrustFiles = None,
     trust_dir: TrustFolders = None,
 ) -> None:
-    """Make a data set of labelled evidence, or the rest of one that was interrupted."""
+    """Make a data set of labelled evidence, the rest of an interrupted one, or lacking files."""
     from fleet2d.datasets.reader import open_dataset
 
     if not verify:
@@ -49,6 +49,10 @@ def dataset(
     for name in differing:
         typer.echo(f"{out / name} is missing, or differs from what was written", err=True)
     if differing:
+        typer.echo(
+            f"delete these files, and make them again: fleet2d dataset {source} --out {out}",
+            err=True,
+        )
         raise typer.Exit(1)
     _print_size(made)
 
@@ -56,7 +60,7 @@ def dataset(
 def _make(
     source: Path, out: Path, workers: int | None, trust: TrustFiles, trust_dir: TrustFolders
 ) -> None:
-    """Make a data set, or the rest of one."""
+    """Make a data set, or what it lacks."""
     from fleet2d.datasets.generate import dataset as make
 
     with restrict_to(trust, trust_dir):

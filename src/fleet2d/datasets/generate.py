@@ -204,7 +204,7 @@ BLOCK_RUNS = 512
 def dataset(
     source: str | Path | Mapping[str, Any], out: str | Path, *, workers: int | None = None
 ) -> Dataset:
-    """Make a data set, or the rest of one that was interrupted, and open it.
+    """Make a data set, the rest of one that was interrupted, or files that it lacks, and open it.
 
     Its content is the same for any number of workers, and after an interruption.
 
@@ -214,7 +214,8 @@ def dataset(
         workers: The number of worker processes; None: one per core.
 
     Raises:
-        InputError: The file is wrong, its splits overlap, or the folder holds something else.
+        InputError: The file is wrong, its splits overlap, the folder holds something else, or
+            files that are lacking can't be made again as they were.
         ComponentError: A run failed.
 
     Example:
@@ -223,25 +224,50 @@ def dataset(
         >>> made = fleet2d.dataset({"splits": {"train": people}}, "small")  # doctest: +SKIP
     """
     plan, root = plan_dataset(source), Path(out)
+    parts, made = root / PARTS, None
     if (root / MANIFEST).is_file():
         made = open_dataset(root)
-        if made.manifest["plan"] == plan.digest:
+        if made.manifest["plan"] != plan.digest:
+            raise InputError(f"{root} holds another data set: choose another folder, or delete it")
+        if not made.lacking():
             return made
-        raise InputError(f"{root} holds another data set: choose another folder, or delete it")
-    if root.exists() and any(root.iterdir()) and not (root / PARTS).is_dir():
+    elif root.exists() and any(root.iterdir()) and not parts.is_dir():
         raise InputError(f"{root} is not empty, and holds no data set: choose another folder")
-    parts = root / PARTS
     parts.mkdir(parents=True, exist_ok=True)
     lock = FolderLock(parts, "dataset.lock")
     try:
         _check_plan(parts, plan)
+        if made is not None:
+            _record_shards(parts, plan, made)
         with progress_bar(show=sys.stderr.isatty()) as bar:
             files = _write_shards(root, parts, plan, workers, bar)
-        _finish(root, plan, files)
+        if made is None:
+            _finish(root, plan, files)
     finally:
         lock.release()
     shutil.rmtree(parts)
+    if made is not None and files != made.manifest["files"]:
+        raise InputError(
+            f"{root}: files that were lacking differ now from those that were written, by other"
+            " versions of libraries (see --verify): delete the data set, and make it again"
+        )
     return open_dataset(root)
+
+
+def _record_shards(parts: Path, plan: DatasetPlan, made: Dataset) -> None:
+    """Record the shards of a complete data set, so that only those that lack a file are made."""
+    version = made.manifest["versions"]["fleet2d"]
+    if version != __version__:
+        raise InputError(
+            f"{made.root} lacks {made.lacking()[0]}, which Fleet2D {version} can make again; this"
+            f" is {__version__}"
+        )
+    for shard in plan.shards():
+        names = [
+            path.relative_to(made.root).as_posix() for path in _files_of(made.root, shard).values()
+        ]
+        record = {name: made.manifest["files"][name] for name in names}
+        write_atomically(_record_path(parts, shard), json.dumps(record).encode())
 
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:

@@ -94,14 +94,21 @@ class Dataset:
 
         return pl.scan_parquet(self.files(table, split))
 
+    def lacking(self) -> list[str]:
+        """Return the names of the files that are missing."""
+        return [name for name in self.manifest["files"] if not self._path(name).is_file()]
+
     def verify(self) -> list[str]:
         """Return the names of the files that are missing or differ from what was written."""
         return [
             name
             for name, record in self.manifest["files"].items()
-            if not (path := path_in(self.root / Path(name).parent, Path(name).name)).is_file()
+            if not (path := self._path(name)).is_file()
             or hashlib.sha256(path.read_bytes()).hexdigest() != record["sha256"]
         ]
+
+    def _path(self, name: str) -> Path:
+        return path_in(self.root / Path(name).parent, Path(name).name)
 
 
 def _read(path: Path) -> "pa.Table":
