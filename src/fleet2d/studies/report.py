@@ -63,7 +63,9 @@ def write_report(study: "Study", folder: Path) -> Path:
     from fleet2d.pictures.floorplan import drawing_style
 
     if not study.counts.complete:
-        raise ArtifactError(f"{study.location} has no complete variant: run it first")
+        failed = study.counts.failed
+        advice = f"{failed} failed, see fleet2d study status" if failed else "run it first"
+        raise ArtifactError(f"{study.location} has no complete variant: {advice}")
     with os_errors_as(InputError, f"{folder} can't be created", "; name another --out"):
         for name in ("figures", "tables"):
             (folder / name).mkdir(parents=True, exist_ok=True)
