@@ -92,7 +92,7 @@ def test_failures_are_printed_and_end_in_one(fleet2d: Cli) -> None:
     assert "0 of 2 variants complete" in out
     assert "variant 0 failed" in err
     assert "no more" in err
-    _, _, err = fleet2d("study", "report", "speeds")
+    _, _, err = fleet2d("study", "report", "studies/speeds")
     assert "no complete variant: 2 failed, see fleet2d study status" in err
 
 
