@@ -7,14 +7,17 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from tests.datasets.small import SOURCE, make
 
 import fleet2d
+from fleet2d.datasets.generate import _bars
 from fleet2d.datasets.reader import Dataset
 from fleet2d.datasets.tasks import windows
 from fleet2d.errors import Fleet2DError, InputError
@@ -201,6 +204,13 @@ def test_the_card_says_what_is_in_it(data: Dataset) -> None:
     assert "| train | 3 | 0.75 | 2 |" in card
     assert "household: " in card
     assert (data.root / "pictures" / "place.png").stat().st_size > 1000
+
+
+def test_numbers_of_rooms_are_written_below_their_bars() -> None:
+    figure = Figure()
+    _bars(figure, {"train": {"rooms in a home": Counter({"5": 1, "14": 2})}}, "rooms in a home")
+    axes = figure.axes[0]
+    assert [label.get_ha() for label in axes.get_xticklabels()] == ["center", "center"]
 
 
 def test_workers_share_the_shards(data: Dataset) -> None:

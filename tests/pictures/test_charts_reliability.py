@@ -1,13 +1,17 @@
 """Reliability diagrams: forecasts and truth as stored, the same bytes, and other tables refused."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from tests.scenes import run, scenario, table
 
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.pictures import charts
 from fleet2d.pictures.charts import draw_reliability, forecasts_of
 
 
@@ -57,6 +61,22 @@ def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Pa
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert (tmp_path / "one.png").stat().st_size > 10_000
     assert "likeliest place" in (tmp_path / "three.svg").read_text()
+
+
+def test_both_panels_have_their_probabilities_at_the_same_places(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    figure = Figure()
+
+    @contextmanager
+    def kept(*_: object) -> Iterator[Figure]:
+        yield figure
+
+    monkeypatch.setattr(charts, "picture", kept)
+    charts.draw_forecasts("rtp", np.eye(3), np.arange(3), tmp_path / "x.png")
+    figure.draw_without_rendering()
+    curve, counts = (axes.get_window_extent().intervalx for axes in figure.axes)
+    np.testing.assert_allclose(curve, counts)
 
 
 @pytest.mark.parametrize(

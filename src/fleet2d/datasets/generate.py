@@ -187,7 +187,8 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
         share = [own[name][key] / max(sum(own[name].values()), 1) for key in keys]
         at = [i + (k - (len(counts) - 1) / 2) * width for i in range(len(keys))]
         axes.bar(at, share, width, label=split, color=USER_COLORS[k % len(USER_COLORS)])
-    axes.set_xticks(range(len(keys)), keys, rotation=30 if name == "place" else 0, ha="right")
+    slanted = {"rotation": 30, "ha": "right"} if name == "place" else {}
+    axes.set_xticks(range(len(keys)), keys, **slanted)
     axes.set_ylabel("share")
     axes.set_xlabel(name)
     axes.legend(frameon=False)

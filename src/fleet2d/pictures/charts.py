@@ -237,9 +237,7 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
             EVERY_COLOR,
             f"every place (mean {classwise:.3f})",
         )
-        curve.set(
-            ylabel="observed frequency", xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal"
-        )
+        curve.set(ylabel="observed frequency", xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
         curve.set_title(f"{name}: {len(truth):,} forecasts", fontsize=11, loc="left")
         curve.legend(loc="upper left", frameon=False)
         for forecasts, color in ((highest, LIKELIEST_COLOR), (belief.ravel(), EVERY_COLOR)):
