@@ -197,6 +197,16 @@ def test_differences_of_each_home_have_the_mean_of_all() -> None:
     assert row["difference"] == pytest.approx(rows["difference"].mean())
 
 
+def test_differences_of_each_home_within_another_axis_are_of_its_values() -> None:
+    frame = variants()
+    rows = unit_differences(frame, COLUMNS, "score", {"method": "old"}, "home", ["robot"])
+    assert ["method", "robot", "home", "difference"] == rows.columns
+    for robot in frame["robot"].unique():
+        some = frame.filter(pl.col("robot") == robot)
+        expected = unit_differences(some, COLUMNS, "score", {"method": "old"}, "home")
+        assert expected.equals(rows.filter(pl.col("robot") == robot).drop("robot"))
+
+
 def test_what_no_axis_explains_is_the_residual() -> None:
     table = variance_shares(variants(noise=3.0), COLUMNS, "score")
     assert "residual" == table["source"][-1]

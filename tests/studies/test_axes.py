@@ -61,6 +61,11 @@ def test_range(keys: dict[str, Any], expected: list[Any]) -> None:
     assert expected == values(axis(key="a.b", **keys))
 
 
+def test_two_values_of_one_label_are_refused() -> None:
+    with pytest.raises(ValidationError, match="two values have the label 'slow'"):
+        axis(key=SPEED, values=[0.2, 0.3, 0.4], labels=["fast", "slow", "slow"])
+
+
 def test_options_change_several_keys_each() -> None:
     x_axis = axis(options={"slow": {SPEED: 0.2}, "fast": {SPEED: 0.9, "robots.astro.radius": 0.1}})
     assert [("slow",), ("fast",)] == labels(x_axis)

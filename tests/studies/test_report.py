@@ -75,6 +75,18 @@ def test_a_report_says_what_is_measured_in_which_unit_and_how(page: Path) -> Non
     assert "The camera has no noise." in text
 
 
+def test_homes_have_a_picture_within_each_value_of_another_axis(page: Path) -> None:
+    figure = (page.parent / "figures/compare-2-home.svg").read_text()
+    assert figure.count("dwell = 0") == figure.count("dwell = 1 min") > 0
+    assert "dwell" not in (page.parent / "figures/compare-1-home.svg").read_text()
+
+
+def test_shares_that_overlap_say_so(study: Study, page: Path) -> None:
+    overlapping = [m for m in study.metrics if study.shares(m)["share"].sum() > 1.01]
+    assert ["room_share.ana.bathroom_0"] == overlapping  # of half of the variants only
+    assert 1 == page.read_text().count("Shares overlap")
+
+
 def test_homes_of_long_names_have_short_ones_that_are_listed(page: Path) -> None:
     text = page.read_text()
     assert f"<td class=text>…long_a</td><td class=text>{LONG}a</td>" in text

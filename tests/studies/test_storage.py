@@ -115,6 +115,14 @@ def test_a_server_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) 
         directory.exists()
 
 
+def test_a_file_location_is_a_folder_like_others(tmp_path: Path) -> None:
+    storage = Storage((tmp_path / "new" / "study").as_uri())
+    storage.write("results/a.txt", b"a")
+    assert storage.is_local
+    assert b"a" == (tmp_path / "new" / "study" / "results" / "a.txt").read_bytes()
+    assert str(tmp_path / "new" / "study") == storage.location
+
+
 def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
     storage = Storage(tmp_path)
     storage.write("a/b.txt", b"whole")

@@ -83,13 +83,16 @@ def unit_differences(
     metric: str,
     against: Mapping[str, Any],
     unit: str,
+    within: Sequence[str] = (),
 ) -> "pl.DataFrame":
-    """Return the mean difference in each unit: columns of the axis, of the unit, `difference`."""
+    """Return the mean difference in each unit: the axis, those of `within`, unit, `difference`."""
     import polars as pl
 
     ((axis, reference),) = against.items()
     tables = [
-        by_units(pairs, [unit], ["difference"]).select(pl.lit(value).alias(axis), pl.all())
+        by_units(pairs, [*within, unit], ["difference"]).select(
+            pl.lit(value).alias(axis), pl.all()
+        )
         for value, pairs in _all_pairs(frame, columns, metric, axis, reference)
     ]
     return pl.concat(tables)

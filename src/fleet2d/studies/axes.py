@@ -377,9 +377,12 @@ class ValuesAxis(Axis):
     labels: tuple[str, ...] = ()
 
     def model_post_init(self, _: object, /) -> None:
-        """Require as many labels as values."""
+        """Require a label of its own for each value, if there are labels."""
         if self.labels and len(self.labels) != len(self.values):
             raise problem(f"there are {len(self.labels)} labels for {len(self.values)} values")
+        if len(set(self.labels)) < len(self.labels):
+            twice = next(label for label in self.labels if self.labels.count(label) > 1)
+            raise problem(f"two values have the label {twice!r}: results couldn't tell them apart")
 
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each value."""

@@ -193,11 +193,12 @@ def report(
     from fleet2d.studies.reader import open_study
     from fleet2d.studies.report import write_report
 
-    if out is None and "://" in location:
+    study = open_study(location)
+    if out is None and "://" in study.location:
         raise InputError(
             "give --out, a local folder for the report: the study is in a remote store"
         )
-    _print(write_report(open_study(location), out or Path(location) / "report"))
+    _print(write_report(study, out or Path(study.location) / "report"))
 
 
 @studying.command()

@@ -100,9 +100,11 @@ def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, label: str
     return figure
 
 
-def draw_unit_differences(rows: "pl.DataFrame", axis: str, unit: str, label: str) -> Figure:
-    """Draw the difference in each unit, the smallest first; one panel for each value of an axis."""
-    tables = rows.partition_by(axis, maintain_order=True)[:MAX_LINES]
+def draw_unit_differences(
+    rows: "pl.DataFrame", axes: Sequence[str], unit: str, label: str
+) -> Figure:
+    """Draw the difference in each unit, the smallest first; a panel for each value of the axes."""
+    tables = rows.partition_by(axes, maintain_order=True)[:MAX_LINES]
     figure = Figure(figsize=(8.0, 2.6), dpi=DPI, layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, len(tables), sharey=True))
     for panel, table in zip(panels, tables, strict=True):
@@ -114,7 +116,8 @@ def draw_unit_differences(rows: "pl.DataFrame", axis: str, unit: str, label: str
         panel.vlines(x, 0, values, color=PALE, lw=1.5)
         panel.plot(x, values, "o", color=COLORS[0], ms=4)
         _label(panel, [str(name) for name in table[unit].to_list()], len(tables))
-        panel.set_title(f"{axis} = {table[axis][0]}", fontsize=8)
+        title = "\n".join(f"{axis} = {table[axis][0]}" for axis in axes)
+        panel.set_title(title, fontsize=8 if len(tables) < 4 else 6)
         panel.set_xlabel(unit)
     _label_y(panels[0], f"difference of {label}")
     return figure

@@ -287,15 +287,19 @@ class Study:
         units = self._units(by, against)
         return answers.paired(frame, self.columns, metric, against, units, within)
 
-    def differences(self, metric: str, against: Mapping[str, Any], unit: str) -> "pl.DataFrame":
+    def differences(
+        self, metric: str, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
+    ) -> "pl.DataFrame":
         """Return the mean difference to the reference in each unit, such as each home.
+
+        With `within`, a row for each value of other axes and each unit.
 
         Raises:
             InputError: There is no such metric, axis or value.
         """
-        answers.check_axes((*against, unit), self.columns)
+        answers.check_axes((*against, unit, *within), self.columns)
         frame = self._with_metric(metric)
-        return answers.unit_differences(frame, self.columns, metric, against, unit)
+        return answers.unit_differences(frame, self.columns, metric, against, unit, within)
 
     def power(
         self,

@@ -13,7 +13,7 @@ from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ArtifactError, InputError, os_errors_as
-from fleet2d.studies.answers import FEW_UNITS, RESIDUAL, holm
+from fleet2d.studies.answers import FEW_UNITS, NOISE, RESIDUAL, holm
 from fleet2d.studies.figures import over_time
 from fleet2d.studies.intervals import LEVEL
 from fleet2d.studies.specification import PairedComparison
@@ -195,9 +195,10 @@ class _Page:
             )
         unit = self.units[0] if self.units else None
         if unit is not None and unit != axis:
-            rows = self._shortened(self.study.differences(metric, against, unit))
+            others = [column for column in comparison.within if column != unit]
+            rows = self._shortened(self.study.differences(metric, against, unit, others))
             yield f"<h3>in each {html.escape(unit)}</h3>"
-            yield self._figure(draw_unit_differences(rows, axis, unit, label), f"{name}-{unit}")
+            yield self._figure(draw_unit_differences(rows, (axis, *others), unit, label), f"{name}-{unit}")
 
     def _metrics(self) -> list[str]:
         """Return the metrics of the report, those of comparisons first."""
@@ -239,6 +240,8 @@ class _Page:
             yield "<h3>share of the variance, by axis and by interaction</h3>"
             largest = shares.head(MAX_SHARES - 1).extend(shares.tail(1)).unique(maintain_order=True)
             yield self._frame(largest, f"{name}-variance", ("source",))
+            if shares["share"].sum() > 1 + NOISE:
+                yield "<p>Shares overlap, as not all combinations have this number.</p>"
 
     def _interactions(self, metric: str, label: str) -> Iterator[str]:
         from fleet2d.studies.figures import draw_interaction

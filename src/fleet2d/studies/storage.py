@@ -114,6 +114,9 @@ class Storage:
                     f"{self.location} can't be used as a store: {error}; write a folder, or a"
                     " location like s3://bucket/study"
                 ) from error
+            if isinstance(self.filesystem, pafs.LocalFileSystem):  # file://, a folder like others
+                self.folder = Path(self.root)
+                self.location = self.root
         else:
             self.folder = Path(source).absolute()
             self.filesystem, self.root = pafs.LocalFileSystem(), str(self.folder)
