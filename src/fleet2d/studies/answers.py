@@ -90,9 +90,7 @@ def unit_differences(
 
     ((axis, reference),) = against.items()
     tables = [
-        by_units(pairs, [*within, unit], ["difference"]).select(
-            pl.lit(value).alias(axis), pl.all()
-        )
+        by_units(pairs, [*within, unit], ["difference"]).select(pl.lit(value).alias(axis), pl.all())
         for value, pairs in _all_pairs(frame, columns, metric, axis, reference)
     ]
     return pl.concat(tables)

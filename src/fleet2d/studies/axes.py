@@ -225,7 +225,7 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
         return qmc.LatinHypercube(dimensions, strength=strength, rng=generator).random(count)
     except ValueError:
         raise ScenarioError(
-            "orthogonal samples come in squares of primes (25, 49, 121, 169, …), of at most one"
+            "orthogonal samples come in squares of primes (4, 9, 25, 49, 121, …), of at most one"
             f" parameter more than the prime: not {count} of {dimensions}"
         ) from None
 

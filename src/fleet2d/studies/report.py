@@ -198,7 +198,9 @@ class _Page:
             others = [column for column in comparison.within if column != unit]
             rows = self._shortened(self.study.differences(metric, against, unit, others))
             yield f"<h3>in each {html.escape(unit)}</h3>"
-            yield self._figure(draw_unit_differences(rows, (axis, *others), unit, label), f"{name}-{unit}")
+            yield self._figure(
+                draw_unit_differences(rows, (axis, *others), unit, label), f"{name}-{unit}"
+            )
 
     def _metrics(self) -> list[str]:
         """Return the metrics of the report, those of comparisons first."""
