@@ -1,5 +1,6 @@
 """What a data set is drawn from: fresh people, a seed for each run, and splits that share nothing."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -50,11 +51,23 @@ def test_another_seed_draws_other_runs() -> None:
     [
         (split(1, 1, ["child"]), r"train and test share 1 home\(s\): home = 1"),
         (split(1, 9, ["student", "retired"]), r"share 1 persona\(s\): retired"),
+        (split(1, 9, [{"extends": "retired", "pace": 0.8}]), r"share 1 persona\(s\): retired"),
+        (split(1, 9, ["mine.yaml"]), r"share 1 persona\(s\): retired"),
     ],
 )
-def test_splits_that_overlap_name_what_they_share(test: dict[str, Any], words: str) -> None:
+def test_splits_that_overlap_name_what_they_share(
+    test: dict[str, Any], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text("extends: [retired, short_stays]\n")
     with pytest.raises(InputError, match=words):
         plan_dataset(file(train=split(1, 0, ["retired"]), test=test))
+
+
+@pytest.mark.parametrize("name", ["../train", "", "a b", "unfinished", "pictures"])
+def test_a_split_is_named_as_its_folder_may_be(name: str) -> None:
+    with pytest.raises(InputError, match="can't be the name of a split"):
+        plan_dataset(file(**{name: split(1, 0, ["retired"])}))
 
 
 def test_a_home_is_the_same_by_any_name() -> None:

@@ -18,7 +18,15 @@ import yaml
 from fleet2d import __version__
 from fleet2d.algorithms.presence.belief import AWAY
 from fleet2d.datasets.reader import FORMAT, MANIFEST, Dataset, open_dataset
-from fleet2d.datasets.specification import DatasetFile, DatasetPlan, PlannedRun, Shard, plan_dataset
+from fleet2d.datasets.specification import (
+    PARTS,
+    PICTURES,
+    DatasetFile,
+    DatasetPlan,
+    PlannedRun,
+    Shard,
+    plan_dataset,
+)
 from fleet2d.datasets.tables import SCHEMAS, tables_of
 from fleet2d.errors import InputError
 from fleet2d.storage.files import FolderLock, partial_file, write_atomically
@@ -32,7 +40,7 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 
-CARD, PICTURES = "README.md", "pictures"
+CARD = "README.md"
 MAX_VALUES = 12  # of a distribution in a row
 TABLES = {
     "runs": "a row for each run: split, home, household, what was varied, seed, digest",
@@ -187,7 +195,7 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
         share = [own[name][key] / max(sum(own[name].values()), 1) for key in keys]
         at = [i + (k - (len(counts) - 1) / 2) * width for i in range(len(keys))]
         axes.bar(at, share, width, label=split, color=USER_COLORS[k % len(USER_COLORS)])
-    slanted = {"rotation": 30, "ha": "right"} if name == "place" else {}
+    slanted: dict[str, Any] = {"rotation": 30, "ha": "right"} if name == "place" else {}
     axes.set_xticks(range(len(keys)), keys, **slanted)
     axes.set_ylabel("share")
     axes.set_xlabel(name)
@@ -196,7 +204,6 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
     return figure
 
 
-PARTS = "unfinished"
 PLAN = "plan.txt"
 # Runs that are planned at a time: they are what a data set of any size keeps in memory.
 BLOCK_RUNS = 512

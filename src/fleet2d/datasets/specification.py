@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -11,20 +12,23 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, field_validator
 
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
+from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, micros, parse_duration
 from fleet2d.errors import InputError, ScenarioError
+from fleet2d.routines.persona import origins_of
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
 
 NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")
+PARTS, PICTURES = "unfinished", "pictures"  # folders beside those of the splits
 EVIDENCE, STAYS, BELIEF = "evidence", "stays", "belief_"
 MAX_SEED = 1 << 31
 MAX_PERIOD = timedelta(days=1)
@@ -72,6 +76,17 @@ class DatasetFile(Settings):
     every: PositiveDuration = timedelta(minutes=7)
     labels: PositiveDuration = timedelta(minutes=1)
     runs_per_shard: int = Field(default=16, ge=1)
+
+    @field_validator("splits")
+    @classmethod
+    def _check_names(cls, splits: dict[str, SplitSettings]) -> dict[str, SplitSettings]:
+        for name in splits:
+            if not re.fullmatch(r"\w+", name, re.ASCII) or name in (PARTS, PICTURES):
+                raise problem(
+                    f"{shown(name)} can't be the name of a split, which has a folder: use letters,"
+                    f" digits and _, and neither {PARTS!r} nor {PICTURES!r}"
+                )
+        return splits
 
 
 @dataclass(frozen=True)
@@ -255,9 +270,9 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
         name: [choice for axis in split.homes for choice in axis.choices("home")]
         for name, split in file.splits.items()
     }
-    _check_splits(file, homes)
     plan = DatasetPlan(file, Document(base), homes)
     plan.check()
+    _check_splits(file, homes)
     return plan
 
 
@@ -301,6 +316,12 @@ def personas_of(household: Any) -> list[str]:
     ]
 
 
+def _origins(user: Any) -> set[str]:
+    """Return what a user has in common with users of the same persona, however that is changed."""
+    persona = user.get("persona") if isinstance(user, Mapping) else None
+    return origins_of(persona) if persona else set(personas_of({"": user}))
+
+
 def _check_splits(file: DatasetFile, homes: Mapping[str, list[Choice]]) -> None:
     """Refuse splits that share a home, a household or a persona.
 
@@ -308,7 +329,12 @@ def _check_splits(file: DatasetFile, homes: Mapping[str, list[Choice]]) -> None:
         InputError: They do; the message names what they share.
     """
     people = {
-        name: {who for household in split.households for who in personas_of(household)}
+        name: {
+            origin
+            for household in split.households
+            for user in members_of(household).values()
+            for origin in _origins(user)
+        }
         for name, split in file.splits.items()
     }
     plans = {

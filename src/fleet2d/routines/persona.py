@@ -519,6 +519,25 @@ def read_persona(value: object) -> Any:
     return _data_of(value, (), [])
 
 
+def origins_of(value: object) -> set[str]:
+    """Return the bundled personas that a valid persona is, or changes; itself if there are none.
+
+    Example:
+        >>> origins_of({"extends": ["retired", "short_stays"], "pace": 0.8})
+        {'retired'}
+    """
+    if isinstance(value, str) and value in bundled_names():
+        return {value}
+    if isinstance(value, str) and value in part_names():
+        return set()
+    data: Any = value
+    if isinstance(value, str | Path):
+        data = read_document(_persona_file(value, is_extended=False)).data
+    below = data.get("extends", ()) if isinstance(data, Mapping) else ()
+    names = below if isinstance(below, list | tuple) else [below]
+    return {origin for name in names for origin in origins_of(name)} or {str(value)}
+
+
 def _data_of(value: object, chain: tuple[str, ...], files: list[Path]) -> Any:
     """Return a persona as plain data, with all that it extends.
 
