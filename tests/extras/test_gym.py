@@ -393,3 +393,5 @@ def test_picture_of_a_life_shows_the_scores() -> None:
 
     assert (np.uint8, 3) == (pixels.dtype, pixels.shape[2])
     assert any(text.startswith("kitchen_0\n") for text in texts)
+    with pytest.raises(InputError, match="scores are of 8 actions, the rooms and to rest"):
+        life_figure(env, np.arange(7.0))

@@ -39,7 +39,7 @@ def test_a_dry_run_prints_axes_variants_and_time_and_writes_nothing(fleet2d: Cli
     assert 0 == code
     assert f"{SPEED}: 0.3, 0.6" in out
     assert f"variant 3 ({SPEED} = 0.6, seed = 1)" in out
-    said = r"4 variants, 1 homes, 8\.0 min of simulated time: .* to .* by 2 workers here"
+    said = r"4 variants, 1 home, 8\.0 min of simulated time: .* to .* by 2 workers here"
     assert re.search(said, out)
     assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from fleet2d.errors import InputError
 from fleet2d.gym.env import RobotEnv
 from fleet2d.kernels import F32
 from fleet2d.palette import ACCENT_COLOR, body_color
@@ -21,8 +22,12 @@ def life_figure(env: RobotEnv, scores: F32 | None = None) -> Figure:
             probabilities (softmax) of the possible ones; None: none are shown.
 
     Raises:
-        InputError: There is no life.
+        InputError: There is no life, or the scores aren't those of its actions.
     """
+    if scores is not None and np.shape(scores) != (actions := env.action_masks()).shape:
+        raise InputError(
+            f"scores are of {len(actions)} actions, the rooms and to rest: got {np.shape(scores)}"
+        )
     simulation = env.present.simulation
     plan, figure = simulation.home.plan, Figure(figsize=figure_size(simulation.home.plan))
     with drawing_style():
