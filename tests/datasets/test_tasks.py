@@ -1,9 +1,12 @@
 """Scores of tasks: differences by home, in which each home counts alike."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from fleet2d.datasets.tasks import SplitForecasts, _difference
+import fleet2d
+from fleet2d.datasets.tasks import SplitForecasts, _difference, leaderboard
 
 
 def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
@@ -23,3 +26,21 @@ def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
     assert [0, 0, 0] == list(_difference(made, "routine").values())
     one = made._replace(home=np.array(["a"] * 4))
     assert ["log_loss - routine"] == list(_difference(one, "mine"))
+
+
+def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path: Path) -> None:
+    people = {"train": ["retired"], "test": ["student"], "nobody": []}
+    splits = {
+        name: {"runs": 1, "homes": [{"synthetic": 1, "first": k}], "households": [household]}
+        for k, (name, household) in enumerate(people.items())
+    }
+    base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+    source = {"base": base, "splits": splits, "beliefs": ["routine", "learned"]}
+
+    data = fleet2d.dataset(source, tmp_path / "made", workers=1)
+
+    assert [(e.model, e.cases) for e in leaderboard(data, ["rtp"])] == [
+        ("routine", 8),
+        ("learned", 8),
+    ]
+    assert leaderboard(data, split="nobody") == []

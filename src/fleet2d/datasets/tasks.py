@@ -143,10 +143,9 @@ def forecasts(
     networks = {"learned": shipped_weights(), **(models or {})}
     beliefs: dict[str, list[F64]] = {}
     for part in parts:
-        for name, belief in part.beliefs.items():
+        new = {n: predict(w, part) for n, w in networks.items() if n not in part.beliefs}
+        for name, belief in {**part.beliefs, **new}.items():
             beliefs.setdefault(name, []).append(belief)
-        for name, weights in networks.items():
-            beliefs.setdefault(name, []).append(predict(weights, part))
     if not parts:
         return None
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
@@ -248,8 +247,10 @@ def _score_activity(data: Dataset, split: str) -> list[LeaderboardEntry]:
 
 def _score_time_to_return(data: Dataset, split: str) -> list[LeaderboardEntry]:
     def cases(part: str) -> tuple[I64, F64]:
-        hours, minutes = [], []
+        hours, minutes = [np.zeros(0, np.int64)], [np.zeros(0)]
         for labels in _with_kinds(data, part):
+            if len(labels["time"]) < 2:  # the length of a step is unknown
+                continue
             until = labels["next_step"].astype(float) - labels["step"]
             own = (labels["kind"] == AWAY) & ~np.isnan(until)
             hours.append(labels["time"][own].astype("datetime64[h]").astype(int) % 24)
