@@ -44,3 +44,13 @@ def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path:
         ("learned", 8),
     ]
     assert leaderboard(data, split="nobody") == []
+
+
+def test_beliefs_without_a_label_of_their_time_are_not_scored(tmp_path: Path) -> None:
+    people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
+    base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+    source = {"base": base, "labels": "1 h", "splits": {"test": people}, "beliefs": ["routine"]}
+
+    data = fleet2d.dataset(source, tmp_path / "made", workers=1)
+
+    assert leaderboard(data) == []

@@ -139,7 +139,7 @@ def forecasts(
 
     None if the split has no windows.
     """
-    parts = list(windows(data, split))
+    parts = [part for part in windows(data, split) if len(part.truth)]
     networks = {"learned": shipped_weights(), **(models or {})}
     beliefs: dict[str, list[F64]] = {}
     for part in parts:
