@@ -65,6 +65,13 @@ def until(page: Any, holds: Callable[[], bool]) -> None:
     pytest.fail("the page did not come to it within 10 s")
 
 
+def add_new_picture(page: Any, pictures: set[bytes]) -> None:
+    """Wait until the plan looks like none of the pictures, and add it to them."""
+    plan = page.locator(".plan canvas")
+    until(page, lambda: plan.screenshot() not in pictures)
+    pictures.add(plan.screenshot())
+
+
 def shows_step(page: Any, step: int) -> None:
     page.wait_for_selector(f"table.now[data-step='{step}']", timeout=5000)
 
@@ -94,6 +101,15 @@ def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Pat
     page.wait_for_selector("tr[data-body=astro] >> text=sees ana", timeout=5000)
 
 
+def shares_are(page: Any, believed: dict[str, float]) -> bool:
+    """Say whether every bar shows what is believed of its room; panels follow with a delay."""
+    bars = page.locator("table.bars tr[data-room]").all()
+    shown = {
+        bar.get_attribute("data-room"): float(bar.get_attribute("data-believed")) for bar in bars
+    }
+    return shown == pytest.approx({room: believed.get(room, 0.0) for room in shown}, abs=1e-9)
+
+
 def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
     run = fleet2d.open_run(run_dir)
     table = run.tables["ltp"].to_pylist()
@@ -103,12 +119,9 @@ def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
         page.fill("#goto", f"step {step}")
         page.press("#goto", "Enter")
         page.wait_for_selector(f".lanes[aria-valuenow='{step}']")
-        page.wait_for_timeout(250)  # panels follow a few times a second
         last = max((row["step"] for row in table if row["step"] <= step), default=-1)
         believed = {row["room"]: row["share"] for row in table if row["step"] == last}
-        for bar in page.locator("table.bars tr[data-room]").all():
-            share = believed.get(bar.get_attribute("data-room"), 0.0)
-            assert share == pytest.approx(float(bar.get_attribute("data-believed")), abs=1e-9)
+        until(page, lambda: shares_are(page, believed))  # noqa: B023
 
 
 def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
@@ -294,8 +307,7 @@ def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
     page.click("#tab-layers")
     page.uncheck("input[name=ways]")
     page.keyboard.press("+")
-    until(page, lambda: "panel=layers" in page.url)
-    page.wait_for_timeout(400)
+    until(page, lambda: "panel=layers" in page.url and "from=" in page.url)
     with page_at(browser, page.url) as second_page:
         assert 5 * 3600 == moment(second_page)
         assert "true" == second_page.get_attribute("#tab-layers", "aria-selected")
@@ -388,11 +400,9 @@ def test_marked_range_has_totals_that_fill_it(page: Any) -> None:
 
 def test_zoom_is_undone_and_keys_are_shown(page: Any) -> None:
     page.keyboard.press("+")
-    page.wait_for_timeout(400)
-    assert "from=" in page.url
+    until(page, lambda: "from=" in page.url)
     page.keyboard.press("z")
-    page.wait_for_timeout(400)
-    assert "from=" not in page.url
+    until(page, lambda: "from=" not in page.url)
     page.keyboard.press("?")
     assert page.locator("details.help dl").is_visible()
 
@@ -415,15 +425,10 @@ def test_any_column_of_a_table_is_plotted(page: Any) -> None:
 
 def test_layers_and_switches_change_the_plan(page: Any) -> None:
     page.click("#tab-layers")
-    pictures = set()
-    for name in ("names", "furniture", "sight"):
-        page.click(f"input[name={name}]")
-        page.wait_for_timeout(150)
-        pictures.add(page.locator(".plan canvas").screenshot())
-    page.click("input[name=layer] >> nth=1")
-    page.wait_for_timeout(600)
-    pictures.add(page.locator(".plan canvas").screenshot())
-    assert 4 == len(pictures)
+    pictures = {page.locator(".plan canvas").screenshot()}
+    for switch in ("[name=names]", "[name=furniture]", "[name=sight]", "[name=layer] >> nth=1"):
+        page.click(f"input{switch}")
+        add_new_picture(page, pictures)
 
 
 def test_click_on_a_body_shows_its_state_and_history(page: Any) -> None:
@@ -460,18 +465,15 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
     with served(PageData(run)) as address, page_at(browser, address + view) as page:
         light = page.locator("div:has(> dt:text-is('light')) dd")
         assert "on" == light.inner_text()
-        plan = page.locator(".plan canvas")
-        pictures = {plan.screenshot()}
+        pictures = {page.locator(".plan canvas").screenshot()}
         page.keyboard.press("End")
         until(page, lambda: light.inner_text() == "off")
         page.wait_for_selector(".label >> text=living_room_0 light")
+        add_new_picture(page, pictures)
         page.click("#tab-layers")
         for name in ("slows", "lights"):
-            pictures.add(plan.screenshot())
             page.uncheck(f"input[name={name}]")
-            page.wait_for_timeout(150)
-        pictures.add(plan.screenshot())
-        assert 4 == len(pictures)
+            add_new_picture(page, pictures)
 
 
 def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
@@ -499,9 +501,7 @@ def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: P
         page.wait_for_selector(".labels button >> text=rooms differ")
         page.fill("#goto", "day 1 08:00")
         page.press("#goto", "Enter")
-        page.wait_for_timeout(300)
-        steps = [table.get_attribute("data-step") for table in page.locator("table.now").all()]
-        assert [str(8 * 3600)] * 2 == steps
+        until(page, lambda: 2 == page.locator(f"table.now[data-step='{8 * 3600}']").count())
         page.click("#tab-metrics")
         assert page.locator("table.results tr.differs").count() > 0
         for name in ("ana · first", "ana · second"):
@@ -555,9 +555,7 @@ def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
         pictures = {page.locator(".plan canvas").screenshot()}
         page.click("#tab-layers")
         page.click("input[name=sight]")
-        page.wait_for_timeout(300)
-        pictures.add(page.locator(".plan canvas").screenshot())
-        assert 2 == len(pictures)
+        add_new_picture(page, pictures)
 
 
 def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> None:
