@@ -1,6 +1,7 @@
 """Walls on the lattice: repaired, snapped, triangulated, and cut by gates that shut."""
 
 from collections.abc import Collection, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -373,13 +374,12 @@ def _crossing(
     vertices: I64, owner: dict[tuple[int, int], int], a: int, b: int
 ) -> list[tuple[int, int]]:
     """Return the inner edges that cross a segment, each once."""
-    edges = np.array([edge for edge in owner if edge[0] < edge[1] and edge[::-1] in owner])
-    if len(edges) == 0:
-        return []
+    edges = np.fromiter(chain.from_iterable(owner), np.int64, 2 * len(owner)).reshape(-1, 2)
+    edges = edges[edges[:, 0] < edges[:, 1]]
     start, along = vertices[a], vertices[b] - vertices[a]
-    side = along[0] * (vertices[:, 1] - start[1]) - along[1] * (vertices[:, 0] - start[0])
-    apart = edges[np.sign(side[edges[:, 0]]) * np.sign(side[edges[:, 1]]) < 0]
-    return [(p, q) for p, q in apart.tolist() if _cross(vertices, a, b, p, q)]
+    side = np.sign(along[0] * (vertices[:, 1] - start[1]) - along[1] * (vertices[:, 0] - start[0]))
+    apart = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0].tolist()
+    return [(p, q) for p, q in apart if (q, p) in owner and _cross(vertices, a, b, p, q)]
 
 
 def _cross(vertices: I64, a: int, b: int, p: int, q: int) -> bool:
@@ -397,7 +397,7 @@ def _turn(vertices: I64, a: int, b: int, c: int) -> int:
 
 def _vertex(vertices: I64, point: tuple[int, int]) -> int:
     """Return the id of the vertex at a point."""
-    matches = np.flatnonzero((vertices == np.array(point, np.int64)).all(axis=1))
+    matches = np.flatnonzero((vertices[:, 0] == point[0]) & (vertices[:, 1] == point[1]))
     if len(matches) == 0:
         raise FloorPlanError(f"the door line ends at {point} [lattice], where no wall is")
     return int(matches[0])

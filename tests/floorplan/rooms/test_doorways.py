@@ -13,7 +13,7 @@ from tests.thorough import examples
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
+from fleet2d.floorplan.rooms.doorways import DoorLine, _with_corner, fit_lines
 
 FREE = shapely.union_all(
     [shapely.box(0, 0, 2, 3), shapely.box(2.1, 0, 5, 3), shapely.box(2, 1, 2.1, 1.9)]
@@ -88,6 +88,30 @@ def test_line_between_slanted_walls_gives_them_a_corner_less_than_a_millimetre_o
         shapely.MultiPolygon(plan.polygons), shapely.MultiPolygon(before.polygons)
     )
     assert change / plan.lattice.units_per_m < 0.001
+
+
+@settings(max_examples=examples(100))
+@given(homes(), seeds())
+def test_corner_beside_a_wall_keeps_a_polygon_valid_where_no_other_wall_is_near(
+    polygons: list[shapely.Polygon], seed: int
+) -> None:
+    draw = np.random.default_rng(seed)
+    for polygon in polygons:
+        corners = shapely.get_coordinates(polygon)
+        start = draw.integers(len(corners) - 1)
+        place = corners[start] + draw.random() * (corners[start + 1] - corners[start])
+        point = 2.0 * np.rint((place + draw.integers(-6, 7, 2)) / 2)
+        changed, is_alone = _with_corner(polygon, point)
+        assert changed.is_valid or not is_alone
+        assert (shapely.get_coordinates(changed) == point).all(axis=1).any()
+
+
+@pytest.mark.parametrize(("tip", "is_alone"), [(1.0, False), (3.0, True)])
+def test_corner_is_alone_unless_its_wall_moves_over_another(tip: float, is_alone: bool) -> None:
+    wedge = [(50, tip), (52, 90), (48, 90)]
+    polygon = shapely.Polygon([(0, 0), (100, 0), (100, 100), (0, 100)], [wedge])
+    changed, was_alone = _with_corner(polygon, np.array([10.0, 4.0]))
+    assert is_alone == was_alone == changed.is_valid
 
 
 def test_stored_plan_has_the_same_doorways() -> None:

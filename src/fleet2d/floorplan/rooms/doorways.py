@@ -24,6 +24,8 @@ CORNER_DISTANCE = 8
 BESIDE_M = (0.1, 0.2, 0.3, 0.45, 0.6)
 # DE-9IM pattern of a line and an area: the line lies in the area, with its ends on the border.
 _FROM_WALL_TO_WALL = "1FFF0F***"
+# DE-9IM pattern of a wall of which at most the ends meet something.
+_INSIDE_APART = "FF*******"
 
 
 @dataclass(frozen=True)
@@ -179,12 +181,13 @@ def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], 
     if jambs[0] is None or jambs[1] is None or jambs[0] == jambs[1]:
         return None
     line = LineString([jambs[0], jambs[1]])
-    polygon = walls[index]
+    polygon, stays_valid = walls[index], len(walls) == 1
     for jamb in jambs:
-        polygon = _with_corner(polygon, np.array(jamb, np.float64))
+        polygon, is_alone = _with_corner(polygon, np.array(jamb, np.float64))
+        stays_valid &= is_alone
     changed = [*walls[:index], polygon, *walls[index + 1 :]]
-    sound = polygon is walls[index] or shapely.MultiPolygon(changed).is_valid
-    if not sound or not shapely.relate_pattern(line, polygon, _FROM_WALL_TO_WALL):
+    is_sound = polygon is walls[index] or stays_valid or shapely.MultiPolygon(changed).is_valid
+    if not is_sound or not shapely.relate_pattern(line, polygon, _FROM_WALL_TO_WALL):
         return None
     return changed, line
 
@@ -197,7 +200,7 @@ def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] |
     hits = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, far])))
     nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))] if len(hits) else end
     corners = shapely.get_coordinates(polygon)
-    away = np.abs(corners - nearest).max(axis=1)
+    away = np.maximum(*np.abs(corners - nearest).T)
     if away.min() <= CORNER_DISTANCE:
         x, y = corners[np.argmin(away)].tolist()
     elif len(hits) == 0:
@@ -207,22 +210,45 @@ def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] |
     return int(x), int(y)
 
 
-def _with_corner(polygon: Polygon, point: F64) -> Polygon:
+def _with_corner(polygon: Polygon, point: F64) -> tuple[Polygon, bool]:
     """Return the polygon with a corner at a point on or beside one of its walls.
 
     It is added even if the point is on the wall, since another corner might move that wall.
+
+    Returns:
+        The polygon, and whether the wall moved over no other wall. If so, the polygon is as valid
+        as before; to find that out from the whole polygon takes long.
     """
-    if (shapely.get_coordinates(polygon) == point).all(axis=1).any():
-        return polygon
-    rings = [np.asarray(ring.coords) for ring in shapely.get_rings(polygon)]
-    walls = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
-    after = int(np.argmin(shapely.distance(shapely.linestrings(walls), shapely.Point(point))))
-    number = 0
-    while after >= len(rings[number]) - 1:
-        after -= len(rings[number]) - 1
-        number += 1
-    rings[number] = np.insert(rings[number], after + 1, point, axis=0)
-    return Polygon(rings[0], rings[1:])
+    rings = shapely.get_rings(polygon)
+    corners, ring_of = shapely.get_coordinates(rings, return_index=True)
+    if ((corners[:, 0] == point[0]) & (corners[:, 1] == point[1])).any():
+        return polygon, True
+    first = np.flatnonzero(ring_of[:-1] == ring_of[1:])  # a wall goes from a corner to the next
+    sides = np.stack([corners[first], corners[first + 1]], axis=1)
+    low, high = sides.min(axis=1), sides.max(axis=1)
+
+    def walls_near(least: F64, most: F64) -> I64:
+        return np.flatnonzero(((low <= most) & (high >= least)).all(axis=1))
+
+    beside = walls_near(point - CORNER_DISTANCE, point + CORNER_DISTANCE)
+    beside = beside if len(beside) else np.arange(len(sides))
+    lines = shapely.linestrings(sides[beside])
+    wall = int(beside[np.argmin(shapely.distance(lines, shapely.Point(point)))])
+    ends = sides[wall]
+    moved = np.concatenate([ends, [point]])
+    swept = shapely.convex_hull(shapely.multipoints(moved))
+    others = walls_near(moved.min(axis=0), moved.max(axis=0))
+    others = others[others != wall]
+    loose = sides[others].reshape(-1, 2)
+    loose = loose[~(loose[:, None] == ends).all(axis=2).any(axis=1)]
+    is_alone = (
+        shapely.relate_pattern(shapely.linestrings(sides[others]), swept, _INSIDE_APART).all()
+        and not shapely.intersects(shapely.points(loose), swept).any()
+    )
+    number = ring_of[first[wall]]
+    place = first[wall] + 1 - np.searchsorted(ring_of, number)
+    rings[number] = shapely.linearrings(np.insert(corners[ring_of == number], place, point, axis=0))
+    return shapely.polygons(rings[0], rings[1:]), bool(is_alone)
 
 
 def rooms_beside(lattice: Lattice, room_of_place: I16, segment: Segment) -> tuple[int, int]:
