@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from tests.homes import all_homes
 from tests.strategies import homes, seeds
 from tests.thorough import examples
@@ -92,6 +92,7 @@ def test_line_between_slanted_walls_gives_them_a_corner_less_than_a_millimetre_o
 
 @settings(max_examples=examples(100))
 @given(homes(), seeds())
+@example([shapely.box(192, 128, 256, 192)], 455)  # the corner lies beyond the end of its wall
 def test_corner_beside_a_wall_keeps_a_polygon_valid_where_no_other_wall_is_near(
     polygons: list[shapely.Polygon], seed: int
 ) -> None:

@@ -241,8 +241,10 @@ def _with_corner(polygon: Polygon, point: F64) -> tuple[Polygon, bool]:
     others = others[others != wall]
     loose = sides[others].reshape(-1, 2)
     loose = loose[~(loose[:, None] == ends).all(axis=2).any(axis=1)]
+    along = ends[1] - ends[0]
     is_alone = (
-        shapely.relate_pattern(shapely.linestrings(sides[others]), swept, _INSIDE_APART).all()
+        0 < (point - ends[0]) @ along < along @ along  # a point beyond its ends makes a spike
+        and shapely.relate_pattern(shapely.linestrings(sides[others]), swept, _INSIDE_APART).all()
         and not shapely.intersects(shapely.points(loose), swept).any()
     )
     number = ring_of[first[wall]]
