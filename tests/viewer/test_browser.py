@@ -103,11 +103,11 @@ def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Pat
 
 def shares_are(page: Any, believed: dict[str, float]) -> bool:
     """Say whether every bar shows what is believed of its room; panels follow with a delay."""
-    bars = page.locator("table.bars tr[data-room]").all()
-    shown = {
-        bar.get_attribute("data-room"): float(bar.get_attribute("data-believed")) for bar in bars
-    }
-    return shown == pytest.approx({room: believed.get(room, 0.0) for room in shown}, abs=1e-9)
+    bars = page.locator("table.bars tr[data-room]")  # read at once: they may be replaced between
+    pairs = bars.evaluate_all("rows => rows.map(row => [row.dataset.room, row.dataset.believed])")
+    shown = {room: float(share) for room, share in pairs}
+    expected = {room: believed.get(room, 0.0) for room in shown}
+    return shown == pytest.approx(expected, abs=1e-9) and bool(shown or not believed)
 
 
 def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
