@@ -3,6 +3,7 @@
 import io
 import json
 import shutil
+import socket
 from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
@@ -105,6 +106,14 @@ def test_server_listens_on_the_loopback_only(run_dir: Path) -> None:
     assert "127.0.0.1" == server.listens_at[0]
     assert server.address.startswith("http://127.0.0.1:")
     server.close()
+
+
+def test_browser_that_comes_before_the_server_runs_is_not_refused(run_dir: Path) -> None:
+    server = PageServer([run_dir])
+    try:
+        socket.create_connection(server.listens_at, timeout=10).close()
+    finally:
+        server.close()
 
 
 def test_tokens_differ_and_are_long() -> None:

@@ -100,9 +100,11 @@ def compose(text: str) -> yaml.Node | None:
     longest = max(map(len, text.splitlines()), default=0)
     try:
         if len(text) > _SHORT or text.count("[") + text.count("{") + 2 * longest > _SHALLOW:
-            _check_events(text)
+            _check_events(text, _FastLoader)
         return _composed(_FastLoader(text))
-    except yaml.YAMLError:
+    except yaml.YAMLError as error:
+        if "nesting depth" in str(error):  # of libyaml 0.2.6, which reads ahead of its events
+            _check_events(text, Loader)
         if len(text) > _SLOW_TO_EXPLAIN:
             raise
     return _composed(Loader(text))
@@ -117,11 +119,11 @@ def _composed(loader: Any) -> yaml.Node | None:
         loader.dispose()
 
 
-def _check_events(text: str) -> None:
+def _check_events(text: str, loader: Any) -> None:
     """Refuse a text of too many levels or values before its nodes are built."""
     depth = values = 0
     most_depth, most_values = DEPTH.limit, YAML_VALUES.limit
-    for event in yaml.parse(text, Loader=_FastLoader):
+    for event in yaml.parse(text, Loader=loader):
         if isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
         elif isinstance(event, yaml.NodeEvent):

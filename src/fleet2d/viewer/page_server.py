@@ -274,6 +274,7 @@ class PageServer:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((HOST, port))
+            self._socket.listen()  # at once: a browser may be there before the server is
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
