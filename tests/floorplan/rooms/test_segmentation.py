@@ -72,6 +72,15 @@ def test_corridor_with_straight_walls_goes_on_past_the_doors_on_either_side(
     assert found == areas(segment_rooms(both, [False], [width], CELL, directions, across))
 
 
+def test_legs_of_chairs_make_no_room_seem_a_corridor() -> None:
+    """Among them no disc is wider than the doorway, which would lie across a corridor."""
+    both = chambers(9.0, 6.0, links=(Link(0, (0, 1)),))
+    both.of_cell[5, 2::4] = -1
+    across = [((0, 0), (0, 640))]
+
+    assert [8.78, 5.85] == areas(segment_rooms(both, [False], [0.8], CELL, STRAIGHT, across))
+
+
 @pytest.mark.parametrize(
     ("end", "straight", "found"),
     [

@@ -30,6 +30,7 @@ from fleet2d.kernels import (
     Bool,
     Mesh,
     label_frames,
+    label_parts,
     label_triangles,
     pairs_in_sight,
     rasterize_cells,
@@ -553,6 +554,8 @@ is behind it is the same corridor or hall, past a column, a niche or a cupboard.
 ACROSS_SHARE, ACROSS_DOOR_SHARE = 0.85, 0.95
 """In straight walls, an opening or a doorway that is wider than this share of the wider space
 beside it lies across a corridor, between the doors on either side."""
+LEG_M = 0.3
+"""Free-standing obstacles up to this size, such as legs of chairs, make no space narrower [m]."""
 
 
 def segment_rooms(
@@ -577,11 +580,14 @@ def segment_rooms(
         The room of each cell, by decreasing size; -1 where not free. int64 (rows, columns).
     """
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
-    areas, across = sizes * cell**2, _clear_widths(chambers, cell)
+    areas = sizes * cell**2
     is_main = np.ones(len(widths_m), np.bool_)
     if directions is not None:
         is_main = directions.are_main(np.reshape(np.array(lines, np.int64), (-1, 4)))
     straight = directions is not None and directions.straight
+    # In ragged walls, what looks like a leg may be all that was seen of a wall.
+    of_cell = _without_legs(chambers.of_cell, cell) if straight else chambers.of_cell
+    across = _clear_widths(of_cell, chambers.count, cell)
     owner = np.arange(chambers.count)
     while True:
         candidates = []
@@ -613,11 +619,21 @@ def segment_rooms(
     return number[chambers.of_cell]
 
 
-def _clear_widths(chambers: Chambers, cell: float) -> F64:
+def _without_legs(of_cell: I32, cell: float) -> I32:
+    """Return the chamber of each cell, of legs of furniture too."""
+    # A margin around the plan joins all that reaches its edge.
+    part = label_parts(np.pad(of_cell, 1, constant_values=-1) < 0, True)
+    frames = label_frames(part, int(part.max()) + 1)
+    is_leg = (frames[:, 2:] - frames[:, :2]).max(axis=1) * cell <= LEG_M + TINY
+    is_leg = np.append(is_leg, False)  # its last entry serves -1
+    return spread_labels(of_cell, (of_cell >= 0) | is_leg[part[1:-1, 1:-1]])
+
+
+def _clear_widths(of_cell: I32, count: int, cell: float) -> F64:
     """Return the diameter of the largest disc in each chamber, float64 (chambers,) [m]."""
-    widths = np.zeros(chambers.count)
-    for chamber, frame in enumerate(label_frames(chambers.of_cell, chambers.count).tolist()):
+    widths = np.zeros(count)
+    for chamber, frame in enumerate(label_frames(of_cell, count).tolist()):
         row, column, end_row, end_column = frame
-        inside = chambers.of_cell[row:end_row, column:end_column] == chamber
+        inside = of_cell[row:end_row, column:end_column] == chamber
         widths[chamber] = 2 * cell * math.sqrt(int(squared_distance(np.pad(inside, 1)).max()))
     return widths
