@@ -253,13 +253,13 @@ def text_of(error: BaseException) -> str:
         return f"(its message can't be written: {type(failure).__name__})"
 
 
-def _place(error: BaseException) -> str:
-    """Return the frames of an error in the user's own code, caller first."""
+def own_frames(stack: traceback.StackSummary) -> list[traceback.FrameSummary]:
+    """Return the frames of a stack in the user's own code, caller first."""
     libraries = (str(Path(__file__).parent), sys.prefix, sys.base_prefix, "<")
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if not frame.filename.startswith(libraries)
-    ]
+    return [frame for frame in stack if not frame.filename.startswith(libraries)]
+
+
+def _place(error: BaseException) -> str:
+    frames = own_frames(traceback.extract_tb(error.__traceback__))
     lines = [f"{Path(f.filename).name}:{f.lineno}, in {f.name}: {f.line}" for f in frames[-FRAMES:]]
     return f" ({'; '.join(lines)})" if lines else ""

@@ -4,7 +4,7 @@ import pytest
 from tests.scenes import run, scenario
 
 from fleet2d.errors import ScenarioError
-from fleet2d.viewer.home_facts import doors_of
+from fleet2d.viewer.home_facts import WallsHistory
 
 
 def test_an_edited_door_of_a_manifest_is_refused() -> None:
@@ -12,4 +12,4 @@ def test_an_edited_door_of_a_manifest_is_refused() -> None:
     stored = run(scenario("1 min"))
     stored.manifest["scenario"]["objects"] = {"d": {"type": "door", "hinge": "left"}}
     with pytest.raises(ScenarioError, match=r"scenario\.objects\.d: "):
-        doors_of(stored)
+        WallsHistory(stored)

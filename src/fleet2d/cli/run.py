@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from fleet2d.errors import ArtifactError, RunDirectoryError, blame
+from fleet2d.errors import ArtifactError, RunDirectoryError, blame, own_frames
 from fleet2d.options import TrustFiles, TrustFolders, file_name, split, trust_of
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
@@ -65,9 +65,7 @@ def _watch(is_over: threading.Event, thread_id: int, first_s: float) -> None:
 
 def _line(frame: FrameType | None) -> str:
     """Return the current line of the user's code as text; empty if there is none."""
-    other_code = (str(Path(__file__).parents[1]), sys.prefix, sys.base_prefix, "<")
-    lines = traceback.extract_stack(frame) if frame else []
-    frames = [f for f in lines if not f.filename.startswith(other_code)]
+    frames = own_frames(traceback.extract_stack(frame)) if frame else []
     return f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
 
 
@@ -157,10 +155,11 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from fleet2d.configuration.components import lookup
     from fleet2d.configuration.units import format_duration
     from fleet2d.metrics.metric import SEPARATOR, flat
 
-    console = Console()
+    console = Console(highlight=False, markup=False, soft_wrap=True)
     wall = summary["wall_s"]
     simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
     seconds = wall["setup"] + wall["simulate"] + wall["save"]
@@ -169,14 +168,12 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     console.print(
         f"{simulated} in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
         f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
-        f" save {wall['save']:.2f} s;"
-        f" whole process {wall['total']:.2f} s{memory})",
-        highlight=False,
-        soft_wrap=True,
+        f" save {wall['save']:.2f} s; whole process {wall['total']:.2f} s{memory})"
     )
     table, hidden = Table("metric", "of", "value", "", show_edge=False), 0
     for metric, result in summary["metrics"].items():
-        metric_class = _class_of(run, metric)
+        configured = run.manifest["scenario"]["metrics"][metric]
+        metric_class = cast("type[Metric]", lookup("metric", configured["type"]))
         rows = flat(metric_class.summary(result))
         hidden += len(flat(result)) - len(rows)
         last_unit = None
@@ -185,15 +182,13 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
             table.add_row(metric, name, _text(value, unit), "" if unit == last_unit else unit)
             metric, last_unit = "", unit
     if table.row_count:
-        console.print(table)
-    if hidden:
-        console.print(f"{hidden} more numbers are in the run: --json shows them", highlight=False)
-    for verdict in run.manifest["expectations"].values():
-        console.print(verdict["says"], highlight=False, markup=False, soft_wrap=True)
-    for note in run.notes or run.manifest["notes"]:
-        console.print(f"note: {note}", highlight=False, markup=False, soft_wrap=True)
-    console.print(f"seed {summary['seed']}, digest {summary['digest'][:16]}", highlight=False)
-    console.print(f"stored in {summary['run_dir']}", highlight=False, soft_wrap=True, markup=False)
+        console.print(table, soft_wrap=False)
+    lines = [f"{hidden} more numbers are in the run: --json shows them"] if hidden else []
+    lines += [verdict["says"] for verdict in run.manifest["expectations"].values()]
+    lines += [f"note: {note}" for note in run.notes or run.manifest["notes"]]
+    lines += [f"seed {summary['seed']}, digest {summary['digest'][:16]}"]
+    lines += [f"stored in {summary['run_dir']}"]
+    console.print(*lines, sep="\n")
 
 
 def _text(value: Any, unit: str) -> str:
@@ -203,14 +198,6 @@ def _text(value: Any, unit: str) -> str:
     if unit.startswith("share"):
         return f"{100 * value:.1f} %" if value >= 0.001 or value == 0 else "< 0.1 %"
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-
-
-def _class_of(run: "Run", metric: str) -> "type[Metric]":
-    """Return the class of a metric, which has its units and its summary."""
-    from fleet2d.configuration.components import lookup
-
-    configured = run.manifest["scenario"]["metrics"][metric]
-    return cast("type[Metric]", lookup("metric", configured["type"]))
 
 
 def _since_start() -> float:

@@ -17,8 +17,6 @@ from fleet2d.options import file_name
 from fleet2d.storage.files import write_atomically
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fleet2d.expectations.verdict import Verdict
     from fleet2d.scenario.model import Scenario
 
@@ -92,15 +90,13 @@ def write_junit(path: Path, cases: "Sequence[ScenarioCase]") -> None:
     for source in dict.fromkeys(case.source for case in cases):
         cases_of_source = [case for case in cases if case.source == source]
         suite = ET.SubElement(root, "testsuite", name=_xml_text(source))
-        failures = errors = skipped = 0
         for case in cases_of_source:
-            failures += sum(verdict.fails for verdict in case.verdicts.values())
-            skipped += sum(v.holds is None and not v.fails for v in case.verdicts.values())
-            errors += bool(case.error)
             _add_case(suite, case)
-        counts = {"tests": len(suite), "failures": failures, "errors": errors, "skipped": skipped}
-        for name, count in counts.items():
-            suite.set(name, str(count))
+        counts = Counter(outcome.tag for outcome in suite.iterfind("testcase/*"))
+        suite.set("tests", str(len(suite)))
+        suite.set("failures", str(counts["failure"]))
+        suite.set("errors", str(counts["error"]))
+        suite.set("skipped", str(counts["skipped"]))
         suite.set("time", f"{sum(case.wall_s for case in cases_of_source):.3f}")
     ET.indent(root)
     text = ET.tostring(root, encoding="utf-8", xml_declaration=True)
@@ -124,12 +120,12 @@ def _add_case(suite: ET.Element, case: "ScenarioCase") -> None:
             error.text = _xml_text(case.error)
             return
         verdict = case.verdicts[name]
-        if verdict.holds is None and not verdict.fails:
-            ET.SubElement(test, "skipped", message=_xml_text(str(verdict)))
         if verdict.fails:
             failure = ET.SubElement(test, "failure", message=_xml_text(str(verdict)))
             files = "".join(f"\nstored: {path}" for path in case.files)
             failure.text = _xml_text(f"{verdict}\nto see it: {case.commands(verdict)}{files}")
+        elif verdict.holds is None:
+            ET.SubElement(test, "skipped", message=_xml_text(str(verdict)))
 
 
 def _xml_text(text: str) -> str:
@@ -141,7 +137,7 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = Console(highlight=False, markup=False, soft_wrap=True)
     has_untested = any(v.holds is None for case in cases for v in case.verdicts.values())
     columns = ["untested"] if has_untested else []
     has_occasions = any(v.occasions is not None for case in cases for v in case.verdicts.values())
@@ -159,26 +155,22 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
                 numbers.append(str(sum(occasions)) if occasions else "")
             table.add_row(label, name, held, *numbers, _lowest(verdicts))
             label = ""
-    console.print(table)
+    console.print(table, soft_wrap=False)
     verdicts = [v for case in cases for v in case.verdicts.values()]
-    for note in dict.fromkeys(note for verdict in verdicts for note in verdict.notes):
-        console.print(f"note: {note}", highlight=False, markup=False, soft_wrap=True)
-    for case in cases:
-        _print_failure(console, case)
-    failed = sum(case.fails for case in cases)
-    runs = counted(len(cases), "run")
-    console.print(f"{failed} of {runs} failed" if failed else f"all held: {runs}", highlight=False)
+    notes = dict.fromkeys(note for verdict in verdicts for note in verdict.notes)
+    failures = [line for case in cases for line in _failure_lines(case)]
+    failed, runs = sum(case.fails for case in cases), counted(len(cases), "run")
+    end = f"{failed} of {runs} failed" if failed else f"all held: {runs}"
+    console.print(*(f"note: {note}" for note in notes), *failures, end, sep="\n")
 
 
-def _print_failure(console: "Console", case: "ScenarioCase") -> None:
+def _failure_lines(case: "ScenarioCase") -> list[str]:
     prefix = f"{case.source}, {case.label}: "
     lines = [f"{prefix}{case.error}"] if case.error else []
     for verdict in case.verdicts.values():
         if verdict.fails:
             lines += [f"{prefix}{verdict}", f"  to see it: {case.commands(verdict)}"]
-    lines += [f"  stored: {path}" for path in case.files]
-    for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    return [*lines, *(f"  stored: {path}" for path in case.files)]
 
 
 def _lowest(verdicts: "Sequence[Verdict]") -> str:
@@ -234,7 +226,7 @@ def test(
     if not files:
         raise InputError("name the scenarios to test: fleet2d test SCENARIO.yaml…")
     if pictures is not None:
-        _check_pictures()
+        import fleet2d.pictures  # noqa: F401 - an error before anything is run, if matplotlib is missing
     cases = [
         case
         for file in files
@@ -349,18 +341,6 @@ def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
             evidence = simulation.evidence(verdict.name)
             draw_failure(run, worst.worst, path, str(verdict), evidence)
             case.files.append(path)
-
-
-def _check_pictures() -> None:
-    """Check that pictures can be drawn, before anything is run.
-
-    Raises:
-        InputError: matplotlib is missing.
-    """
-    from importlib.util import find_spec
-
-    if find_spec("matplotlib") is None:
-        raise InputError("--pictures needs matplotlib: pip install 'fleet2d[viz]'")
 
 
 def _content(case: ScenarioCase) -> dict[str, Any]:

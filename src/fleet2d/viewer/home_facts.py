@@ -2,8 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject, move_object
 from fleet2d.floorplan.plan import FloorPlan, Room
-from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.kernels import I16, Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.runs.run import Run
@@ -61,7 +59,7 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
             ]
             for part in plan.polygons
         ],
-        rooms=_rooms_facts(plan.rooms),
+        rooms=list(_rooms_facts(plan.rooms)),
         room_cells=runs_of(plan.room_of_cell),
         place_cells=runs_of(plan.room_of_place),
         doorways=[(d.start, d.end) for d in plan.doorways],
@@ -110,85 +108,71 @@ def points(coordinates: NDArray[Any]) -> list[Point]:
     return [(x, y) for x, y in np.round(coordinates, DIGITS).tolist()]
 
 
-def _rooms_facts(rooms: Sequence[Room]) -> list[RoomFacts]:
-    """Return the facts of rooms; those of one type have different shades."""
+def _rooms_facts(rooms: Sequence[Room]) -> Iterator[RoomFacts]:
+    """Yield the facts of rooms; those of one type have different shades."""
     counts: Counter[str] = Counter()
-    facts = []
     for room in rooms:
-        number = counts[room.type]
-        facts.append(
-            RoomFacts(
-                name=room.name,
-                type=room.type,
-                color=room_color(room.type, number),
-                deep_color=deep_color(room.type, number),
-                anchor=room.anchor_xy,
-                area_m2=room.area_m2,
-            )
+        yield RoomFacts(
+            name=room.name,
+            type=room.type,
+            color=room_color(room.type, counts[room.type]),
+            deep_color=deep_color(room.type, counts[room.type]),
+            anchor=room.anchor_xy,
+            area_m2=room.area_m2,
         )
         counts[room.type] += 1
-    return facts
 
 
 _MOVE = re.compile(r"(.+) to \((\S+), (\S+)\)")
 MAX_ARRANGEMENTS = 500
 
 
-@dataclass
-class HomeDoors:
-    """The doors of a run, in the order of its scenario."""
-
-    names: list[str] = field(default_factory=list)
-    doorways: list[Doorway] = field(default_factory=list)
-    facts: list[DoorFacts] = field(default_factory=list)
-
-
-def doors_of(run: Run) -> HomeDoors:
-    """Return the doors of a run's scenario.
-
-    Raises:
-        ScenarioError: The manifest describes one wrongly.
-    """
-    doors = HomeDoors()
-    for name, settings in run.manifest["scenario"].get("objects", {}).items():
-        if settings.get("type") != "door":
-            continue
-        try:
-            door = Door(**{key: value for key, value in settings.items() if key != "type"})
-        except ValidationError as error:
-            raise refusal(f"{FILE_NAME}: scenario.objects.{name}", error) from None
-        doorway = door.find(run.plan)
-        doors.names.append(name)
-        doors.doorways.append(doorway)
-        doors.facts.append(door_facts(name, door, doorway))
-    return doors
-
-
-def door_facts(name: str, door: Door, doorway: Doorway) -> DoorFacts:
+def door_facts(name: str, door: Door, plan: FloorPlan) -> DoorFacts:
     """Return a door as it is when the run starts."""
+    doorway = door.find(plan)
     return DoorFacts(
         name=name, start=doorway.start, end=doorway.end, open=door.open, locked=door.locked
     )
+
+
+def _doors_of(run: Run) -> dict[str, Door]:
+    """Return the doors of a run's scenario by name, in its order."""
+    doors = {}
+    for name, settings in run.manifest["scenario"].get("objects", {}).items():
+        if settings.get("type") == "door":
+            try:
+                doors[name] = Door(**{k: value for k, value in settings.items() if k != "type"})
+            except ValidationError as error:
+                raise refusal(f"{FILE_NAME}: scenario.objects.{name}", error) from None
+    return doors
 
 
 class WallsHistory:
     """The walls of a run over time, each arrangement of doors and furniture once.
 
     Attributes:
+        doors: The doors as they are when the run starts, in the order of its scenario.
         changes: The steps at which the walls change, with the id of the new set of walls, in order.
+        meshes: The sets of walls, by id.
     """
 
-    def __init__(self, run: Run, doors: HomeDoors) -> None:
-        """Replay the events of a run that change its home."""
-        self._home = Home(run.plan, doors.doorways)
-        self._doors = doors
-        self._meshes: list[Mesh] = []
+    def __init__(self, run: Run) -> None:
+        """Replay the events of a run that change its home.
+
+        Raises:
+            ScenarioError: The manifest describes a door wrongly.
+        """
+        doors = _doors_of(run)
+        self.doors = [door_facts(name, door, run.plan) for name, door in doors.items()]
+        self._names = list(doors)
+        self._home = Home(run.plan, [door.find(run.plan) for door in doors.values()])
+        self.meshes: list[Mesh] = []
         self._numbers: dict[tuple[object, ...], int] = {}
-        for number, door in enumerate(doors.facts):
-            if not door["open"]:
+        for number, door in enumerate(doors.values()):
+            if not door.open:
                 self._home.set_door(number, is_open=False)
         self.changes = [WallsChange(step=0, walls=self._number())]
-        if doors.names or run.manifest["scenario"].get("changes"):
+        if doors or run.manifest["scenario"].get("changes"):
             for step, entity, event, detail in _home_events(run):
                 self._replay(step, entity, event, detail)
 
@@ -198,18 +182,13 @@ class WallsHistory:
         Raises:
             ArtifactError: There is no such set of walls.
         """
-        if not 0 <= number < len(self._meshes):
+        if not 0 <= number < len(self.meshes):
             raise ArtifactError(f"there is no set of walls with id {number}")
-        return self._meshes[number]
-
-    @property
-    def count(self) -> int:
-        """Number of different sets of walls."""
-        return len(self._meshes)
+        return self.meshes[number]
 
     def _replay(self, step: int, entity: str, event: str, detail: str) -> None:
-        if event in ("opened", "shut") and entity in self._doors.names:
-            self._home.set_door(self._doors.names.index(entity), is_open=event == "opened")
+        if event in ("opened", "shut") and entity in self._names:
+            self._home.set_door(self._names.index(entity), is_open=event == "opened")
         elif event == "moved" and (place := _MOVE.fullmatch(detail)):
             item = self._home.object(place[1])
             to = (float(place[2]), float(place[3]))
@@ -219,7 +198,7 @@ class WallsHistory:
                 return
         else:
             return
-        if len(self._meshes) >= MAX_ARRANGEMENTS:
+        if len(self.meshes) >= MAX_ARRANGEMENTS:
             return
         walls = self._number()
         if walls != self.changes[-1]["walls"]:
@@ -232,8 +211,8 @@ class WallsHistory:
         tall = (item for item in self._home.objects if item.blocks == "sight")
         key = (self._home.shut, tuple((item.name, item.footprint.wkb) for item in tall))
         if key not in self._numbers:
-            self._numbers[key] = len(self._meshes)
-            self._meshes.append(self._home.walls)
+            self._numbers[key] = len(self.meshes)
+            self.meshes.append(self._home.walls)
         return self._numbers[key]
 
 

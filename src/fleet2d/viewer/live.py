@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from contextvars import copy_context
 from functools import partial
 from pathlib import Path
@@ -42,8 +43,7 @@ class LiveEngine:
         """Take over a simulation: nothing else may advance it."""
         self.simulation = simulation
         self._events_until = simulation.step
-        self._meshes: dict[int, int] = {}
-        self._walls: list[Mesh] = []
+        self._walls: dict[Mesh, int] = {}
         self._called: set[str] = set()
         self._recorded = len(simulation.interventions)
 
@@ -59,24 +59,21 @@ class LiveEngine:
             y=int(actor.state.y),
             heading=int(actor.state.heading) % TURN,
             away=bool(actor.state.away),
-            ahead=list(self._ahead(actor)),
+            ahead=self._ahead(actor),
             behavior=behavior,
             reason=reason,
             decides=-1 if actor.asked_at is None else actor.asked_at,
         )
 
-    def _ahead(self, actor: Any) -> Iterator[tuple[int, int, int]]:
-        """Yield the corners of the path ahead: time [us], x and y [lattice]."""
+    def _ahead(self, actor: Any) -> list[tuple[int, int, int]]:
+        """Return the corners of the path ahead: time [us], x and y [lattice]."""
         if not isinstance(actor.motion, Track):
-            return
+            return []
         now_us = self.simulation.step * self.simulation.clock.step_us
         track = actor.motion.breakpoints
-        time = np.asarray(track.time)
-        first = int(np.searchsorted(time, now_us, side="right"))
-        for i in range(first, min(len(time), first + MAX_CORNERS)):
-            if time[i] > now_us + AHEAD_US:
-                return
-            yield int(time[i]), int(track.x[i]), int(track.y[i])
+        first, end = np.searchsorted(track.time, [now_us, now_us + AHEAD_US], side="right").tolist()
+        corners = np.stack([track.time, track.x, track.y], axis=1)[first:end]
+        return [(time, x, y) for time, x, y in corners[:MAX_CORNERS].tolist()]
 
     def in_view(self) -> list[tuple[str, str]]:
         """Return (robot, user) pairs: the users that each robot has in view."""
@@ -127,12 +124,7 @@ class LiveEngine:
 
     def walls(self) -> int:
         """Return the id of the present set of walls, for `mesh`."""
-        mesh = self.simulation.home.walls
-        key = id(mesh)
-        if key not in self._meshes:
-            self._meshes[key] = len(self._walls)
-            self._walls.append(mesh)  # referenced, so that its id stays unique
-        return self._meshes[key]
+        return self._walls.setdefault(self.simulation.home.walls, len(self._walls))
 
     def mesh(self, number: int) -> Mesh:
         """Return a set of walls by its id.
@@ -142,7 +134,7 @@ class LiveEngine:
         """
         if not 0 <= number < len(self._walls):
             raise InputError(f"there is no set of walls with id {number}")
-        return self._walls[number]
+        return list(self._walls)[number]
 
     def apply(self, order: LiveOrder) -> None:
         """Apply an intervention; the manifest records it, and `reproduce` repeats it.
@@ -167,7 +159,9 @@ class LiveEngine:
             self.simulation.replan(name)
         elif order["action"] == "configure":
             behavior, _, key = order["key"].partition(".")
-            self.simulation.configure(name, behavior, **{key: read_value(order["text"])})
+            self.simulation.configure(
+                name, behavior, **{key: parse_yaml(order["text"], Path(), "the value")}
+            )
         else:
             raise InputError(f"there is no intervention {order['action']!r}")
 
@@ -213,6 +207,7 @@ class LiveRun:
         engine: The simulation.
         run: The run once it is finished.
         failure: The exception that ended the simulation; None if there is none.
+        serve: Serves the run when it is over, and returns its number.
     """
 
     def __init__(self, simulation: Simulation, *, paused: bool = False, speed: float = 0.0) -> None:
@@ -226,6 +221,7 @@ class LiveRun:
         self.engine = LiveEngine(simulation)
         self.run: Run | None = None
         self.failure: BaseException | None = None
+        self.serve: Callable[[Run], int] = lambda _: -1
         self._clock = simulation.clock
         self._paused, self._speed = paused, speed
         self._achieved = 0.0
@@ -233,7 +229,6 @@ class LiveRun:
         self._watchers: list[queue.Queue[LiveFrame]] = []
         self._lock = threading.Lock()
         self._is_ending = self._streams_end = False
-        self._serve: Callable[[Run], int] | None = None
         self._frame = self._state()
         # In the present context: what code is trusted there, is in the thread.
         run_loop = partial(copy_context().run, self._run_loop)
@@ -242,10 +237,6 @@ class LiveRun:
     def start(self) -> None:
         """Start the simulation."""
         self._thread.start()
-
-    def serve_by(self, serve: Callable[[Run], int]) -> None:
-        """Serve the run when it is over; the function returns its number."""
-        self._serve = serve
 
     def end(self) -> None:
         """Stop the simulation at its current step, and close the run."""
@@ -279,14 +270,7 @@ class LiveRun:
             self._frame = {**self._frame, "message": f"the simulation failed: {error}"}
         finally:
             self.run = self.engine.simulation.finish()
-            served_as = self._serve(self.run) if self._serve is not None else -1
-            self._frame = {
-                **self._frame,
-                "events": [],
-                "marks": [],
-                "slows": [],
-                "served_as": served_as,
-            }
+            self._frame = {**self._without_news(), "served_as": self.serve(self.run)}
             self._send(self._frame)
 
     def _advance(self) -> None:
@@ -314,9 +298,7 @@ class LiveRun:
         while not self._is_ending:
             wait_s = deadline - time.perf_counter()
             try:
-                order, answer = (
-                    self._orders.get(timeout=wait_s) if wait_s > 0 else self._orders.get_nowait()
-                )
+                order, answer = self._orders.get(timeout=max(0.0, wait_s))
             except queue.Empty:
                 return
             try:
@@ -369,6 +351,9 @@ class LiveRun:
         )
         return self._frame
 
+    def _without_news(self) -> LiveFrame:
+        return {**self._frame, "events": [], "marks": [], "slows": []}
+
     def _send(self, frame: LiveFrame) -> None:
         with self._lock:
             for watcher in self._watchers:
@@ -380,16 +365,13 @@ class LiveRun:
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)
-            watcher.put({**self._frame, "events": [], "marks": [], "slows": []})
+            watcher.put(self._without_news())
         try:
             while not (self._is_ending or self._streams_end):
                 frames = []
-                try:
+                with suppress(queue.Empty):
                     frames.append(watcher.get(timeout=FRAME_WAIT_S))
-                except queue.Empty:
-                    yield []
-                    continue
-                while not watcher.empty() and len(frames) < MAX_QUEUED:
+                while frames and not watcher.empty() and len(frames) < MAX_QUEUED:
                     frames.append(watcher.get_nowait())
                 yield frames
                 time.sleep(1 / BATCHES_PER_S)
@@ -400,16 +382,3 @@ class LiveRun:
     def end_streams(self) -> None:
         """End all `frames`, though the simulation goes on; lock-free for signal handlers."""
         self._streams_end = True
-
-
-def read_value(text: str) -> Any:
-    """Return the value of a key as it is written in a scenario.
-
-    Raises:
-        InputError: It isn't YAML.
-
-    Example:
-        >>> read_value("10 min"), read_value("0.5"), read_value("[kitchen, office]")
-        ('10 min', 0.5, ['kitchen', 'office'])
-    """
-    return parse_yaml(text, Path(), "the value")

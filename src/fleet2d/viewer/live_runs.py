@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
@@ -14,14 +13,14 @@ from fleet2d.artifacts.manifest import plain
 from fleet2d.configuration.trust import restrict_stored
 from fleet2d.engine.repeat import branch, repeat_until
 from fleet2d.engine.simulation import Simulation
-from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import BRANCH_ORDER, LIVE_ORDER, BranchOrder, LiveSession, read_body
 from fleet2d.viewer.home_facts import walls_facts
 from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.page_data import PageData, compact_json
 from fleet2d.viewer.run_facts import live_facts
-from fleet2d.viewer.served_runs import ServedRuns, endpoint, json_answer, json_body, problem
+from fleet2d.viewer.served_runs import ServedRuns, endpoint, json_answer, problem
 
 MAX_BRANCHES = 4
 
@@ -46,7 +45,7 @@ class LiveRuns:
             self._add(first, title, "", 0)
 
     def _add(self, live: LiveRun, title: str, of: str, since: int) -> LiveSession:
-        live.serve_by(lambda run: self._served.add(PageData(run)))
+        live.serve = lambda run: self._served.add(PageData(run))
         path = f"live/{len(self._runs)}"
         session = LiveSession(path=path, title=title, of=of, since=since)
         self._runs.append(live)
@@ -118,37 +117,28 @@ class LiveRuns:
     def routes(self) -> list[Route]:
         """Return the routes of running simulations."""
         return [
-            Route("/branch", self._begin, methods=["POST"]),
+            Route("/branch", endpoint(self._begin), methods=["POST"]),
             Route("/live/{number:int}/facts.json", endpoint(self._facts)),
             Route("/live/{number:int}/frames", endpoint(self._frames)),
-            Route("/live/{number:int}/order", self._order, methods=["POST"]),
+            Route("/live/{number:int}/order", endpoint(self._order), methods=["POST"]),
             Route("/live/{number:int}/walls/{walls:int}.json", endpoint(self._walls)),
         ]
 
-    async def _begin(self, request: Request) -> Response:
-        def begin(body: bytes) -> Response:
-            try:
-                order = read_body(
-                    body, BRANCH_ORDER, "the request is not a valid wish for a branch"
-                )
-                return json_answer(compact_json(self.branch(order)))
-            except (Fleet2DError, ValueError) as error:
-                return problem(str(error))
-
-        body = await json_body(request)
-        return body if isinstance(body, Response) else await run_in_threadpool(begin, body)
+    def _begin(self, _: Request, body: bytes) -> Response:
+        order = read_body(body, BRANCH_ORDER, "the request is not a valid wish for a branch")
+        return json_answer(self.branch(order))
 
     def _requested(self, request: Request) -> LiveRun:
         return self._live(request.path_params["number"])
 
-    def _facts(self, request: Request) -> Response:
-        return json_answer(compact_json(live_facts(self._requested(request).engine.simulation)))
+    def _facts(self, request: Request, _: bytes) -> Response:
+        return json_answer(live_facts(self._requested(request).engine.simulation))
 
-    def _walls(self, request: Request) -> Response:
+    def _walls(self, request: Request, _: bytes) -> Response:
         mesh = self._requested(request).engine.mesh(request.path_params["walls"])
-        return json_answer(compact_json(walls_facts(mesh)))
+        return json_answer(walls_facts(mesh))
 
-    def _frames(self, request: Request) -> Response:
+    def _frames(self, request: Request, _: bytes) -> Response:
         live = self._requested(request)
 
         def lines() -> Iterator[bytes]:
@@ -157,17 +147,10 @@ class LiveRuns:
 
         return StreamingResponse(lines(), media_type="text/event-stream")
 
-    async def _order(self, request: Request) -> Response:
-        body = await json_body(request)
-        if isinstance(body, Response):
-            return body
-        try:
-            live = self._requested(request)
-            order = read_body(body, LIVE_ORDER, "the request is not a valid order")
-        except InputError as error:
-            return problem(str(error))
-        refusal = await run_in_threadpool(live.submit, order)
-        return problem(refusal) if refusal else json_answer(b"{}")
+    def _order(self, request: Request, body: bytes) -> Response:
+        live = self._requested(request)
+        refusal = live.submit(read_body(body, LIVE_ORDER, "the request is not a valid order"))
+        return problem(refusal) if refusal else json_answer({})
 
 
 def free_directory(beside: Path | None) -> Path | None:

@@ -1,11 +1,11 @@
 """Moments and parts of a run: times in words as steps, and who was where between two steps."""
 
 import re
+from contextlib import suppress
 from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
-from pydantic_core import PydanticCustomError
 
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.artifacts.table import categories
@@ -83,18 +83,12 @@ def _elapsed_us(text: str, clock: Clock) -> int | None:
         midnight = midnight_of(clock.start)
         since = timedelta(days=int(day[1]) - 1, hours=parts[0], minutes=parts[1], seconds=parts[2])
         return clock.elapsed(midnight) + micros(since)
-    try:
+    with suppress(ValueError):
         moment = datetime.fromisoformat(text)
-    except ValueError:
-        return _duration_us(text)
-    return None if moment.tzinfo is not None else clock.elapsed(moment)
-
-
-def _duration_us(text: str) -> int | None:
-    try:
+        return None if moment.tzinfo is not None else clock.elapsed(moment)
+    with suppress(ValueError):
         return micros(parse_duration(text))
-    except (PydanticCustomError, ValueError):
-        return None
+    return None
 
 
 KEY_FRAMES = "key_frames"
@@ -182,15 +176,10 @@ def expand_walks(run: Run) -> Any:
     interval = timedelta(microseconds=run.manifest["step_us"])
     parts = [table.take(np.flatnonzero(~np.isin(entity, walkers)))]
     parts += [positions(run, name, interval) for name in walkers]
-    return pa.concat_tables([part.cast(plain_schema(table)) for part in parts])
-
-
-def plain_schema(table: Any) -> Any:
-    """Return the schema of a table of key frames, with plain strings and without metadata."""
-    import pyarrow as pa
-
+    # With plain strings and without metadata.
     texts = {"entity": pa.string(), "kind": pa.string()}
-    return pa.schema([(field.name, texts.get(field.name, field.type)) for field in table.schema])
+    schema = pa.schema([(field.name, texts.get(field.name, field.type)) for field in table.schema])
+    return pa.concat_tables([part.cast(schema) for part in parts])
 
 
 def positions(run: Run, name: str, interval: timedelta) -> Any:

@@ -11,6 +11,7 @@ import weakref
 from collections.abc import Callable
 from datetime import timedelta
 from functools import cached_property
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +24,9 @@ from fleet2d.kernels import TURN
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import path_in, write_atomically
 from fleet2d.viewer.contract import RunFacts, SightingFacts, WallsFacts
-from fleet2d.viewer.home_facts import WallsHistory, doors_of, walls_facts
+from fleet2d.viewer.home_facts import WallsHistory, walls_facts
 from fleet2d.viewer.moments import KEY_FRAMES, key_frame_rows, positions
 from fleet2d.viewer.run_facts import run_facts, run_title, sightings_of
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file; readers see all of it, or none.
-
-    Raises:
-        InputError: It can't be written.
-    """
-    with os_errors_as(InputError, f"{path} can't be written"):
-        write_atomically(path, content)
-
 
 POSES = "poses"
 """A table that replaces `key_frames` for the page in runs with random walks."""
@@ -63,11 +53,7 @@ class PageData:
 
     @cached_property
     def _walls(self) -> WallsHistory:
-        return WallsHistory(self.run, self._doors)
-
-    @cached_property
-    def _doors(self) -> Any:
-        return doors_of(self.run)
+        return WallsHistory(self.run)
 
     @cached_property
     def facts(self) -> RunFacts:
@@ -76,7 +62,7 @@ class PageData:
         Raises:
             ArtifactError: The run has no floor plan, or is damaged.
         """
-        facts = run_facts(self.run, self._doors, self._walls)
+        facts = run_facts(self.run, self._walls)
         facts["walks_every_s"] = self._walks_every_us / 1e6
         return facts
 
@@ -93,10 +79,9 @@ class PageData:
         """
         return walls_facts(self._walls.mesh(number))
 
-    @property
-    def arrangements(self) -> int:
-        """The number of different arrangements of doors and furniture in the run."""
-        return self._walls.count
+    def all_walls(self) -> list[WallsFacts]:
+        """Return the walls of each different arrangement of doors and furniture in the run."""
+        return [walls_facts(mesh) for mesh in self._walls.meshes]
 
     @cached_property
     def sightings(self) -> list[SightingFacts]:
@@ -227,6 +212,16 @@ def compact_json(content: Any) -> bytes:
     return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
 
 
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file; readers see all of it, or none.
+
+    Raises:
+        InputError: It can't be written.
+    """
+    with os_errors_as(InputError, f"{path} can't be written"):
+        write_atomically(path, content)
+
+
 def write_table(table: Any, target: Path | io.BytesIO) -> None:
     """Write a table as Parquet, with the encodings of the tables of a run directory."""
     import pyarrow as pa
@@ -287,7 +282,7 @@ def embedded_run(data: PageData, first: int, end: int) -> dict[str, Any]:
     return {
         "facts": facts,
         "sightings": [_cut(lane, first, end) for lane in data.sightings],
-        "walls": [data.walls(number) for number in range(data.arrangements)],
+        "walls": data.all_walls(),
         "tables": tables,
     }
 
@@ -343,15 +338,11 @@ def _rows(table: Any, name: str, first: int, end: int) -> Any:
 
 def _cut(lane: SightingFacts, first: int, end: int) -> SightingFacts:
     """Return the stretches of a lane that lie between two steps."""
-    rows = [
-        i
-        for i, (low, high) in enumerate(zip(lane["first"], lane["last"], strict=True))
-        if high >= first and low < end
-    ]
+    is_inside = (np.array(lane["last"]) >= first) & (np.array(lane["first"]) < end)
     return SightingFacts(
         robot=lane["robot"],
         user=lane["user"],
-        first=[lane["first"][i] for i in rows],
-        last=[lane["last"][i] for i in rows],
-        false=[lane["false"][i] for i in rows],
+        first=list(compress(lane["first"], is_inside)),
+        last=list(compress(lane["last"], is_inside)),
+        false=list(compress(lane["false"], is_inside)),
     )

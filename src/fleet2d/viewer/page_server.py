@@ -29,7 +29,7 @@ from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import SessionFacts
 from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.live_runs import LiveRuns
-from fleet2d.viewer.page_data import PageData, compact_json
+from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.served_runs import ServedRuns, json_answer, problem
 
 TOKEN = re.compile(r"[\w-]{32,64}", re.ASCII)
@@ -183,7 +183,7 @@ def page_app(
 
     async def session(_: Request) -> Response:
         facts = SessionFacts(runs=runs.titles, live=live.sessions(), version=__version__)
-        return json_answer(compact_json(facts))
+        return json_answer(facts)
 
     async def file(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")

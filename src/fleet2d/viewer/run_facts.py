@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from fleet2d.viewer.contract import (
     BodyFacts,
     CameraFacts,
     ColumnFacts,
-    DoorFacts,
     MarkFacts,
     RunFacts,
     SightingFacts,
@@ -33,7 +32,7 @@ from fleet2d.viewer.contract import (
     TableFacts,
     WallsChange,
 )
-from fleet2d.viewer.home_facts import HomeDoors, WallsHistory, door_facts, home_facts
+from fleet2d.viewer.home_facts import WallsHistory, door_facts, home_facts
 
 INTERVENTIONS = "interventions"
 VIOLATIONS = "violations"  # name of the table
@@ -134,20 +133,20 @@ def expectation_marks(
         [(0, 10, 'held'), (10, 20, 'violated'), (20, 100, 'held')]
     """
     label = str(verdict.get("says") or verdict.get("expectation") or name)
-    marks: list[MarkFacts] = []
-
-    def add(step: int, end: int, kind: Literal["held", "violated", "open"]) -> None:
-        if end > step:
-            marks.append(MarkFacts(lane=name, step=step, end=end, kind=kind, label=label))
-
-    end_of_last, is_decided = 0, verdict.get("decided", True)
+    stretches: list[tuple[int, int, Literal["held", "violated", "open"]]] = []
+    begin = 0
     for first, last in violations:
-        add(end_of_last, first, "held")
-        add(max(end_of_last, first), last + 1, "violated")
-        end_of_last = max(end_of_last, last + 1)
-    is_violated = not marks and not verdict.get("holds", True)
-    add(end_of_last, steps, "violated" if is_violated else "held" if is_decided else "open")
-    return marks
+        stretches += [(begin, first, "held"), (max(begin, first), last + 1, "violated")]
+        begin = max(begin, last + 1)
+    if not stretches and not verdict.get("holds", True):
+        stretches.append((begin, steps, "violated"))
+    else:
+        stretches.append((begin, steps, "held" if verdict.get("decided", True) else "open"))
+    return [
+        MarkFacts(lane=name, step=step, end=end, kind=kind, label=label)
+        for step, end, kind in stretches
+        if end > step
+    ]
 
 
 def _violations(run: Run) -> dict[str, list[tuple[int, int]]]:
@@ -184,12 +183,16 @@ def sightings_of(run: Run) -> list[SightingFacts]:
     robots: dict[str, None] = {}  # in the order in which they appear, as users
     users: dict[str, None] = {}
     for batch in _observations(run):
-        rows = _SightingColumns.of(batch)
-        robots |= dict.fromkeys(rows.robots)
-        users |= dict.fromkeys(rows.users)
-        for robot, user, part in rows.lanes():
-            found = _stretches(rows.step[part], rows.false[part], gap)
-            _extend(lanes.setdefault((robot, user), _no_sightings(robot, user)), found, gap)
+        robot, robot_names = categories(batch["robot"])
+        user, user_names = categories(batch["user"])
+        robots |= dict.fromkeys(robot_names)
+        users |= dict.fromkeys(user_names)
+        step, false, names = batch["step"].to_numpy(), _are_false(batch), [*user_names, ""]
+        lane = robot * len(names) + user % len(names)  # the last one is of an unknown user
+        for code in np.unique(lane).tolist():
+            key = robot_names[code // len(names)], names[code % len(names)]
+            none = SightingFacts(robot=key[0], user=key[1], first=[], last=[], false=[])
+            _extend(lanes.setdefault(key, none), step[lane == code], false[lane == code], gap)
     order = [(robot, user) for robot in robots for user in (*users, "")]
     return [lanes[key] for key in order if key in lanes]
 
@@ -213,77 +216,38 @@ def _observations(run: Run) -> Iterator[Any]:
         raise ArtifactError(f"{path} can't be read: {error}") from None
 
 
-class _SightingColumns(NamedTuple):
-    """Columns of observations, all of one length.
+def _are_false(table: Any) -> Bool:
+    """Return which observations are of something else than the user that the robot took it for."""
+    import pyarrow.compute as pc
 
-    Attributes:
-        step: int64 (rows,).
-        robot, user: int64 (rows,), numbers in `robots` and `users`; -1: an unknown user.
-        false: bool (rows,), whether the robot took something else for that user.
-    """
-
-    step: I64
-    robot: I64
-    user: I64
-    false: Bool
-    robots: list[str]
-    users: list[str]
-
-    @classmethod
-    def of(cls, table: Any) -> Self:
-        robot, robots = categories(table["robot"])
-        user, users = categories(table["user"])
-        false = np.zeros(len(robot), np.bool_)
-        if "true_user" in table.column_names:
-            true_user, true_names = categories(table["true_user"])
-            names = np.array([*users, ""], dtype=object)
-            true = np.array([*true_names, ""], dtype=object)
-            is_mistaken = (names[user] != true[true_user]) & (user >= 0)
-            false = (true_user < 0) | is_mistaken
-            if "truth_known" in table.column_names:
-                false &= table["truth_known"].to_numpy()
-        return cls(table["step"].to_numpy(), robot, user, false, robots, users)
-
-    def lanes(self) -> Iterator[tuple[str, str, I64]]:
-        """Yield a robot, a user, empty for an unknown one, and the rows of both."""
-        names = [*self.users, ""]
-        lane = self.robot * len(names) + self.user % len(names)
-        order = np.argsort(lane, kind="stable")
-        codes, begins = np.unique(lane[order], return_index=True)
-        parts = np.split(order, begins[1:]) if len(order) else []  # it has a part of nothing, too
-        for code, rows in zip(codes.tolist(), parts, strict=True):
-            yield self.robots[code // len(names)], names[code % len(names)], rows
+    if "true_user" not in table.column_names:
+        return np.zeros(table.num_rows, np.bool_)
+    user, true_user = (pc.cast(table[name], "string") for name in ("user", "true_user"))
+    is_mistaken = pc.fill_null(pc.not_equal(user, true_user), False)
+    false: Bool = pc.or_(pc.is_null(true_user), is_mistaken).to_numpy()
+    return false & table["truth_known"].to_numpy() if "truth_known" in table.column_names else false
 
 
-def _no_sightings(robot: str, user: str) -> SightingFacts:
-    return SightingFacts(robot=robot, user=user, first=[], last=[], false=[])
-
-
-def _extend(lane: SightingFacts, found: tuple[I64, I64, Any], gap: int) -> None:
-    """Add later stretches to a lane; the first one may continue its last one."""
-    first, last, false = (values.tolist() for values in found)
-    if lane["last"] and first[0] - lane["last"][-1] <= gap and false[0] == lane["false"][-1]:
-        lane["last"][-1] = last[0]
-        first, last, false = first[1:], last[1:], false[1:]
-    lane["first"] += first
-    lane["last"] += last
-    lane["false"] += false
-
-
-def _stretches(step: I64, false: Bool, gap: int) -> tuple[I64, I64, Any]:
-    """Return first and last step of each stretch without a gap, and whether it is of false ones."""
+def _extend(lane: SightingFacts, step: I64, false: Bool, gap: int) -> None:
+    """Add stretches of later sightings to a lane; the first one may continue its last one."""
     order = np.argsort(step, kind="stable")
     step, false = step[order], false[order]
     cuts = (np.diff(step) > gap) | (false[1:] != false[:-1])
     begins = np.append(0, np.flatnonzero(cuts) + 1)
     ends = np.append(begins[1:] - 1, len(step) - 1)
-    return step[begins], step[ends], false[begins]
+    first, last, is_false = (each.tolist() for each in (step[begins], step[ends], false[begins]))
+    if lane["last"] and first[0] - lane["last"][-1] <= gap and is_false[0] == lane["false"][-1]:
+        lane["last"][-1] = last[0]
+        first, last, is_false = first[1:], last[1:], is_false[1:]
+    lane["first"] += first
+    lane["last"] += last
+    lane["false"] += is_false
 
 
 Role = Literal["log", "algorithm", "metric", "layer"]
 
 
-def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
+def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
     """Return the facts of a run.
 
     Raises:
@@ -303,7 +267,7 @@ def run_facts(run: Run, doors: HomeDoors, walls: WallsHistory) -> RunFacts:
         seed=manifest["seed"],
         digest=run.digest,
         version=__version__,
-        home=home_facts(run.plan, doors.facts),
+        home=home_facts(run.plan, walls.doors),
         bodies=bodies_of(scenario, manifest["entities"]),
         tables=[_table_facts(run, name) for name in run.tables],
         walls=walls.changes,
@@ -329,6 +293,7 @@ def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[
     for bucket, robot in (("users", False), ("robots", True)):
         for number, name in enumerate(entities.get(bucket, ())):
             settings = scenario.get(bucket, {}).get(name, {})
+            cameras = {"camera": settings.get("camera"), **(settings.get("cameras") or {})}
             color = settings.get("color")
             bodies.append(
                 BodyFacts(
@@ -336,7 +301,7 @@ def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[
                     robot=robot,
                     color=color if _is_color(color) else body_color(number, robot=robot),
                     radius=float(settings.get("radius", 0.15 if robot else 0.2)),
-                    cameras=_cameras(settings),
+                    cameras=[_camera(key, value) for key, value in cameras.items() if value],
                     behaviors=[b.get("type", "") for b in settings.get("behaviors", ())],
                     keys={},
                 )
@@ -346,13 +311,6 @@ def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[
 
 def _is_color(value: object) -> bool:
     return isinstance(value, str) and value.startswith("#") and len(value) == 7
-
-
-def _cameras(settings: Mapping[str, Any]) -> list[CameraFacts]:
-    cameras = dict(settings.get("cameras") or {})
-    if settings.get("camera"):
-        cameras = {"camera": settings["camera"], **cameras}
-    return [_camera(name, camera) for name, camera in cameras.items()]
 
 
 def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
@@ -418,12 +376,10 @@ def _role(scenario: Mapping[str, Any], name: str) -> Role:
 def live_facts(simulation: Simulation) -> RunFacts:
     """Return what the page receives about a running simulation, which has no tables yet."""
     scenario = plain(simulation.scenario.resolved())
-    clock = simulation.clock
-    entities = {
-        "users": list(simulation.scenario.users),
-        "robots": list(simulation.scenario.robots),
-    }
-    bodies = bodies_of(scenario, entities)
+    clock, plan = simulation.clock, simulation.home.plan
+    objects = simulation.scenario.objects.items()
+    doors = [door_facts(name, door, plan) for name, door in objects if isinstance(door, Door)]
+    bodies = bodies_of(scenario, scenario)
     for body in bodies:
         for behavior in simulation.actors[body["name"]].behaviors:
             keys = behavior.model_dump(mode="json")
@@ -440,7 +396,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         seed=simulation.seed,
         digest=None,
         version=__version__,
-        home=home_facts(simulation.home.plan, _doors(simulation)),
+        home=home_facts(plan, doors),
         bodies=bodies,
         tables=[],
         walls=[WallsChange(step=0, walls=0)],
@@ -451,11 +407,3 @@ def live_facts(simulation: Simulation) -> RunFacts:
         scenario=scenario,
         walks_every_s=0.0,
     )
-
-
-def _doors(simulation: Simulation) -> list[DoorFacts]:
-    return [
-        door_facts(name, door, door.find(simulation.home.plan))
-        for name, door in simulation.scenario.objects.items()
-        if isinstance(door, Door)
-    ]

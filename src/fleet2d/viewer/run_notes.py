@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-from fleet2d.errors import InputError, os_errors_as
+from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
-from fleet2d.storage.files import write_atomically
 from fleet2d.viewer.contract import NOTES, NoteFacts, read_body
+from fleet2d.viewer.page_data import write_file
 
 MAX_BYTES = 4_000_000
 SUFFIX = ".notes.json"
@@ -47,9 +47,7 @@ def write_notes(run: Run, body: bytes) -> list[NoteFacts]:
         InputError: The body isn't notes, the run isn't stored, or the file can't be written.
     """
     notes, path = checked_notes(body), notes_path(run)
-    content = json.dumps(notes, indent=1, ensure_ascii=False).encode()
-    with os_errors_as(InputError, f"{path} can't be written"):
-        write_atomically(path, content)
+    write_file(path, json.dumps(notes, indent=1, ensure_ascii=False).encode())
     return notes
 
 

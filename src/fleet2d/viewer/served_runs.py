@@ -2,7 +2,9 @@
 
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -19,14 +21,57 @@ from fleet2d.viewer.run_notes import read_notes, write_notes
 Endpoint = Callable[[Request], Awaitable[Response]]
 
 
-def json_answer(content: bytes, status: int = 200) -> Response:
-    """Return a response of JSON bytes."""
-    return Response(content, status, media_type="application/json")
+def json_answer(content: object, status: int = 200) -> Response:
+    """Return a response of content as JSON."""
+    return Response(compact_json(content), status, media_type="application/json")
 
 
 def problem(message: str, status: int = 422) -> Response:
     """Return a response with the reason why something can't be shown or done."""
-    return json_answer(compact_json(Problem(message=message)), status)
+    return json_answer(Problem(message=message), status)
+
+
+def endpoint(respond: Callable[[Request, bytes], Response]) -> Endpoint:
+    """Return an endpoint that works in a thread; its response to errors is their message.
+
+    Args:
+        respond: Returns the response to a request and its body; only a POST has one, of JSON.
+    """
+
+    def work(request: Request, body: bytes) -> Response:
+        try:
+            return respond(request, body)
+        except (Fleet2DError, ValueError) as error:
+            return problem(str(error))
+
+    async def serve(request: Request) -> Response:
+        body = b""
+        if request.method == "POST":
+            if request.headers.get("content-type", "").split(";")[0] != "application/json":
+                return problem("a change must be requested as JSON", 415)
+            body = await request.body()
+        return await run_in_threadpool(work, request, body)
+
+    return serve
+
+
+Respond = Callable[[PageData, dict[str, Any], bytes], Response]
+
+RESPONSES: dict[str, Respond] = {
+    "facts.json": lambda data, _, __: Response(data.facts_json, media_type="application/json"),
+    "sightings.json": lambda data, _, __: json_answer(data.sightings),
+    "tracks.bin": lambda data, _, __: Response(data.tracks, media_type="application/octet-stream"),
+    "notes.json": lambda data, _, __: json_answer(read_notes(data.run)),
+    "notes": lambda data, _, body: json_answer(write_notes(data.run, body)),
+    "walls/{walls:int}.json": lambda data, names, _: json_answer(data.walls(names["walls"])),
+    "film/{step:int}.mp4": lambda data, names, _: FileResponse(
+        data.film_path(names["step"]), media_type="video/mp4"
+    ),
+    "tables/{table}.parquet": lambda data, names, _: FileResponse(
+        data.table_path(names["table"]), media_type="application/vnd.apache.parquet"
+    ),
+}
+"""The responses to requests about a run, by path; `notes` stores them, the others only read."""
 
 
 class ServedRuns:
@@ -77,89 +122,22 @@ class ServedRuns:
                 _ = data.sightings
         release_memory()  # the tables that were read
 
-    async def _store_notes(self, request: Request) -> Response:
-        body = await json_body(request)
-        if isinstance(body, Response):
-            return body
-        store = _endpoint(
-            self, lambda data, _: json_answer(compact_json(write_notes(data.run, body)))
-        )
-        return await store(request)
-
     def routes(self) -> list[Route]:
         """Return the routes of the data of all runs."""
         return [
-            Route("/run/{number:int}/facts.json", _endpoint(self, _facts)),
-            Route("/run/{number:int}/sightings.json", _endpoint(self, _sightings)),
-            Route("/run/{number:int}/tracks.bin", _endpoint(self, _tracks)),
-            Route("/run/{number:int}/notes.json", _endpoint(self, _notes)),
-            Route("/run/{number:int}/notes", self._store_notes, methods=["POST"]),
-            Route("/run/{number:int}/walls/{walls:int}.json", _endpoint(self, _walls)),
-            Route("/run/{number:int}/film/{step:int}.mp4", _endpoint(self, _film)),
-            Route("/run/{number:int}/tables/{table}.parquet", _endpoint(self, _table)),
+            Route(
+                f"/run/{{number:int}}/{path}",
+                endpoint(partial(self._answer, respond)),
+                methods=["POST" if path == "notes" else "GET"],
+            )
+            for path, respond in RESPONSES.items()
         ]
 
-
-def _notes(data: PageData, _: Request) -> Response:
-    return json_answer(compact_json(read_notes(data.run)))
-
-
-async def json_body(request: Request) -> bytes | Response:
-    """Return the body of a request that must be JSON, or the refusal."""
-    if request.headers.get("content-type", "").split(";")[0] != "application/json":
-        return problem("a change must be requested as JSON", 415)
-    return await request.body()
-
-
-def endpoint(respond: Callable[[Request], Response]) -> Endpoint:
-    """Return an endpoint that works in a thread; its response to errors is their message."""
-
-    def work(request: Request) -> Response:
+    def _answer(self, respond: Respond, request: Request, body: bytes) -> Response:
+        names = request.path_params
         try:
-            return respond(request)
-        except Fleet2DError as error:
-            return problem(str(error))
-
-    async def serve(request: Request) -> Response:
-        return await run_in_threadpool(work, request)
-
-    return serve
-
-
-def _endpoint(runs: ServedRuns, respond: Callable[[PageData, Request], Response]) -> Endpoint:
-    """Return the endpoint of data of a run."""
-
-    def work(request: Request) -> Response:
-        try:
-            return respond(runs.data(request.path_params["number"]), request)
+            return respond(self.data(names["number"]), names, body)
         except (OSError, ValueError, KeyError) as error:
             raise ArtifactError(
                 f"the run can't be read: its files are damaged ({error!r})"
             ) from error
-
-    return endpoint(work)
-
-
-def _facts(data: PageData, _: Request) -> Response:
-    return json_answer(data.facts_json)
-
-
-def _tracks(data: PageData, _: Request) -> Response:
-    return Response(data.tracks, media_type="application/octet-stream")
-
-
-def _sightings(data: PageData, _: Request) -> Response:
-    return json_answer(compact_json(data.sightings))
-
-
-def _film(data: PageData, request: Request) -> Response:
-    return FileResponse(data.film_path(request.path_params["step"]), media_type="video/mp4")
-
-
-def _walls(data: PageData, request: Request) -> Response:
-    return json_answer(compact_json(data.walls(request.path_params["walls"])))
-
-
-def _table(data: PageData, request: Request) -> Response:
-    path = data.table_path(request.path_params["table"])
-    return FileResponse(path, media_type="application/vnd.apache.parquet")

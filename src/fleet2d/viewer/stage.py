@@ -17,7 +17,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I16, Bool
+from fleet2d.kernels import F64, I16, I64, Bool
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, deep_color
 from fleet2d.pictures.charts import AskedTime, asked_of
 from fleet2d.pictures.floorplan import floorplan_axes
@@ -25,7 +25,7 @@ from fleet2d.pictures.life import HATCH_COLOR, QUIET_COLOR, RIM_COLOR, SightWall
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 from fleet2d.viewer.contract import BodyFacts
-from fleet2d.viewer.home_facts import WallsHistory, doors_of
+from fleet2d.viewer.home_facts import WallsHistory
 from fleet2d.viewer.moments import part_of_run
 from fleet2d.viewer.run_facts import bodies_of, sightings_of
 
@@ -74,7 +74,8 @@ def draw_strip(run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes) 
         rows: The rows that `strip_rows` returned.
         axes: The axes to draw on; their limits are set.
     """
-    begin, end = _limits(run)
+    clock = run.clock
+    begin, end = mdates.date2num([clock.start, clock.time(clock.steps)]).tolist()
     boxes: list[F64] = []
     faces: list[tuple[float, float, float]] = []
     for number, row in enumerate(rows):
@@ -84,27 +85,13 @@ def draw_strip(run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes) 
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
             if room >= 0 and stop - start > LABEL_PART * (end - begin):
                 name = plan.rooms[room].name.replace("_", " ")
-                axes.text(
-                    (start + stop) / 2,
-                    number + 0.42,
-                    name,
-                    clip_on=True,
-                    fontsize=6.5,
-                    color=TEXT_COLOR,
-                    ha="center",
-                    va="center",
-                )
+                style: dict[str, Any] = {"ha": "center", "va": "center", "color": TEXT_COLOR}
+                at = (start + stop) / 2
+                axes.text(at, number + 0.42, name, clip_on=True, fontsize=6.5, **style)
     axes.add_collection(PolyCollection(boxes, facecolors=faces, lw=0, zorder=1), autolim=False)
     _mark_sightings(run, rows, axes)
     axes.set(xlim=(begin, end), ylim=(len(rows), -0.05))
     _label(axes, rows)
-
-
-def _limits(run: Run) -> tuple[float, float]:
-    start = np.datetime64(run.manifest["start"], "us")
-    length = np.timedelta64(run.manifest["steps"] * run.manifest["step_us"], "us")
-    begin, end = mdates.date2num([start, start + length]).tolist()
-    return begin, end
 
 
 def _stretches(row: StripRow, end: float) -> list[tuple[float, float, int]]:
@@ -207,7 +194,7 @@ class Stage:
         self._run, self._plan = run, run.plan
         self._part = part_of_run(run, first, end)
         self._step_us = run.manifest["step_us"]
-        self._walls = WallsHistory(run, doors_of(run))
+        self._walls = WallsHistory(run)
         self._change_steps = [change["step"] for change in self._walls.changes]
         self._strip: Axes | None = None
         if axes is None:
@@ -231,7 +218,7 @@ class Stage:
             self._axes.add_collection(artist, autolim=False)
         self._clock, self._away = self._write_head(axes)
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
-        self._observations = _ObservationsByStep(self._part)
+        self._observed = _observations(self._part)
         has_talks = bool(run.manifest["scenario"].get("interactions"))
         self._talks = [each for each in asked_of(run)[0] if each.step < end] if has_talks else []
         self._scene: object = None
@@ -429,30 +416,20 @@ class Stage:
     def _draw_sightings(self, step: int, index: int) -> list[Any]:
         """Draw lines from robots to the places where they notice users; return them."""
         xy = {b.facts["name"]: (b.path.x[index], b.path.y[index]) for b in self.bodies}
-        index_in_part = step - self._first
-        sightings = self._observations.between(index_in_part, index_in_part + self.stride)
-        lines = [[xy[robot], place] for robot, place in sightings if robot in xy]
+        steps, robots, places = self._observed
+        begin = step - self._first
+        rows = slice(*np.searchsorted(steps, [begin, begin + self.stride]).tolist())
+        seen = set(zip(robots[rows], map(tuple, places[rows].round(2).tolist()), strict=True))
+        lines = [[xy[robot], place] for robot, place in sorted(seen) if robot in xy]
         self._sightings.set_segments(lines)
         return lines
 
 
-class _ObservationsByStep:
-    """The observations of robots, by step."""
-
-    def __init__(self, part: Run) -> None:
-        self._step = np.zeros(0, np.int64)
-        if "observations" not in part.tables:
-            return
-        table = part.tables["observations"]
-        self._step = table["step"].to_numpy()
-        self._robot = table["robot"].cast("string").to_numpy(zero_copy_only=False)
-        self._xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
-
-    def between(self, first: int, end: int) -> list[tuple[str, tuple[float, float]]]:
-        """Return (robot, place [m]) of the observations from step `first` to before step `end`."""
-        low, high = np.searchsorted(self._step, [first, end]).tolist()
-        places = {
-            (str(self._robot[i]), round(float(self._xy[i, 0]), 2), round(float(self._xy[i, 1]), 2))
-            for i in range(low, high)
-        }
-        return [(robot, (x, y)) for robot, x, y in sorted(places)]
+def _observations(part: Run) -> tuple[I64, NDArray[Any], F64]:
+    """Return the steps of robots' observations, in order, the robots, and the places (n, 2) [m]."""
+    if "observations" not in part.tables:
+        return np.zeros(0, np.int64), np.zeros(0, object), np.zeros((0, 2))
+    table = part.tables["observations"]
+    robots = table["robot"].cast("string").to_numpy(zero_copy_only=False)
+    places = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
+    return table["step"].to_numpy(), robots, places
