@@ -20,10 +20,12 @@ from fleet2d.runs.run import FLOORPLAN_NAME
 pytest.importorskip("matplotlib")
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Text
 
+from fleet2d.palette import deep_color
 from fleet2d.pictures.life import BodyTrace, best_view, field_of_view, opacity, trace_of
 from fleet2d.pictures.run import (
     MARK_PART,
@@ -34,7 +36,6 @@ from fleet2d.pictures.run import (
     hours_shown,
     mark_boxes,
     marks_by_day,
-    room_color,
     rooms_by_day,
     run_figure,
 )
@@ -364,7 +365,7 @@ def test_hash_that_names_a_plan_is_shortened(tmp_path: Path) -> None:
 
 def test_rooms_in_the_actogram_are_a_deeper_shade_of_the_plan() -> None:
     plan = fleet2d.load_floorplan()
-    colors = {room.type: room_color(plan, room.index) for room in plan.rooms}
+    colors = {room.type: to_rgb(deep_color(room.type)) for room in plan.rooms}
     assert all(0 <= part <= 1 for color in colors.values() for part in color)
     assert colors["kitchen"] != colors["living_room"] != colors["dining_room"]
 
@@ -402,7 +403,7 @@ def test_field_of_view_is_what_is_visible_in_range_and_angle() -> None:
     camera = run.manifest["scenario"]["robots"]["astro"]["camera"]
     astro = trace_of(run, run.plan, "astro", 0, robot=True)
     assert isinstance(astro, BodyTrace)
-    view = best_view(run.plan, astro, camera, {})
+    view = best_view(run.plan, astro, camera, np.zeros(0, np.int64), np.zeros((0, 2)))
     assert view is not None
     outline = field_of_view(run.plan, view.xy, view.heading, camera)
     near, far = camera["range"]

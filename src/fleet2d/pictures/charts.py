@@ -61,24 +61,12 @@ def diary_lines(name: str, persona: Persona, days: Days) -> list[str]:
             again = " (goes on)" if episode.role == RESUMES else ""
             away = " (out)" if persona.activity(episode.activity).away else ""
             text = f"{indent}{episode.activity.replace('_', ' ')}{away}{again}"
-            lines.append(
-                f"  {_clock(episode.begin)}  {_length(episode.end - episode.begin):>10}  {text}"
-            )
-    return [*lines, *_summary(days)]
-
-
-def _summary(days: Days) -> list[str]:
-    counts = Counter(
-        d.activity for _, episodes in days for d in episodes if d.role in INTERRUPTION_ROLES
-    )
-    rates = ", ".join(
-        f"{name.replace('_', ' ')} {count / len(days):.1f}" for name, count in counts.most_common()
-    )
-    return [f"interruptions a day: {rates}"] if rates else []
-
-
-def _clock(time_s: int) -> str:
-    return f"{time_s // HOUR_S % 24:02}:{time_s // 60 % 60:02}"
+            clock = f"{episode.begin // HOUR_S % 24:02}:{episode.begin // 60 % 60:02}"
+            lines.append(f"  {clock}  {_length(episode.end - episode.begin):>10}  {text}")
+    episodes_of_all = (episode for _, episodes in days for episode in episodes)
+    counts = Counter(each.activity for each in episodes_of_all if each.role in INTERRUPTION_ROLES)
+    rates = [f"{name.replace('_', ' ')} {n / len(days):.1f}" for name, n in counts.most_common()]
+    return [*lines, f"interruptions a day: {', '.join(rates)}"] if rates else lines
 
 
 def _length(time_s: int) -> str:
@@ -125,9 +113,7 @@ def _diary_figure(persona: Persona, name: str, days: Days) -> Figure:
 
 
 def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:
-    names = {
-        episode.activity for _, episodes in days for episode in without_interruptions(episodes)
-    }
+    names = {each.activity for _, day in days for each in without_interruptions(day)}
     all_colors = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
     palette = [color for i, color in enumerate(all_colors) if i not in GREYS]
     home = [n for n in sorted(names) if n != "sleep" and not persona.activity(n).away]
@@ -230,13 +216,8 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
         curve.plot([0, 1], [0, 1], color="#9a9a9a", linewidth=1, linestyle="--")
         ece, classwise = calibration_error(belief, truth), classwise_error(belief, truth)
         _points(curve, highest, is_right, LIKELIEST_COLOR, f"likeliest place (ECE {ece:.3f})")
-        _points(
-            curve,
-            belief.ravel(),
-            is_true.ravel(),
-            EVERY_COLOR,
-            f"every place (mean {classwise:.3f})",
-        )
+        every = f"every place (mean {classwise:.3f})"
+        _points(curve, belief.ravel(), is_true.ravel(), EVERY_COLOR, every)
         curve.set(ylabel="observed frequency", xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
         curve.set_title(f"{name}: {len(truth):,} forecasts", fontsize=11, loc="left")
         curve.legend(loc="upper left", frameon=False)
@@ -320,8 +301,7 @@ def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
             asked += [open_ones.pop(robot)] if robot in open_ones else []
             open_ones[robot] = AskedTime(robot, detail, step, "no answer")
         elif event in SHOWN_AS and robot in open_ones and open_ones[robot].answered is None:
-            answer = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
-            open_ones[robot] = answer
+            open_ones[robot] = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
         elif event == "expired":
             expired.append(AskedTime(robot, detail, step, event))
     return [*asked, *open_ones.values()], expired
@@ -353,10 +333,11 @@ def answers_figure(run: Run) -> Figure:
     days = 1 + int(hours_of(run.manifest["steps"] - 1) // 24)
     width = 7 if days >= WEEKLY_FROM else 1
     for (robot, user), (by_day, by_hour) in zip(pairs, panels, strict=True):
-        own = [each for each in asked if (each.robot, each.user) == (robot, user)]
-        late = [
-            hours_of(each.step) / 24 for each in expired if (each.robot, each.user) == (robot, user)
-        ]
+        own, own_expired = (
+            [each for each in times if (each.robot, each.user) == (robot, user)]
+            for times in (asked, expired)
+        )
+        late = [hours_of(each.step) / 24 for each in own_expired]
         times = [(hours_of(each.step), each.answer) for each in own]
         _stack(by_day, [(hours / 24, answer) for hours, answer in times], width, days)
         _stack(by_hour, [(hours % 24, answer) for hours, answer in times], 1, 24)
@@ -367,9 +348,8 @@ def answers_figure(run: Run) -> Figure:
         by_day.set(xlabel="day", ylabel="times a week" if width == 7 else "times a day")
         by_hour.set(xlabel="hour of the day", xticks=range(0, 25, 6))
         _draw_annoyance(run, robot, user, by_day)
-    panels[0, 1].legend(
-        loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize=7
-    )
+    place = {"loc": "lower right", "bbox_to_anchor": (1, 1)}
+    panels[0, 1].legend(**place, ncols=3, frameon=False, fontsize=7)
     figure.tight_layout()
     return figure
 
@@ -394,8 +374,8 @@ def _draw_annoyance(run: Run, robot: str, user: str, axes: "Axes") -> None:
         return
     table, hours_of = tables["interactions"], _hours_of(run)
     columns = (table[name].to_pylist() for name in ("asked_at", "robot", "addressed", "annoyance"))
-    rows = [(hours_of(at) / 24, value) for at, r, u, value in zip(*columns, strict=True)
-            if (r, u) == (robot, user)]  # fmt: skip
+    pairs = zip(*columns, strict=True)
+    rows = [(hours_of(at) / 24, value) for at, *pair, value in pairs if pair == [robot, user]]
     if rows:
         mood = axes.twinx()
         mood.plot(*zip(*rows, strict=True), color=MOOD_COLOR, linewidth=1.2)

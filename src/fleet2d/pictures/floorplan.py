@@ -3,7 +3,7 @@
 import io
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import MappingProxyType
@@ -13,7 +13,6 @@ import matplotlib as mpl
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -96,18 +95,18 @@ UNLABELLED = frozenset(
 def draw_objects(plan: FloorPlan, axes: Axes) -> None:
     """Draw furniture with its symbols, doorways, and no-go areas of robots, in metres."""
     for blocks, fill in FILL_COLORS.items():
-        outlines = [
-            Outline(shapely.get_coordinates(item.footprint.exterior), closed=True)
-            for item in plan.objects
-            if item.blocks == blocks
-        ]
+        footprints = [item.footprint for item in plan.objects if item.blocks == blocks]
         dashes = "--" if blocks == "nothing" else "-"
-        style: dict[str, Any] = {"facecolor": fill, "edgecolor": EDGE_COLOR, "zorder": 1.6}
-        axes.add_collection(PathCollection(outlines, linewidths=0.6, linestyles=dashes, **style))
+        _fill(footprints, axes, facecolor=fill, linewidths=0.6, linestyles=dashes, zorder=1.6)
     lines = [line for item in plan.objects for line in _symbol(item)]
     axes.add_collection(LineCollection(lines, lw=0.4, color=EDGE_COLOR, zorder=1.65))
-    _draw_glass(plan, axes)
-    _draw_no_go(plan, axes)
+    # What is seen through, and not walked through, is drawn as glass in its walls.
+    panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
+    parts = shapely.get_parts(shapely.transform(panes, plan.lattice.to_metres)).tolist()
+    glass = [part for part in parts if part.geom_type == "Polygon"]
+    _fill(glass, axes, facecolor=GLASS_COLOR, linewidths=0.5, zorder=1.7)
+    no_go: dict[str, Any] = {"facecolor": "none", "edgecolor": NO_GO_COLOR, "hatch": "////"}
+    _fill(plan.no_go, axes, **no_go, linewidths=0.5, zorder=1.75)
     _draw_doorways(plan, axes)
     for number, portal in enumerate(plan.portals, 1):
         sign = {"stairs": "\N{UPWARDS ARROW FROM BAR}", "lift": "\N{UP DOWN ARROW}"}[portal.type]
@@ -116,23 +115,15 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
             axes.text(*at, f"{sign}{number}", ha="center", va="center", size=5, bbox=box)
 
 
-def _draw_glass(plan: FloorPlan, axes: Axes) -> None:
-    """Draw what is seen through, and not walked through, as glass in its walls."""
-    panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
-    parts = [part for part in shapely.get_parts(panes).tolist() if part.geom_type == "Polygon"]
-    outlines = [
-        Outline(plan.lattice.to_metres(shapely.get_coordinates(part.exterior)), closed=True)
-        for part in parts
-    ]
-    style: dict[str, Any] = {"facecolor": GLASS_COLOR, "edgecolor": EDGE_COLOR, "zorder": 1.7}
-    axes.add_collection(PathCollection(outlines, linewidths=0.5, **style))
+def _fill(polygons: Iterable[shapely.Polygon], axes: Axes, **style: Any) -> None:
+    """Draw polygons without their holes, in metres."""
+    outlines = [Outline(shapely.get_coordinates(each.exterior), closed=True) for each in polygons]
+    axes.add_collection(PathCollection(outlines, **{"edgecolor": EDGE_COLOR, **style}))
 
 
 def label_objects(plan: FloorPlan, axes: Axes) -> None:
     """Write the type of each object on it, where it is large enough."""
-    axes.apply_aspect()  # needed for the transform to pixels
-    pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
-    points_per_m = float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
+    points_per_m = _points_per_m(axes)
     for item in plan.objects:
         x0, y0, x1, y1 = item.footprint.bounds
         label = item.type.replace("_", " ")
@@ -146,6 +137,13 @@ def label_objects(plan: FloorPlan, axes: Axes) -> None:
         style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
         rotation = 90 * (upright > flat)
         axes.text(middle.x, middle.y, label, fontsize=size, rotation=rotation, zorder=4, **style)
+
+
+def _points_per_m(axes: Axes) -> float:
+    """Return the size of a metre on axes [points]."""
+    axes.apply_aspect()  # needed for the transform to pixels
+    pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
+    return float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
 
 
 def _symbol(item: PlacedObject) -> list[F64]:
@@ -186,12 +184,6 @@ def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
     axes.add_collection(LineCollection(leaves, lw=1.2, **style))
     axes.add_collection(LineCollection(swings, lw=0.4, **style))
     axes.add_collection(LineCollection(openings, lw=0.9, ls=(0, (1, 2)), **style))
-
-
-def _draw_no_go(plan: FloorPlan, axes: Axes) -> None:
-    areas = [Outline(shapely.get_coordinates(area.exterior), closed=True) for area in plan.no_go]
-    style: dict[str, Any] = {"facecolor": "none", "edgecolor": NO_GO_COLOR, "zorder": 1.75}
-    axes.add_collection(PathCollection(areas, hatch="////", linewidths=0.5, **style))
 
 
 # Formats of pictures, each with the metadata that would differ from time to time.
@@ -245,7 +237,6 @@ def picture(path: Path, width: float, height: float) -> Iterator[Figure]:
     check_picture(path)
     with drawing_style():
         figure = Figure(figsize=(width, height), dpi=DPI)
-        FigureCanvasAgg(figure)
         yield figure
         save_figure(figure, path)
 
@@ -409,13 +400,9 @@ def _spread(room_of_cell: I16) -> I16:
 
 def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
     """Return polygons [lattice] as one path [m]."""
-    parts = []
-    for polygon in polygons:
-        # Holes need the opposite orientation.
-        for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
-            corners = plan.lattice.to_metres(shapely.get_coordinates(ring))
-            parts.append(Outline(corners, closed=True))
-    return Outline.make_compound_path(*parts)
+    rings = shapely.get_rings(shapely.orient_polygons(polygons))  # holes the other way round
+    corners = [plan.lattice.to_metres(shapely.get_coordinates(ring)) for ring in rings]
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in corners))
 
 
 def _draw_scale(plan: FloorPlan, axes: Axes) -> None:
@@ -428,26 +415,15 @@ def _draw_scale(plan: FloorPlan, axes: Axes) -> None:
         corner = (x0 + part * length / 2, bottom)
         bar = Rectangle(corner, length / 2, height, facecolor=color, edgecolor=TEXT_COLOR, lw=0.8)
         axes.add_patch(bar)
+    style: dict[str, Any] = {"ha": "center", "va": "top", "color": TEXT_COLOR, "zorder": 5}
     for metres, text in ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length} m")):
-        y = y0 - scale_depth(plan)
-        axes.text(
-            x0 + metres, y, text, fontsize=8, ha="center", va="top", color=TEXT_COLOR, zorder=5
-        )
+        axes.text(x0 + metres, y0 - scale_depth(plan), text, fontsize=8, **style)
 
 
 def _draw_entrance(entrance: tuple[float, float], axes: Axes) -> None:
     axes.plot(*entrance, marker="^", markersize=9, color=ACCENT_COLOR, mec="white", zorder=1.9)
-    axes.annotate(
-        "entrance",
-        entrance,
-        xytext=(0, -7),
-        textcoords="offset points",
-        fontsize=6.5,
-        ha="center",
-        va="top",
-        color=ACCENT_COLOR,
-        zorder=5,
-    )
+    style: dict[str, Any] = {"ha": "center", "va": "top", "color": ACCENT_COLOR, "fontsize": 6.5}
+    axes.annotate("entrance", entrance, (0, -7), textcoords="offset points", zorder=5, **style)
 
 
 def _empty_floor(plan: FloorPlan) -> I16:
@@ -469,9 +445,7 @@ def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
         inside = plan.room_of_cell == room.index
     row, column = _middle(inside)
     across, up = _clear_lengths(plan.lattice.cell, inside, row, column)
-    axes.apply_aspect()  # needed for the transform to pixels
-    pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
-    points_per_m = float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
+    points_per_m = _points_per_m(axes)
     name_and_area = f"{room.name}\n{room.area_m2:,.1f} m²"
     for text in (name_and_area, room.name.rpartition("_")[2]):
         # Widths and heights in multiples of the font size.
@@ -491,10 +465,7 @@ def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
 def _middle(cells: Bool) -> tuple[int, int]:
     """Return the (row, column) in the middle of the cells that are deepest inside."""
     rows, columns = np.nonzero(cells)
-    top, left = int(rows.min()), int(columns.min())
-    inside = np.zeros((int(rows.max()) - top + 3, int(columns.max()) - left + 3), np.bool_)
-    inside[rows - top + 1, columns - left + 1] = True
-    depth = squared_distance(inside)[rows - top + 1, columns - left + 1]
+    depth = squared_distance(np.pad(cells, 1))[rows + 1, columns + 1]
     deep = np.flatnonzero(depth >= MIDDLE_DEPTH * depth.max())
     rows, columns = rows[deep], columns[deep]
     distance = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
@@ -546,9 +517,10 @@ def _lines(findings: Sequence[Finding], letters: int) -> list[tuple[str, str]]:
         return [("nothing wrong or odd was found", TEXT_COLOR)]
     lines = []
     for number, finding in enumerate(findings, start=1):
-        for i, line in enumerate(textwrap.wrap(finding.text, letters)):
-            lines.append((f"{number:>3}  {line}" if i == 0 else f"     {line}", finding.severity))
-    return [(text, COLORS[severity]) for text, severity in lines]
+        first, *others = textwrap.wrap(finding.text, letters)
+        texts = [f"{number:>3}  {first}", *(f"     {line}" for line in others)]
+        lines += [(text, COLORS[finding.severity]) for text in texts]
+    return lines
 
 
 def _mark(axes: Axes, number: int, finding: Finding) -> None:
@@ -557,17 +529,12 @@ def _mark(axes: Axes, number: int, finding: Finding) -> None:
         axes.plot(line[:, 0], line[:, 1], color=color, lw=1.2, zorder=5.5)
     if finding.at is not None:
         box = {"boxstyle": "circle,pad=0.25", "facecolor": color, "edgecolor": "white", "lw": 0.8}
-        axes.text(
-            *finding.at, str(number), fontsize=7, color="white", ha="center", va="center",
-            zorder=6, bbox=box,
-        )  # fmt: skip
+        style: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "zorder": 6}
+        axes.text(*finding.at, str(number), fontsize=7, bbox=box, **style)
 
 
 def _outlines(shape: BaseGeometry | None) -> list[F64]:
-    if shape is None:
-        return []
-    lines = []
-    for part in shapely.get_parts(shape).tolist():
-        rings = [part.exterior, *part.interiors] if part.geom_type == "Polygon" else [part]
-        lines += [shapely.get_coordinates(ring) for ring in rings]
-    return lines
+    parts = shapely.get_parts(shape)
+    is_area = shapely.get_dimensions(parts) == 2
+    lines = [*shapely.get_rings(parts[is_area]), *parts[~is_area]]
+    return [shapely.get_coordinates(line) for line in lines]

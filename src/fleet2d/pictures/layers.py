@@ -9,16 +9,16 @@ import shapely
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.patches import Circle, Polygon, Wedge
+from matplotlib.patches import Wedge
 from numpy.typing import NDArray
 
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import TURN, Reach
-from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE
+from fleet2d.palette import TEXT_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import draw_cells, figure_size, floorplan_axes, picture
-from fleet2d.pictures.life import SightWalls, field_of_view
+from fleet2d.pictures.life import SightWalls, draw_region, draw_robot, field_of_view
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import LAYER_PREFIX, Run, layer_steps, read_layer
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
@@ -55,9 +55,7 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
         axes = figure.add_axes((0, 0, width / (width + beside), 1))
         floorplan_axes(plan, axes, title=False)
         colors = layer_on_axes(plan, values, axes)
-        title = f"{name}{f' [{unit}]' if unit else ''}, after step {step}"
-        x0, _, _, y1 = plan.bounds
-        axes.text(x0, y1 + 0.3, title, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
+        _write_title(plan, f"{name}{f' [{unit}]' if unit else ''}, after step {step}", axes)
         if colors is not None:
             bar = figure.add_axes(((width + 0.1) / (width + beside), 0.12, 0.018, 0.76))
             figure.colorbar(colors, cax=bar).ax.tick_params(labelsize=8)
@@ -177,10 +175,7 @@ def region_panel(plan: FloorPlan, pose: CameraPose, axes: Axes, title: str) -> N
     camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
     heading = float(np.deg2rad(pose.heading_deg))
     region = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
-    for part in shapely.get_parts(region):
-        outline = shapely.get_coordinates(part.exterior)
-        axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.5, ec="none", zorder=2.2))
-        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=1.0, zorder=3.1))
+    draw_region([shapely.get_coordinates(part.exterior) for part in region.geoms], axes)
     _draw_robot(pose, axes)
 
 
@@ -198,14 +193,14 @@ def cells_panel(
 
 def _draw_plan(plan: FloorPlan, axes: Axes, title: str) -> None:
     floorplan_axes(plan, axes, names=False, title=False)
+    _write_title(plan, title, axes)
+
+
+def _write_title(plan: FloorPlan, title: str, axes: Axes) -> None:
     x0, _, _, y1 = plan.bounds
     axes.text(x0, y1 + 0.3, title, fontsize=11, color=TEXT_COLOR, va="bottom", zorder=5)
 
 
 def _draw_robot(pose: CameraPose, axes: Axes) -> None:
-    body = Circle((pose.x, pose.y), RADIUS_M, facecolor=ROBOT_COLOR, edgecolor="white", lw=0.9)
-    body.set_zorder(4.3)
-    axes.add_patch(body)
-    heading = np.deg2rad(pose.heading_deg)
-    nose = (pose.x + RADIUS_M * np.cos(heading), pose.y + RADIUS_M * np.sin(heading))
-    axes.plot([pose.x, nose[0]], [pose.y, nose[1]], color="white", lw=1.2, zorder=4.4)
+    heading = float(np.deg2rad(pose.heading_deg))
+    draw_robot(np.array([pose.x, pose.y]), heading, RADIUS_M, ROBOT_COLOR, axes)

@@ -19,6 +19,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.table import categories
+from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import Lattice
@@ -64,23 +65,25 @@ class Overlay:
     def write(self, x: float, y: float, line: str, size: float, **style: Any) -> float:
         """Write a line of text, with its baseline at y; return the x of its end."""
         style = {"color": TEXT_COLOR, "va": "baseline", **style}
-        text = self.axes.text(x, y, line, fontsize=size, **style)
-        return x + self.width(text)
+        return x + self._width(self.axes.text(x, y, line, fontsize=size, **style))
 
-    def width(self, text: Text) -> float:
+    def _width(self, text: Text) -> float:
         """Return the width of a text [in]."""
         extent = text.get_window_extent(self._canvas.get_renderer())
         return float(extent.width) / float(self._figure.dpi)
 
+    def _width_of(self, line: str, size: float) -> float:
+        """Return the width that a line would have [in]."""
+        text = self.axes.text(0, 0, line, fontsize=size)
+        width = self._width(text)
+        text.remove()
+        return width
+
     def fit(self, line: str, size: float, width: float) -> str:
         """Return a line, shortened if it is wider than `width` inches."""
-        text = self.axes.text(0, 0, line, fontsize=size)
-        end = len(line)
-        while self.width(text) > width and end > 1:
-            end -= 1
-            text.set_text(line[:end].rstrip() + "…")
-        text.remove()
-        return line if end == len(line) else line[:end].rstrip() + "…"
+        shorter = (f"{line[:end].rstrip()}…" for end in range(len(line) - 1, 0, -1))
+        lines = [line, *shorter]
+        return next((each for each in lines if self._width_of(each, size) <= width), lines[-1])
 
     def wrap(self, parts: Sequence[str], separator: str, size: float, width: float) -> list[str]:
         """Return parts joined to lines of at most `width` inches; a longer part is shortened."""
@@ -119,10 +122,7 @@ class Overlay:
                 left += self._chip_width(chip, size) + SPACE_IN
 
     def _chip_width(self, chip: Chip, size: float) -> float:
-        text = self.axes.text(0, 0, chip.label, fontsize=size)
-        width = self.width(text)
-        text.remove()
-        return _picture_width(chip) + width
+        return _picture_width(chip) + self._width_of(chip.label, size)
 
     def _picture(self, chip: Chip, x: float, y: float) -> None:
         """Draw the picture of a chip, its left middle at (x, y)."""
@@ -137,13 +137,8 @@ class Overlay:
                 box = Rectangle(corner, 0.2 * side, share * side, facecolor=TEXT_COLOR, lw=0)
                 axes.add_patch(box)
         if chip.kind == "away":
-            style: dict[str, Any] = {
-                "facecolor": "white",
-                "edgecolor": HATCH_COLOR,
-                "hatch": "////////",
-                "lw": 0.5,
-            }
-            axes.add_patch(Rectangle((x, low), side, side, **style))
+            style: dict[str, Any] = {"facecolor": "white", "edgecolor": HATCH_COLOR, "lw": 0.5}
+            axes.add_patch(Rectangle((x, low), side, side, hatch="////////", **style))
         if chip.kind == "spot":
             for part, alpha in ((0.62, 0.2), (0.42, 0.35), (0.24, 0.8)):
                 axes.add_patch(Circle(middle, part * side, facecolor=chip.color, alpha=alpha, lw=0))
@@ -172,6 +167,7 @@ WALKED_STEPS = 4_000_000
 MAX_LEG_GAP_US = 5_000_000
 # A position so near to the way between its neighbours is on it: somewhat more than rounding.
 STRAIGHT_M = 0.003
+NO_LEGS = np.zeros((0, 2, 2))
 
 
 @dataclass(frozen=True)
@@ -252,7 +248,7 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
     if (keys["kind"] == "walk").any():
         step_us, steps = run.manifest["step_us"], run.manifest["steps"]
         if steps > WALKED_STEPS or step_us > MAX_LEG_GAP_US:
-            return _no_legs(), ""
+            return NO_LEGS, ""
         path = rebuild_path(run, plan, name, timedelta(microseconds=step_us))
         legs = _legs_between(np.stack([path.x, path.y], axis=1), path.away)
         if len(legs) <= LEGS:
@@ -285,8 +281,9 @@ def _from_trajectories(
     xy = np.stack([rows["x"], rows["y"]], axis=1)
     index = {room.name: room.index for room in plan.rooms}
     room = np.array([index.get(word, -1) for word in rows["room"].tolist()], np.int16)
-    legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= MAX_LEG_GAP_US else _no_legs()
-    note = f"{reason}: positions every {_length(every_us)}"
+    legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= MAX_LEG_GAP_US else NO_LEGS
+    every = format_duration(timedelta(microseconds=every_us))
+    note = f"{reason}: positions every {every}"
     samples = (rows["step"], xy, rows["heading"], room)
     return BodyTrace(name, color, robot, every_us, *samples, legs, note)
 
@@ -325,17 +322,6 @@ def _are_ends(xy: F64, state: F64) -> Bool:
     ends = np.ones(len(xy), np.bool_)
     ends[1:-1] = ~(is_straight & is_same[1:] & is_same[:-1])
     return ends
-
-
-def _no_legs() -> F64:
-    return np.zeros((0, 2, 2))
-
-
-def _length(us: int) -> str:
-    seconds = us / 1e6
-    if seconds < 60:
-        return f"{seconds:g} s"
-    return f"{seconds / 60:g} min" if seconds < 3600 else f"{seconds / 3600:g} h"
 
 
 BLUR_M = 0.14  # standard deviation of the spot of a body, about its own size
@@ -387,18 +373,20 @@ class CameraView:
 
 def draw_presence(plan: FloorPlan, trace: BodyTrace, axes: Axes) -> None:
     """Draw where a body spent its time; longer is more opaque."""
-    at_home = trace.room >= 0
-    lattice = plan.lattice
-    cells = (trace.xy[at_home] - lattice.origin) / lattice.cell
-    column, row = np.floor(cells).astype(np.int64).T
-    shape = (lattice.rows, lattice.columns)
-    flat = np.clip(row, 0, shape[0] - 1) * shape[1] + np.clip(column, 0, shape[1] - 1)
-    time = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape).astype(np.float64)
-    time = blurred(time, BLUR_M / lattice.cell) * plan.free
-    image = np.empty((*shape, 4))
+    samples = samples_by_cell(plan.lattice, trace.xy[trace.room >= 0])
+    time = blurred(samples, BLUR_M / plan.lattice.cell) * plan.free
+    image = np.empty((*time.shape, 4))
     image[..., :3] = to_rgb(trace.color)
     image[..., 3] = opacity(time, plan.free)
     draw_cells(plan, image, axes, interpolation="bilinear", zorder=3)
+
+
+def samples_by_cell(lattice: Lattice, xy: F64) -> F64:
+    """Return the number of positions, float64 (n, 2) [m], in each cell: float64 (rows, columns)."""
+    column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
+    row, column = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
+    counts = np.bincount(row * lattice.columns + column, minlength=lattice.rows * lattice.columns)
+    return counts.reshape(lattice.rows, lattice.columns).astype(np.float64)
 
 
 def opacity(time: F64, free: Bool) -> F64:
@@ -441,33 +429,32 @@ def places_of(spots: F64) -> F64:
 
 def draw_sightings(places: F64, color: str, axes: Axes) -> None:
     """Draw a ring at each place where a robot saw a user."""
-    axes.scatter(
-        places[:, 0],
-        places[:, 1],
-        s=7,
-        facecolors="none",
-        edgecolors=color,
-        linewidths=0.45,
-        alpha=0.6,
-        zorder=3.5,
-    )
+    style: dict[str, Any] = {"facecolors": "none", "linewidths": 0.45, "alpha": 0.6}
+    axes.scatter(places[:, 0], places[:, 1], s=7, edgecolors=color, zorder=3.5, **style)
 
 
 def draw_view(view: CameraView, radius: float, axes: Axes) -> None:
     """Draw the region that a camera sees, the robot, and lines to the users in view."""
     color = view.robot.color
-    for outline in view.outlines:
-        axes.add_patch(
-            Polygon(outline, facecolor=VIEW_COLOR, alpha=0.38, edgecolor="none", zorder=2.2)
-        )
-        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=0.7, zorder=3.2))
+    draw_region(view.outlines, axes)
     for x, y in view.users.tolist():
         axes.plot([view.xy[0], x], [view.xy[1], y], color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=4)
         axes.plot(x, y, "o", ms=5, mfc="white", mec=color, mew=1.1, zorder=4.2)
-    x, y = view.xy.tolist()
-    size = max(radius, 0.13)
-    axes.add_patch(Circle((x, y), size, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3))
-    nose = [[x, x + size * np.cos(view.heading)], [y, y + size * np.sin(view.heading)]]
+    draw_robot(view.xy, view.heading, max(radius, 0.13), color, axes)
+
+
+def draw_region(outlines: Sequence[F64], axes: Axes) -> None:
+    """Draw a region that a camera sees, by the outlines of its parts [m]."""
+    for outline in outlines:
+        axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.38, ec="none", zorder=2.2))
+        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=0.7, zorder=3.2))
+
+
+def draw_robot(xy: F64, heading: float, radius: float, color: str, axes: Axes) -> None:
+    """Draw a robot as a disc with a line to the front."""
+    x, y = xy.tolist()
+    axes.add_patch(Circle((x, y), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3))
+    nose = [[x, x + radius * np.cos(heading)], [y, y + radius * np.sin(heading)]]
     axes.plot(*nose, color="white", lw=1.1, zorder=4.4, solid_capstyle="butt")
 
 
@@ -495,7 +482,7 @@ def clear_names(plan: FloorPlan, views: Sequence[CameraView], axes: Axes) -> Non
 
 
 def best_view(
-    plan: FloorPlan, robot: BodyTrace, camera: dict[str, Any], sightings: dict[int, F64]
+    plan: FloorPlan, robot: BodyTrace, camera: dict[str, Any], seen_at: I64, seen_xy: F64
 ) -> CameraView | None:
     """Return the moment that shows best what a robot sees, and what walls hide from it.
 
@@ -506,9 +493,10 @@ def best_view(
         plan: The home.
         robot: The robot.
         camera: Its camera, as in the scenario.
-        sightings: The positions of users that it saw, by step, each float64 (n, 2) [m].
+        seen_at: The steps at which it saw users, int64 (n,).
+        seen_xy: The positions of these users, float64 (n, 2) [m].
     """
-    index = np.flatnonzero(np.isin(robot.step, np.fromiter(sightings, np.int64, len(sightings))))
+    index = np.flatnonzero(np.isin(robot.step, seen_at))
     if len(index) == 0:
         index = np.arange(len(robot.step))
     index = index[:: 1 + len(index) // CANDIDATES]
@@ -521,7 +509,7 @@ def best_view(
         outline = field_of_view(plan, robot.xy[i], float(robot.heading[i]), camera)
         area = outline.area
         step = int(robot.step[i])
-        users = sightings.get(step, np.zeros((0, 2)))
+        users = seen_xy[seen_at == step]
         score = area if area < 0.97 * sector_area else 0.3 * area
         if len(users):
             distance = float(np.hypot(*(users - robot.xy[i]).T).max())
@@ -561,11 +549,6 @@ def blurred(image: F64, sigma: float) -> F64:
     offsets = np.arange(-reach, reach + 1)
     weights = np.exp(-0.5 * (offsets / max(sigma, 1e-6)) ** 2)
     weights /= weights.sum()
-    blurred = image
     for axis in (0, 1):
-        padding = [(reach, reach) if a == axis else (0, 0) for a in (0, 1)]
-        padded = np.pad(blurred, padding)
-        size = image.shape[axis]
-        slices = [np.take(padded, range(k, k + size), axis=axis) for k in range(len(offsets))]
-        blurred = np.sum([w * s for w, s in zip(weights, slices, strict=True)], axis=0)
-    return blurred
+        image = np.apply_along_axis(lambda line: np.convolve(line, weights), axis, image)
+    return image[reach:-reach, reach:-reach]

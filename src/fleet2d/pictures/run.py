@@ -18,7 +18,7 @@ from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import micros
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64
-from fleet2d.palette import ACCENT_COLOR, OTHER_COLOR, ROOM_COLORS, TEXT_COLOR
+from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, deep_color
 from fleet2d.pictures.floorplan import (
     DPI,
     drawing_style,
@@ -50,8 +50,6 @@ from fleet2d.runtime.clock import DAY_MINUTES, DAY_US, HOUR_US, midnight_of
 
 BINS = DAY_MINUTES  # coloured intervals of a day
 MARKS = 288  # intervals of a day with a mark, whose height is the share of sightings
-# Rows are a few pixels high: their colours are deeper than those of the floor plan.
-DEEPER = 1.9
 GAPS_UP_TO = 75  # days; of longer runs, rows have no gaps between them
 # The height of a mark where somebody was seen all the time, as a share of the row.
 MARK_PART = 0.5
@@ -59,13 +57,6 @@ MARK_PART = 0.5
 MIN_MARK_HEIGHT = 0.06
 
 NOT_SIMULATED = -2
-
-
-def room_color(plan: FloorPlan, index: int) -> tuple[float, float, float]:
-    """Return the colour of a room in an actogram: deeper than on the floor plan."""
-    pale = to_rgb(ROOM_COLORS.get(plan.rooms[index].type, OTHER_COLOR))
-    red, green, blue = (max(0.0, 1 - DEEPER * (1 - part)) for part in pale)
-    return red, green, blue
 
 
 def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) -> I16:
@@ -143,15 +134,12 @@ def draw_actogram(
     """
     days = len(rooms)
     table = np.ones((len(plan.rooms) + 2, 4))
-    table[:-2, :3] = [room_color(plan, index) for index in range(len(plan.rooms))]
+    table[:-2, :3] = [to_rgb(deep_color(room.type)) for room in plan.rooms]
     table[-1, 3] = 0.0  # away: transparent over the hatching
-    away = Rectangle(
-        (0, 0), 24, days, facecolor="white", edgecolor=HATCH_COLOR, hatch="//////", lw=0
-    )
-    axes.add_patch(away)
-    axes.imshow(
-        table[rooms], extent=(0, 24, days, 0), aspect="auto", interpolation="nearest", zorder=1
-    )
+    style: dict[str, Any] = {"facecolor": "white", "edgecolor": HATCH_COLOR, "hatch": "//////"}
+    axes.add_patch(Rectangle((0, 0), 24, days, lw=0, **style))
+    extent = (0, 24, days, 0)
+    axes.imshow(table[rooms], extent=extent, aspect="auto", interpolation="nearest", zorder=1)
     gap = (1.1 if days <= 40 else 0.6) if days <= GAPS_UP_TO else 0.0  # points
     row = axes.bbox.height / axes.figure.dpi * 72 / max(1, days)
     # Marks keep a distance to the lines between rows, which are snapped to whole pixels.
@@ -172,19 +160,14 @@ def _draw_marks(marks: F64, axes: Axes, lift: float) -> None:
 def _label(axes: Axes, start: datetime, days: int, *, dates: bool) -> None:
     low, high = axes.get_xlim()
     is_wide = axes.bbox.width / axes.figure.dpi > 2.4  # inches
-    step = (
-        (3 if is_wide else 6)
-        if high - low > 12
-        else max(0.25, 2.0 ** np.ceil(np.log2((high - low) / 6)))
-    )
+    step = 3 if is_wide else 6
+    if high - low <= 12:
+        step = max(0.25, 2.0 ** np.ceil(np.log2((high - low) / 6)))
     ticks = np.arange(np.ceil(low / step) * step, high + 1e-9, step)
-    labels = [
-        f"{tick:g}" if step >= 1 else f"{int(tick)}:{round(tick % 1 * 60):02d}" for tick in ticks
-    ]
-    axes.set_xticks(ticks, labels)
-    axes.vlines(
-        ticks[(ticks > low) & (ticks < high)], 0, days, color="white", lw=0.5, alpha=0.6, zorder=2.5
-    )
+    clock = (f"{int(tick)}:{round(tick % 1 * 60):02d}" for tick in ticks)
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks] if step >= 1 else list(clock))
+    inner = ticks[(ticks > low) & (ticks < high)]
+    axes.vlines(inner, 0, days, color="white", lw=0.5, alpha=0.6, zorder=2.5)
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
     for side in axes.spines.values():
         side.set_visible(False)
@@ -202,16 +185,11 @@ def _dated_rows(start: datetime, days: int) -> tuple[list[float], list[str]]:
     else:
         labelled = [day for day in range(days) if dates[day].day == 1]
         labelled = labelled[:: 1 + len(labelled) // 24]
-    by_month = days > GAPS_UP_TO
-    names = []
-    for day in labelled:
-        date = dates[day]
-        month = (
-            f"{date:%b}"
-            if not (by_month and (date.month == 1 or day == labelled[0]))
-            else f"{date:%b %Y}"
-        )
-        names.append(month if by_month else f"{date:%a} {date.day} {date:%b}")
+    names = [f"{dates[day]:%a} {dates[day].day} {dates[day]:%b}" for day in labelled]
+    if days > GAPS_UP_TO:
+        has_year = [day == labelled[0] or dates[day].month == 1 for day in labelled]
+        forms = ["%b %Y" if each else "%b" for each in has_year]
+        names = [f"{dates[day]:{form}}" for day, form in zip(labelled, forms, strict=True)]
     return [day + 0.5 for day in labelled], names
 
 
@@ -299,7 +277,8 @@ class _Picture:
         self._header()
         self._life()
         self._actograms()
-        self._footer()
+        for number, line in enumerate(reversed(self.note_lines)):
+            self.overlay.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
 
     def _traces(self, bucket: str, *, robot: bool) -> list[BodyTrace]:
         names = self.run.manifest["entities"][bucket]
@@ -335,13 +314,8 @@ class _Picture:
             if camera is None:
                 continue
             seen = self.observations
-            rows = (seen.robot == robot.name) & np.isin(seen.step, robot.step)
-            sightings: dict[int, Any] = {}
-            for step, xy in zip(seen.step[rows].tolist(), seen.xy[rows], strict=True):
-                sightings[step] = (
-                    np.vstack([sightings[step], xy]) if step in sightings else xy[None]
-                )
-            view = best_view(self.plan, robot, camera, sightings)
+            rows = seen.robot == robot.name
+            view = best_view(self.plan, robot, camera, seen.step[rows], seen.xy[rows])
             if view is not None:
                 yield view
 
@@ -411,9 +385,8 @@ class _Picture:
         ]
         x = self.overlay.write(EDGE, top - 0.66, WIDE_SEPARATOR.join(facts), 8.5, color=QUIET_COLOR)
         if self.run.status != "complete":
-            self.overlay.write(
-                x + 0.2, top - 0.66, self.run.status, 8.5, color=ACCENT_COLOR, weight="bold"
-            )
+            style = {"color": ACCENT_COLOR, "weight": "bold"}
+            self.overlay.write(x + 0.2, top - 0.66, self.run.status, 8.5, **style)
 
     def _life(self) -> None:
         axes = self._axes(EDGE, self.foot, self.left, self.body)
@@ -482,20 +455,14 @@ class _Picture:
 
     def _room_chips(self) -> Iterator[Chip]:
         indices = {room for rooms in self.days for room in np.unique(rooms).tolist()}
-        index_of_type: dict[str, int] = {}
-        for index in sorted(index for index in indices if index >= 0):
-            index_of_type.setdefault(self.plan.rooms[index].type, index)
-        for kind, index in index_of_type.items():
-            yield Chip("room", room_color(self.plan, index), kind.replace("_", " "))
+        kinds = [self.plan.rooms[index].type for index in sorted(indices) if index >= 0]
+        for kind in dict.fromkeys(kinds):
+            yield Chip("room", deep_color(kind), kind.replace("_", " "))
         if -1 in indices:
             yield Chip("away", None, "away")
         if np.isin([user.name for user in self.users], self.observations.user).any():
             label = f"seen by a robot: height is the share of {DAY_MINUTES // MARKS} min"
             yield Chip("seen", "#dfe1e4", label)
-
-    def _footer(self) -> None:
-        for number, line in enumerate(reversed(self.note_lines)):
-            self.overlay.write(EDGE, 0.2 + number * LINE_IN, line, NOTE)
 
     def _number(self, kind: str, body: str) -> float | None:
         """Return the number of the first metric of a type for a body; None if it has none."""

@@ -116,21 +116,26 @@ def _dark(rgb: F64) -> F64:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
+_COLORS: tuple[tuple[type[Artist], tuple[str, ...]], ...] = (
+    (Patch, ("facecolor", "edgecolor")),
+    (Line2D, ("color", "markerfacecolor", "markeredgecolor")),
+    (Text, ("color",)),
+)
+"""The properties that are colours, by the class of an artist."""
+
+
 def _darken_artist(artist: Artist) -> None:
-    if isinstance(artist, Patch):
-        face, edge = artist.get_facecolor(), artist.get_edgecolor()
-        artist.set_facecolor(_dark_or_transparent(face))
-        artist.set_edgecolor(_dark_or_transparent(edge))
-    elif isinstance(artist, Line2D):
-        artist.set_color(_dark_or_transparent(artist.get_color()))
-        artist.set_markerfacecolor(_dark_or_transparent(artist.get_markerfacecolor()))
-        artist.set_markeredgecolor(_dark_or_transparent(artist.get_markeredgecolor()))
-    elif isinstance(artist, Text):
-        artist.set_color(_dark_or_transparent(artist.get_color()))
+    for kind, names in _COLORS:
+        if isinstance(artist, kind):
+            colors = {name: getattr(artist, f"get_{name}")() for name in names}
+            artist.set(**{name: _dark_or_transparent(color) for name, color in colors.items()})
+    if isinstance(artist, Text):
         if (box := artist.get_bbox_patch()) is not None:
             _darken_artist(box)
-        for effect in artist.get_path_effects() or ():
-            _darken_outline(effect)
+        for effect in artist.get_path_effects() or ():  # outlines
+            style = getattr(effect, "_gc", {})
+            if "foreground" in style:
+                style["foreground"] = _dark_or_transparent(style["foreground"])
     elif isinstance(artist, Collection):
         _darken_collection(artist)
     elif isinstance(artist, AxesImage):
@@ -143,23 +148,11 @@ def _dark_or_transparent(color: Any) -> Any:
     return tuple(colors[0].tolist()) if len(colors) and colors[0, 3] else color
 
 
-def _darken_outline(effect: Any) -> None:
-    """Convert the colour of an outline around text."""
-    style = getattr(effect, "_gc", {})
-    if "foreground" in style:
-        style["foreground"] = _dark_or_transparent(style["foreground"])
-
-
 def _darken_collection(artist: Collection) -> None:
     if artist.get_array() is not None:  # its colours stand for numbers
         return
-    for get_colors, set_colors in (
-        (artist.get_facecolor, artist.set_facecolor),
-        (artist.get_edgecolor, artist.set_edgecolor),
-    ):
-        colors = np.asarray(get_colors())
-        if len(colors):
-            set_colors(dark_colors(colors))
+    colors = {"facecolor": artist.get_facecolor(), "edgecolor": artist.get_edgecolor()}
+    artist.set(**{name: dark_colors(value) for name, value in colors.items() if len(value)})
 
 
 def _darken_image(image: AxesImage) -> None:

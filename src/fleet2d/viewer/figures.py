@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
@@ -26,7 +25,7 @@ from fleet2d.pictures.floorplan import (
     write_picture,
 )
 from fleet2d.pictures.layers import COLORS
-from fleet2d.pictures.life import blurred
+from fleet2d.pictures.life import blurred, samples_by_cell
 from fleet2d.pictures.run import run_figure
 from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import Run
@@ -146,7 +145,6 @@ def moment_figure(run: Run, step: int) -> Figure:
         raise InputError(f"the run has no step {step}: its last is {steps - 1}")
     width, height = figure_size(run.plan)
     figure = Figure(figsize=(width, height * 1.15), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
     first, end = _day_around(run, step)
     Stage(run, first, end, figure=figure).show(step)
     return figure
@@ -197,7 +195,6 @@ def strip_figure(part: Run) -> Figure:
     bodies = bodies_of(part.manifest["scenario"], part.manifest["entities"])
     rows = strip_rows(part, [(body["name"], body["color"]) for body in bodies])
     figure = Figure(figsize=(10.67, 0.7 + 0.34 * len(rows)), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
     height = figure.get_figheight()
     axes = figure.add_axes((0.08, 0.32 / height, 0.9, 1 - 0.42 / height))
     draw_strip(part, part.plan, rows, axes)
@@ -213,7 +210,6 @@ def _heat_figure(part: Run) -> Figure:
     width, height = figure_size(part.plan)
     scale = min(1.0, HEIGHT_IN / height)
     figure = Figure(figsize=(width * scale * len(groups), height * scale), dpi=DPI)
-    FigureCanvasAgg(figure)
     share = 1 / len(groups)
     for number, (bucket, names) in enumerate(groups):
         axes = figure.add_axes((number * share, 0, share * 0.9, 1))
@@ -256,9 +252,7 @@ def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> F64:
     for name in names:
         path = run.path(name, interval)
         xy = np.stack([path.x, path.y], axis=1)[~path.away]
-        column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
-        row, column = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
-        np.add.at(time, (row, column), 24 / max(1, len(path.x)))
+        time += samples_by_cell(lattice, xy) * (24 / max(1, len(path.x)))
     return blurred(time, BLUR_M / lattice.cell) / lattice.cell**2
 
 
