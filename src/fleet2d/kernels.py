@@ -437,11 +437,6 @@ class Stretches(NamedTuple):
     patch: I64
     share: F64
 
-    @property
-    def shown(self) -> U8:
-        """The part of each patch in view, in 1/255, by stretch: uint8 (stretches, patches)."""
-        return self.views[self.view]
-
 
 class StayModel(NamedTuple):
     """The transition probabilities of a person: between stages of a stay, and between rooms.
@@ -520,11 +515,6 @@ class PeoplePlaces(NamedTuple):
     probability: F64
     bins: I64
     begin: I64
-
-    def by_bin(self, person: int) -> F64:
-        """Return the probability of one person's places in each bin: float64 (bins, rooms + 1)."""
-        own = slice(self.begin[person], self.begin[person + 1])
-        return np.repeat(self.probability[own], self.bins[own], axis=0)
 
 
 class TracedRooms(NamedTuple):

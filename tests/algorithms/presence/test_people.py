@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.algorithms.presence.worlds import MONDAY, evidence_of, patch_evidence
+from tests.kernels.test_presence_people import by_bin
 from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
 from fleet2d._core import smooth
@@ -102,6 +103,11 @@ def stretches_of(bins: Evidence, longest: int) -> Stretches:
     return DayEvidence.of(bins).stretches(0, longest)
 
 
+def shown_of(stretches: Stretches) -> Any:
+    """Return the part of each patch in view, in 1/255, by stretch: uint8 (stretches, patches)."""
+    return stretches.views[stretches.view]
+
+
 def test_equal_bins_are_merged_within_an_hour() -> None:
     shown = [[0, 1, 0]] * 6 + [[0, 1, 0.5]] * 2
     seen = [[0, 0, 0]] * 2 + [[0, 7, 0]] * 2 + [[0, 3, 3]] * 2 + [[0, 0, 0]] * 2
@@ -111,7 +117,7 @@ def test_equal_bins_are_merged_within_an_hour() -> None:
     assert [0, 0, 1, 2, 4, 6, 6] == merged.begin.tolist()
     assert [1, 1, 1, 2, 1, 2] == merged.patch.tolist()
     assert [1, 1, 0.5, 0.5, 0.5, 0.5] == merged.share.tolist()
-    assert [0, 255, 128, 0] == merged.shown[-1].tolist()
+    assert [0, 255, 128, 0] == shown_of(merged)[-1].tolist()
     assert [1] * 8 == stretches_of(bins_of(shown, seen), longest=1).bins.tolist()
 
 
@@ -119,7 +125,7 @@ def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
     seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
     bins = replace(bins, by_patch=bins.by_patch._replace(sightings=SightingCounts.of(seen)))
-    assert [255, 255, 0, 0] == stretches_of(bins, longest=1).shown[0].tolist()
+    assert [255, 255, 0, 0] == shown_of(stretches_of(bins, longest=1))[0].tolist()
 
 
 def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
@@ -127,12 +133,12 @@ def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
     people = People(StateLayout.of(bins, 1), prior, 1, longest=5)
-    places = people.end_day(DayEvidence.of(bins)).by_bin(0)
+    places = by_bin(people.end_day(DayEvidence.of(bins)), 0)
     assert places[300, 0] > 0.1
     assert places[300, 1] < 0.01
     hidden = bins_of([[0.5, 0, 1]] * 600, seen)
     people = People(StateLayout.of(hidden, 1), prior, 1, longest=5)
-    again = people.end_day(DayEvidence.of(hidden)).by_bin(0)
+    again = by_bin(people.end_day(DayEvidence.of(hidden)), 0)
     assert places[300, 0] + 0.02 < again[300, 0]
 
 
@@ -205,7 +211,7 @@ def test_merging_bins_loses_nothing() -> None:
         assert 90 == merged.bins.sum()
         assert merged.bins.max() <= 4
         at = np.repeat(np.arange(len(merged.bins)), merged.bins)
-        assert np.array_equal(merged.shown[at], shown)
+        assert np.array_equal(shown_of(merged)[at], shown)
         rebuilt = np.zeros((len(merged.bins), 3))
         stretch = np.repeat(np.arange(len(merged.bins)), np.diff(merged.begin))
         rebuilt[stretch, merged.patch] = merged.share
