@@ -1,7 +1,7 @@
 """Distances and scores: against slow twins, and what must hold of each."""
 
 import math
-from datetime import datetime
+from datetime import datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
 
@@ -231,9 +231,10 @@ def poses(rooms: list[int]) -> Any:
 class History:
     """Steps of users, as metrics read them."""
 
-    first, end, step_s = 0, STEPS, 600.0
+    step_s = 600.0
 
-    def __init__(self, users: list[list[int]]) -> None:
+    def __init__(self, users: list[list[int]], first: int) -> None:
+        self.first, self.end = first, first + STEPS
         self._poses = {str(i): poses(rooms) for i, rooms in enumerate(users)}
 
     def __len__(self) -> int:
@@ -246,13 +247,26 @@ class History:
 rooms_of_user = st.lists(st.integers(-1, ROOMS - 1), min_size=STEPS, max_size=STEPS)
 
 
-@given(st.lists(rooms_of_user, max_size=4))
-def test_steps_in_places_are_those_of_all_hours(users: list[list[int]]) -> None:
+@given(st.lists(rooms_of_user, max_size=4), st.integers(0, 7 * 24 * 60), st.integers(0, 99))
+def test_steps_are_counted_by_place_and_hour(
+    users: list[list[int]], minute: int, first: int
+) -> None:
+    """As they are one by one, in runs that begin at any minute of a week."""
     names = tuple(map(str, range(len(users))))
     home = SimpleNamespace(rooms=range(ROOMS))
-    state: Any = SimpleNamespace(home=home, users=names, start=datetime(2026, 3, 2))
-    history: Any = History(users)
+    start = datetime(2026, 3, 2) + timedelta(minutes=minute)
+    state: Any = SimpleNamespace(home=home, users=names, start=start)
+    history: Any = History(users, first)
+    expected = np.zeros((168, len(users) + 1, ROOMS + 1), np.int64)
+    for step in range(STEPS):
+        time = start + timedelta(seconds=(first + step) * History.step_s)
+        hour = time.weekday() * 24 + time.hour
+        rooms = [user[step] for user in users]
+        for row, room in enumerate(rooms):
+            expected[hour, row, room] += 1
+        occupied = set(rooms) - {-1}
+        for room in occupied or {-1}:
+            expected[hour, -1, room] += 1
 
-    counts = steps_in_places(history, state)
-
-    assert counts.tolist() == steps_by_hour(history, state).sum(axis=0).tolist()
+    assert expected.tolist() == steps_by_hour(history, state).tolist()
+    assert expected.sum(axis=0).tolist() == steps_in_places(history, state).tolist()

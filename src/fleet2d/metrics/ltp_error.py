@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import timedelta
+from datetime import datetime
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -10,7 +10,6 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence, presence_of
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
 from fleet2d.configuration.components import register
@@ -18,10 +17,10 @@ from fleet2d.configuration.units import PositiveDuration, Share, micros
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, SUB, Bool
+from fleet2d.kernels import F64, I64, SUB
 from fleet2d.kernels import earth_mover as minimal_cost
 from fleet2d.metrics.metric import Metric
-from fleet2d.runtime.clock import DAY_S, HOUR_US, midnight_of
+from fleet2d.runtime.clock import DAY_S, HOUR_US
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
@@ -127,74 +126,30 @@ def steps_in_places(history: History, state: Present) -> I64:
     The last column is away. The last row is for anyone: steps with somebody in the room, and last
     with nobody at home.
     """
-    rooms, users = len(state.home.rooms), state.users
-    counts = np.zeros((len(users) + 1, rooms + 1), np.int64)
-    for row, user in enumerate(users):
-        counts[row] = history.poses(user).time_in_rooms
-    if not users:
-        counts[-1, -1] = len(history)
-    elif len(users) == 1:
-        counts[-1] = counts[0]
-    else:
-        visits = [history.poses(user).visits for user in users]
-        begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))
-        is_home = room != NOWHERE
-        begin, end, room = begin[is_home], end[is_home], room[is_home].astype(np.int64)
-        counts[-1, :-1] = _steps_in_any(begin, end, room, rooms)
-        counts[-1, -1] = len(history) - _steps_in_any(begin, end, 0 * room, 1)[0]
-    return counts
-
-
-def _steps_in_any(begin: I64, end: I64, group: I64, groups: int) -> I64:
-    """Return the number of steps in any stretch of each group, whose stretches may overlap."""
-    span = int(end.max(initial=0)) + 1
-    ends = np.concatenate([2 * (group * span + begin) + 1, 2 * (group * span + end)])
-    ends.sort()  # odd: a beginning; each group has as many ends as beginnings
-    is_in_any = np.cumsum(2 * (ends & 1) - 1)[:-1] > 0
-    at = ends >> 1
-    steps = np.zeros(groups, np.int64)
-    np.add.at(steps, at[:-1] // span, np.where(is_in_any, np.diff(at), 0))
-    return steps
+    return steps_by_hour(history, state).sum(axis=0)
 
 
 def steps_by_hour(history: History, state: Present) -> I64:
     """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
-    rooms, users = len(state.home.rooms), state.users
-    counts = np.zeros((HOURS, len(users) + 1, rooms + 1), np.int64)
-    hour = hours_of_week(history, state)
-    for row, user in enumerate(users):
-        room = history.poses(user).room.astype(np.int64)
-        place = np.where(room == NOWHERE, rooms, room)
-        steps = np.bincount(hour * (rooms + 1) + place, minlength=HOURS * (rooms + 1))
-        counts[:, row] = steps.reshape(HOURS, rooms + 1)
-    first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
-    steps = np.add.reduceat(_anybody(history, state), first, axis=0, dtype=np.int64)
-    np.add.at(counts[:, -1], hour[first], steps)
+    step_us = round(history.step_s * 1e6)
+    first_us = micros(state.start - datetime.min) + history.first * step_us  # since a Monday
+    end_us = first_us + len(history) * step_us
+    hour_us = np.arange(first_us // HOUR_US, -(-end_us // HOUR_US)) * HOUR_US
+    visits = [history.poses(user).visits for user in state.users]
+    # In the stretches between these steps nobody changes room, and the hour is the same.
+    hour_begins = np.maximum(-((first_us - hour_us) // step_us), 0)
+    begin = np.sort(np.concatenate([hour_begins, *(begins for begins, _, _ in visits)]))
+    steps = np.diff(begin, append=len(history))
+    is_there = np.zeros((len(begin), len(visits) + 1, len(state.home.rooms) + 1), np.bool_)
+    for row, (begins, _, room) in enumerate(visits):
+        place = room[np.searchsorted(begins, begin, side="right") - 1]
+        is_there[np.arange(len(begin)), row, place] = True  # NOWHERE is -1: the last column
+    is_there[:, -1, :-1] = is_there[:, :-1, :-1].any(axis=1)
+    is_there[:, -1, -1] = ~is_there[:, -1, :-1].any(axis=1)
+    counts = np.zeros((HOURS, *is_there.shape[1:]), np.int64)
+    hour = (first_us + begin * step_us) // HOUR_US % HOURS
+    np.add.at(counts, hour, is_there * steps[:, np.newaxis, np.newaxis])
     return counts
-
-
-def hours_of_week(history: History, state: Present) -> I64:
-    """Return the hour of the week, from Monday 00:00, of each step of a history."""
-    monday = midnight_of(state.start)
-    monday -= timedelta(days=monday.weekday())
-    start_us = micros(state.start - monday)
-    steps = np.arange(history.first, history.end, dtype=np.int64)
-    return (start_us + steps * round(history.step_s * 1e6)) // HOUR_US % HOURS
-
-
-def _anybody(history: History, state: Present) -> Bool:
-    """Return whether each room was occupied, and last whether nobody was at home.
-
-    bool (steps, rooms + 1).
-    """
-    change = np.zeros((len(history) + 1, len(state.home.rooms) + 1), np.int32)
-    for user in state.users:
-        begin, end, room = history.poses(user).visits
-        np.add.at(change, (begin, room), 1)  # NOWHERE is -1: the last column
-        np.add.at(change, (end, room), -1)
-    is_occupied: Bool = np.cumsum(change[:-1], axis=0) > 0
-    is_occupied[:, -1] = ~is_occupied[:, :-1].any(axis=1)
-    return is_occupied
 
 
 def shares(counts: I64, steps: float) -> tuple[F64, F64]:
