@@ -189,17 +189,16 @@ class RoomShare(Metric):
 
     def update(self, history: History, state: Present) -> Any:
         """Count the steps per room."""
-        users, shares = [], []
+        shares = []
         for user in state.users:
             steps = history.poses(user).time_in_rooms
             self.seconds[user] = self.seconds.get(user, 0) + steps
-            users.append(user)
             shares.append(steps / steps.sum())
-        if not users:
+        if not shares:
             return None
         return {
-            "user": np.repeat(users, len(self.names)),
-            "room": np.tile(self.names, len(users)),
+            "user": np.repeat(state.users, len(self.names)),
+            "room": np.tile(self.names, len(shares)),
             "share": np.concatenate(shares),
         }
 

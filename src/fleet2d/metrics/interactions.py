@@ -3,15 +3,13 @@
 from collections import Counter
 from typing import Any, ClassVar
 
-import numpy as np
-
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import AnswerRecord
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.metric import Metric, columns_of
 from fleet2d.runtime.determinism import sum_in_order
 
 # What happens between a person and a robot without a request.
@@ -61,12 +59,10 @@ class Interactions(Metric):
         for record in records:
             key = record.robot, _person(record.text)
             self.records.setdefault(key, []).append(record)
-        if not records:
-            return None
-        columns = zip(*records, strict=True)
-        rows = dict(zip(AnswerRecord._fields, map(np.array, columns), strict=True))
-        rows["asked_at"] = rows.pop("step")
-        return rows
+        columns = columns_of(AnswerRecord._fields, records)
+        if columns is not None:
+            columns["asked_at"] = columns.pop("step")
+        return columns
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {number: value}}}."""

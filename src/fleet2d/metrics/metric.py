@@ -78,6 +78,16 @@ def nested(numbers: Mapping[tuple[str, str], Any]) -> dict[str, Any]:
     return results
 
 
+def columns_of(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, Any] | None:
+    """Return the rows of a table as columns; None without any.
+
+    >>> columns_of(("user", "steps"), [("ana", 1), ("ben", 2)])
+    {'user': array(['ana', 'ben'], dtype='<U3'), 'steps': array([1, 2])}
+    """
+    columns = map(np.array, zip(*rows, strict=True))
+    return dict(zip(names, columns, strict=True)) if rows else None
+
+
 SEPARATOR = " · "  # between the parts of the name of a number
 
 

@@ -1,8 +1,6 @@
 """Metrics of proximity: robots in people's way, and close to them."""
 
-from collections import Counter
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,7 +11,8 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length
 from fleet2d.floorplan.home import Home
-from fleet2d.metrics.metric import Metric, in_sight, nested, pairs_of
+from fleet2d.kernels import F64
+from fleet2d.metrics.metric import Metric, columns_of, in_sight, nested, pairs_of
 from fleet2d.runtime.clock import DAY_S
 
 # Hall's zones, by the distance at which they end [m].
@@ -45,9 +44,7 @@ class Blocking(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.blocks: dict[tuple[str, str], int] = {}
-        self.seconds: dict[tuple[str, str], float] = {}
-        self.asides: Counter[tuple[str, str]] = Counter()
+        self.counts: dict[tuple[str, str], dict[str, float]] = {}
         self.last: dict[tuple[str, str], tuple[tuple[float, float], bool, bool]] = {}
         self.days = 0.0
 
@@ -63,25 +60,25 @@ class Blocking(Metric):
             moves = (np.diff(xy, axis=0, prepend=[start]) != 0).any(axis=1) & pair.at_home
             is_blocked = moves & (is_near | np.append(was_near, is_near[:-1]))
             begins = is_blocked & ~np.append(was_blocked, is_blocked[:-1])
-            self.blocks[key] = self.blocks.get(key, 0) + int(np.count_nonzero(begins))
-            seconds = int(np.count_nonzero(is_blocked)) * history.step_s
-            self.seconds[key] = self.seconds.get(key, 0.0) + seconds
+            counts = self.counts.setdefault(key, {"blocks": 0, "seconds": 0.0})
+            counts["blocks"] += int(np.count_nonzero(begins))
+            counts["seconds"] += int(np.count_nonzero(is_blocked)) * history.step_s
             self.last[key] = pair.user_poses.at(-1), bool(is_near[-1]), bool(is_blocked[-1])
         steps_aside = {f"steps aside for {robot}": robot for robot in state.robots}
         for event in history.events:
             if event.event == "reacts" and event.detail in steps_aside:
-                self.asides[steps_aside[event.detail], event.entity] += 1
+                counts = self.counts[steps_aside[event.detail], event.entity]
+                counts["asides"] = counts.get("asides", 0) + 1
         self.days += len(history) * history.step_s / DAY_S
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
-        results: dict[tuple[str, str], Any] = {}
-        for pair, blocks in self.blocks.items():
-            numbers = {"blocks": blocks, "seconds": self.seconds[pair]}
-            if self.asides[pair]:
-                numbers["asides"] = self.asides[pair]
-            results[pair] = {name: value / self.days for name, value in numbers.items()}
-        return nested(results)
+        return nested(
+            {
+                pair: {name: value / self.days for name, value in counts.items()}
+                for pair, counts in self.counts.items()
+            }
+        )
 
 
 @register("metric", "intrusion")
@@ -98,34 +95,28 @@ class Intrusion(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.minutes: dict[tuple[str, str], list[float]] = {}
+        self.minutes: dict[tuple[str, str], F64] = {}  # in each zone
         self.days = 0.0
 
     def update(self, history: History, state: Present) -> Any:
         """Count the steps in each zone; return a row for each robot and user."""
-        rows: dict[str, list[Any]] = {name: [] for name in ("robot", "user", *ZONES)}
+        rows = []
         for pair in pairs_of(history, state):
-            distance = pair.distance
+            distance, key = pair.distance, (pair.robot, pair.user)
             near = np.flatnonzero(distance < max(ZONES.values()))
             near = near[in_sight(state.home.plan, pair, near)]
-            edges = [0.0, *ZONES.values()]
-            counts = [
-                np.count_nonzero((distance[near] >= low) & (distance[near] < high))
-                for low, high in pairwise(edges)
-            ]
-            minutes = [int(count) * history.step_s / 60 for count in counts]
-            total = self.minutes.setdefault((pair.robot, pair.user), [0.0] * len(ZONES))
-            total[:] = [a + b for a, b in zip(total, minutes, strict=True)]
-            for name, value in zip(rows, (pair.robot, pair.user, *minutes), strict=True):
-                rows[name].append(value)
+            counts, _ = np.histogram(distance[near], [0.0, *ZONES.values()])
+            minutes = counts * history.step_s / 60
+            self.minutes[key] = self.minutes.get(key, 0.0) + minutes
+            rows.append((*key, *minutes.tolist()))
         self.days += len(history) * history.step_s / DAY_S
-        return {name: np.array(column) for name, column in rows.items()} if rows["robot"] else None
+        return columns_of(("robot", "user", *ZONES), rows)
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {zone: minutes a day}}}."""
         return nested(
             {
-                pair: {zone: m / self.days for zone, m in zip(ZONES, minutes, strict=True)}
+                pair: dict(zip(ZONES, (minutes / self.days).tolist(), strict=True))
                 for pair, minutes in self.minutes.items()
             }
         )

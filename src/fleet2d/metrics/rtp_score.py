@@ -17,7 +17,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, UNKNOWN_TRUTH, Bool
-from fleet2d.metrics.metric import Metric, UnknownPlaces
+from fleet2d.metrics.metric import Metric, UnknownPlaces, columns_of
 from fleet2d.runtime.determinism import sum_in_order
 
 MIN_PROBABILITY = 1e-6  # smaller probabilities are raised to this before taking logarithms
@@ -245,8 +245,7 @@ class ScoredBins(NamedTuple):
 
     def of(self, which: Bool) -> "ScoredBins":
         """Return the bins of a mask."""
-        gap, truth, last = self.gap[which], self.truth[which], self.last[which]
-        return ScoredBins(gap, truth, last, self.belief[which], self.reference[which])
+        return ScoredBins._make(column[which] for column in self)
 
 
 @register("metric", "rtp_score")
@@ -335,14 +334,7 @@ class RtpScore(Metric):
             scored = self._score(user, places, gap, last, history, ends)
             self.scored.setdefault(user, []).append(scored)
             rows += [(user, *sums) for sums in _sums(scored)]
-        if not rows:
-            return None
-        names = ("user", "gap", "bins", "log_loss", "brier", "top_1")
-        columns = dict(zip(names, zip(*rows, strict=True), strict=True))
-        return {
-            name: np.array(values, dtype=object if name in ("user", "gap") else None)
-            for name, values in columns.items()
-        }
+        return columns_of(("user", "gap", "bins", "log_loss", "brier", "top_1"), rows)
 
     def _places(self, home: F64, away: F64) -> F64:
         """Return the probability of each scored place: rooms, and away unless `given_home`."""

@@ -12,8 +12,16 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration, Speed, micros
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64, points_in_sight
-from fleet2d.metrics.metric import Metric, kaplan_meier, pairs_of, quantile, restricted_mean
+from fleet2d.floorplan.space import PointXY, Space
+from fleet2d.kernels import F64, I64, points_in_sight
+from fleet2d.metrics.metric import (
+    Metric,
+    columns_of,
+    kaplan_meier,
+    pairs_of,
+    quantile,
+    restricted_mean,
+)
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event
 from fleet2d.sight.camera import DEFAULT_RANGE_M
@@ -66,21 +74,14 @@ class ReachTime(Metric):
             for i in calls[pair.at_home[calls]].tolist():
                 start = lattice.point_at(pair.robot_poses.at(i))
                 target = lattice.point_at(pair.user_poses.at(i))
-                part = (
-                    space.part_near(*start) if space.part_at(*start) < 0 else space.part_at(*start)
-                )
-                goal = (
-                    tuple(target)
-                    if space.part_at(*target) == part
-                    else space.nearest(*target, part)
-                )
-                route = None if goal is None else space.route(tuple(start), goal)
+                part = space.part_at(*start)
+                part = space.part_near(*start) if part < 0 else part
+                route = _route(space, part, start, target)
                 if route is None:
                     self.unreached[key] += 1
-                    continue
-                legs = np.diff(route, axis=0)
-                length = float(np.sqrt((legs * legs).sum(axis=1).astype(np.float64)).sum())
-                seconds.append(length / lattice.units_per_m / self.speed)
+                else:
+                    metres = float(_lengths(route).sum()) / lattice.units_per_m
+                    seconds.append(metres / self.speed)
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {mean, p90, calls, unreached}}}.
@@ -100,28 +101,41 @@ class ReachTime(Metric):
         return results
 
 
+def _route(space: Space, part: int, start: PointXY, target: PointXY) -> I64 | None:
+    """Return the shortest route in a part of the space to its place nearest to the target."""
+    goal = target if space.part_at(*target) == part else space.nearest(*target, part)
+    return None if goal is None else space.route(start, goal)
+
+
+def _lengths(route: I64) -> F64:
+    legs = np.diff(route, axis=0)
+    return np.sqrt((legs * legs).sum(axis=1).astype(np.float64))
+
+
 class SearchRecord(NamedTuple):
-    """A search for a user.
+    """A search for a user, a row of the table.
 
     Attributes:
-        step: Step at which it began.
+        robot: Name of the robot.
         user: Name of the user.
-        at_home: Whether the user was at home when it began.
-        ideal: Length of the shortest route to a place from which the user is visible [m].
-        metres: During the search, the robot's total distance driven when it began; after it, the
-            distance driven during the search [m].
+        began: Step at which it began.
         seconds: Duration [s].
         end: Outcome: one of ENDS, `false` where the robot mistook another person for the user, or
-            `open` where the run ended first.
+            `open` during the search, or where the run ended first.
+        at_home: Whether the user was at home when it began.
+        metres: During the search, the robot's total distance driven when it began; after it, the
+            distance driven during the search [m].
+        ideal: Length of the shortest route to a place from which the user is visible [m].
     """
 
-    step: int
+    robot: str
     user: str
+    began: int
+    seconds: float
+    end: str
     at_home: bool
-    ideal: float
     metres: float
-    seconds: float = 0.0
-    end: str = ""
+    ideal: float
 
 
 @register("metric", "time_to_find")
@@ -178,7 +192,7 @@ class TimeToFind(Metric):
 
     def update(self, history: History, state: Present) -> Any:
         """Update the searches; return a row for each that ended."""
-        ended: list[tuple[str, SearchRecord]] = []
+        ended: list[SearchRecord] = []
         for robot in state.robots:
             driven = self._driven(history, robot)
             for event in history.events:
@@ -188,12 +202,12 @@ class TimeToFind(Metric):
                 if event.event == "find_begins" and event.detail in state.users:
                     self.open[robot] = self._begin(history, state, event, metres)
                 elif event.event in ENDS and robot in self.open:
-                    ended.append((robot, self._end(history, event, robot, metres)))
+                    ended.append(self._end(history, event, metres))
             self.driven[robot] = float(driven[-1])
-        for robot, search in ended:
-            self.done.setdefault(robot, []).append(search)
+        for search in ended:
+            self.done.setdefault(search.robot, []).append(search)
         self.end, self.step_s = history.end, history.step_s
-        return _rows(ended)
+        return columns_of(SearchRecord._fields, ended)
 
     def _driven(self, history: History, robot: str) -> F64:
         """Return the distance driven by a robot up to each step of the period [m]."""
@@ -205,23 +219,19 @@ class TimeToFind(Metric):
 
     def _begin(self, history: History, state: Present, event: Event, metres: float) -> SearchRecord:
         i, user = event.step - history.first, history.poses(event.detail)
-        at_home = not bool(user.away[i])
-        ideal = 0.0
+        robot, at_home, ideal = event.entity, not bool(user.away[i]), 0.0
         if at_home:
-            ideal = self._ideal(state.home, history.poses(event.entity).at(i), user.at(i))
-        return SearchRecord(event.step, event.detail, at_home, ideal, metres)
+            ideal = self._ideal(state.home, history.poses(robot).at(i), user.at(i))
+        return SearchRecord(robot, event.detail, event.step, 0.0, "open", at_home, metres, ideal)
 
-    def _end(self, history: History, event: Event, robot: str, metres: float) -> SearchRecord:
-        search, end = self.open.pop(robot), event.event
+    def _end(self, history: History, event: Event, metres: float) -> SearchRecord:
+        search, end = self.open.pop(event.entity), event.event
         i, user = event.step - history.first, history.poses(search.user)
-        gap = np.array(history.poses(robot).at(i)) - user.at(i)
+        gap = np.array(history.poses(event.entity).at(i)) - user.at(i)
         if end == "found" and (user.away[i] or float((gap * gap).sum()) > self.sight**2):
             end = "false"
-        return search._replace(
-            metres=metres - search.metres,
-            seconds=(event.step - search.step) * history.step_s,
-            end=end,
-        )
+        seconds = (event.step - search.began) * history.step_s
+        return search._replace(metres=metres - search.metres, seconds=seconds, end=end)
 
     def _ideal(self, home: Home, robot: tuple[float, float], user: tuple[float, float]) -> float:
         """Return the shortest distance to drive until a robot could see a user [m]."""
@@ -229,11 +239,10 @@ class TimeToFind(Metric):
         lattice = plan.lattice
         start, target = lattice.point_at(robot), lattice.point_at(user)
         part = space.part_at(*start)
-        goal = tuple(target) if space.part_at(*target) == part else space.nearest(*target, part)
-        route = None if goal is None or part < 0 else space.route(tuple(start), goal)
+        route = None if part < 0 else _route(space, part, start, target)
         if route is None:
             return 0.0
-        legs = np.sqrt((np.diff(route, axis=0) ** 2).sum(axis=1).astype(np.float64))
+        legs = _lengths(route)
         total, along = float(legs.sum()), np.append(0.0, np.cumsum(legs))
         at = np.append(np.arange(0.0, total, lattice.units_per_m / 10), total)
         points = np.stack([np.interp(at, along, route[:, k]) for k in (0, 1)], axis=1)
@@ -247,8 +256,7 @@ class TimeToFind(Metric):
         """Return {robot: numbers}, without undefined ones."""
         searches = {robot: list(done) for robot, done in self.done.items()}
         for robot, search in self.open.items():
-            seconds = (self.end - search.step) * self.step_s
-            cut = search._replace(seconds=seconds, end="open")
+            cut = search._replace(seconds=(self.end - search.began) * self.step_s)
             searches.setdefault(robot, []).append(cut)
         return {robot: self._numbers(records) for robot, records in searches.items()}
 
@@ -282,18 +290,3 @@ class TimeToFind(Metric):
             if correct:
                 numbers["out_mean"] = sum_in_order(s.seconds for s in correct) / len(correct)
         return numbers
-
-
-def _rows(ended: list[tuple[str, SearchRecord]]) -> dict[str, Any] | None:
-    if not ended:
-        return None
-    return {
-        "robot": np.array([robot for robot, _ in ended], dtype=object),
-        "user": np.array([search.user for _, search in ended], dtype=object),
-        "began": np.array([search.step for _, search in ended], np.int64),
-        "seconds": np.array([search.seconds for _, search in ended]),
-        "end": np.array([search.end for _, search in ended], dtype=object),
-        "at_home": np.array([search.at_home for _, search in ended]),
-        "metres": np.array([search.metres for _, search in ended]),
-        "ideal": np.array([search.ideal for _, search in ended]),
-    }

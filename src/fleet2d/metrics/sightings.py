@@ -82,19 +82,16 @@ class Detections(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.looks: I64 | None = None  # (robots, users, 2): in view, noticed
-        self.confusion: I64  # (robots, users + 1, users + 1): true, perceived
+        nothing = np.zeros((), np.int64)
+        self.looks = nothing  # (robots, users, 2): in view, noticed
+        self.confusion = nothing  # (robots, users + 1, users + 1): true, perceived
+        self.unknown = nothing  # (robots,): observations whose truth nobody knows
         self.names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-        self.unknown: I64  # (robots,): observations whose truth nobody knows
 
     def update(self, history: History, state: Present) -> Any:
         """Count looks and observations; return a row for each robot and user."""
         robots, users = len(state.robots), len(state.users)
-        if self.looks is None:
-            self.looks = np.zeros((robots, users, 2), np.int64)
-            self.confusion = np.zeros((robots, users + 1, users + 1), np.int64)
-            self.unknown = np.zeros(robots, np.int64)
-            self.names = state.robots, state.users
+        self.names = state.robots, state.users
         counts, observations = history.looks, history.observations
         looks = np.zeros((robots, users, 2), np.int64)
         np.add.at(looks, counts.robot, np.stack([counts.in_view, counts.detected], axis=-1))
@@ -103,9 +100,9 @@ class Detections(Metric):
         true = history.truth.user
         known = true != UNKNOWN_TRUTH
         np.add.at(confusion, (observations.robot[known], true[known], observations.user[known]), 1)
-        self.unknown += np.bincount(observations.robot[~known], minlength=robots)
-        self.looks += looks
-        self.confusion += confusion
+        self.unknown = self.unknown + np.bincount(observations.robot[~known], minlength=robots)
+        self.looks = self.looks + looks
+        self.confusion = self.confusion + confusion
         return self._rows(looks, confusion)
 
     def _rows(self, looks: I64, confusion: I64) -> Any:
@@ -130,8 +127,6 @@ class Detections(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {precision, recall, recognized, confusion}}, without undefined ratios."""
-        if self.looks is None:
-            return {}
         robots, users = self.names
         return {
             robot: self._summary(self.looks[r], self.confusion[r], users)

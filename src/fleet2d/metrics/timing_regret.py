@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, ClassVar
 
-import numpy as np
-
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
@@ -16,9 +14,11 @@ from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.metric import Metric, columns_of, nested
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
+
+COLUMNS = ("robot", "request", "due_at", "best_at", "best_chance", "best", "value")
 
 
 @dataclass
@@ -99,7 +99,11 @@ class TimingRegret(Metric):
                     _consider(request, step, life)
         self.activities = life.last_activities
         self.closed += closed
-        return _rows(closed) if closed else None
+        rows = [
+            (r.wanted.robot, r.wanted.text, r.wanted.step, r.best_at, r.chance, r.best, r.value)
+            for r in closed
+        ]
+        return columns_of(COLUMNS, rows)
 
     def _attitude(self, robot: str, user: str, life: "_LifeOfPeriod", step: int) -> AttitudeState:
         """Return the attitude of a user to a robot at a step."""
@@ -137,20 +141,11 @@ class TimingRegret(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {number: value}}}."""
-        result: dict[str, Any] = {}
-        pairs = sorted({(each.wanted.robot, each.wanted.interaction.to) for each in self.closed})
-        for robot, user in pairs:
-            own = [each for each in self.closed if _pair(each) == (robot, user)]
-            best = sum_in_order(each.best for each in own)
-            value = sum_in_order(each.value for each in own)
-            result.setdefault(robot, {})[user] = {
-                "requests": len(own),
-                "best": best,
-                "value": value,
-                "regret": best - value,
-                "best_chance": sum_in_order(each.chance for each in own) / len(own),
-            }
-        return result
+        by_pair: dict[tuple[str, str], list[OpenRequest]] = {}
+        for request in self.closed:
+            pair = request.wanted.robot, request.wanted.interaction.to
+            by_pair.setdefault(pair, []).append(request)
+        return nested({pair: _numbers(by_pair[pair]) for pair in sorted(by_pair)})
 
 
 class _LifeOfPeriod:
@@ -218,18 +213,14 @@ def _consider(request: OpenRequest, step: int, life: _LifeOfPeriod) -> None:
         request.best, request.best_at, request.chance = value, step, chance
 
 
-def _pair(request: OpenRequest) -> tuple[str, str]:
-    return request.wanted.robot, request.wanted.interaction.to
-
-
-def _rows(requests: list[OpenRequest]) -> dict[str, Any]:
-    """Return a row for each request."""
+def _numbers(requests: list[OpenRequest]) -> dict[str, float]:
+    """Return the numbers of one robot and one person."""
+    best = sum_in_order(request.best for request in requests)
+    value = sum_in_order(request.value for request in requests)
     return {
-        "robot": np.array([each.wanted.robot for each in requests], object),
-        "request": np.array([each.wanted.text for each in requests], object),
-        "due_at": np.array([each.wanted.step for each in requests], np.int64),
-        "best_at": np.array([each.best_at for each in requests], np.int64),
-        "best_chance": np.array([each.chance for each in requests]),
-        "best": np.array([each.best for each in requests]),
-        "value": np.array([each.value for each in requests]),
+        "requests": len(requests),
+        "best": best,
+        "value": value,
+        "regret": best - value,
+        "best_chance": sum_in_order(request.chance for request in requests) / len(requests),
     }
