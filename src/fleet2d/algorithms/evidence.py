@@ -179,22 +179,13 @@ class SightingCounts(NamedTuple):
             place: int64 (n,), where the user was perceived.
             bin_steps: Steps of a bin.
             shape: Numbers of bins, of users + 1, and of places.
-        """
-        return cls(*list_sightings(step, user, place, bin_steps, *shape), shape)
-
-    @classmethod
-    def of(cls, seen: I64) -> Self:
-        """Return the counts in an array (bins, users + 1, places).
 
         Example:
-            >>> counts = SightingCounts.of(np.array([[[0, 7], [0, 7]]]))
-            >>> counts.user.tolist(), counts.place.tolist(), counts.dense.tolist()
-            ([0, 1], [1, 1], [[[0, 7], [0, 7]]])
+            >>> zero = np.array([0])
+            >>> SightingCounts.of_observations(zero, zero, zero, 1, (1, 2, 1)).dense.tolist()
+            [[[1], [1]]]
         """
-        by_user = seen.transpose(1, 0, 2)
-        user, seen_bin, place = np.nonzero(by_user)
-        bins, users, places = seen.shape
-        return cls(user, seen_bin, place, by_user[user, seen_bin, place], (bins, users, places))
+        return cls(*list_sightings(step, user, place, bin_steps, *shape), shape)
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:

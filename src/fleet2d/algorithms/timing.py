@@ -1,6 +1,5 @@
 """When to address whom: the algorithm `timing`, its output, and its policies."""
 
-import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -146,7 +145,7 @@ class TimingAlgorithm(Algorithm):
 
     def update(self, history: History, state: Present) -> Any:
         """Learn from the questions and answers; return the chances."""
-        before = sum(1 for _ in self.policies)
+        before = len(self.policies)
         learned = 0
         self.worth |= {w.text.rpartition(" ")[0]: w.interaction.worth for w in history.wanted}
         for event in history.events:
@@ -195,6 +194,11 @@ def _count(asked: Asked, counts: F64, weight: float = 1.0) -> None:
             row[asked.room] += 0.7 * near * weight
 
 
+def _logistic(values: F64) -> F64:
+    """Return the logistic function of each value, with the same bits on every machine."""
+    return np.array([logistic(value) for value in values.ravel().tolist()]).reshape(values.shape)
+
+
 @register("timing_policy", "fixed_times")
 class FixedTimes(TimingPolicy):
     """Address people in some hours, in any room.
@@ -234,13 +238,11 @@ class LogisticTiming(TimingPolicy):
         super().start(rooms)
         self.base, self.by_hour, self.by_room = 0.5, np.zeros(HOURS), np.zeros(rooms)
 
-    def _logit(self, hour: int, room: int) -> float:
-        by_room = float(self.by_room[room]) if room >= 0 else 0.0
-        return float(self.base) + float(self.by_hour[hour]) + by_room
-
     def learn(self, asked: Asked) -> None:
         """Make a step along the gradient of the log likelihood; neighboring hours share half."""
-        step = self.rate * (asked.was_accepted - logistic(self._logit(asked.hour, asked.room)))
+        by_room = self.by_room[asked.room] if asked.room >= 0 else 0.0
+        chance = logistic(float(self.base + self.by_hour[asked.hour] + by_room))
+        step = self.rate * (asked.was_accepted - chance)
         self.base += step / 4
         for hour, part in ((-1, 0.5), (0, 1.0), (1, 0.5)):
             self.by_hour[(asked.hour + hour) % HOURS] += part * step
@@ -249,11 +251,8 @@ class LogisticTiming(TimingPolicy):
 
     def chances(self) -> F64:
         """Return 1 where a yes is likely, else the probability of exploring."""
-        likely = [
-            [logistic(self._logit(hour, room)) >= self.ask_at for room in range(self.rooms)]
-            for hour in range(HOURS)
-        ]
-        return np.where(likely, 1.0, self.explore)
+        chance = _logistic(self.base + self.by_hour[:, np.newaxis] + self.by_room)
+        return np.where(chance >= self.ask_at, 1.0, self.explore)
 
 
 @register("timing_policy", "thompson")
@@ -299,15 +298,10 @@ class ThompsonTiming(TimingPolicy):
     def chances(self) -> F64:
         """Return the probability that the rate of yes is above `ask_at`."""
         ask_at = self.answers[0] / self.answers[1] if self.ask_at is None else self.ask_at
-        chances = np.empty((HOURS, self.rooms))
-        for hour in range(HOURS):
-            for room in range(self.rooms):
-                yes, no = float(self.yes[hour, room]), float(self.no[hour, room])
-                total = yes + no
-                spread = math.sqrt(yes * no / (total * total * (total + 1)))
-                above = logistic(1.7 * (yes / total - ask_at) / spread)
-                chances[hour, room] = max(self.min_chance, min(above, 1.0))
-        return chances
+        total = self.yes + self.no
+        spread = np.sqrt(self.yes * self.no / (total * total * (total + 1)))
+        above = _logistic(1.7 * (self.yes / total - ask_at) / spread)
+        return above.clip(self.min_chance, 1.0)
 
 
 @register("timing_policy", "two_stage")
@@ -358,5 +352,4 @@ class TwoStageTiming(TimingPolicy):
         yes_variance = yes * (1 - yes) / (answers + 1)
         variance = time**2 * yes_variance + (yes**2 + yes_variance) * time_variance
         gain = (self.worth * time * yes - self.price) / (self.worth * np.sqrt(variance))
-        above = [logistic(1.7 * each) for each in gain.ravel().tolist()]
-        return np.array(above).reshape(gain.shape).clip(self.min_chance, 1.0)
+        return _logistic(1.7 * gain).clip(self.min_chance, 1.0)

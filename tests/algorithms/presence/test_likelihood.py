@@ -9,6 +9,7 @@ from tests.algorithms.presence.worlds import (
     DETECTION,
     MONDAY,
     any_evidence,
+    counts_of,
     evidence,
     evidence_of,
     follow,
@@ -20,7 +21,7 @@ from tests.algorithms.presence.worlds import (
     transitions,
 )
 
-from fleet2d.algorithms.evidence import Evidence, SightingCounts
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import with_anyone
 from fleet2d.algorithms.presence.estimator import SightingShare
 from fleet2d.algorithms.presence.exposure_ratio import AuditOnly, ExposureRatio
@@ -42,7 +43,7 @@ def test_observations_of_no_user_are_unknown() -> None:
     bins = any_evidence(10, users=1)
     seen = np.zeros_like(bins.seen)
     seen[3, 1, 2] = 6
-    bins = replace(bins, sightings=SightingCounts.of(seen))
+    bins = replace(bins, sightings=counts_of(seen))
     assert [[3, 2]] == np.argwhere(bins.sightings.unknown).tolist()
 
 

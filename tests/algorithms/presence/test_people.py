@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.algorithms.presence.worlds import MONDAY, evidence_of, patch_evidence
+from tests.algorithms.presence.worlds import MONDAY, counts_of, evidence_of, patch_evidence
 from tests.kernels.test_presence_people import by_bin
 from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
@@ -124,7 +124,7 @@ def test_equal_bins_are_merged_within_an_hour() -> None:
 def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
     seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
-    bins = replace(bins, by_patch=bins.by_patch._replace(sightings=SightingCounts.of(seen)))
+    bins = replace(bins, by_patch=bins.by_patch._replace(sightings=counts_of(seen)))
     assert [255, 255, 0, 0] == shown_of(stretches_of(bins, longest=1))[0].tolist()
 
 
@@ -169,9 +169,9 @@ def crowd_of(count: int, bins: int, seed: int) -> Evidence:
     seen = np.where(random.random((bins, count + 1, 3)) < 0.02, random.integers(1, 9), 0)
     seen[:, -1] = seen.max(axis=1)
     base = bins_of(shown, seen[:, 0])
-    by_patch = base.by_patch._replace(sightings=SightingCounts.of(seen))
+    by_patch = base.by_patch._replace(sightings=counts_of(seen))
     in_rooms = np.stack([seen[..., :2].max(axis=-1), seen[..., 2]], axis=-1)
-    return replace(base, by_patch=by_patch, sightings=SightingCounts.of(in_rooms))
+    return replace(base, by_patch=by_patch, sightings=counts_of(in_rooms))
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 13])

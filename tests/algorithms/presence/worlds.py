@@ -96,6 +96,16 @@ def follow(t: int, at: int, sees_person: bool, sightings: I64, random: np.random
     return at if sees_person else (at + 1) % len(sightings)
 
 
+def counts_of(seen: I64) -> SightingCounts:
+    """The counts in an array (bins, users + 1, places)."""
+    by_user = seen.transpose(1, 0, 2)
+    user, seen_bin, place = np.nonzero(by_user)
+    bins, users, places = seen.shape
+    return SightingCounts(
+        user, seen_bin, place, by_user[user, seen_bin, place], (bins, users, places)
+    )
+
+
 def evidence_of(
     watched: F64,
     seen: I64,
@@ -106,7 +116,7 @@ def evidence_of(
 ) -> Evidence:
     """Evidence in bins of a minute; without patches, each room is one."""
     bins, rooms = watched.shape
-    sightings = SightingCounts.of(seen)
+    sightings = counts_of(seen)
     clock = Clock(start, 60_000_000 // bin_steps, begin + bins * bin_steps)
     day, minute = times_of_bins(clock, begin, bin_steps, bins)
     by_patch = by_patch or patch_evidence(np.arange(rooms), np.ones(rooms, int), watched, seen)
@@ -116,7 +126,7 @@ def evidence_of(
 def patch_evidence(room: I64, cells: I64, shown: F64, seen: I64) -> PatchEvidence:
     """Evidence by patches that are watched for whole bins."""
     shown_255 = np.rint(255 * np.minimum(shown, 1)).astype(np.uint8)
-    return PatchEvidence(room, cells, shown, shown, shown_255, SightingCounts.of(seen))
+    return PatchEvidence(room, cells, shown, shown, shown_255, counts_of(seen))
 
 
 def pieces(evidence: Evidence, length: int = 60) -> list[Evidence]:

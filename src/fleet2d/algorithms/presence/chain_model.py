@@ -201,19 +201,6 @@ class Follower:
         return PersonForecast(mass.astype(np.float64), model, habits)
 
 
-def part_of(stretches: Stretches, first: int, end: int) -> Stretches:
-    """Return the stretches `first` to `end` - 1."""
-    begin = stretches.begin[first : end + 1]
-    rows = slice(*begin[[0, -1]].tolist())
-    return stretches._replace(
-        bins=stretches.bins[first:end],
-        view=stretches.view[first:end],
-        begin=begin - begin[0],
-        patch=stretches.patch[rows],
-        share=stretches.share[rows],
-    )
-
-
 def steps_of(model: StayModel) -> F64:
     """Return the transition matrix from bin to bin without evidence: float64 (nodes, nodes)."""
     nodes, places = len(model.stay), model.follow.shape[1] - 1
@@ -331,13 +318,9 @@ class RoutineModel(SemiMarkov):
         hours = day.minute // 60
         begins = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist()]
         models = self.habits(user).at(model, (day.number - 1) % 7, hours[begins].tolist())
-        whole, parts = day.stretches(user, 1), pairwise([*begins, len(hours)])
-        return np.concatenate(
-            [
-                self.followers[user].follow(at_hour, part_of(whole, first, end))
-                for at_hour, (first, end) in zip(models, parts, strict=True)
-            ]
-        )
+        parts, follow = pairwise([*begins, len(hours)]), super()._follow
+        each = zip(parts, models, strict=True)
+        return np.concatenate([follow(user, day.between(*part), at) for part, at in each])
 
     def habits(self, user: int) -> Habits:
         """Return how a user's transitions depend on the hour, as learned so far."""

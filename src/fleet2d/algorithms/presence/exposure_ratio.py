@@ -16,7 +16,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
-from fleet2d.kernels import F64, I64, Bool
+from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_MINUTES
 
 PRIOR = 1.0  # bins of average sightings that are added to each place
@@ -96,16 +96,8 @@ class ExposureRatio(Estimator):
 
     def sums(self, evidence: Evidence) -> F64:
         """Return for how long each patch was watched, and somebody seen in it, in bins."""
-        return seen_and_watched(
-            evidence.by_patch.seen,
-            evidence.by_patch.watched,
-            self.is_counted(evidence),
-            evidence.bin_steps,
-        )
-
-    def is_counted(self, evidence: Evidence) -> Bool:
-        """Return whether each bin counts: bool (bins,)."""
-        return np.ones(len(evidence), bool)
+        patches = evidence.by_patch
+        return seen_and_watched(patches.seen, patches.watched, evidence.bin_steps)
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return the sums of ratios, normalized, and the remainder as away."""
@@ -138,19 +130,17 @@ def ratios(sums: F64, detection: float) -> tuple[F64, F64]:
     return rate, np.where(is_watched, away, 0.0)
 
 
-def seen_and_watched(seen: I64, watched: F64, is_counted: Bool, bin_steps: int) -> F64:
+def seen_and_watched(seen: I64, watched: F64, bin_steps: int) -> F64:
     """Return seen and watched of each place, in bins, and 1: (bins, users + 1, 2 places + 1).
 
     Args:
         seen: int64 (bins, users + 1, places), steps.
         watched: float64 (bins, places), shares.
-        is_counted: bool (bins,), whether each bin counts.
         bin_steps: Steps of a bin.
     """
-    factor = is_counted[:, None, None]
     exposure = np.broadcast_to(watched[:, None], seen.shape)
     ones = np.ones((*seen.shape[:2], 1))
-    return np.concatenate([seen / bin_steps * factor, exposure * factor, ones], axis=-1)
+    return np.concatenate([seen / bin_steps, exposure, ones], axis=-1)
 
 
 @register("presence_estimator", "audit_only")
@@ -178,12 +168,12 @@ class AuditOnly(ExposureRatio):
                 f"length is {self.length}, but audits come every {self.every}: it can't be longer"
             )
 
-    def is_counted(self, evidence: Evidence) -> Bool:
-        """Return whether each bin begins in an audit: bool (bins,)."""
-        every, length = (
-            max(1, duration // timedelta(minutes=1)) for duration in (self.every, self.length)
-        )
-        return evidence.minute % every < length
+    def sums(self, evidence: Evidence) -> F64:
+        """Return for how long each patch was watched, and somebody seen in it, during audits."""
+        minute, sums = timedelta(minutes=1), super().sums(evidence)
+        every, length = (max(1, duration // minute) for duration in (self.every, self.length))
+        sums[evidence.minute % every >= length, :, :-1] = 0
+        return sums
 
 
 def _cosines() -> F64:
@@ -225,8 +215,7 @@ class Fremen(Estimator):
 
     def sums(self, evidence: Evidence) -> F64:
         """Return for how long each room was watched, and somebody seen in it, in bins."""
-        is_counted = np.ones(len(evidence), bool)
-        return seen_and_watched(evidence.seen, evidence.watched, is_counted, evidence.bin_steps)
+        return seen_and_watched(evidence.seen, evidence.watched, evidence.bin_steps)
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return the shares by the static models, which have no periods."""
