@@ -5,7 +5,7 @@ import json
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -35,7 +35,6 @@ from fleet2d.studies.progress import progress_bar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.progress import Progress
 
     from fleet2d.runs.run import Run
 
@@ -246,9 +245,8 @@ def dataset(
     try:
         _check_plan(parts, plan)
         if made is not None:
-            _record_shards(parts, plan, made)
-        with progress_bar(show=sys.stderr.isatty()) as bar:
-            files = _write_shards(root, parts, plan, workers, bar)
+            _record_shards(plan, made)
+        files = _write_shards(root, plan, workers)
         if made is None:
             _finish(root, plan, files)
     finally:
@@ -262,7 +260,7 @@ def dataset(
     return open_dataset(root)
 
 
-def _record_shards(parts: Path, plan: DatasetPlan, made: Dataset) -> None:
+def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
     """Record the shards of a complete data set, so that only those that lack a file are made."""
     version = made.manifest["versions"]["fleet2d"]
     if version != __version__:
@@ -271,11 +269,8 @@ def _record_shards(parts: Path, plan: DatasetPlan, made: Dataset) -> None:
             f" is {__version__}"
         )
     for shard in plan.shards():
-        names = [
-            path.relative_to(made.root).as_posix() for path in _files_of(made.root, shard).values()
-        ]
-        record = {name: made.manifest["files"][name] for name in names}
-        write_atomically(_record_path(parts, shard), json.dumps(record).encode())
+        record = {name: made.manifest["files"][name] for name in _files_of(shard).values()}
+        write_atomically(_record_path(made.root, shard), json.dumps(record).encode())
 
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:
@@ -289,88 +284,51 @@ def _check_plan(parts: Path, plan: DatasetPlan) -> None:
     write_atomically(path, identity.encode())
 
 
-def _write_shards(
-    root: Path, parts: Path, plan: DatasetPlan, workers: int | None, bar: "Progress | None"
-) -> dict[str, dict[str, Any]]:
+def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[str, dict[str, Any]]:
     """Simulate the runs that are lacking, block by block; return the record of each file."""
-    total = sum(split.runs for split in plan.file.splits.values())
-    task = bar.add_task("runs", total=total) if bar else None
-
-    def advance(runs: int = 1) -> None:
-        if bar is not None and task is not None:
-            bar.advance(task, runs)
-
-    files: dict[str, dict[str, Any]] = {}
-    block: list[Shard] = []
-    for shard in plan.shards():
-        record = _record_of(root, parts, shard)
-        if record:
-            files |= record
-            advance(shard.end - shard.first)
-            continue
-        block.append(shard)
-        if sum(each.end - each.first for each in block) >= BLOCK_RUNS:
-            files |= _write_block(root, parts, plan, block, workers, advance)
-            block = []
-    return files | _write_block(root, parts, plan, block, workers, advance)
-
-
-def _write_block(
-    root: Path,
-    parts: Path,
-    plan: DatasetPlan,
-    block: Sequence[Shard],
-    workers: int | None,
-    advance: Callable[[int], None],
-) -> dict[str, dict[str, Any]]:
-    """Simulate the runs of some shards that have no part yet, then join the parts to shards."""
-    runs = {
-        shard: [plan.run(shard.split, k) for k in range(shard.first, shard.end)] for shard in block
-    }
-    lacking = [
-        run for own in runs.values() for run in own if not (parts / _part_name(run)).is_file()
-    ]
-    advance(sum(map(len, runs.values())) - len(lacking))
-    writer = PartWriter(str(parts), {run.seed: run for run in lacking}, plan.file.labels)
-    map_runs(
-        writer,
-        [run.scenario for run in lacking],
-        workers=workers,
-        on_result=lambda _: advance(1),
-    )
-    files: dict[str, dict[str, Any]] = {}
-    for shard, own in runs.items():
-        made = _join(root, parts, shard, own)
-        write_atomically(_record_path(parts, shard), json.dumps(made).encode())
-        files |= made
-        for run in own:
-            (parts / _part_name(run)).unlink()
-    return files
+    records = {shard: _record_of(root, shard) for shard in plan.shards()}
+    lacking = [shard for shard, record in records.items() if not record]
+    size = max(1, BLOCK_RUNS // plan.file.runs_per_shard)
+    total, left = (sum(s.end - s.first for s in shards) for shards in (records, lacking))
+    with progress_bar(show=sys.stderr.isatty()) as bar:
+        task = bar.add_task("runs", total=total, completed=total - left)
+        for begin in range(0, len(lacking), size):
+            runs = {
+                shard: [plan.run(shard.split, k) for k in range(shard.first, shard.end)]
+                for shard in lacking[begin : begin + size]
+            }
+            planned = [run for own in runs.values() for run in own]
+            new = [run for run in planned if not _part_path(root, run).is_file()]
+            bar.advance(task, len(planned) - len(new))
+            writer = PartWriter(root, {run.seed: run for run in new}, plan.file.labels)
+            scenarios = [run.scenario for run in new]
+            map_runs(writer, scenarios, workers=workers, on_result=lambda _: bar.advance(task))
+            records |= {shard: _join(root, shard, own) for shard, own in runs.items()}
+    return {name: file for record in records.values() for name, file in record.items()}
 
 
-def _record_path(parts: Path, shard: Shard) -> Path:
-    return parts / f"{shard.split}-{shard.number:05}.json"
+def _record_path(root: Path, shard: Shard) -> Path:
+    return root / PARTS / f"{shard.split}-{shard.number:05}.json"
 
 
-def _record_of(root: Path, parts: Path, shard: Shard) -> dict[str, dict[str, Any]]:
+def _record_of(root: Path, shard: Shard) -> dict[str, dict[str, Any]]:
     """Return the record of a shard that was written whole, else nothing."""
-    paths = {path.relative_to(root).as_posix(): path for path in _files_of(root, shard).values()}
     try:
-        record: dict[str, dict[str, Any]] = json.loads(_record_path(parts, shard).read_text())
-        sizes = {name: record[name]["bytes"] for name in paths}
-        is_whole = all(path.stat().st_size == sizes[name] for name, path in paths.items())
+        stored = json.loads(_record_path(root, shard).read_text())
+        record = {name: stored[name] for name in _files_of(shard).values()}
+        is_whole = all((root / n).stat().st_size == file["bytes"] for n, file in record.items())
     except (OSError, ValueError, LookupError, TypeError):
         return {}
-    return {name: record[name] for name in paths} if is_whole else {}
+    return record if is_whole else {}
 
 
-def _files_of(root: Path, shard: Shard) -> dict[str, Path]:
-    """Return the file of each table of a shard."""
-    return {name: root / shard.split / f"{name}-{shard.number:05}.parquet" for name in SCHEMAS}
+def _files_of(shard: Shard) -> dict[str, str]:
+    """Return the name of the file of each table of a shard."""
+    return {table: f"{shard.split}/{table}-{shard.number:05}.parquet" for table in SCHEMAS}
 
 
-def _part_name(run: PlannedRun) -> str:
-    return f"{run.number:06}.arrow"
+def _part_path(root: Path, run: PlannedRun) -> Path:
+    return root / PARTS / f"{run.number:06}.arrow"
 
 
 @dataclass
@@ -378,12 +336,12 @@ class PartWriter:
     """Writes what a data set stores of a run, in the process that simulated it.
 
     Attributes:
-        folder: The folder of parts.
+        root: The folder of the data set.
         runs: The planned runs, by seed.
         labels: Time between labels.
     """
 
-    folder: str
+    root: Path
     runs: Mapping[int, PlannedRun]
     labels: timedelta
 
@@ -392,7 +350,7 @@ class PartWriter:
         planned = self.runs[int(run.manifest["seed"])]
         tables = tables_of(run, planned, self.labels)
         with (
-            partial_file(Path(self.folder) / _part_name(planned)) as path,
+            partial_file(_part_path(self.root, planned)) as path,
             pa.OSFile(str(path), "wb") as file,
         ):
             for name in SCHEMAS:
@@ -400,13 +358,11 @@ class PartWriter:
                     stream.write_table(tables[name])
 
 
-def _join(
-    root: Path, parts: Path, shard: Shard, runs: Sequence[PlannedRun]
-) -> dict[str, dict[str, Any]]:
-    """Write the tables of a shard from the parts of its runs; return a record of each file."""
+def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, dict[str, Any]]:
+    """Turn the parts of some runs into the files of a shard; return a record of each file."""
     tables: dict[str, list[pa.Table]] = {name: [] for name in SCHEMAS}
-    for run in runs:
-        part = parts / _part_name(run)
+    parts = [_part_path(root, run) for run in runs]
+    for part in parts:
         try:
             with pa.OSFile(str(part), "rb") as file:
                 for name in SCHEMAS:
@@ -416,19 +372,20 @@ def _join(
             raise InputError(
                 f"{part} was damaged, and is deleted ({error}): run the same command again"
             ) from None
-    records = {}
-    for name, path in _files_of(root, shard).items():
+    record = {}
+    for table_name, name in _files_of(shard).items():
+        path = root / name
         path.parent.mkdir(exist_ok=True)
-        table = pa.concat_tables(tables[name]).unify_dictionaries()
+        table = pa.concat_tables(tables[table_name]).unify_dictionaries()
         with partial_file(path) as partial:
             pq.write_table(table, partial, **_encoding(table))
         content = path.read_bytes()
-        records[path.relative_to(root).as_posix()] = {
-            "rows": table.num_rows,
-            "bytes": len(content),
-            "sha256": hashlib.sha256(content).hexdigest(),
-        }
-    return records
+        digest = hashlib.sha256(content).hexdigest()
+        record[name] = {"rows": table.num_rows, "bytes": len(content), "sha256": digest}
+    write_atomically(_record_path(root, shard), json.dumps(record).encode())
+    for part in parts:
+        part.unlink()
+    return record
 
 
 def _encoding(table: pa.Table) -> dict[str, Any]:

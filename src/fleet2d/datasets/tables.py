@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
+from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.artifacts.arrow import number_array, string_array, values_of
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
@@ -16,67 +17,26 @@ from fleet2d.runtime.clock import DAY_S
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
-TIME = pa.timestamp("us")
+_KINDS: Mapping[str, pa.DataType] = {
+    **dict.fromkeys(("run", "step", "next_step"), pa.int32()),
+    **dict.fromkeys(("time", "start"), pa.timestamp("us")),
+    **dict.fromkeys(("area_m2", "x", "y", "days"), pa.float64()),
+    **dict.fromkeys(("watched", "probability"), pa.float32()),
+    "seen": pa.int16(),
+    "seed": pa.int64(),
+    "users": pa.list_(pa.string()),
+}
+"""The types of columns; all others are texts."""
+_COLUMNS = {
+    "runs": "run split home household varied users seed start days digest",
+    "rooms": "run room kind area_m2 x y",
+    "evidence": "run time step room kind user watched seen",
+    "labels": "run time step user place next_place next_step activity",
+    "beliefs": "run time step model user place probability",
+}
 SCHEMAS: Mapping[str, pa.Schema] = {
-    "runs": pa.schema(
-        [
-            ("run", pa.int32()),
-            ("split", pa.string()),
-            ("home", pa.string()),
-            ("household", pa.string()),
-            ("varied", pa.string()),
-            ("users", pa.list_(pa.string())),
-            ("seed", pa.int64()),
-            ("start", TIME),
-            ("days", pa.float64()),
-            ("digest", pa.string()),
-        ]
-    ),
-    "rooms": pa.schema(
-        [
-            ("run", pa.int32()),
-            ("room", pa.string()),
-            ("kind", pa.string()),
-            ("area_m2", pa.float64()),
-            ("x", pa.float64()),
-            ("y", pa.float64()),
-        ]
-    ),
-    "evidence": pa.schema(
-        [
-            ("run", pa.int32()),
-            ("time", TIME),
-            ("step", pa.int32()),
-            ("room", pa.string()),
-            ("kind", pa.string()),
-            ("user", pa.string()),
-            ("watched", pa.float32()),
-            ("seen", pa.int16()),
-        ]
-    ),
-    "labels": pa.schema(
-        [
-            ("run", pa.int32()),
-            ("time", TIME),
-            ("step", pa.int32()),
-            ("user", pa.string()),
-            ("place", pa.string()),
-            ("next_place", pa.string()),
-            ("next_step", pa.int32()),
-            ("activity", pa.string()),
-        ]
-    ),
-    "beliefs": pa.schema(
-        [
-            ("run", pa.int32()),
-            ("time", TIME),
-            ("step", pa.int32()),
-            ("model", pa.string()),
-            ("user", pa.string()),
-            ("place", pa.string()),
-            ("probability", pa.float32()),
-        ]
-    ),
+    table: pa.schema([(name, _KINDS.get(name, pa.string())) for name in names.split()])
+    for table, names in _COLUMNS.items()
 }
 """The columns of each table.
 
@@ -84,38 +44,6 @@ SCHEMAS: Mapping[str, pa.Schema] = {
 of a belief the one at which it was held, of a label the one whose truth it tells. So evidence up to
 a step, joined with the labels of that step, has no knowledge of the future.
 """
-
-
-class Whereabouts(NamedTuple):
-    """Where a user truly was, and what the user did.
-
-    Attributes:
-        begin: int64 (stays,), the first step of each stay, ascending.
-        place: str (stays,), the name of the room, or away; consecutive ones differ.
-        end: One past the last step.
-        since: int64 (activities,), the first step of each activity.
-        activity: str (activities,).
-    """
-
-    begin: I64
-    place: Any
-    end: int
-    since: I64
-    activity: Any
-
-    def at(self, steps: I64) -> dict[str, Any]:
-        """Return the labels of some steps: place, next place and the step at which it begins."""
-        k = np.searchsorted(self.begin, steps, side="right") - 1
-        is_last = k + 1 == len(self.begin)
-        following = np.where(is_last, -1, k + 1)
-        return {
-            "place": text_array(self.place, k),
-            "next_place": text_array(self.place, following),
-            "next_step": np.where(is_last, np.nan, self.begin[following]),
-            "activity": text_array(
-                self.activity, np.searchsorted(self.since, steps, side="right") - 1
-            ),
-        }
 
 
 def text_array(names: Sequence[str], index: I64) -> pa.DictionaryArray:
@@ -139,71 +67,42 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         planned: What was planned for it.
         labels: Time between labels.
     """
-    manifest = run.manifest
+    manifest, rooms = run.manifest, run.plan.rooms
     start, step_us = np.datetime64(manifest["start"], "us"), int(manifest["step_us"])
     users = list(manifest["scenario"]["users"])
-    number = planned.number
-
-    def table(name: str, columns: Mapping[str, Any], rows: int) -> pa.Table:
-        values = {"run": np.full(rows, number, np.int32), **columns}
-        if "step" in columns:
-            values["time"] = start + np.asarray(columns["step"], np.int64) * step_us
-        arrays = [_array(values[field.name], field.type) for field in SCHEMAS[name]]
-        return pa.table(arrays, names=SCHEMAS[name].names)
-
-    rooms = run.plan.rooms
-    made = {
-        "runs": table("runs", _run_row(planned, users, start, run), 1),
-        "rooms": table(
-            "rooms",
+    every = max(1, labels // timedelta(microseconds=step_us))
+    steps = np.arange(every - 1, int(manifest["steps"]), every)
+    parts: dict[str, list[dict[str, Any]]] = {
+        "runs": [_run_row(planned, users, start, run)],
+        "rooms": [
             {
                 "room": [room.name for room in rooms],
                 "kind": [room.type for room in rooms],
                 "area_m2": [room.area_m2 for room in rooms],
                 "x": [room.anchor_xy[0] for room in rooms],
                 "y": [room.anchor_xy[1] for room in rooms],
-            },
-            len(rooms),
-        ),
-    }
-    bin_steps = max(1, 60_000_000 // step_us)
-    made["evidence"] = empty_table("evidence")
-    if EVIDENCE in run.tables:
-        looks = run.arrow(EVIDENCE)
-        columns = {name: looks[name] for name in ("room", "kind", "user", "watched", "seen")}
-        columns["step"] = values_of(looks["bin"]) + bin_steps - 1
-        made["evidence"] = table("evidence", columns, len(looks))
-    every = max(1, labels // timedelta(microseconds=step_us))
-    steps = np.arange(every - 1, int(manifest["steps"]), every)
-    of_users = [
-        {"step": steps, "user": text_array([user], np.zeros(len(steps), np.int64))}
-        | whereabouts(run, user).at(steps)
-        for user in users
-    ]
-    made["labels"] = _joined("labels", [table("labels", own, len(steps)) for own in of_users])
-    of_models = [_belief(run, name) for name in run.tables if name.startswith(BELIEF)]
-    made["beliefs"] = _joined(
-        "beliefs",
-        [
-            table("beliefs", own, len(own["step"])).filter(
-                number_array(values_of(own["user"]) != ANYONE, pa.bool_())
-            )
-            for own in of_models
+            }
         ],
-    )
-    return made
+        "evidence": [_evidence(run, step_us)] if EVIDENCE in run.tables else [],
+        "labels": [_labels(run, user, steps) for user in users],
+        "beliefs": [_belief(run, name) for name in run.tables if name.startswith(BELIEF)],
+    }
+    for columns in (columns for of_table in parts.values() for columns in of_table):
+        rows = len(next(iter(columns.values())))
+        columns["run"] = np.full(rows, planned.number, np.int32)
+        if "step" in columns:
+            columns["time"] = start + np.asarray(columns["step"], np.int64) * step_us
+    return {name: _table(name, of_table) for name, of_table in parts.items()}
 
 
-def _joined(name: str, parts: Sequence[pa.Table]) -> pa.Table:
-    return pa.concat_tables(parts).unify_dictionaries() if parts else empty_table(name)
-
-
-def empty_table(name: str) -> pa.Table:
-    """Return a table of a run that has no rows."""
-    return pa.table(
-        [_array(np.zeros(0, np.int64), field.type) for field in SCHEMAS[name]],
-        names=SCHEMAS[name].names,
-    )
+def _table(name: str, parts: Sequence[Mapping[str, Any]]) -> pa.Table:
+    """Return a table of some parts, each with all columns; without parts, it has no rows."""
+    schema = SCHEMAS[name]
+    tables = [
+        pa.table([_array(columns[f.name], f.type) for f in schema], names=schema.names)
+        for columns in parts or [dict.fromkeys(schema.names, np.zeros(0, np.int64))]
+    ]
+    return pa.concat_tables(tables).unify_dictionaries()
 
 
 def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") -> dict[str, Any]:
@@ -230,23 +129,41 @@ def columns_of(run: "Run", name: str, columns: Sequence[str]) -> dict[str, Any]:
     return {column: values_of(table[column]) for column in columns}
 
 
-def whereabouts(run: "Run", user: str) -> Whereabouts:
-    """Return where a user truly was, from the tables `stays` and `events` of a run."""
-    stays = columns_of(run, STAYS, ["user", "place", "begin", "end"])
+def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
+    """Return where a user truly was at some steps, where next and when, and what the user did."""
+    stays = columns_of(run, STAYS, ["user", "place", "begin"])
     own = stays["user"] == user
-    place, begin, end = stays["place"][own], stays["begin"][own], stays["end"][own]
+    place, begin = stays["place"][own], stays["begin"][own]
     is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
+    place, begin = place[is_new], begin[is_new]
     since, activity = np.zeros(0, np.int64), np.zeros(0, object)
     if "events" in run.tables:
         events = columns_of(run, "events", ["event", "entity", "step", "detail"])
         is_own = (events["event"] == "activity") & (events["entity"] == user)
         since, activity = events["step"][is_own], events["detail"][is_own]
-    return Whereabouts(begin[is_new], place[is_new], int(end[-1]), since, activity)
+    stay = np.searchsorted(begin, steps, side="right") - 1
+    is_last = stay + 1 == len(begin)
+    following = np.where(is_last, -1, stay + 1)
+    return {
+        "step": steps,
+        "user": text_array([user], np.zeros(len(steps), np.int64)),
+        "place": text_array(place, stay),
+        "next_place": text_array(place, following),
+        "next_step": np.where(is_last, np.nan, begin[following]),
+        "activity": text_array(activity, np.searchsorted(since, steps, side="right") - 1),
+    }
+
+
+def _evidence(run: "Run", step_us: int) -> dict[str, Any]:
+    looks = run.arrow(EVIDENCE)
+    columns = {name: looks[name] for name in ("room", "kind", "user", "watched", "seen")}
+    return {**columns, "step": values_of(looks["bin"]) + steps_of_bin(step_us) - 1}
 
 
 def _belief(run: "Run", name: str) -> dict[str, Any]:
-    """Return the rows of the belief of a model, also those about anyone."""
+    """Return the rows of the belief of a model about each user."""
     rows = run.arrow(name)
+    rows = rows.filter(number_array(values_of(rows["user"]) != ANYONE, pa.bool_()))
     share = values_of(rows["share"]).reshape(-1, len(run.plan.rooms) + 1).copy()  # away last
     share[:, :-1] *= 1 - share[:, -1:]  # of all time, not given at home
     at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`

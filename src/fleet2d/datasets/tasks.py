@@ -12,7 +12,8 @@ Baselines learn from `train` and are scored on another split.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,8 +29,8 @@ from fleet2d.metrics.rtp_score import GAP_ENDS, GAPS, calibration_error, log_los
 from fleet2d.studies.intervals import estimate
 
 TRAIN = "train"
-Cases = list[tuple[tuple[str, ...], str]]
-"""What is known of each case, and its outcome."""
+Scores = dict[str, tuple[dict[str, float], int]]
+"""By model: its numbers by metric, and the number of cases that were scored."""
 SMOOTHING = 1.0  # added to each count of a baseline
 
 
@@ -85,11 +86,9 @@ def leaderboard(
         raise InputError(f"there is no task {unknown[0]!r}: tasks are {', '.join(TASKS)}")
     names = tasks or [t for t in TASKS if t == "rtp" or TRAIN in data.splits]
     return [
-        entry
+        LeaderboardEntry(task, model, scores, cases)
         for task in names
-        for entry in (
-            _score_rtp(data, split, models or {}) if task == "rtp" else TASKS[task](data, split)
-        )
+        for model, (scores, cases) in TASKS[task](data, split, models or {}).items()
     ]
 
 
@@ -140,14 +139,14 @@ def forecasts(
     None if the split has no windows.
     """
     parts = [part for part in windows(data, split) if len(part.truth)]
+    if not parts:
+        return None
     networks = {"learned": shipped_weights(), **(models or {})}
     beliefs: dict[str, list[F64]] = {}
     for part in parts:
         new = {n: predict(w, part) for n, w in networks.items() if n not in part.beliefs}
         for name, belief in {**part.beliefs, **new}.items():
             beliefs.setdefault(name, []).append(belief)
-    if not parts:
-        return None
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
     return SplitForecasts(
         {name: _padded(own, width) for name, own in beliefs.items()},
@@ -157,19 +156,17 @@ def forecasts(
     )
 
 
-def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> list[LeaderboardEntry]:
+def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> Scores:
     made = forecasts(data, split, models)
     if made is None:
-        return []
-    return [
-        LeaderboardEntry(
-            "rtp",
-            name,
+        return {}
+    return {
+        name: (
             {**rtp_scores(belief, made.truth, made.gap), **_difference(made, name)},
             len(made.truth),
         )
         for name, belief in made.beliefs.items()
-    ]
+    }
 
 
 def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
@@ -188,9 +185,9 @@ def _padded(beliefs: Sequence[F64], width: int) -> F64:
     return np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in beliefs])
 
 
-def _score_ltp(data: Dataset, split: str) -> list[LeaderboardEntry]:
+def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
     """Score shares of rooms from all evidence of a run, against the true ones."""
-    errors: dict[str, list[float]] = {"uniform": [], "sighting_share": [], "exposure_ratio": []}
+    errors: dict[str, list[float]] = {}
     rooms, evidence = _groups(data, "rooms", split), _groups(data, "evidence", split)
     for (run, user), labels in _groups(data, "labels", split, "user").items():
         names = rooms[(run,)]["room"].tolist()
@@ -198,113 +195,94 @@ def _score_ltp(data: Dataset, split: str) -> list[LeaderboardEntry]:
         if not at_home:
             continue
         truth = np.array([at_home.count(name) for name in names]) / len(at_home)
-        rows = evidence.get((run,))
         seen, watched = np.zeros(len(names)), np.zeros(len(names))
-        if rows is not None:
+        if (rows := evidence.get((run,))) is not None:
             room = np.array([names.index(name) for name in rows["room"]])
             is_look, is_user = rows["user"] == ANYONE, rows["user"] == user
             np.add.at(watched, room[is_look], rows["watched"][is_look])
             np.add.at(seen, room[is_user], rows["seen"][is_user] / 60)
+        uniform = np.ones(len(names))
         guesses = {
-            "uniform": np.ones(len(names)),
-            "sighting_share": seen,
+            "uniform": uniform,
+            "sighting_share": seen if seen.any() else uniform,
             "exposure_ratio": (seen + 0.01) / (watched + 1),
         }
         for name, guess in guesses.items():
-            share = guess / guess.sum() if guess.any() else np.full(len(names), 1 / len(names))
-            errors[name].append(float(np.abs(share - truth).sum() / 2))
-    return [
-        LeaderboardEntry("ltp", n, {"tv": float(np.mean(e))}, len(e))
-        for n, e in errors.items()
-        if e
-    ]
+            error = float(np.abs(guess / guess.sum() - truth).sum() / 2)
+            errors.setdefault(name, []).append(error)
+    return {name: ({"tv": float(np.mean(own))}, len(own)) for name, own in errors.items()}
 
 
-def _score_next_room(data: Dataset, split: str) -> list[LeaderboardEntry]:
-    def cases(part: str) -> Cases:
-        found: Cases = []
-        for labels in _with_kinds(data, part):
-            is_last = np.append(labels["next_step"][1:] != labels["next_step"][:-1], True)
-            is_last &= ~np.isnan(labels["next_step"].astype(float))
-            rows = zip(labels["kind"][is_last], labels["next_kind"][is_last], strict=True)
-            found += [((kind,), following) for kind, following in rows]
-        return found
-
-    return _score_tables("next_room", cases(TRAIN), cases(split), "kind of room")
+def _next_rooms(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
+    """Yield for each stay the kind of its place, and that of the next one."""
+    following = labels["next_step"].astype(float)
+    is_last = np.append(following[1:] != following[:-1], True) & ~np.isnan(following)
+    yield from zip(labels["kind"][is_last], labels["next_kind"][is_last], strict=True)
 
 
-def _score_activity(data: Dataset, split: str) -> list[LeaderboardEntry]:
-    def cases(part: str) -> Cases:
-        found: Cases = []
-        for labels in _with_kinds(data, part):
-            hour = labels["time"].astype("datetime64[h]").astype(int) % 24
-            rows = zip(labels["kind"], hour.astype(str), labels["activity"], strict=True)
-            found += [((kind, h), what) for kind, h, what in rows if kind != AWAY and what]
-        return found
-
-    return _score_tables("activity", cases(TRAIN), cases(split), "kind of room and hour")
+def _activities(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
+    """Yield for each label at home the kind of room and the hour, and the activity."""
+    rows = zip(labels["kind"], _hours(labels["time"]), labels["activity"], strict=True)
+    yield from (((kind, hour), what) for kind, hour, what in rows if kind != AWAY and what)
 
 
-def _score_time_to_return(data: Dataset, split: str) -> list[LeaderboardEntry]:
-    def cases(part: str) -> tuple[I64, F64]:
-        hours, minutes = [np.zeros(0, np.int64)], [np.zeros(0)]
-        for labels in _with_kinds(data, part):
-            if len(labels["time"]) < 2:  # the length of a step is unknown
-                continue
-            until = labels["next_step"].astype(float) - labels["step"]
-            own = (labels["kind"] == AWAY) & ~np.isnan(until)
-            hours.append(labels["time"][own].astype("datetime64[h]").astype(int) % 24)
-            step_s = (labels["time"][1] - labels["time"][0]) / np.timedelta64(1, "s")
-            step_s /= max(int(labels["step"][1] - labels["step"][0]), 1)
-            minutes.append(until[own] * step_s / 60)
-        return np.concatenate(hours), np.concatenate(minutes)
+def _hours(times: Any) -> I64:
+    return times.astype("datetime64[h]").astype(np.int64) % 24
 
-    (hour, known), (asked, truth) = cases(TRAIN), cases(split)
+
+def _returns(data: Dataset, split: str) -> tuple[I64, F64]:
+    """Return the hour of each label of somebody away, and the time until the return [min]."""
+    hours, minutes = [np.zeros(0, np.int64)], [np.zeros(0)]
+    for labels in _with_kinds(data, split):
+        time, step = labels["time"], labels["step"]
+        if len(time) < 2:  # the length of a step is unknown
+            continue
+        until = labels["next_step"].astype(float) - step
+        own = (labels["kind"] == AWAY) & ~np.isnan(until)
+        step_s = (time[1] - time[0]) / np.timedelta64(1, "s") / max(int(step[1] - step[0]), 1)
+        hours.append(_hours(time[own]))
+        minutes.append(until[own] * step_s / 60)
+    return np.concatenate(hours), np.concatenate(minutes)
+
+
+def _score_time_to_return(data: Dataset, split: str, _: object) -> Scores:
+    (hour, known), (asked, truth) = _returns(data, TRAIN), _returns(data, split)
     if not len(known) or not len(truth):
-        return []
+        return {}
     overall = float(np.median(known))
-    by_hour = [
-        float(np.median(known[hour == h])) if (hour == h).any() else overall for h in range(24)
-    ]
+    by_hour = [np.median(known[hour == h]) if (hour == h).any() else overall for h in range(24)]
     guesses = {"median": np.full(len(truth), overall), "median by hour": np.take(by_hour, asked)}
-    return [
-        LeaderboardEntry(
-            "time_to_return", name, {"mae_min": float(np.abs(g - truth).mean())}, len(truth)
-        )
-        for name, g in guesses.items()
-    ]
+    return {
+        name: ({"mae_min": float(np.abs(guess - truth).mean())}, len(truth))
+        for name, guess in guesses.items()
+    }
 
 
-def _score_tables(
-    task: str,
-    known: Cases,
-    asked: Cases,
-    given: str,
-) -> list[LeaderboardEntry]:
+def _score_shares(
+    data: Dataset, split: str, _: object, cases: Callable[[Any], Iterable[Any]], given: str
+) -> Scores:
     """Score the shares of each outcome in the training: overall, and given what is known."""
-    outcomes = sorted({what for _, what in [*known, *asked]})
+    known, asked = (
+        [case for labels in _with_kinds(data, part) for case in cases(labels)]
+        for part in (TRAIN, split)
+    )
     if not known or not asked:
-        return []
-    overall = Counter(what for _, what in known)
+        return {}
+    outcomes = sorted({what for _, what in [*known, *asked]})
+    overall, counts = Counter(what for _, what in known), Counter(known)
     base = np.array([overall[what] + SMOOTHING for what in outcomes])
     base /= base.sum()
-    counts: dict[tuple[str, ...], Counter[str]] = {}
-    for condition, what in known:
-        counts.setdefault(condition, Counter())[what] += 1
-    tables = {
-        condition: (np.array([own[what] for what in outcomes]) + SMOOTHING * base)
-        / (sum(own.values()) + SMOOTHING)
-        for condition, own in counts.items()
-    }
+    tables = {}
+    for condition, number in Counter(condition for condition, _ in known).items():
+        own = np.array([counts[condition, what] for what in outcomes])
+        tables[condition] = (own + SMOOTHING * base) / (number + SMOOTHING)
     truth = np.array([outcomes.index(what) for _, what in asked])
     beliefs = {
         "most common": np.tile(base, (len(truth), 1)),
         f"by {given}": np.array([tables.get(condition, base) for condition, _ in asked]),
     }
-    return [
-        LeaderboardEntry(
-            task,
-            name,
+    return {
+        name: (
             {
                 "log_loss": float(log_loss(belief, truth).mean()),
                 "accuracy": float(top_k(belief, truth, 1).mean()),
@@ -312,7 +290,7 @@ def _score_tables(
             len(truth),
         )
         for name, belief in beliefs.items()
-    ]
+    }
 
 
 def _with_kinds(data: Dataset, split: str) -> Iterator[dict[str, Any]]:
@@ -342,14 +320,10 @@ def _groups(data: Dataset, table: str, split: str, *also: str) -> dict[Any, dict
     }
 
 
-def _rtp(data: Dataset, split: str) -> list[LeaderboardEntry]:
-    return _score_rtp(data, split, {})
-
-
-TASKS: Mapping[str, Callable[[Dataset, str], list[LeaderboardEntry]]] = {
-    "rtp": _rtp,
+TASKS: Mapping[str, Callable[[Dataset, str, Mapping[str, Weights]], Scores]] = {
+    "rtp": _score_rtp,
     "ltp": _score_ltp,
-    "next_room": _score_next_room,
+    "next_room": partial(_score_shares, cases=_next_rooms, given="kind of room"),
     "time_to_return": _score_time_to_return,
-    "activity": _score_activity,
+    "activity": partial(_score_shares, cases=_activities, given="kind of room and hour"),
 }

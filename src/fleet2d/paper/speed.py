@@ -107,11 +107,10 @@ def measure_rows(options: PaperOptions) -> Result:
     runs, days = options.size(SPEED)
     content, cases, measured = read_table(), rows(options, days), []
     with _one_core(), progress_bar(show=sys.stderr.isatty()) as progress:
-        task = progress.add_task(SPEED, total=len(cases)) if progress else None
+        task = progress.add_task(SPEED, total=len(cases))
         for row in cases:
             measured.append({**row, **measure(row, runs)})
-            if progress and task is not None:
-                progress.advance(task)
+            progress.advance(task)
     notes = content["notes"]
     if options.quick:
         notes.append("quick: short runs are mostly set-up")

@@ -6,7 +6,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
@@ -369,11 +369,8 @@ def _rate(per_second: float) -> str:
 
 
 @contextmanager
-def progress_bar(*, show: bool) -> "Iterator[Progress | None]":
-    """Yield a progress bar on stderr with counts and time left; None unless `show`."""
-    if not show:
-        yield None
-        return
+def progress_bar(*, show: bool) -> "Iterator[Progress]":
+    """Yield a progress bar on stderr with counts and time left; it is invisible unless `show`."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -385,7 +382,9 @@ def progress_bar(*, show: bool) -> "Iterator[Progress | None]":
 
     text = TextColumn("{task.description}")
     columns = (text, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    progress = Progress(*columns, console=console, transient=True, disable=not show)
+    with progress if show else nullcontext():
         yield progress
 
 
@@ -404,8 +403,11 @@ def observing(*, quiet: bool = False) -> Iterator[Observer]:
     Args:
         quiet: Show nothing.
     """
-    with progress_bar(show=sys.stderr.isatty() and not quiet) as progress:
-        yield BarObserver(progress) if progress else Observer() if quiet else NoteObserver()
+    if quiet or not sys.stderr.isatty():
+        yield Observer() if quiet else NoteObserver()
+        return
+    with progress_bar(show=True) as progress:
+        yield BarObserver(progress)
 
 
 def in_words(time_span: timedelta) -> str:
@@ -427,10 +429,10 @@ def in_words(time_span: timedelta) -> str:
 @contextmanager
 def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
     """Yield an observer of a search; it shows a bar if `show`, else nothing."""
-    with progress_bar(show=show) as progress:
-        if progress is None:
-            yield None
-            return
+    if not show:
+        yield None
+        return
+    with progress_bar(show=True) as progress:
         task = progress.add_task("trials", total=None)
 
         def update(done: int, trials: int, best: list[float] | None) -> None:
