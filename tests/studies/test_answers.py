@@ -10,15 +10,7 @@ import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.studies.answers import (
-    effects,
-    holm,
-    paired,
-    power_table,
-    unit_differences,
-    variance_ratio,
-    variance_shares,
-)
+from fleet2d.studies.answers import AnswerSource, holm, variance_ratio
 
 COLUMNS = ("method", "robot", "home", "seed")
 
@@ -41,9 +33,13 @@ def variants(
     )  # fmt: skip
 
 
+def answers(frame: pl.DataFrame, *more: str) -> AnswerSource:
+    return AnswerSource(frame, (*COLUMNS, *more), "score")
+
+
 def compare(frame: pl.DataFrame, **keys: Any) -> list[dict[str, Any]]:
     keys = {"by": ("home", "seed"), **keys}
-    return paired(frame, COLUMNS, "score", {"method": "old"}, **keys).to_dicts()
+    return answers(frame).paired({"method": "old"}, **keys).to_dicts()
 
 
 def test_a_known_difference_is_found_though_homes_differ_more() -> None:
@@ -90,7 +86,7 @@ def test_an_axis_that_applies_on_one_side_only_needs_no_partner() -> None:
     frame = variants().with_columns(
         explore=pl.when(pl.col("method") == "new").then(0.2).otherwise(None)
     )
-    table = paired(frame, (*COLUMNS, "explore"), "score", {"method": "old"}, ("home", "seed"))
+    table = answers(frame, "explore").paired({"method": "old"}, ("home", "seed"))
     assert 64 == table["pairs"][0]
 
 
@@ -107,14 +103,14 @@ def test_without_pairs_there_is_no_answer() -> None:
 
 
 def test_main_effects_are_those_that_were_put_in() -> None:
-    table = effects(variants(), ("method", "robot"), "score", ("home", "seed"))
+    table = answers(variants()).effects(("method", "robot"), ("home", "seed"))
     rows = {(row["axis"], row["value"]): row for row in table.to_dicts()}
     assert 0.25 == pytest.approx(rows["method", "new"]["effect"], abs=0.05)
     assert rows["robot", "patrol"]["low"] < 0 < rows["robot", "patrol"]["high"]
 
 
 def test_shares_of_the_variance_name_what_matters() -> None:
-    table = variance_shares(variants(effect=0), COLUMNS, "score")
+    table = answers(variants(effect=0)).variance_shares()
     assert "home" == table["source"][0]
     assert 1 == pytest.approx(table["share"].sum(), abs=0.05)
 
@@ -190,7 +186,7 @@ def test_an_effect_is_told_in_deviations_and_relative_to_the_reference() -> None
 
 def test_differences_of_each_home_have_the_mean_of_all() -> None:
     frame = variants()
-    rows = unit_differences(frame, COLUMNS, "score", {"method": "old"}, "home")
+    rows = answers(frame).differences({"method": "old"}, "home")
     assert ["method", "home", "difference"] == rows.columns
     assert 8 == len(rows)
     (row,) = compare(frame)
@@ -199,23 +195,23 @@ def test_differences_of_each_home_have_the_mean_of_all() -> None:
 
 def test_differences_of_each_home_within_another_axis_are_of_its_values() -> None:
     frame = variants()
-    rows = unit_differences(frame, COLUMNS, "score", {"method": "old"}, "home", ["robot"])
+    rows = answers(frame).differences({"method": "old"}, "home", ["robot"])
     assert ["method", "robot", "home", "difference"] == rows.columns
     for robot in frame["robot"].unique():
         some = frame.filter(pl.col("robot") == robot)
-        expected = unit_differences(some, COLUMNS, "score", {"method": "old"}, "home")
+        expected = answers(some).differences({"method": "old"}, "home")
         assert expected.equals(rows.filter(pl.col("robot") == robot).drop("robot"))
 
 
 def test_what_no_axis_explains_is_the_residual() -> None:
-    table = variance_shares(variants(noise=3.0), COLUMNS, "score")
+    table = answers(variants(noise=3.0)).variance_shares()
     assert "residual" == table["source"][-1]
     assert table["share"][-1] > 0.1
     assert 1 == pytest.approx(table["share"].sum())
 
 
 def test_shares_of_nothing_are_zero_and_no_rounding_errors() -> None:
-    table = variance_shares(variants(effect=0, noise=0), COLUMNS, "score")
+    table = answers(variants(effect=0, noise=0)).variance_shares()
     shares = dict(table.iter_rows())
     assert 0 == shares["robot"] == shares["residual"] == shares["method × robot"]
 
@@ -223,7 +219,7 @@ def test_shares_of_nothing_are_zero_and_no_rounding_errors() -> None:
 def power(frame: pl.DataFrame, effect: float | None) -> pl.DataFrame:
     against = {"method": "old"}
     units = ("home", "seed")
-    return power_table(frame, COLUMNS, "score", against, units, effect=effect, power=0.8)
+    return answers(frame).power(against, units, effect, 0.8)
 
 
 def test_more_homes_and_seeds_detect_smaller_differences() -> None:

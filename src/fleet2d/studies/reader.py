@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import ArtifactError, InputError, extra
-from fleet2d.studies import answers
+from fleet2d.studies.answers import AnswerSource, check_axes
 from fleet2d.studies.directory import META, Counts, StudyDirectory
 from fleet2d.studies.intervals import POWER
 from fleet2d.studies.parts import TABLES, Part, plain_schema, with_variant
@@ -281,11 +281,8 @@ class Study:
         Raises:
             InputError: There is no such metric, axis or value.
         """
-        frame = self._with_metric(metric)
-        if variants is not None:
-            frame = frame.filter(_polars().col(VARIANT).is_in(list(variants)))
-        units = self._units(by, against)
-        return answers.paired(frame, self.columns, metric, against, units, within)
+        source = self._answers(metric, variants)
+        return source.paired(against, self._units(by, against), within)
 
     def differences(
         self, metric: str, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
@@ -297,9 +294,7 @@ class Study:
         Raises:
             InputError: There is no such metric, axis or value.
         """
-        answers.check_axes((*against, unit, *within), self.columns)
-        frame = self._with_metric(metric)
-        return answers.unit_differences(frame, self.columns, metric, against, unit, within)
+        return self._answers(metric).differences(against, unit, within)
 
     def power(
         self,
@@ -322,10 +317,7 @@ class Study:
         Raises:
             InputError: There is no such metric, axis or value, or less than two units.
         """
-        frame, units = self._with_metric(metric), self._units(by, against)
-        return answers.power_table(
-            frame, self.columns, metric, against, units, effect=effect, power=power
-        )
+        return self._answers(metric).power(against, self._units(by, against), effect, power)
 
     def summary(
         self, metric: str, axes: Sequence[str], by: Sequence[str] | None = None
@@ -335,7 +327,7 @@ class Study:
         Raises:
             InputError: There is no such metric or axis.
         """
-        return answers.summary(self._with_metric(metric), metric, axes, self._units(by))
+        return self._answers(metric).summary(axes, self._units(by))
 
     def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
         """Return the main effect of each value of each axis: its mean minus the mean of all.
@@ -343,9 +335,8 @@ class Study:
         Raises:
             InputError: There is no such metric.
         """
-        return answers.effects(
-            self._with_metric(metric), self._fixed_axes(), metric, self._units(by)
-        )
+        fixed = [column for column in self.columns if column not in self.meta.populations]
+        return self._answers(metric).effects(fixed, self._units(by))
 
     def shares(self, metric: str) -> "pl.DataFrame":
         """Return the share of a metric's variance by axis, and by pairs of axes beyond both.
@@ -353,19 +344,17 @@ class Study:
         Raises:
             InputError: There is no such metric.
         """
-        return answers.variance_shares(self._with_metric(metric), self.columns, metric)
-
-    def _fixed_axes(self) -> tuple[str, ...]:
-        return tuple(c for c in self.columns if c not in self.meta.populations)
+        return self._answers(metric).variance_shares()
 
     def _units(self, by: Sequence[str] | None, compared: Iterable[str] = ()) -> tuple[str, ...]:
         units = tuple(by or ())
         if by is None:
             units = tuple(c for c in self.meta.populations if c not in compared)
-        answers.check_axes(units, self.columns)
+        check_axes(units, self.columns)
         return units
 
-    def _with_metric(self, metric: str) -> "pl.DataFrame":
+    def _answers(self, metric: str, variants: Sequence[int] | None = None) -> AnswerSource:
+        """Return a metric in the complete variants, or in some of them."""
         if metric not in self.metrics:
             hint = did_you_mean(metric, self.metrics)
             raise InputError(
@@ -373,7 +362,10 @@ class Study:
                 f" {', '.join(self.metrics[:20])}{', …' if len(self.metrics) > 20 else ''}"
             )
         pl = _polars()
-        return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
+        frame = self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
+        if variants is not None:
+            frame = frame.filter(pl.col(VARIANT).is_in(list(variants)))
+        return AnswerSource(frame, self.columns, metric)
 
     @cached_property
     def _parts(self) -> list[Part]:

@@ -212,7 +212,7 @@ class _Page:
         from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
 
         study, name, label = self.study, _file_name(metric), self._label(metric)
-        frame = self._shortened(study._with_metric(metric))
+        frame = self._shortened(study._answers(metric).frame)
         if not len(frame):
             return
         yield f"<h2>{html.escape(metric)}</h2>{self._describe(metric)}"
