@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.configuration.documents import read_document
-from fleet2d.studies.driver import RunOptions, StudyJob, check_study, run_study
+from fleet2d.studies.driver import StudyJob, check_study, run_study
 from fleet2d.studies.executors import (
     Event,
     Executor,
@@ -63,7 +63,7 @@ class InstantExecutor:
 def run(study: Any, folder: Path, executor: Executor) -> float:
     """Run a study; return the wall time [s]."""
     start_s = time.perf_counter()
-    run_study(check_study(study), folder, executor, RunOptions())
+    run_study(check_study(study), folder, executor)
     return time.perf_counter() - start_s
 
 

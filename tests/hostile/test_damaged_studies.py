@@ -252,7 +252,7 @@ def test_nothing_is_written_through_a_link(study: Path, fleet2d: Cli, link: str)
 def test_names_with_escapes_are_printed_without(study: Path, fleet2d: Cli) -> None:
     _set_value(study / "study.json", "name", "speeds\x1b[2J")
     code, out, _ = fleet2d("study", "status", str(study))
-    assert (0, "speeds?[2J: 4 of 4 variants complete, 0 failed, 0 to run\n") == (code, out)
+    assert (0, "speeds\\x1b[2J: 4 of 4 variants complete, 0 failed, 0 to run\n") == (code, out)
 
 
 # --- Searches -------------------------------------------------------------------------------------

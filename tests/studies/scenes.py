@@ -9,7 +9,7 @@ import pytest
 from tests.scenes import scenario
 
 from fleet2d.studies.directory import Counts
-from fleet2d.studies.driver import RunOptions, check_study, run_study
+from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import Executor, SerialExecutor
 from fleet2d.studies.reader import Study, open_study
 
@@ -37,9 +37,7 @@ def run(
     study: Any, folder: Path, executor: Executor | None = None, **options: Any
 ) -> tuple[Counts, Study]:
     """Run a study in this process, and open it."""
-    counts = run_study(
-        check_study(study), folder, executor or SerialExecutor(), RunOptions(**options)
-    )
+    counts = run_study(check_study(study), folder, executor or SerialExecutor(), **options)
     return counts, open_study(folder)
 
 

@@ -10,7 +10,7 @@ from tests.studies.scenes import SPEED, base, run, small
 
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.model import load_scenario
-from fleet2d.studies.design import FileHashes, build_design, code_version, input_hash
+from fleet2d.studies.design import build_design, code_version, input_hash
 from fleet2d.studies.driver import Observer, check_study
 from fleet2d.studies.executors import (
     SerialExecutor,
@@ -68,9 +68,9 @@ def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
     scenario = load_scenario(
         base(algorithms={"own": {"type": f"{tmp_path.as_posix()}/mine:Nothing"}})
     )
-    first_hash = input_hash(scenario, FileHashes())
+    first_hash = input_hash(scenario)
     module.write_text(text + "# another\n")
-    assert first_hash != input_hash(scenario, FileHashes())
+    assert first_hash != input_hash(scenario)
 
 
 def test_the_code_has_a_version() -> None:

@@ -44,7 +44,7 @@ def test_a_base_can_be_a_scenario_in_python() -> None:
 
 def test_a_bare_list_is_an_axis_called_by_its_key(tmp_path: Path) -> None:
     specification = read_text(f"axes: {{{SPEED}: [0.3, 0.6]}}\n", tmp_path)
-    assert (SPEED,) == specification.file.columns
+    assert [SPEED] == list(specification.file.axes)
 
 
 def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:

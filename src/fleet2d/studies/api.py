@@ -11,7 +11,7 @@ from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import home_key
-from fleet2d.studies.driver import RunOptions, check_study, run_study
+from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import (
     Executor,
     LocalExecutor,
@@ -66,8 +66,10 @@ def study(
     specification = read_specification(source)
     location = out or default_location(specification.name)
     with observing() as observer:
-        options = RunOptions(fail_fast, changed, observer)
-        run_study(check_study(specification), location, make_executor(executor, workers), options)
+        run_study(
+            check_study(specification), location, make_executor(executor, workers),
+            fail_fast=fail_fast, changed=changed, observer=observer,
+        )  # fmt: skip
     return open_study(location)
 
 

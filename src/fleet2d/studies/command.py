@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from fleet2d.configuration.problems import suggest
-from fleet2d.errors import InputError, end_by_signal
+from fleet2d.errors import InputError, end_by_signal, printable
 from fleet2d.options import TrustFiles, TrustFolders, restrict_to
-from fleet2d.studies.storage import printable
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy
@@ -50,7 +49,7 @@ IDENTITY_START = 6
 
 def _print(text: object, *, err: bool = False) -> None:
     """Print text, which may come from somebody else's folder, without control characters."""
-    typer.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
+    typer.echo(printable(str(text), "\n"), err=err)
 
 
 @studying.command()
@@ -79,7 +78,7 @@ def run(  # noqa: PLR0913 - options of the command line
 ) -> None:
     """Run the variants of a study that have no results yet."""
     from fleet2d.studies.api import default_location, make_executor
-    from fleet2d.studies.driver import RunOptions, check_study, run_study
+    from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
 
     begin_s = time.perf_counter()
@@ -95,9 +94,9 @@ def run(  # noqa: PLR0913 - options of the command line
         restrict_to(trust, trust_dir),
         observing(quiet=quiet) as observer,
     ):
-        options = RunOptions(fail_fast, changed, observer)
+        where = make_executor(executor, workers, slurm_parameters(slurm))
         counts = run_study(
-            checked, location, make_executor(executor, workers, slurm_parameters(slurm)), options
+            checked, location, where, fail_fast=fail_fast, changed=changed, observer=observer
         )
     if as_json:
         _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))

@@ -48,24 +48,20 @@ def code_version() -> str:
     return f"fleet2d {__version__}, python {python}, files {digest.hexdigest()[:DIGITS]}"
 
 
-class FileHashes:
-    """Hashes of input files; a file is read again only after it changed."""
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of an input file, which is read again only after it changed.
 
-    def __init__(self) -> None:
-        self._hashes: dict[tuple[str, int, int], str] = {}
+    Raises:
+        InputError: The file can't be read.
+    """
+    with os_errors_as(InputError, f"{path} can't be read", "; a variant needs it"):
+        status = path.stat()
+        return _hash_of(path, status.st_mtime_ns, status.st_size)
 
-    def __getitem__(self, path: Path) -> str:
-        """Return the SHA-256 of a file.
 
-        Raises:
-            InputError: The file can't be read.
-        """
-        with os_errors_as(InputError, f"{path} can't be read", "; a variant needs it"):
-            status = path.stat()
-            key = (str(path), status.st_mtime_ns, status.st_size)
-            if key not in self._hashes:
-                self._hashes[key] = hashlib.sha256(path.read_bytes()).hexdigest()
-        return self._hashes[key]
+@cache
+def _hash_of(path: Path, *_: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def scenario_content(scenario: Scenario) -> dict[str, Any]:
@@ -86,13 +82,13 @@ def content_hash(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 
 
-def input_hash(scenario: Scenario, files: FileHashes) -> str:
+def input_hash(scenario: Scenario) -> str:
     """Return a hash of the files that a scenario names: floor plans, logs, the user's modules.
 
     Raises:
         InputError: A file can't be read.
     """
-    return content_hash({str(path): files[path] for path in files_of(scenario)})
+    return content_hash({str(path): file_hash(path) for path in files_of(scenario)})
 
 
 def scenario_hashes(content: dict[str, Any], seeds: Sequence[int]) -> Iterator[str]:
@@ -129,12 +125,8 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 NOT_APPLICABLE = -1
 MAX_VARIANTS = 10_000_000
-SWITCHES = (
-    "key_frames",
-    "observations",
-    "events",
-    "decisions",
-)  # of `artifacts`, named after their tables
+SWITCHES = ("key_frames", "observations", "events", "decisions")
+"""Keys of `artifacts` that are named after their tables."""
 
 
 @dataclass(frozen=True)
@@ -383,21 +375,8 @@ def _place(specification: Specification, *location: str | int) -> str:
 
 def _check_conditions(specification: Specification, design: Design) -> None:
     """Refuse conditions on values that no axis has: they would silently never hold."""
-    file = specification.file
-    conditions: list[tuple[tuple[str | int, ...], Mapping[str, Any]]] = [
-        *(((("axes", axis.name, "when")), axis.when) for axis in design.axes),
-        *((("rules", i, "when"), rule.when) for i, rule in enumerate(file.rules)),
-        *((("exclude", i), condition) for i, condition in enumerate(file.exclude)),
-        *(
-            (("compare", i, "against"), comparison.against)
-            for i, comparison in enumerate(file.compare)
-        ),
-    ]
-    if file.adapt is not None:
-        conditions.append((("adapt", "against"), file.adapt.against))
-    if file.tune is not None:
-        conditions.append((("tune", "held_out"), file.tune.held_out))
-    for location, condition in conditions:
+    of_axes = [(("axes", axis.name, "when"), axis.when) for axis in design.axes]
+    for location, condition in [*of_axes, *specification.file.conditions()]:
         for column in condition:
             labels = design.labels[column]
             for value in _values(condition, column):
@@ -411,10 +390,8 @@ def _artifacts(tables: Sequence[str]) -> Document:
     settings: dict[str, Any] = {name: name in tables for name in SWITCHES}
     if "trajectories" not in tables:
         settings["trajectories"] = "off"
-    change = Document()
-    for name, value in {**settings, "outputs": True, "learned": False}.items():
-        change = merge(change, assignment(("artifacts", name), value, "keep.tables"))
-    return change
+    settings |= {"outputs": True, "learned": False}
+    return _change(((f"artifacts.{name}", on) for name, on in settings.items()), "keep.tables")
 
 
 def _base_seed(base: Document) -> int:

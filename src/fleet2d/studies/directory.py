@@ -32,7 +32,7 @@ from fleet2d.studies.records import (
     numbers_of,
     read_journal,
 )
-from fleet2d.studies.storage import Storage, from_json, write_error
+from fleet2d.studies.storage import Storage, from_json, writing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -364,13 +364,11 @@ class StudyDirectory:
             ArtifactError: It can't be written.
         """
         path = self.journal_path(parts)
-        try:
+        with writing(self.scratch):
             self.scratch.mkdir(parents=True, exist_ok=True)
             for journal in self.scratch.glob("journal-*.bin"):
                 if journal.name < path.name:  # left by a crash between commit and removal
                     journal.unlink()
-        except OSError as error:
-            raise write_error(self.scratch, error) from error
         return Journal(path)
 
     def commit(self, journal: Journal, parts: Iterable[Part]) -> Part:
@@ -394,11 +392,9 @@ class StudyDirectory:
             RunDirectoryError: Another process is running it.
         """
         advice = "wait for it or end it; `fleet2d study status` shows how far it is"
-        try:
+        with writing(self.scratch):
             self.scratch.mkdir(parents=True, exist_ok=True)
             lock = FolderLock(self.scratch, LOCK, advice)
-        except OSError as error:
-            raise write_error(self.scratch, error) from error
         try:
             yield
         finally:

@@ -17,7 +17,6 @@ from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import (
     Design,
-    FileHashes,
     build_design,
     code_version,
     content_hash,
@@ -182,7 +181,13 @@ class StudyJob:
     def __call__(self, task: WorkerTask) -> VariantRecord:
         """Run a variant; return its record, with the error if it fails."""
         with restrict(self.trust):
-            return record_of(task, self._outcome(task))
+            try:
+                scenario = self.scenario(task)
+            except Fleet2DError as error:
+                outcome = VariantOutcome("failed", error=describe_error(error))
+            else:
+                outcome = execute(scenario, self.metrics, self.tables)
+            return record_of(task, outcome)
 
     def scenario(self, task: WorkerTask) -> Scenario:
         """Return the scenario of a variant.
@@ -191,21 +196,10 @@ class StudyJob:
             Fleet2DError: It is wrong, or not as it was planned, since a file changed.
         """
         scenario = self.design.scenario(task.index)
-        inputs = input_hash(scenario, self._files)
+        inputs = input_hash(scenario)
         if identity(content_hash(scenario_content(scenario)), inputs) != task.identity:
             raise ComponentError(CHANGED_MESSAGE)
         return scenario
-
-    def _outcome(self, task: WorkerTask) -> VariantOutcome:
-        try:
-            scenario = self.scenario(task)
-        except Fleet2DError as error:  # a file changed after the study was planned
-            return VariantOutcome("failed", error=describe_error(error))
-        return execute(scenario, self.metrics, self.tables)
-
-    def __post_init__(self) -> None:
-        """Start with no hashes."""
-        self._files = FileHashes()
 
 
 class Observer:
@@ -274,69 +268,68 @@ def check_study(
     return CheckedStudy(specification, plan, scenarios, names.facts)
 
 
-@dataclass
-class RunOptions:
-    """How a study is run.
+def run_study(
+    checked: CheckedStudy,
+    location: str | Path,
+    executor: Executor,
+    *,
+    fail_fast: bool = False,
+    changed: Changed | None = None,
+    observer: Observer | None = None,
+) -> Counts:
+    """Run the variants of a study that have no results yet.
 
-    Attributes:
+    Args:
+        checked: The study.
+        location: Its folder or store.
+        executor: Where variants run.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
             to continue.
         observer: Follows the progress.
-    """
-
-    fail_fast: bool = False
-    changed: Changed | None = None
-    observer: Observer = field(default_factory=Observer)
-
-
-def run_study(
-    checked: CheckedStudy, location: str | Path, executor: Executor, options: RunOptions
-) -> Counts:
-    """Run the variants of a study that have no results yet.
 
     Raises:
         InputError: The folder can't be used, or holds results that don't belong to the study.
         ArtifactError: Results can't be written; stored results are kept.
         KeyboardInterrupt: Ctrl-C; all workers have ended, and finished variants are stored.
     """
-    directory = StudyDirectory(location)
+    observer, directory = observer or Observer(), StudyDirectory(location)
     directory.check_empty()
     if not directory.exists():
-        check_setups(checked.plan, executor, options.observer.on_check)
+        check_setups(checked.plan, executor, observer.on_check)
     with directory.locked():
-        parts = directory.intact_parts(options.observer.on_note)
+        parts = directory.intact_parts(observer.on_note)
         status = directory.statuses(parts)
-        reconciled = reconcile(checked.plan, directory, status > 0, options.changed)
+        reconciled = reconcile(checked.plan, directory, status > 0, changed)
         variants = reconciled.plan.variants
         _write_plan(directory, checked, reconciled.plan)
         status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
         missing = np.flatnonzero(status[variants.number] != COMPLETE)
         adapt = checked.specification.file.adapt
-        _describe(reconciled, directory, options.observer, is_adaptive=adapt is not None)
+        _describe(reconciled, directory, observer, is_adaptive=adapt is not None)
         keeper = _ResultKeeper(directory, parts)
         counts = Counts(len(variants), len(variants) - len(missing), 0)
-        options.observer.on_start(counts, executor.workers)
+        observer.on_start(counts, executor.workers)
         failed, is_checked = 0, False
         schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
         try:
             if adapt is not None:
                 schedule = AdaptiveSchedule(
-                    adapt, reconciled.plan, missing, directory, options.observer.on_note
+                    adapt, reconciled.plan, missing, directory, observer.on_note
                 )
             with closing(executor.run(checked.job, schedule)) as events:
                 for event in events:
                     record = _record(event)
                     keeper.add(record)
                     schedule.on_end()
-                    options.observer.on_result(record)
+                    observer.on_result(record)
                     failed += not record.is_complete
                     if record.is_complete and not is_checked:
                         summary = VariantSummary(checked)
                         summary.add(results_table([record.header]))
-                        summary.note_missing(options.observer)
+                        summary.note_missing(observer)
                         is_checked = True
-                    if failed and options.fail_fast:
+                    if failed and fail_fast:
                         break
         except BaseException:
             keeper.pause()
@@ -346,7 +339,7 @@ def run_study(
             write_plan(directory, schedule.plan)
         summary = VariantSummary(checked)
         directory.write_variants(summary.add)
-    summary.note_missing(options.observer)
+    summary.note_missing(observer)
     return summary.counts
 
 

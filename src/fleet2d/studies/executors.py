@@ -54,25 +54,6 @@ class WorkerJob(Protocol):
         ...
 
 
-class TaskGroup(Protocol):
-    """Tasks that share a home, as a deque has them."""
-
-    def append(self, task: WorkerTask, /) -> None:
-        """Add a task as the last."""
-
-    def appendleft(self, task: WorkerTask, /) -> None:
-        """Add a task as the first."""
-
-    def popleft(self) -> WorkerTask:
-        """Remove the first task and return it."""
-
-    def pop(self) -> WorkerTask:
-        """Remove the last task and return it."""
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-
-
 class TaskSchedule:
     """Tasks in groups that share a home; a worker stays with a group until it is empty.
 
@@ -88,7 +69,7 @@ class TaskSchedule:
 
     def __init__(self, tasks: Iterable[WorkerTask] = ()) -> None:
         """Group tasks by home."""
-        self._groups: dict[str, TaskGroup] = {}
+        self._groups: dict[str, deque[WorkerTask]] = {}
         self._owners: dict[Hashable, str] = {}
         for task in tasks:
             self.add(task)
@@ -123,7 +104,7 @@ class TaskSchedule:
 
     def put_back(self, task: WorkerTask) -> None:
         """Return a task to the front of the group of its home."""
-        group: TaskGroup = self._groups.pop(task.home, deque())
+        group = self._groups.pop(task.home, deque())
         group.appendleft(task)
         self._groups = {task.home: group, **self._groups}
 

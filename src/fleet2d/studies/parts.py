@@ -19,7 +19,7 @@ import numpy as np
 
 from fleet2d.kernels import I32
 from fleet2d.studies.records import VARIANT, VariantRecord, check_numbers, numbers_of, results_table
-from fleet2d.studies.storage import Storage, from_json, write_error
+from fleet2d.studies.storage import Storage, from_json, writing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -137,13 +137,11 @@ def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal")
         ArtifactError: It can't be written; the journal still holds everything.
     """
     name, files = part_name(number), []
-    try:
+    with writing(storage.location):
         scratch.mkdir(parents=True, exist_ok=True)
         for file in scratch.iterdir():  # left by a crash
             file.unlink()
         local_files = _write_files(scratch, name, journal)
-    except OSError as error:
-        raise write_error(storage.location, error) from error
     for target, local in local_files.items():
         with local.open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
@@ -279,8 +277,8 @@ def _results_schema(storage: Storage, part: Part) -> "pa.Schema":
     import pyarrow as pa
 
     types = {field.name: field.type for field in results_table(()).schema}
-    names = storage.schema(part.results).names
-    with storage.reading(part.results):
+    with storage.parquet(part.results) as file:
+        names = file.schema_arrow.names
         if not types.keys() <= set(names):
             raise ValueError("it has no results of variants")
     return pa.schema([(name, types.get(name, pa.float64())) for name in names])
@@ -346,6 +344,6 @@ class ResultRows:
             return self._newest
         part, number = self._groups[group]
         name, schema = self._parts[part].results, _results_schema(self._storage, self._parts[part])
-        table = self._storage.read_row_group(name, number)
-        with self._storage.reading(name):
+        with self._storage.parquet(name) as file:
+            table = file.read_row_group(number, use_threads=False)
             return table.select(schema.names).cast(schema)

@@ -4,6 +4,7 @@ import json
 import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,19 +14,13 @@ from numpy.typing import NDArray
 from fleet2d.configuration.problems import Location, did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.configuration.units import parse_duration
-from fleet2d.errors import (
-    Fleet2DError,
-    InputError,
-    RunDirectoryError,
-    ScenarioError,
-)
+from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError, ScenarioError
 from fleet2d.kernels import F64, I32, Bool
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Label
 from fleet2d.studies.design import (
     SWITCHES,
     Design,
-    FileHashes,
     content_hash,
     home_key,
     identity,
@@ -274,14 +269,14 @@ def make_plan(
     templates, simulated_s = np.zeros(count, HASH), np.zeros(count)
     homes, home_keys = np.zeros(count, np.int32), dict[str, int]()
     problems: list[str] = []
-    files, first_of = FileHashes(), dict[tuple[str, str], int]()
+    first_of = dict[tuple[str, str], int]()
     repeated = _repeated(design.seeds)  # two variants with the same scenario
     for number in range(count):
         first = number * seeds
         try:
             scenario = design.scenario(first)
             content = scenario_content(scenario)
-            inputs = input_hash(scenario, files)
+            inputs = input_hash(scenario)
         except InputError as error:
             problems.append(str(error))
             if len(problems) == MAX_PROBLEMS:
@@ -318,40 +313,31 @@ def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
     return next((pair for pair in pairs if pair[0] != pair[1]), None)
 
 
-class PlannedTasks:
-    """The tasks of variants that share a home, each made when it is taken."""
+class PlannedTasks(deque[WorkerTask]):
+    """Tasks of variants that share a home; of those that nobody had yet only places are there."""
 
     def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
         """Take the places of variants, in their order."""
+        super().__init__()
         self._variants, self._places = variants, places
-        self._begin, self._end = 0, len(places)
-        self._first, self._last = deque[WorkerTask](), deque[WorkerTask]()
 
     def __len__(self) -> int:
         """Return how many there are."""
-        return len(self._first) + self._end - self._begin + len(self._last)
-
-    def append(self, task: WorkerTask, /) -> None:
-        """Add a task as the last."""
-        self._last.append(task)
-
-    def appendleft(self, task: WorkerTask, /) -> None:
-        """Add a task as the first."""
-        self._first.appendleft(task)
+        return super().__len__() + len(self._places)
 
     def popleft(self) -> WorkerTask:
-        """Remove the first task and return it."""
-        if self._first or self._begin == self._end:
-            return (self._first or self._last).popleft()
-        self._begin += 1
-        return self._variants.task(self._places[self._begin - 1])
+        """Remove the first task, one that was put back if there is one, and return it."""
+        if super().__len__():
+            return super().popleft()
+        place, self._places = self._places[0], self._places[1:]
+        return self._variants.task(place)
 
-    def pop(self) -> WorkerTask:
+    def pop(self) -> WorkerTask:  # type: ignore[override]
         """Remove the last task and return it."""
-        if self._last or self._begin == self._end:
-            return (self._last or self._first).pop()
-        self._end -= 1
-        return self._variants.task(self._places[self._end])
+        if not len(self._places):
+            return super().pop()
+        place, self._places = self._places[-1], self._places[:-1]
+        return self._variants.task(place)
 
 
 class PlanSchedule(TaskSchedule):
@@ -419,7 +405,9 @@ class SetupJob:
 
 
 def check_setups(
-    plan: StudyPlan, executor: Executor, on_progress: Callable[[int, int], None] | None = None
+    plan: StudyPlan,
+    executor: Executor,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> None:
     """Set up the variants that `setups_to_check` returns: homes with people and robots in them.
 
@@ -429,34 +417,30 @@ def check_setups(
     problems: dict[int, str] = {}
     tasks = list(map(plan.variants.task, setups_to_check(plan)))
     runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
-    events = runner.run(SetupJob(plan.design), TaskSchedule(tasks))
-    try:
+    with closing(runner.run(SetupJob(plan.design), TaskSchedule(tasks))) as events:
         for done, event in enumerate(events):
-            if on_progress is not None:
-                on_progress(done + 1, len(tasks))
+            on_progress(done + 1, len(tasks))
             text = event.reason if isinstance(event, LostTask) else event.payload
             if text:
                 problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
             if len(problems) == MAX_PROBLEMS:
                 break
-    finally:
-        events.close()
     _raise_problems([problems[index] for index in sorted(problems)])
 
 
 def _raise_problems(problems: list[str]) -> None:
+    """Raise an error about problems; of those that differ by their variant only, about the first.
+
+    Raises:
+        ScenarioError: There are problems.
+    """
     if len(problems) == MAX_PROBLEMS:
         problems = [*problems, f"… and perhaps more: these are the first {MAX_PROBLEMS}"]
-    if problems:
-        raise ScenarioError("\n".join(_without_repetition(problems)))
-
-
-def _without_repetition(problems: list[str]) -> list[str]:
-    """Return the first of all problems that differ by their variant only."""
     first: dict[str, str] = {}
     for text in problems:
         first.setdefault(text.partition("): ")[2] or text, text)
-    return list(first.values())
+    if first:
+        raise ScenarioError("\n".join(first.values()))
 
 
 Changed = Literal["redo", "keep"]

@@ -4,6 +4,7 @@ import json
 import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import numpy as np
 
 from fleet2d.kernels import I32
 from fleet2d.storage.files import Frame, FrameWriter, JournalFormat, read_frames
-from fleet2d.studies.storage import DAMAGE, damaged, write_error
+from fleet2d.studies.storage import DAMAGE, damaged, writing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -195,10 +196,8 @@ class Journal:
         for frame in read_frames(path, FORMAT):
             self._add(_record(frame, path), frame.start)
             end = frame.end
-        try:
+        with writing(path.parent):
             self._writer = FrameWriter(path, FORMAT, end)
-        except OSError as error:
-            raise write_error(path.parent, error) from error
         self._sync_time = time.monotonic()
 
     @property
@@ -217,15 +216,16 @@ class Journal:
             ArtifactError: The disk is full, or the file can't be written; nothing is added.
         """
         start = self.size
-        try:
-            self._writer.add("variant", _ENCODER.encode(record.header), record.body)
-            self._writer.commit()
-            if time.monotonic() - self._sync_time > SYNC_EVERY_S:
-                self._writer.sync()
-                self._sync_time = time.monotonic()
-        except OSError as error:
-            self._writer.undo()
-            raise write_error(self.path.parent, error) from error
+        with writing(self.path.parent):
+            try:
+                self._writer.add("variant", _ENCODER.encode(record.header), record.body)
+                self._writer.commit()
+                if time.monotonic() - self._sync_time > SYNC_EVERY_S:
+                    self._writer.sync()
+                    self._sync_time = time.monotonic()
+            except OSError:
+                self._writer.undo()
+                raise
         self._add(record, start)
 
     def results(self) -> "Iterator[pa.Table]":
@@ -271,12 +271,8 @@ class Journal:
         Raises:
             ArtifactError: The disk failed.
         """
-        try:
+        with closing(self._writer), writing(self.path.parent):
             self._writer.sync()
-        except OSError as error:
-            raise write_error(self.path.parent, error) from error
-        finally:
-            self._writer.close()
 
 
 def read_journal(path: Path) -> Iterator[VariantRecord]:

@@ -1,7 +1,7 @@
 """The study file: its sections as typed settings, and how it is read."""
 
 import os.path
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -218,25 +218,24 @@ class StudyFile(Settings):
         for name, axis in self.axes.items():
             _check_columns(axis.when, known, ("axes", name, "when"), "axes before it")
             known += axis.columns(name)
-        for i, rule in enumerate(self.rules):
-            _check_columns(rule.when, [*known, SEED], ("rules", i, "when"), "axes")
-        for i, condition in enumerate(self.exclude):
-            _check_columns(condition, [*known, SEED], ("exclude", i), "axes")
+        for location, condition in self.conditions():
+            seed = () if location[0] == "adapt" else (SEED,)
+            _check_columns(condition, [*known, *seed], location, "axes")
         for i, comparison in enumerate(self.compare):
-            for key in ("against", "by", "within"):
+            for key in ("by", "within"):
                 columns = getattr(comparison, key) or ()
                 _check_columns(columns, [*known, SEED], ("compare", i, key), "axes")
-        if self.adapt is not None:
-            _check_columns(self.adapt.against, known, ("adapt", "against"), "axes")
-        if self.tune is not None:
-            columns = [*known, SEED]
-            _check_columns(self.tune.held_out, columns, ("tune", "held_out"), "axes")
         return self
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The columns of all axes."""
-        return tuple(c for name, axis in self.axes.items() for c in axis.columns(name))
+    def conditions(self) -> Iterator[tuple[Location, Mapping[str, Any]]]:
+        """Yield the conditions on columns, but those of axes, and where they stand."""
+        yield from ((("rules", i, "when"), rule.when) for i, rule in enumerate(self.rules))
+        yield from ((("exclude", i), condition) for i, condition in enumerate(self.exclude))
+        yield from ((("compare", i, "against"), c.against) for i, c in enumerate(self.compare))
+        if self.adapt is not None:
+            yield ("adapt", "against"), self.adapt.against
+        if self.tune is not None:
+            yield ("tune", "held_out"), self.tune.held_out
 
     @property
     def populations(self) -> tuple[str, ...]:
@@ -263,7 +262,7 @@ def _long_form(name: str, axis: Any) -> Any:
 def _check_columns(
     columns: Mapping[str, Any] | tuple[str, ...],
     known: list[str],
-    location: tuple[str | int, ...],
+    location: Location,
     noun: str,
 ) -> None:
     for column in columns:

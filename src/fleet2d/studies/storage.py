@@ -4,17 +4,18 @@ import itertools
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import is_dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 from fleet2d.bounds import one_line
-from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError, errors_as
 from fleet2d.storage.files import PARTIAL, is_disk_full, path_in, plain_name, write_atomically
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
 COPY_BYTES = 1 << 22
 BATCH_ROWS = 5_000  # of a table that is read in parts
@@ -27,32 +28,30 @@ DAMAGE = (
 )  # fmt: skip
 
 
-def write_error(location: str | Path, error: OSError) -> ArtifactError:
-    """Return the error of a failed write, with its reason and remedy."""
-    reason = "the disk is full" if is_disk_full(error) else (error.strerror or str(error))
-    remedy = "free some space" if is_disk_full(error) else "make it writable"
-    return ArtifactError(
-        f"{location} can't be written: {reason}; finished results are kept: {remedy}, and the same"
-        " command continues"
-    )
+@contextmanager
+def writing(location: str | Path) -> Iterator[None]:
+    """Within the context, an error while something is written names its place and the remedy.
+
+    Raises:
+        ArtifactError: It can't be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = "the disk is full" if is_disk_full(error) else (error.strerror or str(error))
+        remedy = "free some space" if is_disk_full(error) else "make it writable"
+        raise ArtifactError(
+            f"{location} can't be written: {reason}; finished results are kept: {remedy}, and the"
+            " same command continues"
+        ) from error
 
 
 def damaged(path: str | Path, reason: object) -> RunDirectoryError:
     """Return the error of a damaged file, with its remedy."""
     return RunDirectoryError(
-        f"{path} is damaged ({printable(one_line(reason, 120))}): run the study again, which"
+        f"{path} is damaged ({one_line(reason, 120)}): run the study again, which"
         " restores what it can"
     )
-
-
-def printable(text: str) -> str:
-    r"""Return text from a file without control characters, which would steer the terminal.
-
-    Example:
-        >>> printable("speeds\x1b[2J")
-        'speeds?[2J'
-    """
-    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def from_json(kind: Any, value: Any) -> Any:
@@ -145,10 +144,8 @@ class Storage:
         import pyarrow.fs as pafs
 
         selector = pafs.FileSelector(self.path(folder), allow_not_found=True)
-        try:
+        with self._reaching():
             infos = self.filesystem.get_file_info(selector)
-        except OSError as error:
-            raise self._unreachable(error) from error
         return sorted(
             f"{folder}/{info.base_name}" for info in infos if info.type == pafs.FileType.File
         )
@@ -159,11 +156,8 @@ class Storage:
 
     def size(self, name: str) -> int | None:
         """Return the size of a file [bytes], None if there is none."""
-        try:
-            info = self.filesystem.get_file_info(self.path(name))
-        except OSError as error:
-            raise self._unreachable(error) from error
-        return info.size
+        with self._reaching():
+            return self.filesystem.get_file_info(self.path(name)).size
 
     @contextmanager
     def reading(self, name: str) -> Iterator[None]:
@@ -198,18 +192,19 @@ class Storage:
         """
         import pyarrow.parquet as pq
 
-        with self.reading(name):
-            names = None if columns is None else list(columns)
-            if filters is None:  # without the modules of data sets, which take 60 MB
-                with self.filesystem.open_input_file(self.path(name)) as source:
-                    table = pq.ParquetFile(source).read(names)
-            else:
+        names = None if columns is None else list(columns)
+        if filters is None:  # without the modules of data sets, which take 60 MB
+            with self.parquet(name) as file:
+                table = file.read(names)
+        else:
+            with self.reading(name):
                 table = pq.read_table(
                     self.path(name), columns=names, filters=filters, filesystem=self.filesystem
                 )
+        with self.reading(name):
             if names and set(names) != set(table.column_names):
                 raise ValueError(f"it has no columns {', '.join(names)}")
-            return table
+        return table
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file; readers see all of it, or none.
@@ -219,54 +214,17 @@ class Storage:
             RunDirectoryError: It is a link, or in one.
         """
         path = self.path(name)
-        try:
+        with writing(self.location):
             if self.folder is None:
                 with self.filesystem.open_output_stream(path) as stream:
                     stream.write(content)
             else:
                 Path(path).parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(Path(path), content)
-        except OSError as error:
-            raise write_error(self.location, error) from error
 
-    def write_table(self, name: str, table: "pa.Table") -> None:
-        """Write a Parquet file; readers see all of it, or none.
-
-        Raises:
-            ArtifactError: It can't be written.
-        """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        sink = pa.BufferOutputStream()
-        pq.write_table(table, sink, compression="zstd", row_group_size=50_000)
-        self.write(name, bytes(sink.getvalue()))
-
-    def schema(self, name: str) -> "pa.Schema":
-        """Return the schema of a Parquet file.
-
-        Raises:
-            RunDirectoryError: There is none, or it is damaged.
-        """
-        import pyarrow.parquet as pq
-
-        with self.reading(name):
-            return pq.read_schema(self.path(name), filesystem=self.filesystem)
-
-    def row_groups(self, name: str) -> list[int]:
-        """Return how many rows each group of a Parquet file has.
-
-        Raises:
-            RunDirectoryError: There is none, or it is damaged.
-        """
-        import pyarrow.parquet as pq
-
-        with self.reading(name):
-            metadata = pq.read_metadata(self.path(name), filesystem=self.filesystem)
-            return [metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)]
-
-    def read_row_group(self, name: str, number: int) -> "pa.Table":
-        """Return one group of rows of a Parquet file.
+    @contextmanager
+    def parquet(self, name: str) -> "Iterator[pq.ParquetFile]":
+        """Yield a Parquet file; within the context, errors are those of `reading`.
 
         Raises:
             RunDirectoryError: There is none, or it is damaged.
@@ -274,7 +232,16 @@ class Storage:
         import pyarrow.parquet as pq
 
         with self.reading(name), self.filesystem.open_input_file(self.path(name)) as source:
-            return pq.ParquetFile(source).read_row_group(number, use_threads=False)
+            yield pq.ParquetFile(source)
+
+    def row_groups(self, name: str) -> list[int]:
+        """Return how many rows each group of a Parquet file has.
+
+        Raises:
+            RunDirectoryError: There is none, or it is damaged.
+        """
+        with self.parquet(name) as file:
+            return [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
 
     def read_batches(self, name: str, columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
         """Yield some rows of a Parquet file after the other, at least one table.
@@ -283,10 +250,8 @@ class Storage:
             RunDirectoryError: There is none, it is damaged, or it lacks a column.
         """
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        with self.reading(name), self.filesystem.open_input_file(self.path(name)) as source:
-            file = pq.ParquetFile(source)
+        with self.parquet(name) as file:
             names = file.schema_arrow.names if columns is None else list(columns)
             if missing := [name for name in names if name not in file.schema_arrow.names]:
                 raise ValueError(f"it has no columns {', '.join(missing)}")
@@ -312,7 +277,7 @@ class Storage:
 
         local, first = scratch / f"{PurePosixPath(name).name}{PARTIAL}", next(tables)
         group, rows, written = list[pa.Table](), 0, 0
-        try:
+        with writing(self.location):
             scratch.mkdir(parents=True, exist_ok=True)
             with pq.ParquetWriter(local, first.schema, compression="zstd") as file:
                 for table in itertools.chain([first], tables):
@@ -324,8 +289,6 @@ class Storage:
                         group, rows, written = [], 0, written + rows
                 if group:
                     file.write_table(pa.concat_tables(group))
-        except OSError as error:
-            raise write_error(self.location, error) from error
         self.publish(local, name)
 
     def publish(self, local: Path, name: str) -> None:
@@ -336,7 +299,7 @@ class Storage:
             RunDirectoryError: Its place is a link, or in one.
         """
         path = self.path(name)
-        try:
+        with writing(self.location):
             with local.open("rb") as file:
                 if self.folder is not None:
                     os.fsync(file.fileno())
@@ -347,8 +310,6 @@ class Storage:
                     while block := file.read(COPY_BYTES):
                         out.write(block)
             local.unlink()
-        except OSError as error:
-            raise write_error(self.location, error) from error
 
     def delete(self, name: str) -> None:
         """Delete a file, if there is one.
@@ -356,11 +317,9 @@ class Storage:
         Raises:
             ArtifactError: It can't be deleted.
         """
-        try:
+        with writing(self.location):
             if self.exists(name):
                 self.filesystem.delete_file(self.path(name))
-        except OSError as error:
-            raise write_error(self.location, error) from error
 
-    def _unreachable(self, error: OSError) -> ArtifactError:
-        return ArtifactError(f"{self.location} can't be reached: {error}")
+    def _reaching(self) -> AbstractContextManager[None]:
+        return errors_as(ArtifactError, f"{self.location} can't be reached", of=OSError)

@@ -19,14 +19,14 @@ from fleet2d.errors import (
 from fleet2d.studies.axes import OptionsAxis, rounded
 from fleet2d.studies.design import (
     Design,
-    FileHashes,
     code_version,
     content_hash,
+    file_hash,
     matches,
     scenario_content,
 )
 from fleet2d.studies.directory import StudyDirectory
-from fleet2d.studies.driver import CheckedStudy, RunOptions, check_study, run_study
+from fleet2d.studies.driver import CheckedStudy, check_study, run_study
 from fleet2d.studies.executors import Executor, LostTask
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
@@ -168,7 +168,7 @@ def tune(
     best = _best(study, settings)
     held_out = _check_held_out(specification, plan.design, best, settings)
     # After more trials, the best settings may be others.
-    run_study(held_out, directory.storage.folder / HELD_OUT, executor, RunOptions(changed="redo"))
+    run_study(held_out, directory.storage.folder / HELD_OUT, executor, changed="redo")
     states = [trial.state.name.lower() for trial in study.trials]
     return TuneResult(
         {name: _overrides(trial, settings) for name, trial in best.items()},
@@ -208,14 +208,14 @@ def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
     Raises:
         ScenarioError: A held-out variant and one of the training differ by names of files only.
     """
-    files, first_of = FileHashes(), dict[str, tuple[bool, int]]()
+    first_of = dict[str, tuple[bool, int]]()
     first_seed = {variant.template: variant for variant in reversed(plan.variants)}
     for variant in reversed(first_seed.values()):
         scenario = plan.design.scenario(variant.index)
         content = scenario_content(scenario)
         text = json.dumps({**content, "simulation": {**content["simulation"], "seed": None}})
         for path in files_of(scenario):
-            text = text.replace(json.dumps(str(path)), json.dumps(files[path]))
+            text = text.replace(json.dumps(str(path)), json.dumps(file_hash(path)))
         is_held_out = matches(settings.held_out, plan.parameters(variant))
         was_held_out, other = first_of.setdefault(text, (is_held_out, variant.index))
         if is_held_out != was_held_out:
