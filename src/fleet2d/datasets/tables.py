@@ -136,7 +136,8 @@ def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
     place, begin = stays["place"][own], stays["begin"][own]
     is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
     place, begin = place[is_new], begin[is_new]
-    since, activity = np.zeros(0, np.int64), np.zeros(0, object)
+    since: I64 = np.zeros(0, np.int64)
+    activity: Any = np.zeros(0, object)
     if "events" in run.tables:
         events = columns_of(run, "events", ["event", "entity", "step", "detail"])
         is_own = (events["event"] == "activity") & (events["entity"] == user)
