@@ -10,7 +10,7 @@ from fleet2d.configuration.problems import check_known, refusal, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
-from fleet2d.entities.decisions import DoActivity, GoOut, GoTo, StandStill
+from fleet2d.entities.decisions import DecidingActor, DoActivity, GoOut, GoTo, StandStill
 from fleet2d.entities.place import Place, Point, RoomChoice, furniture_of, is_point, matching_rooms
 from fleet2d.entities.plan import check_data, plan_of
 from fleet2d.entities.users.scripted import Guest
@@ -29,9 +29,17 @@ class BodyIntervention(Intervention):
 
     entity: str
 
+    def actor(self, world: World) -> DecidingActor:
+        """Return the body in the run.
+
+        Raises:
+            ScenarioError: There is no such body.
+        """
+        return body(world, self.entity)
+
     def check(self, world: World) -> None:
         """Refuse an unknown body."""
-        body(world, self.entity)
+        self.actor(world)
 
 
 @register("intervention", "put")
@@ -51,7 +59,7 @@ class Put(BodyIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a place where the body doesn't fit."""
-        self._place(body(world, self.entity), world)
+        self._place(self.actor(world), world)
 
     def begin(self, world: World) -> None:
         """Put it there.
@@ -59,7 +67,7 @@ class Put(BodyIntervention):
         Raises:
             PlacementError: A shut door or moved furniture leaves no room for the body there.
         """
-        actor = body(world, self.entity)
+        actor = self.actor(world)
         x, y = self._place(actor, world)
         if actor.space.part_at(x, y) < 0:
             x_m, y_m = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
@@ -95,12 +103,12 @@ class Send(BodyIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a place that doesn't exist or can't be reached."""
-        check_reach(body(world, self.entity), self.to)
+        check_reach(self.actor(world), self.to)
 
     def begin(self, world: World) -> None:
         """Give the order."""
         order = GoTo(self.to, heading_of(self.heading_deg), self.duration)
-        body(world, self.entity).follow_order(order, world.step)
+        self.actor(world).follow_order(order, world.step)
 
 
 @register("intervention", "hold")
@@ -117,14 +125,13 @@ class HoldStill(BodyIntervention):
 
     def check(self, world: World) -> None:
         """Refuse an unknown body, and a robot that sits or lies."""
-        body(world, self.entity)
+        self.actor(world)
         if self.posture is not None:
             user(world, self.entity)
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        order = StandStill(self.duration, self.posture)
-        body(world, self.entity).follow_order(order, world.step)
+        self.actor(world).follow_order(StandStill(self.duration, self.posture), world.step)
 
 
 @register("intervention", "release")
@@ -133,7 +140,7 @@ class Release(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Cancel its order."""
-        body(world, self.entity).follow_order(None, world.step)
+        self.actor(world).follow_order(None, world.step)
 
 
 @register("intervention", "replan")
@@ -142,7 +149,7 @@ class Replan(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Let its behaviors decide at the present step."""
-        body(world, self.entity).decide_again(world.step)
+        self.actor(world).decide_again(world.step)
 
 
 @register("intervention", "configure")
@@ -161,7 +168,7 @@ class Configure(BodyIntervention):
 
     def check(self, world: World) -> None:
         """Refuse an unknown behavior or key, and a value with which the behavior can't start."""
-        actor = body(world, self.entity)
+        actor = self.actor(world)
         behavior = self._behavior(actor)
         behavior.start(actor)
         for name in behavior.reads():
@@ -169,7 +176,7 @@ class Configure(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Replace the behavior."""
-        actor = body(world, self.entity)
+        actor = self.actor(world)
         behavior = self._behavior(actor)
         behavior.start(actor)
         actor.replace(behavior_number(actor, self.behavior), behavior)
@@ -191,7 +198,7 @@ class TakeControl(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Let it follow given plans; without a plan it stays where it is."""
-        world.drive(body(world, self.entity))
+        world.drive(self.actor(world))
 
 
 @register("intervention", "decide")
@@ -206,14 +213,14 @@ class Decide(BodyIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a plan that the body can't follow."""
-        plan_of(body(world, self.entity), world.step, self.plan)
+        plan_of(self.actor(world), world.step, self.plan)
 
     def begin(self, world: World) -> None:
         """Let the body follow the plan from the present step on, and from where it begins.
 
         The body may have been put elsewhere at the same step, after the plan was made.
         """
-        actor, rows = body(world, self.entity), self.plan["rows"]
+        actor, rows = self.actor(world), self.plan["rows"]
         plan = plan_of(actor, world.step, self.plan)
         if rows and rows[0][0] == world.step * world.clock.step_us:
             _, x, y, heading, away = rows[0]
@@ -265,18 +272,16 @@ def check_reach(actor: Actor, place: RoomChoice | Point) -> None:
         actor.rooms(place)  # type: ignore[arg-type]
 
 
-class PersonIntervention(Intervention):
+class PersonIntervention(BodyIntervention):
     """Base of interventions on a person.
 
     Attributes:
         entity: The person.
     """
 
-    entity: str
-
-    def check(self, world: World) -> None:
-        """Refuse an unknown person."""
-        user(world, self.entity)
+    def actor(self, world: World) -> DecidingActor:
+        """Return the person in the run."""
+        return user(world, self.entity)
 
 
 @register("intervention", "away")
@@ -291,7 +296,7 @@ class Away(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        user(world, self.entity).follow_order(GoOut(self.duration), world.step)
+        self.actor(world).follow_order(GoOut(self.duration), world.step)
 
 
 @register("intervention", "call_home")
@@ -308,15 +313,15 @@ class CallHome(PersonIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a place that doesn't exist or can't be reached."""
-        check_reach(user(world, self.entity), self.to)
+        check_reach(self.actor(world), self.to)
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        user(world, self.entity).follow_order(GoTo(self.to, None, self.duration), world.step)
+        self.actor(world).follow_order(GoTo(self.to, None, self.duration), world.step)
 
 
 @register("intervention", "guest")
-class LetIn(PersonIntervention):
+class LetIn(CallHome):
     """Let a guest, a user with the behavior `guest`, come, stay for a while, and leave.
 
     Attributes:
@@ -324,22 +329,17 @@ class LetIn(PersonIntervention):
         duration: How long the guest stays there.
     """
 
-    to: Place = ("living_room", "any")
     duration: PositiveDuration = timedelta(hours=2)
 
     def check(self, world: World) -> None:
         """Refuse a user who is not a guest, and an unknown place."""
-        actor = user(world, self.entity)
+        actor = self.actor(world)
         if not any(isinstance(behavior, Guest) for behavior in actor.behaviors):
             raise ScenarioError(
                 f"{self.entity} is not a guest: a guest is a user with that behavior, like users:"
                 " {gina: guest}; use call_home for people who live here"
             )
-        check_reach(actor, self.to)
-
-    def begin(self, world: World) -> None:
-        """Give the order."""
-        user(world, self.entity).follow_order(GoTo(self.to, None, self.duration), world.step)
+        super().check(world)
 
 
 @register("intervention", "activity")
@@ -358,7 +358,7 @@ class StartActivity(PersonIntervention):
 
     def check(self, world: World) -> None:
         """Refuse an activity for which the person has no place."""
-        actor = user(world, self.entity)
+        actor = self.actor(world)
         if self.to is not None:
             check_reach(actor, self.to)
             return
@@ -371,5 +371,4 @@ class StartActivity(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        order = DoActivity(self.what, self.to, self.duration)
-        user(world, self.entity).follow_order(order, world.step)
+        self.actor(world).follow_order(DoActivity(self.what, self.to, self.duration), world.step)

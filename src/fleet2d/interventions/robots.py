@@ -1,21 +1,27 @@
 """Interventions on robots: calls, batteries, faults, and what they perceive."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
-from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.problems import check_known, problem, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Command
 from fleet2d.entities.body import NEVER
-from fleet2d.entities.equipment import Displacement
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import Place
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
-from fleet2d.interventions.bodies import Put, behavior_number, check_reach, heading_of
-from fleet2d.interventions.intervention import Intervention, Lasting, World, body, robot, user
+from fleet2d.interventions.bodies import (
+    BodyIntervention,
+    Put,
+    behavior_number,
+    check_reach,
+    heading_of,
+)
+from fleet2d.interventions.intervention import Lasting, World, body, robot, user
 from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting
@@ -24,22 +30,20 @@ from fleet2d.sight.perception import Perception
 UNKNOWN = "unknown"
 # Coordinates beyond this are not in a home [m].
 MAX_PLACE_M = 1e4
-# The behavior of Fleet2D that responds to each command.
-RESPONDERS = {"come": "come", "find": "find", "dock": "dock"}
+# Commands to which the behavior of the same name responds.
+RESPONDERS = ("come", "find", "dock")
 
 
-class RobotIntervention(Intervention):
+class RobotIntervention(BodyIntervention):
     """Base of interventions on a robot.
 
     Attributes:
         entity: The robot.
     """
 
-    entity: str
-
-    def check(self, world: World) -> None:
-        """Refuse an unknown robot."""
-        robot(world, self.entity)
+    def actor(self, world: World) -> DecidingActor:
+        """Return the robot in the run."""
+        return robot(world, self.entity)
 
 
 @register("intervention", "call")
@@ -78,21 +82,21 @@ class Call(RobotIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a call that none of its behaviors responds to."""
-        actor, command = robot(world, self.entity), self.order
+        actor, command = self.actor(world), self.order
         if self.to is not None:
             check_reach(actor, self.to)
         if not any(behavior.takes(command) for behavior in actor.behaviors):
-            kind = RESPONDERS.get(command.do)
-            hint = f": give it one, like behaviors: [{{type: {kind}}}, …]" if kind else ""
+            hint = f": give it one, like behaviors: [{{type: {command.do}}}, …]"
             raise ScenarioError(
-                f"none of the behaviors of {self.entity} answers the call {command.text!r}{hint}"
+                f"none of the behaviors of {self.entity} answers the call {command.text!r}"
+                f"{hint if command.do in RESPONDERS else ''}"
             )
 
     def begin(self, world: World) -> None:
         """Pass the command to its behaviors."""
         command = self.order
         world.emit(self.entity, EventKind.CALLED, command.text)
-        robot(world, self.entity).receive(command, world.step)
+        self.actor(world).receive(command, world.step)
 
 
 @register("intervention", "dismiss")
@@ -101,7 +105,7 @@ class Dismiss(RobotIntervention):
 
     def begin(self, world: World) -> None:
         """Make it replan without that."""
-        robot(world, self.entity).dismiss(world.step)
+        self.actor(world).dismiss(world.step)
 
 
 @register("intervention", "keep_out")
@@ -126,11 +130,11 @@ class KeepOut(RobotIntervention, Lasting):
         """Tell it, and let it leave."""
         for room in self._rooms(world):
             world.emit(self.entity, EventKind.BANNED, room.name)
-            robot(world, self.entity).keep_out(room.index, world.step, NEVER, room.name)
+            self.actor(world).keep_out(room.index, world.step, NEVER, room.name)
 
     def end(self, world: World) -> None:
         """Let it in again, unless another one of these interventions doesn't."""
-        actor = robot(world, self.entity)
+        actor = self.actor(world)
         others = {room.index for act in self.active(world) for room in act._rooms(world)}
         for room in self._rooms(world):
             if room.index not in others:
@@ -144,14 +148,12 @@ class KeepOut(RobotIntervention, Lasting):
         Raises:
             PlacementError: One of the names is no room of the home, and no kind of one.
         """
-        rooms: dict[int, Room] = {}
-        for name in (self.of,) if isinstance(self.of, str) else self.of:
-            found = [room for room in world.home.rooms if name in (room.name, room.type)]
-            if not found:
-                known = {name for room in world.home.rooms for name in (room.name, room.type)}
-                raise PlacementError(f"there is no room {name!r}{suggest(name, known)}")
-            rooms |= {room.index: room for room in found}
-        return [rooms[index] for index in sorted(rooms)]
+        rooms = world.home.rooms
+        known = dict.fromkeys(name for room in rooms for name in (room.name, room.type))
+        names = (self.of,) if isinstance(self.of, str) else self.of
+        for name in names:
+            check_known(name, "room", known, PlacementError)
+        return [room for room in rooms if room.name in names or room.type in names]
 
 
 @register("intervention", "battery")
@@ -166,15 +168,24 @@ class SetBattery(RobotIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a robot without a battery."""
-        if robot(world, self.entity).charge is None:
-            raise ScenarioError(f"{self.entity} has no battery: add `battery` to the robot")
+        battery_of(self.actor(world))
 
     def begin(self, world: World) -> None:
         """Set it, and make the behaviors replan."""
-        actor = robot(world, self.entity)
-        assert actor.charge is not None
-        actor.charge.set(self.charge, actor.motion, world.step * world.clock.step_us)
+        actor, now_us = self.actor(world), world.step * world.clock.step_us
+        battery_of(actor).set(self.charge, actor.motion, now_us)
         actor.decide_again(world.step)
+
+
+def battery_of(actor: Actor) -> Charge:
+    """Return the charge of a robot's battery.
+
+    Raises:
+        ScenarioError: It has no battery.
+    """
+    if actor.charge is None:
+        raise ScenarioError(f"{actor.name} has no battery: add `battery` to the robot")
+    return actor.charge
 
 
 class Switch(Lasting):
@@ -248,8 +259,71 @@ class SwitchOn(Switch):
         )
 
 
+class Trouble(RobotIntervention, Lasting):
+    """Base of interventions that hinder a robot for a while; `begin` and `end` apply all of them.
+
+    Attributes:
+        entity: The robot.
+    """
+
+    @property
+    def disturbance(self) -> Disturbance | None:
+        """The effect on cameras."""
+        return None
+
+    @property
+    def loses_place(self) -> bool:
+        """Whether the robot doesn't know where it is."""
+        return False
+
+    @property
+    def immobilizes(self) -> bool:
+        """Whether the robot can't drive."""
+        return self.loses_place
+
+    def begin(self, world: World) -> None:
+        """Let it happen; a robot that is lost may find its place again by sight."""
+        self._apply(world)
+        if self.loses_place:
+            world.emit(self.entity, EventKind.LOCALIZATION_LOST, "")
+            after = relocalizes_after(self.actor(world))
+            if after is not None:
+                world.later(Relocalize(entity=self.entity, by_sight=True), after)
+
+    def end(self, world: World) -> None:
+        """Undo it; the robot knows its place again, unless it is lost for another reason."""
+        self._apply(world)  # all that are still active
+        if not self.loses_place or any(is_lost(act, self.entity) for act in world.lasting):
+            return
+        displacements = self.actor(world).displacements
+        if displacements and displacements[-1].end > world.step:
+            displacements[-1] = displacements[-1]._replace(end=world.step)
+        world.emit(self.entity, EventKind.RELOCALIZED, "")
+
+    def _apply(self, world: World) -> None:
+        """Apply all that are active."""
+        if self.disturbance is not None:
+            disturb(world, self.entity)
+        if self.immobilizes:
+            actor = self.actor(world)
+            troubles = (act for act in world.lasting if isinstance(act, Trouble))
+            actor.is_stuck = any(t.immobilizes and t.entity == self.entity for t in troubles)
+            actor.decide_again(world.step)
+
+
+def is_lost(act: object, name: str) -> bool:
+    """Return whether because of an active intervention a robot doesn't know where it is."""
+    return isinstance(act, Trouble) and act.loses_place and act.entity == name
+
+
+def relocalizes_after(actor: Actor) -> timedelta | None:
+    """Return for how long a robot has to see the home to know its place; None: it can't."""
+    settings = getattr(actor.entity, "localization", None)
+    return None if settings is None else settings.relocalizes
+
+
 @register("intervention", "fault")
-class Fault(RobotIntervention, Lasting):
+class Fault(Trouble):
     """Let a part of a robot fail for a while: stuck wheels, or a camera that sees less.
 
     With stuck wheels the robot can neither drive nor turn, and its behaviors don't decide. A robot
@@ -282,6 +356,11 @@ class Fault(RobotIntervention, Lasting):
             )
 
     @property
+    def loses_place(self) -> bool:
+        """Whether its localization is lost."""
+        return self.lost
+
+    @property
     def immobilizes(self) -> bool:
         """Whether the robot can't drive."""
         return self.wheels or self.lost
@@ -297,37 +376,20 @@ class Fault(RobotIntervention, Lasting):
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot or camera."""
-        actor = robot(world, self.entity)
+        actor = self.actor(world)
         if self.disturbance is not None:
             check_camera(actor, self.dark or True)
         if self.errs is not None:
             check_truth(world, self.entity)
-        if self.charger and actor.charge is None:
-            raise ScenarioError(f"{self.entity} has no battery: add `battery` to the robot")
-
-    def begin(self, world: World) -> None:
-        """Let it fail."""
-        if self.lost:
-            lose(world, self.entity)
-        self._apply(world)
-
-    def end(self, world: World) -> None:
-        """Repair it."""
-        self._apply(world)  # all active faults, without this one
-        if self.lost:
-            find_place(world, self.entity)
+        if self.charger:
+            battery_of(actor)
 
     def _apply(self, world: World) -> None:
-        if self.disturbance is not None:
-            disturb(world, self.entity)
-        if self.immobilizes:
-            immobilize(world, self.entity)
+        super()._apply(world)
         if self.charger:
-            actor = robot(world, self.entity)
-            assert actor.charge is not None
+            actor, now_us = self.actor(world), world.step * world.clock.step_us
             is_broken = any(act.charger for act in self.active(world))
-            now_us = world.step * world.clock.step_us
-            actor.charge.set_broken(is_broken, actor.motion, now_us)
+            battery_of(actor).set_broken(is_broken, actor.motion, now_us)
             actor.decide_again(world.step)
 
 
@@ -371,55 +433,13 @@ class Perceive(RobotIntervention):
 
     def begin(self, world: World) -> None:
         """Let it perceive them."""
-        world.perceive(
-            self.entity,
-            [
-                FalseSighting(
-                    "" if d.user == UNKNOWN else d.user, d.x, d.y, heading_of(d.heading_deg) or 0
-                )
-                for d in self.detections
-            ],
-        )
+        detections = [false_sighting(d.user, (d.x, d.y), d.heading_deg) for d in self.detections]
+        world.perceive(self.entity, detections)
 
 
-def immobilize(world: World, name: str) -> None:
-    """Let a robot stand still while an active intervention keeps it from driving."""
-    actor = robot(world, name)
-    actor.is_stuck = any(
-        getattr(act, "immobilizes", False) and getattr(act, "entity", None) == name
-        for act in world.lasting
-    )
-    actor.decide_again(world.step)
-
-
-def is_lost(act: object, name: str) -> bool:
-    """Return whether an active intervention is a kidnapping or a loss of localization."""
-    lost = isinstance(act, Kidnap) or (isinstance(act, Fault) and act.lost)
-    return lost and getattr(act, "entity", None) == name
-
-
-def lose(world: World, name: str) -> None:
-    """Let a robot lose its place, which it may find again by sight."""
-    world.emit(name, EventKind.LOCALIZATION_LOST, "")
-    after = relocalizes_after(world, name)
-    if after is not None:
-        world.later(Relocalize(entity=name, by_sight=True), after)
-
-
-def find_place(world: World, name: str) -> None:
-    """Let a robot know its place again, unless it is lost for another reason."""
-    if any(is_lost(act, name) for act in world.lasting):
-        return
-    displacements = robot(world, name).displacements
-    if displacements and displacements[-1].end > world.step:
-        displacements[-1] = displacements[-1]._replace(end=world.step)
-    world.emit(name, EventKind.RELOCALIZED, "")
-
-
-def relocalizes_after(world: World, name: str) -> timedelta | None:
-    """Return for how long a robot has to see the home to know its place; None: it can't."""
-    settings = getattr(robot(world, name).entity, "localization", None)
-    return None if settings is None else settings.relocalizes
+def false_sighting(user: str, spot: tuple[float, float], heading_deg: float) -> FalseSighting:
+    """Return what a robot perceives, of a person or 'unknown', as cameras have it."""
+    return FalseSighting("" if user == UNKNOWN else user, *spot, heading_of(heading_deg) or 0)
 
 
 @register("intervention", "relocalize")
@@ -437,7 +457,7 @@ class Relocalize(RobotIntervention):
         """End what keeps it lost, if it sees."""
         if not any(is_lost(act, self.entity) for act in world.lasting):
             return
-        after = relocalizes_after(world, self.entity)
+        after = relocalizes_after(self.actor(world))
         if self.by_sight and after is not None and not self._sees(world):
             world.later(self, after)
         else:
@@ -448,12 +468,12 @@ class Relocalize(RobotIntervention):
         disturbances = disturbances_of(world, self.entity)
         return any(
             not any(d.dark and d.is_of(name) for d in disturbances)
-            for name in robot(world, self.entity).entity.eyes
+            for name in self.actor(world).entity.eyes
         )
 
 
 @register("intervention", "kidnap")
-class Kidnap(RobotIntervention, Lasting):
+class Kidnap(Trouble):
     """Carry a robot elsewhere without its knowledge: it is lost there, until it knows its place.
 
     Meanwhile it stands still, and its behaviors don't decide. If it has errors of `localization`,
@@ -470,7 +490,10 @@ class Kidnap(RobotIntervention, Lasting):
     to: Place
     duration: PositiveDuration | None = timedelta(minutes=1)
 
-    immobilizes: ClassVar[bool] = True
+    @property
+    def loses_place(self) -> bool:
+        """Whether the robot doesn't know where it is."""
+        return True
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot, and a place where it doesn't fit."""
@@ -479,41 +502,23 @@ class Kidnap(RobotIntervention, Lasting):
 
     def begin(self, world: World) -> None:
         """Put it there, lost."""
-        actor = robot(world, self.entity)
+        actor = self.actor(world)
         before = actor.state
         self._put.begin(world)
-        after = actor.state
         if getattr(actor.entity, "localization", None) is not None:
+            after, displacements = actor.state, actor.displacements
+            x, y = before.x - after.x, before.y - after.y
             turn = turn_between(after.heading, before.heading)
-            off = (before.x - after.x, before.y - after.y, turn)
-            carry_off(actor.displacements, world.step, off)
-        immobilize(world, self.entity)
-        lose(world, self.entity)
-
-    def end(self, world: World) -> None:
-        """Let it know where it is."""
-        immobilize(world, self.entity)
-        find_place(world, self.entity)
+            last = displacements[-1] if displacements else None
+            if last is not None and last.end > world.step:  # carried off again before it knew
+                displacements[-1] = last._replace(end=world.step)
+                x, y, turn = x + last.x, y + last.y, turn + last.turn
+            displacements.append(Displacement(world.step, NEVER, x, y, turn))
+        super().begin(world)
 
     @property
     def _put(self) -> Put:
         return Put(entity=self.entity, to=self.to)
-
-
-def carry_off(displacements: list[Displacement], step: int, off: tuple[int, int, int]) -> None:
-    """Note that a robot believes to be elsewhere from a step on, besides what it believed before.
-
-    Args:
-        displacements: What it believed so far.
-        step: The step.
-        off: Its last place minus the new one: x, y [lattice], heading [1/4096 turn].
-    """
-    x, y, turn = off
-    if displacements and displacements[-1].end > step:  # carried off again before it knew
-        last = displacements[-1]
-        displacements[-1] = last._replace(end=step)
-        x, y, turn = x + last.x, y + last.y, turn + last.turn
-    displacements.append(Displacement(step, NEVER, x, y, turn))
 
 
 def camera_name(camera: bool | str | None) -> str | None:
@@ -555,6 +560,18 @@ def check_truth(world: World, name: str) -> None:
         )
 
 
+def check_perceived(world: World, name: str, person: str) -> None:
+    """Refuse an unknown person, and 'unknown' if the run's tables can't store it.
+
+    Raises:
+        ScenarioError: There is no such person, or the cameras of the robot don't err in this run.
+    """
+    if person == UNKNOWN:
+        check_truth(world, name)
+    else:
+        user(world, person)
+
+
 def disturbances_of(world: World, name: str) -> list[Disturbance]:
     """Return the disturbances of all active interventions on the cameras of a robot."""
     acts = (act for act in world.lasting if getattr(act, "entity", None) == name)
@@ -567,7 +584,7 @@ def disturb(world: World, name: str) -> None:
     world.disturb(name, disturbances_of(world, name))
 
 
-class PerceptionIntervention(RobotIntervention, Lasting):
+class PerceptionIntervention(Trouble):
     """Base of interventions on perception; they don't change the random draws of cameras.
 
     Attributes:
@@ -577,18 +594,9 @@ class PerceptionIntervention(RobotIntervention, Lasting):
 
     camera: str | None = None
 
-    @property
-    def disturbance(self) -> Disturbance:
-        """The effect on cameras."""
-        raise NotImplementedError
-
     def check(self, world: World) -> None:
         """Refuse an unknown robot or camera."""
-        check_camera(robot(world, self.entity), self.camera)
-
-    def begin(self, world: World) -> None:
-        """Apply all active disturbances of its cameras."""
-        disturb(world, self.entity)
+        check_camera(self.actor(world), self.camera)
 
 
 @register("intervention", "suppress")
@@ -634,10 +642,7 @@ class Mistake(PerceptionIntervention):
         """Refuse unknown people."""
         super().check(world)
         user(world, self.user)
-        if self.taken_for == UNKNOWN:
-            check_truth(world, self.entity)
-        else:
-            user(world, self.taken_for)
+        check_perceived(world, self.entity, self.taken_for)
 
 
 @register("intervention", "inject")
@@ -659,17 +664,13 @@ class Inject(PerceptionIntervention):
     @property
     def disturbance(self) -> Disturbance:
         """The effect on cameras."""
-        name = "" if self.user == UNKNOWN else self.user
-        heading = heading_of(self.heading_deg) or 0
-        return Disturbance(self.camera, injected=FalseSighting(name, *self.spot, heading))
+        sighting = false_sighting(self.user, self.spot, self.heading_deg)
+        return Disturbance(self.camera, injected=sighting)
 
     def check(self, world: World) -> None:
         """Refuse an unknown person, and a place outside the home."""
         super().check(world)
-        if self.user == UNKNOWN:
-            check_truth(world, self.entity)
-        else:
-            user(world, self.user)
+        check_perceived(world, self.entity, self.user)
         if world.home.plan.room_at(*self.spot) is None:
             x, y = self.spot
             raise PlacementError(f"({x:g}, {y:g}) m is outside the home")
