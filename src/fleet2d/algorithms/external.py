@@ -21,7 +21,6 @@ from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.logs.log import AWAY, LogError
 from fleet2d.logs.positions import LogTable, local_times
-from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.program import ExternalProgram
 
 # What ends an Arrow IPC stream: no further message.
@@ -121,8 +120,6 @@ class Process(Algorithm):
 
 def _ipc(columns: Mapping[str, Any]) -> bytes:
     """Return columns of numbers as an Arrow IPC stream of one batch."""
-    import pyarrow as pa
-
     arrays = [  # not by `pa.array`, which imports pandas
         pa.Array.from_buffers(
             pa.from_numpy_dtype(values.dtype),
@@ -165,10 +162,9 @@ def _poses(history: History, state: Present) -> dict[str, bytes]:
     columns = {
         "step": np.tile(steps, len(parts)),
         "robot": np.repeat(np.arange(len(parts), dtype=np.int64), count),
-        "x": np.concatenate([part.x for part in parts]) if parts else np.zeros(0),
-        "y": np.concatenate([part.y for part in parts]) if parts else np.zeros(0),
-        "heading": np.concatenate([part.heading for part in parts]) if parts else np.zeros(0),
     }
+    for name in ("x", "y", "heading"):
+        columns[name] = np.concatenate([np.zeros(0), *(getattr(part, name) for part in parts)])
     return {"poses": _ipc(columns)}
 
 
@@ -219,18 +215,14 @@ class ReplayedOutput(Algorithm):
         local = local_times(
             self.path, "shares", stamps, np.isfinite(share), [], time_zone=zone, sort=True
         )
-        begins = np.flatnonzero(np.append(True, np.diff(local.time_us) > 0))
-        self._times = local.time_us[begins]
-        self._day = local.first_day
-        row_of = np.cumsum(np.append(True, np.diff(local.time_us) > 0)) - 1
-        self._shares = np.zeros((len(begins), len(rooms)))
-        np.add.at(self._shares, (row_of, room[local.row]), share[local.row])
+        is_new = np.append(True, np.diff(local.time_us) > 0)
+        self._times, self._day = local.time_us[is_new], local.first_day
+        self._shares = np.zeros((len(self._times), len(rooms)))
+        np.add.at(self._shares, (np.cumsum(is_new) - 1, room[local.row]), share[local.row])
 
     def update(self, history: History, state: Present) -> Any:
         """Return the newest shares; None before the first."""
-        midnight = midnight_of(state.start)
-        if self._day is not None:
-            midnight = datetime.combine(self._day, datetime.min.time())
+        midnight = datetime.combine(self._day or state.start.date(), datetime.min.time())
         row = int(np.searchsorted(self._times, micros(state.time - midnight), side="right")) - 1
         return None if row < 0 else RoomDistribution(self._shares[row])
 
@@ -259,28 +251,19 @@ class EvidenceTable(Algorithm):
     def update(self, history: History, state: Present) -> dict[str, Any] | None:
         """Return the rows of the period, by bin, room and user, anyone first; None without any."""
         evidence = history.evidence
-        user, bin_, room, steps, shape = evidence.sightings
-        anyone = shape[1] - 1
-        seen = np.zeros((shape[0], shape[2]), np.int64)
-        is_anyone = user == anyone
-        seen[bin_[is_anyone], room[is_anyone]] = steps[is_anyone]
-        watched_bin, watched_room = np.nonzero((evidence.watched > 0) | (seen > 0))
-        known = ~is_anyone
-        bins = np.concatenate([watched_bin, bin_[known]])
-        rooms = np.concatenate([watched_room, room[known]])
-        users = np.concatenate([np.full(len(watched_bin), -1), user[known]])
-        counts = np.concatenate([seen[watched_bin, watched_room], steps[known]])
+        seen = np.roll(evidence.seen, 1, axis=1).transpose(0, 2, 1)  # anyone first
+        is_row = seen > 0
+        is_row[:, :, 0] |= evidence.watched > 0
+        bins, rooms, users = np.nonzero(is_row)
         if not len(bins):
             return None
-        order = np.lexsort((users, rooms, bins))
-        bins, rooms, users = bins[order], rooms[order], users[order]
         return {
             "bin": evidence.begin + bins * evidence.bin_steps,
             "day": evidence.day[bins],
             "minute": evidence.minute[bins],
             "room": self.names[rooms],
             "kind": self.kinds[rooms],
-            "user": np.array([*state.users, ANYONE], object)[users],
+            "user": np.array([ANYONE, *state.users], object)[users],
             "watched": evidence.watched[bins, rooms],
-            "seen": counts[order],
+            "seen": seen[bins, rooms, users],
         }
