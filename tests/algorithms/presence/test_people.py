@@ -154,7 +154,7 @@ def test_revisited_days_count_once() -> None:
         people.end_day(day)
     for _ in range(20):
         for number in (2, 1, 0):
-            people.revisit(number, 1.0, days[number])
+            people.revisit(number, 1.0)
     for total, parts in zip(
         people.total, zip(*(day.moments for day in people.days), strict=True), strict=True
     ):
@@ -187,10 +187,10 @@ def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages:
         only = day._replace(sightings=own._replace(user=np.zeros(rows.sum(), np.int64)))
         person.follow(only.between(0, 100))
         person.end_day(only)
-        person.revisit(0, 0.7, only)
+        person.revisit(0, 0.7)
     people.follow(day.between(0, 100))
     people.end_day(day)
-    people.revisit(0, 0.7, day)
+    people.revisit(0, 0.7)
     for user, person in enumerate(alone):
         assert np.array_equal(people.now[user], person.now[0])
         for together, single in zip(people.total, person.total, strict=True):

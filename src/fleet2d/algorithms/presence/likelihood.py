@@ -78,8 +78,7 @@ class Likelihood(Estimator):
         self.people: People | None = None
         self.learned: Mapping[str, Any] = {}
         self.parts: list[DayEvidence] = []  # the parts of the present day
-        self.days: list[DayEvidence] = []  # the days that are revisited
-        self.hours: list[F64] = []  # the sums by hour of these days
+        self.hours: list[F64] = []  # the sums by hour of the days that are revisited
         self.turn = 0  # index of the day that was revisited last
         self.is_watched = np.zeros(rooms, bool)  # whether a robot has looked into the room
         self.island: I64 | None = None  # as in `Parts`
@@ -221,20 +220,18 @@ class Likelihood(Estimator):
         day, self.parts = DayEvidence.joined(self.parts), []
         self.counts.hours = self._whole_day(people.end_day(day), day)
         self.hours.append(self.counts.hours)
-        self.days.append(day)
         for _ in range(REVISITS):
-            self.turn = (self.turn - 1) % len(self.days)
+            self.turn = (self.turn - 1) % len(self.hours)
             self._revisit(self.turn, people)
         fade = self.counts.faded(next_day - self.counts.today)
         people.fade(fade)
-        people.forget(STORED_DAYS)
-        del self.days[:-STORED_DAYS], self.hours[:-STORED_DAYS]
+        del people.days[:-STORED_DAYS], self.hours[:-STORED_DAYS]
 
     def _revisit(self, number: int, people: People) -> None:
         """Smooth a day with the present model, and replace its sums."""
-        day = self.days[number]
+        day = people.days[number].evidence
         weight = self.counts.faded(self.counts.today - day.number)
-        hours = self._whole_day(people.revisit(number, weight, day), day)
+        hours = self._whole_day(people.revisit(number, weight), day)
         self.counts.put(day.number, self.hours[number], hours)
         self.hours[number] = hours
 

@@ -231,15 +231,17 @@ def _sum_by_room(values: F64, room: I64) -> F64:
 
 @dataclass
 class PeopleDay:
-    """The messages to one day of people, and the statistics learned from it.
+    """One day of people: its evidence, the messages to it, and the statistics learned from it.
 
     Attributes:
+        evidence: The evidence.
         start: float64 (people, stages, patches), the distribution before the day.
         backward: float64 (people, stages, patches), the backward message from later days: the
             likelihood of their evidence given each state.
         moments: The expected sufficient statistics of the day, with people as first dimension.
     """
 
+    evidence: DayEvidence
     start: F64
     backward: F64
     moments: Moments
@@ -252,7 +254,7 @@ class People:
         model: The transition probabilities, with people as first dimension.
         total: Sum of the moments of all days, with decayed weights of older ones, likewise.
         now: float64 (people, stages, patches), the distribution after the last bin.
-        days: The finished days that are still revisited.
+        days: The finished days that are still revisited; the statistics of others stay in `total`.
     """
 
     def __init__(self, layout: StateLayout, prior: Prior, count: int, longest: int) -> None:
@@ -307,10 +309,10 @@ class People:
     def end_day(self, day: DayEvidence) -> PeoplePlaces:
         """Smooth the finished day as a whole, and learn from it."""
         moments = self.layout.no_moments(self.count)
-        self.days.append(PeopleDay(self.day_start, np.ones_like(self.day_start), moments))
-        return self.revisit(len(self.days) - 1, 1.0, day)
+        self.days.append(PeopleDay(day, self.day_start, np.ones_like(self.day_start), moments))
+        return self.revisit(len(self.days) - 1, 1.0)
 
-    def revisit(self, number: int, weight: float, evidence: DayEvidence) -> PeoplePlaces:
+    def revisit(self, number: int, weight: float) -> PeoplePlaces:
         """Smooth a day with the present models, and update the models by the difference.
 
         The day before and the next day get new boundary messages, which they use when they are
@@ -319,12 +321,11 @@ class People:
         Args:
             number: Index of the day in `days`.
             weight: Weight of the day.
-            evidence: The evidence of the day.
         """
         day, moments = self.days[number], self.layout.no_moments(self.count)
         places, end, begin = smooth_people(
             self.model,
-            evidence.of_people(self.count),
+            day.evidence.of_people(self.count),
             self.longest,
             day.start,
             day.backward,
@@ -350,10 +351,6 @@ class People:
         """Multiply the moments learned so far by a weight."""
         if weight < 1:
             self.total = Moments(*(weight * part for part in self.total))
-
-    def forget(self, count: int) -> None:
-        """Keep the last `count` days only; the statistics of the others stay."""
-        del self.days[:-count]
 
     def remember(self) -> dict[str, Any]:
         """Return what was learned of each person, as arrays, by number."""
