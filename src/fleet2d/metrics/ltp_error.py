@@ -1,7 +1,7 @@
 """Errors of long-term presence: distances of the estimate from the true occupancy of rooms."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from datetime import datetime
 from typing import Any, ClassVar, Literal
 
@@ -25,7 +25,6 @@ from fleet2d.runtime.clock import DAY_S, HOUR_US
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
 MEAN = "mean"
-SUMMARY_MEASURES = ("tv", "earth_mover_m", "inside", "burn_in_day")  # in the closing table
 COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
 
 
@@ -226,6 +225,12 @@ class LongTermMetric(Metric):
             self.counts, self.steps = self.counts[-most:], self.steps[-most:]
         return np.sum(self.counts, axis=0), sum(self.steps)
 
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the rows of users, and that of anyone, unless it is that of the only user."""
+        rows = super().summary(result)
+        return {user: row for user, row in rows.items() if len(rows) != 2 or user != ANYONE}
+
 
 @register("metric", "ltp_error")
 class LtpError(LongTermMetric):
@@ -257,6 +262,7 @@ class LtpError(LongTermMetric):
         burn_in: Total variation at which burn-in ends.
     """
 
+    hidden: ClassVar[Set[str]] = frozenset({"js", "kl", "max_gap", "mean_gap", "tau", "flips"})
     unit: ClassVar[str] = "at the end"
     units: ClassVar[Mapping[str, str]] = {
         "tv": "share of time in wrong rooms",
@@ -359,16 +365,6 @@ class LtpError(LongTermMetric):
                 results[user]["burn_in_day"] = day
         return results
 
-    @classmethod
-    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return each user's total variation, earth mover's distance [m] and burn-in day."""
-        has_one_user = len(result) == 2  # whose row is equal to that of anyone
-        return {
-            user: {name: row[name] for name in SUMMARY_MEASURES if name in row}
-            for user, row in result.items()
-            if not (has_one_user and user == ANYONE)
-        }
-
 
 @register("metric", "ltp_gap")
 class LtpGap(LongTermMetric):
@@ -424,9 +420,7 @@ class LtpGap(LongTermMetric):
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return each user's mean gap, and the largest gap with its room."""
         summary = {}
-        for user, gaps in result.items():
-            if len(result) == 2 and user == ANYONE:
-                continue  # the same as the only user
+        for user, gaps in super().summary(result).items():
             rooms = {room: gap for room, gap in gaps.items() if room != MEAN}
             worst = max(rooms, key=lambda room: rooms[room])
             summary[user] = {MEAN: gaps[MEAN], worst: rooms[worst]}

@@ -135,14 +135,15 @@ class Detections(Metric):
         }
 
     def _summary(self, looks: I64, counts: I64, users: tuple[str, ...]) -> dict[str, Any]:
-        numbers: dict[str, Any] = {}
-        real, total = int(counts[:-1].sum()), int(counts.sum())
-        if total:
-            numbers["precision"] = real / total
-        if looks[:, 0].sum():
-            numbers["recall"] = int(looks[:, 1].sum()) / int(looks[:, 0].sum())
-        if real:
-            numbers["recognized"] = int(np.trace(counts[:-1, :-1])) / real
+        real = counts[:-1].sum()
+        ratios = {
+            "precision": (real, counts.sum()),
+            "recall": (looks[:, 1].sum(), looks[:, 0].sum()),
+            "recognized": (np.trace(counts[:-1, :-1]), real),
+        }
+        numbers: dict[str, Any] = {
+            name: int(part) / int(whole) for name, (part, whole) in ratios.items() if whole
+        }
         confusion = {
             true: {
                 perceived: int(counts[t, p]) / int(counts[t].sum())
