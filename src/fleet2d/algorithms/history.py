@@ -53,11 +53,11 @@ class Blocks:
         >>> blocks = Blocks()
         >>> blocks.append(0, 2, np.array([1, 2]))
         >>> blocks.append(2, 5, np.array([3, 4, 5]))
-        >>> blocks.touching(1, 3)[0], blocks.touching(2, 4)[1].tolist()
-        (0, [3, 4, 5])
+        >>> blocks.touching(1, 3)
+        (0, [array([1, 2]), array([3, 4, 5])])
         >>> blocks.forget(2)
         >>> blocks.touching(0, 9)
-        (2, array([3, 4, 5]))
+        (2, [array([3, 4, 5])])
     """
 
     def __init__(self) -> None:
@@ -72,21 +72,10 @@ class Blocks:
         self._ends.append(end)
         self._rows.append(rows)
 
-    def touching(self, begin: int, end: int) -> tuple[int, NDArray[Any] | None]:
-        """Return all arrays that overlap a stretch of time, joined, and where they begin."""
-        overlap = self._touching(begin, end)
-        blocks = self._rows[overlap]
-        if not blocks:
-            return begin, None
-        rows = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        return self._begins[overlap.start], rows
-
-    def each_touching(self, begin: int, end: int) -> list[Any]:
-        """Return each block that overlaps a stretch of time."""
-        return self._rows[self._touching(begin, end)]
-
-    def _touching(self, begin: int, end: int) -> slice:
-        return slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
+    def touching(self, begin: int, end: int) -> tuple[int, list[Any]]:
+        """Return the blocks that overlap a stretch of time, and where the first one begins."""
+        overlap = slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
+        return next(iter(self._begins[overlap]), begin), self._rows[overlap]
 
     def forget(self, before: int) -> None:
         """Drop the blocks that end by `before`."""
@@ -314,7 +303,7 @@ class Log:
 
     def observations(self, first: int, end: int) -> Observations:
         """Return the observations of the steps from `first` to `end` - 1."""
-        blocks = self._observations.each_touching(first, end)
+        _, blocks = self._observations.touching(first, end)
         return Observations(
             self.home.plan,
             self._rooms,
@@ -365,9 +354,8 @@ class Log:
                 f" {first} to {end} isn't made of whole ones: choose a period of whole minutes"
             )
         begin, last = first // self.bin_steps, end // self.bin_steps
-        since, bins = self._bins.touching(begin, last)
-        assert bins is not None, "a history is not empty"
-        bins = bins[begin - since : last - since]
+        since, blocks = self._bins.touching(begin, last)
+        bins = np.concatenate(blocks)[begin - since : last - since]
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         seen = self.observations(first, end)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -103,11 +103,6 @@ class Presence:
                 f" {self._away[row]:g}"
             )
 
-    @cached_property
-    def _rows(self) -> dict[str, int]:
-        """The row of each name; of equal names, the first."""
-        return {name: row for row, name in reversed([*enumerate(self.names)])}
-
     @property
     def arrays(self) -> tuple[F64, F64]:
         """Shares of everybody, float64 (users + 1, rooms), and of away, float64 (users + 1,)."""
@@ -119,12 +114,11 @@ class Presence:
         Raises:
             ComponentError: There is no such user.
         """
-        row = self._rows.get(user)
-        if row is None:
+        if user not in self.names:
             raise ComponentError(
                 f"no presence estimate for user {user!r}{suggest(user, self.names)}"
             )
-        return row
+        return self.names.index(user)
 
     def share(self, user: str = ANYONE) -> F64:
         """Return the probability of each room, given at home: float64 (rooms,), sums to one."""

@@ -17,7 +17,7 @@ from fleet2d.algorithms.presence.people import DayEvidence, StateLayout
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64, I64, Bool, StayModel, Stretches, advance, follow
+from fleet2d.kernels import F64, I64, Bool, StayModel, advance, follow
 from fleet2d.runtime.clock import DAY_MINUTES
 
 WEEKEND = 5  # its first day, Monday being 0
@@ -184,15 +184,6 @@ class Follower:
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
 
-    def follow(self, model: StayModel, stretches: Stretches) -> F64:
-        """Return P(room | evidence up to each bin): float64 (bins, rooms + 1).
-
-        Args:
-            model: The transition probabilities.
-            stretches: The evidence, in stretches of one bin.
-        """
-        return follow(model, stretches, self.now, self.shown)
-
     def forecast(self, model: StayModel, habits: Habits | None) -> PersonForecast:
         """Return the present distribution over rooms, with the transitions of the person."""
         stages = self.layout.stages
@@ -257,10 +248,12 @@ class Filter(Model):
         return split(places, self.users, evidence.sightings.unknown)
 
     def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
+        """Return P(room | evidence up to each bin): float64 (bins, rooms + 1)."""
         stretches = day.stretches(user, 1)
         if not self.negative:
             stretches = stretches._replace(views=np.zeros_like(stretches.views))
-        return self.followers[user].follow(model, stretches)
+        follower = self.followers[user]
+        return follow(model, stretches, follower.now, follower.shown)
 
     def habits(self, user: int) -> Habits | None:
         """Return how a user's transitions depend on the hour; None: they don't."""

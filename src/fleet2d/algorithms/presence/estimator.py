@@ -100,7 +100,14 @@ class DayCounts:
     def begin_day(self, day: int) -> None:
         """End the present day, if there is one, and reduce the weights of older days."""
         if self.today:
-            self._end(self.today, self.hours, day)
+            total, monday = self.hours.sum(axis=0), (self.today - 1) % 7 * 24
+            weight = self.faded(day - self.today)
+            self.days.append(self.today)
+            self.by_day = np.concatenate([self.by_day, total[None]])
+            self.finished = (self.finished + total) * weight
+            self.week[monday : monday + 24] += self.hours
+            if weight < 1.0:
+                self.week *= weight  # in place: of many users it is large
         self.today = day
         self.hours = np.zeros((24, *self.shape))
 
@@ -114,17 +121,6 @@ class DayCounts:
         self.by_day[self.days.index(day)] += change.sum(axis=0)
         self.finished = self.finished + weight * change.sum(axis=0)
         self.week[monday : monday + 24] += weight * change
-
-    def _end(self, day: int, hours: F64, next_day: int) -> None:
-        self.days.append(day)
-        total = hours.sum(axis=0)
-        self.by_day = np.concatenate([self.by_day, total[None]])
-        monday = (day - 1) % 7 * 24
-        self.week[monday : monday + 24] += hours
-        weight = self.faded(next_day - day)
-        self.finished = (self.finished + total) * weight
-        if weight < 1.0:
-            self.week *= weight  # in place: of many users it is large
 
     def faded(self, days: int) -> float:
         """Return the weight of a day after a number of further days, by repeated products."""

@@ -46,6 +46,7 @@ GROUPS = (
     ("office",),
     ("hallway", "hall", "entryway", "lobby"),
 )
+GROUP_OF_KIND = {kind: number for number, kinds in enumerate(GROUPS) for kind in kinds}
 PLACE_FEATURES = len(GROUPS) + 5
 
 INPUTS = ("features", "places")
@@ -72,10 +73,7 @@ class PlaceFacts(NamedTuple):
             >>> facts.features[:, 2].tolist(), facts.rooms.distance.tolist()
             ([1.0, 0.0, 0.0], [[0.0, 0.5], [0.5, 0.0]])
         """
-        groups = [
-            next((k for k, names in enumerate(GROUPS) if kind in names), len(GROUPS))
-            for kind in kinds
-        ]
+        groups = [GROUP_OF_KIND.get(kind, len(GROUPS)) for kind in kinds]
         area = np.maximum(area_m2, 0.01)
         count, features = len(groups), np.zeros((len(groups) + 1, PLACE_FEATURES))
         features[np.arange(count), groups] = 1
@@ -272,9 +270,7 @@ def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:
         person: Row of the user; without users, 0 is anybody.
         belief: float64 (bins, rooms + 1), the belief to be corrected, away last.
     """
-    bin_, room, steps = evidence.sightings.of_user(person)
-    seen = np.zeros(evidence.watched.shape)
-    seen[bin_, room] = steps / evidence.bin_steps
+    seen = evidence.seen[:, person] / evidence.bin_steps
     unknown = evidence.sightings.unknown.astype(np.uint8)
     return TracedEvidence(evidence.day, evidence.minute, evidence.watched, seen, unknown, belief)
 
