@@ -8,13 +8,13 @@ from typing import Any
 
 import yaml
 
-from fleet2d.configuration.documents import Document, Keys, read_document
+from fleet2d.configuration.documents import Document, read_document
 from fleet2d.errors import ArtifactError, InputError, ScenarioError
 from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.home import Home
 from fleet2d.published.sections import (
     ConfigReader,
-    body_keys,
+    body_of,
     convert_floorplan,
     convert_outputs,
     convert_robot,
@@ -64,28 +64,29 @@ def _read(old: Path) -> Document:
 
 def _convert(reader: ConfigReader, old: Path, new: Path) -> dict[str, Any]:
     """Return the scenario as plain data; starts in or near walls are moved to free points."""
-    step = read_step(reader)
-    floorplan, plan_file = convert_floorplan(reader, old, new)
-    users, paths = convert_users(reader, step)
+    simulation = reader.at("simulation")
+    step = read_step(simulation)
+    floorplan, plan_file = convert_floorplan(reader.at("floorplan"), old, new)
+    users, bodies = convert_users(reader.at("users"), step)
     data: dict[str, Any] = {
-        "simulation": convert_simulation(reader, step),
+        "simulation": convert_simulation(simulation, step),
         "floorplan": floorplan,
         "users": users,
         "robots": {},
-        "sight": convert_sight(reader),
-        "artifacts": convert_outputs(reader, step),
+        "sight": convert_sight(simulation),
+        "artifacts": convert_outputs(simulation.at("outputs"), step),
     }
-    if reader.get(("robot",)) is None:
-        reader.remark(("robot",), "missing; the scenario has no robot")
+    if reader.get("robot") is None:
+        reader.remark("missing; the scenario has no robot", "robot")
     else:
         name = free_name("robot", users)
         if name != "robot":
-            reader.remark(("robot",), f"called {name}: there is a user robot")
-        paths[name] = body_keys(reader, ("robot",))
-        data["robots"][name] = convert_robot(reader, paths[name], step)
+            reader.remark(f"called {name}: there is a user robot", "robot")
+        bodies[name] = body_of(reader.at("robot"))
+        data["robots"][name] = convert_robot(bodies[name], step, data["sight"])
     scenario = _validate(data, plan_file, reader.shown_as)
     if plan_file:
-        _move_starts(reader, data, scenario, plan_file, paths)
+        _move_starts(data, scenario, plan_file, bodies)
     return {key: value for key, value in data.items() if value}
 
 
@@ -99,11 +100,7 @@ def _validate(data: dict[str, Any], plan_file: Path | None, shown_as: str) -> Sc
 
 
 def _move_starts(
-    reader: ConfigReader,
-    data: dict[str, Any],
-    scenario: Scenario,
-    plan: Path,
-    paths: Mapping[str, Keys],
+    data: dict[str, Any], scenario: Scenario, plan: Path, bodies: Mapping[str, ConfigReader]
 ) -> None:
     """Move every start at which its body doesn't fit to the nearest point at which it does."""
     home = Home(read_houseexpo(plan, data["floorplan"]["cell"]))
@@ -115,16 +112,15 @@ def _move_starts(
         try:
             space = home.space(entity.radius)
         except InputError as error:
-            raise reader.wrong((*paths[name], "radius"), str(error)) from None
+            raise bodies[name].wrong(str(error), "radius") from None
         x, y = lattice.point_at(start)
         near = space.nearest(x, y, 0)
         if space.part_at(x, y) >= 0 or near is None:
             continue
         free = [round(value, 4) for value in lattice.to_metres(near).tolist()]
-        reader.remark(
-            (*paths[name], "pose_config", "init_pose"),
+        bodies[name].at("pose_config", "init_pose").remark(
             f"{start} is in a wall or nearer to one than its radius, {entity.radius:g} m: it starts"
-            f" at {free}, the nearest free point",
+            f" at {free}, the nearest free point"
         )
         start[:] = free
 
