@@ -20,7 +20,7 @@ from fleet2d.configuration.units import InputPath, PositiveDuration, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.logs.log import AWAY, LogError
-from fleet2d.logs.positions import LogTable, local_times
+from fleet2d.logs.positions import LogTable
 from fleet2d.runtime.program import ExternalProgram
 
 # What ends an Arrow IPC stream: no further message.
@@ -212,9 +212,8 @@ class ReplayedOutput(Algorithm):
             check_known(name, "room", rooms, LogError, f"{self.path}: ")
         room = pc.index_in(texts, value_set=pa.array(rooms)).to_numpy(zero_copy_only=False)
         share, stamps, zone = table.numbers("share"), table.stamps(), self.time_zone
-        local = local_times(
-            self.path, "shares", stamps, np.isfinite(share), [], time_zone=zone, sort=True
-        )
+        usable = np.isfinite(share)
+        local = stamps.local(self.path, "shares", usable, [], time_zone=zone, sort=True)
         is_new = np.append(True, np.diff(local.time_us) > 0)
         self._times, self._day = local.time_us[is_new], local.first_day
         self._shares = np.zeros((len(self._times), len(rooms)))

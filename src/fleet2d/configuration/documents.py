@@ -1,7 +1,7 @@
 """YAML documents as plain data, with the place of each value: the one reader of all YAML.
 
 Scalars are those of YAML 1.2: booleans are true and false only, 12:30 is text. An alias is the same
-node as its anchor, so few nodes can stand for very many values: `TreeWalk` counts these.
+node as its anchor, so few nodes can stand for very many values, which are counted.
 """
 
 import re
@@ -147,53 +147,75 @@ def parse(text: str) -> Any:
         {'a': [1, 2], 'b': {'c': '12:30', 'd': [1, 2]}}
     """
     node = compose(text)
-    return None if node is None else _plain(node, [], TreeWalk())
+    return None if node is None else _Builder(None, "").build(node)
 
 
-def _plain(node: yaml.Node, parents: list[yaml.Node], walk: "TreeWalk") -> Any:
-    walk.enter(node, parents)
-    if isinstance(node, yaml.ScalarNode):
-        return walk.scalar(node)
-    path = [*parents, node]
-    if isinstance(node, yaml.MappingNode):
-        return {key.value: _plain(value, path, walk) for key, value in walk.pairs(node)}
-    return [_plain(item, path, walk) for item in node.value]
+Keys = tuple[str, ...]
+"""The path of a value in a scenario; indices of lists are text, too."""
 
 
-class TreeWalk:
-    """A walk through a tree: reads its values, and counts them, once for each alias."""
+class _Builder:
+    """Turns a tree of YAML nodes into plain data; counts its values, once for each alias."""
 
-    def __init__(self) -> None:
-        """Start with no values."""
+    def __init__(
+        self, folder: Path | None, title: str, places: dict[Keys, str] | None = None
+    ) -> None:
+        """Start with no values.
+
+        Args:
+            folder: The folder of the text, which all texts in it get; None: they get none.
+            title: The name of the text in places.
+            places: Where the place of each value is added; None: nowhere.
+        """
+        self._folder, self._title, self._places = folder, title, places
         self._values, self._most_values, self._most_depth = 0, YAML_VALUES.limit, DEPTH.limit
         self._scalars = Loader("")
         self._pairs: dict[int, dict[str, Pair] | None] = {}
+        self._parents: list[yaml.Node] = []
 
-    def enter(self, node: yaml.Node, parents: list[yaml.Node]) -> None:
-        """Count a node.
-
-        Args:
-            node: The node.
-            parents: The nodes that contain it, outermost first.
+    def build(self, node: yaml.Node, location: Keys = ()) -> Any:
+        """Return the value of a node.
 
         Raises:
-            NodeError: It contains itself.
+            NodeError: It contains itself, has an unknown tag, or can't be read as what its tag
+                says; a key is not text or is there twice, or a merged value is not a mapping.
             InputError: There are too many values or levels.
         """
+        self._enter(node)
+        if self._places is not None:
+            self._places.setdefault(location, f"{self._title}:{node.start_mark.line + 1}")
+        if isinstance(node, yaml.ScalarNode):
+            value = self._scalar(node)
+            if isinstance(value, str) and self._folder is not None:
+                return Text(value, self._folder)
+            return value
+        self._parents.append(node)
+        if isinstance(node, yaml.MappingNode):
+            content: Any = self._mapping(node, location)
+        else:
+            content = [self.build(n, (*location, str(i))) for i, n in enumerate(node.value)]
+        self._parents.pop()
+        return content
+
+    def _mapping(self, node: yaml.MappingNode, location: Keys) -> dict[str, Any]:
+        result = {}
+        for key, value in self._pairs_of(node).values():
+            path = (*location, key.value)
+            result[key.value] = self.build(value, path)
+            if self._places is not None:
+                self._places[path] = f"{self._title}:{key.start_mark.line + 1}"
+        return result
+
+    def _enter(self, node: yaml.Node) -> None:
         self._values += 1
         if self._values > self._most_values:
             YAML_VALUES.check(self._values, "it", prefix="more than ")
-        if len(parents) >= self._most_depth:
-            DEPTH.check(len(parents) + 1, "it", prefix="at least ")
-        if node in parents:  # nodes are equal only to themselves
+        if len(self._parents) >= self._most_depth:
+            DEPTH.check(len(self._parents) + 1, "it", prefix="at least ")
+        if node in self._parents:  # nodes are equal only to themselves
             raise NodeError(node, "a value can't contain itself")
 
-    def scalar(self, node: yaml.ScalarNode) -> Any:
-        """Return the value of a scalar.
-
-        Raises:
-            NodeError: It has an unknown tag, or can't be read as what its tag says.
-        """
+    def _scalar(self, node: yaml.ScalarNode) -> Any:
         if node.tag not in _PLAIN:
             raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
         if node.tag == f"{TAG}str":
@@ -205,15 +227,8 @@ class TreeWalk:
             size = f" of {len(node.value)} characters" if len(node.value) > len(text) else ""
             raise NodeError(node, f"{text!r}{size} is not a valid {kind}") from None
 
-    def pairs(self, node: yaml.MappingNode) -> list[Pair]:
-        """Return the keys and values of a mapping, those that it merges from others ('<<') first.
-
-        Raises:
-            NodeError: A key is not text or is there twice, or a merged value is not a mapping.
-        """
-        return list(self._pairs_of(node).values())
-
     def _pairs_of(self, node: yaml.MappingNode) -> dict[str, Pair]:
+        """Return the keys and values of a mapping, first those that it merges ('<<')."""
         if id(node) in self._pairs:
             pairs = self._pairs[id(node)]
             if pairs is None:
@@ -240,10 +255,6 @@ class TreeWalk:
         pairs.update(keys)
         self._pairs[id(node)] = pairs
         return pairs
-
-
-Keys = tuple[str, ...]
-"""The path of a value in a scenario; indices of lists are text, too."""
 
 
 @dataclass
@@ -307,13 +318,10 @@ def read_document(path: Path, title: str | None = None) -> Document:
             f"{title} is empty; a scenario that changes nothing reads: extends: bundled:base"
         )
     if not isinstance(document.data, dict):
+        value = f"the value {one_line(repr(document.data))}"
+        kind = "a list" if isinstance(document.data, list) else value
         raise ScenarioError(
-            f"{title}: a scenario is a mapping (simulation: …, floorplan: …); this is "
-            + (
-                "a list"
-                if isinstance(document.data, list)
-                else f"the value {one_line(repr(document.data))}"
-            )
+            f"{title}: a scenario is a mapping (simulation: …, floorplan: …); this is {kind}"
         )
     return document
 
@@ -339,11 +347,10 @@ def parse_yaml(text: str, folder: Path, title: str, places: dict[Keys, str] | No
         node = compose(text)
         if node is None:
             return None
-        return _Builder(folder, title, {} if places is None else places).build(node, ())
+        return _Builder(folder, title, places).build(node)
     except yaml.MarkedYAMLError as error:
-        line = (
-            f":{error.problem_mark.line + 1}" if error.problem_mark and places is not None else ""
-        )
+        mark = error.problem_mark if places is not None else None
+        line = f":{mark.line + 1}" if mark else ""
         raise ScenarioError(f"{title}{line}: not valid YAML: {_explain(error)}") from error
     except NodeError as error:
         line = f":{error.node.start_mark.line + 1}" if places is not None else ""
@@ -393,38 +400,3 @@ def _read_text(path: Path, title: str) -> str:
         raise ScenarioError(f"{title} is not a text file (byte {error.start})") from None
     except OSError as error:
         raise ScenarioError(f"can't read {title}: {error.strerror}") from error
-
-
-@dataclass
-class _Builder:
-    """Turns a tree of YAML nodes into plain data."""
-
-    folder: Path
-    title: str
-    places: dict[Keys, str]
-    open_nodes: list[yaml.Node] = field(default_factory=list)
-    walk: TreeWalk = field(default_factory=TreeWalk)
-
-    def build(self, node: yaml.Node, location: Keys) -> Any:
-        """Return the value of a node, and add its place to `places`."""
-        self.places.setdefault(location, f"{self.title}:{node.start_mark.line + 1}")
-        self.walk.enter(node, self.open_nodes)
-        if isinstance(node, yaml.ScalarNode):
-            value = self.walk.scalar(node)
-            return Text(value, self.folder) if isinstance(value, str) else value
-        self.open_nodes.append(node)
-        try:
-            if isinstance(node, yaml.MappingNode):
-                return self._mapping(node, location)
-            return [self.build(item, (*location, str(i))) for i, item in enumerate(node.value)]
-        finally:
-            self.open_nodes.pop()
-
-    def _mapping(self, node: yaml.MappingNode, location: Keys) -> dict[str, Any]:
-        result = {}
-        for key, value in self.walk.pairs(node):
-            path = (*location, key.value)
-            self.places.pop(path, None)
-            result[key.value] = self.build(value, path)
-            self.places[path] = f"{self.title}:{key.start_mark.line + 1}"
-        return result

@@ -27,6 +27,7 @@ COLUMNS = {
 }
 """The names that a column may have, if the user gives none."""
 
+POSE = ("x", "y", "heading")
 ARRAYS = ("vision_msgs/msg/Detection3DArray", "geometry_msgs/msg/PoseArray")
 _FIELDS: dict[str, dict[str, str]] = {
     "vision_msgs/msg/Detection3DArray": {
@@ -97,17 +98,9 @@ def read_detections(
             raise LogError(f"{path} is a table: 'topic' is for bags")
         fixes, label, labels = _from_table(path, columns or {})
     local = fixes.local(path, "detections", time_zone=time_zone, sort=sort)
-    return RobotDetections(
-        path,
-        "detections",
-        local.first_day,
-        local.time_us,
-        np.stack([fixes.x, fixes.y], 1)[local.row],
-        fixes.heading[local.row],
-        tuple(fixes.notes),
-        label=label[local.row],
-        labels=labels,
-    )
+    xy, heading = np.stack([fixes.x, fixes.y], 1)[local.row], fixes.heading[local.row]
+    log = (path, "detections", local.first_day, local.time_us, xy, heading, tuple(fixes.notes))
+    return RobotDetections(*log, label=label[local.row], labels=labels)
 
 
 _LabelledFixes = tuple[RawFixes, I64, tuple[str, ...]]
@@ -140,7 +133,7 @@ def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _Lab
         connection, fields = _topic(reader, path, topic, columns)
         FIXES.check(connection.msgcount, path, LogError)
         times: list[int] = []
-        rows: list[tuple[float, float, float]] = []
+        rows: list[list[float]] = []
         users: list[str | None] = []
         number = 0
         for number, (_, time, data) in enumerate(reader.messages([connection]), 1):
@@ -148,27 +141,17 @@ def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _Lab
             stamp = stamp_of(message, time) if hasattr(message, "header") else time
             for one in _each(message, fields, path, number):
                 times.append(stamp)
-                rows.append(
-                    (
-                        _number(one, fields["x"], path, number),
-                        _number(one, fields["y"], path, number),
-                        _number(one, fields["heading"], path, number)
-                        if "heading" in fields
-                        else np.nan,
-                    )
-                )
+                rows.append([_number(one, fields.get(k), path, number) for k in POSE])
                 user = _value(one, fields["user"]) if "user" in fields else None
                 users.append(None if user is None else str(user))
             FIXES.check(len(times), path, LogError)
+    topic = connection.topic
     if not times:
-        raise LogError(
-            f"{path}: none of the {number} messages of {connection.topic} has a detection"
-        )
+        raise LogError(f"{path}: none of the {number} messages of {topic} has a detection")
     stamps = Stamps.of_messages(np.array(times, np.int64))
+    note = f"{topic}: {len(times)} detections in {number} messages"
     x, y, heading = np.array(rows, np.float64).T
-    label, labels = _codes(pa.array(users, pa.string()))
-    note = f"{connection.topic}: {len(times)} detections in {number} messages"
-    return RawFixes(stamps, x, y, heading, [note]), label, labels
+    return RawFixes(stamps, x, y, heading, [note]), *_codes(pa.array(users, pa.string()))
 
 
 def _topic(
@@ -228,8 +211,8 @@ def _value(message: Any, field: str) -> Any:
     return message
 
 
-def _number(message: Any, field: str, path: Path, number: int) -> float:
-    value = _value(message, field)
+def _number(message: Any, field: str | None, path: Path, number: int) -> float:
+    value = None if field is None else _value(message, field)
     try:
         return np.nan if value is None else float(value)
     except (TypeError, ValueError):

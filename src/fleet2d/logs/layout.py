@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import date, datetime
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from fleet2d.bounds import one_line
 from fleet2d.logs.log import (
@@ -40,8 +40,9 @@ ADDED = 1000  # objects from this number on were added later, in any room
 MINUTE_US = 60_000_000
 MAX_MINUTES = 1e6  # later times are cut to the end of their activity in any case
 _TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
-UCI_ADL_LINE = re.compile(rf"{_TIME}\s+{_TIME}\s+(.*)")
-HEAD = re.compile(r"(Start time\s+End time.*|[-\s]+)")
+UCI_ADL = rf"{_TIME}\s+{_TIME}\s+(.*)"  # an interval
+HEAD = r"Start time\s+End time.*|[-\s]+"  # a line of the head of a table
+UCI_ADL_FILES = {"sensors": "_Sensors", "activities": "_ADLs"}
 LEAVING = frozenset({"leaving", "leave_home", "away", "out"})
 FIRST_LINES = 20
 
@@ -111,11 +112,6 @@ class _ScriptedActivity:
     steps: list[tuple[int, list[tuple[str, int]], int]] = field(default_factory=list)
 
 
-def _shows_homer(line: str) -> bool:
-    """Return whether a line is of an agenda."""
-    return AGENDA.fullmatch(line) is not None
-
-
 def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
     """Read the days of a household: one file, or a folder whose files follow each other by name.
 
@@ -141,18 +137,16 @@ def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
     if not files:
         raise LogError(f"{path} holds no .txt file")
     days = [_day(file) for file in files]
-    rooms = sorted(
-        {(n, name) for day in days for b in day for _, things, _ in b.steps for name, n in things
-         if ROOM.fullmatch(name) and n < ADDED}
-    )  # fmt: skip
+    steps = [step for day in days for block in day for step in block.steps]
+    things = {(n, name) for _, named, _ in steps for name, n in named if n < ADDED}
+    rooms = sorted((n, name) for n, name in things if ROOM.fullmatch(name))
     readings: list[Reading] = []
     notes: list[str] = []
     for number, (file, blocks) in enumerate(zip(files, days, strict=True)):
         of_day = [reading for block in blocks for reading in _readings(block, rooms)]
         of_day, order_notes = in_order(of_day, file, sort=sort)
         notes += [f"{file.name}: {note}" for note in order_notes]
-        without_room = {block.activity for block in blocks} - {r.activity for r in of_day}
-        if without_room:
+        if without_room := {block.activity for block in blocks} - {r.activity for r in of_day}:
             names = ", ".join(sorted(without_room))
             notes.append(f"{file.name}: in no room, or in no time: {names}")
         readings += [
@@ -235,13 +229,16 @@ class _Row(NamedTuple):
 
     begin: datetime
     end: datetime
-    words: str
+    words: list[str]
     line: int
 
-
-def _shows_uci_adl(line: str) -> bool:
-    """Return whether a line is an interval, or of the head of a table."""
-    return (UCI_ADL_LINE.fullmatch(line) or HEAD.fullmatch(line)) is not None
+    def reading(self, first_day: date) -> Reading:
+        """Return the reading of an activity or a sensor."""
+        label = self.words[-1]
+        activity = label if len(self.words) == 1 else ""
+        room = AWAY if activity.lower() in LEAVING else label
+        begin_us, end_us = since(first_day, self.begin), since(first_day, self.end)
+        return Reading(begin_us, end_us, room, activity, self.line)
 
 
 def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
@@ -264,7 +261,7 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
     notes: list[str] = []
     parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
     for kind, (file, rows) in files.items():
-        readings = [_reading(row, first_day) for row in rows]
+        readings = [row.reading(first_day) for row in rows]
         parts[kind], order_notes = in_order(readings, file, sort=sort)
         notes += [f"{file.name}: {note}" for note in order_notes]
     readings = parts["activities"]
@@ -276,48 +273,33 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
 def _pair(path: Path) -> dict[str, Path]:
     """Return the files of a home: of sensors, of activities, or both."""
     if path.is_dir():
-        by_kind = {
-            "sensors": sorted(path.glob("*_Sensors.txt")),
-            "activities": sorted(path.glob("*_ADLs.txt")),
-        }
+        by_kind = {kind: sorted(path.glob(f"*{end}.txt")) for kind, end in UCI_ADL_FILES.items()}
         for kind, files in by_kind.items():
             if len(files) > 1:
                 raise LogError(f"{path} holds {len(files)} files of {kind}: name the one to read")
         return {kind: files[0] for kind, files in by_kind.items() if files}
-    is_sensors = len(_rows(path)[0].words.split()) >= 3
-    parts = ("_Sensors", "_ADLs") if is_sensors else ("_ADLs", "_Sensors")
-    twin = path.with_name(path.name.replace(*parts))
-    pair = {"sensors" if is_sensors else "activities": path}
-    if twin != path and twin.is_file():
-        pair["activities" if is_sensors else "sensors"] = twin
-    return pair
+    kinds = list(UCI_ADL_FILES)
+    kind, other = kinds if len(_rows(path)[0].words) >= 3 else reversed(kinds)
+    twin = path.with_name(path.name.replace(UCI_ADL_FILES[kind], UCI_ADL_FILES[other]))
+    return {kind: path, **({other: twin} if twin != path and twin.is_file() else {})}
 
 
 def _rows(path: Path) -> list[_Row]:
     rows = []
     for number, text in log_lines(path):
-        if HEAD.fullmatch(text):
+        if re.fullmatch(HEAD, text):
             continue
-        match = UCI_ADL_LINE.fullmatch(text)
+        match = re.fullmatch(UCI_ADL, text)
         if match is None or not match[3].strip():
             raise LogError(
                 f"{path}, line {number}: expected a start time, an end time, and an activity or a"
                 f" sensor with its type and place, got {one_line(text)!r}"
             )
         begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
-        rows.append(_Row(begin, end, match[3].strip(), number))
+        rows.append(_Row(begin, end, match[3].split(), number))
     if not rows:
         raise LogError(f"{path} holds no reading: is it the right file?")
     return rows
-
-
-def _reading(row: _Row, first_day: date) -> Reading:
-    begin, end, text, number = row
-    words = text.split()
-    label = words[-1]
-    activity = label if len(words) == 1 else ""
-    room = AWAY if activity.lower() in LEAVING else label
-    return Reading(since(first_day, begin), since(first_day, end), room, activity, number)
 
 
 def _with_activities(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
@@ -336,27 +318,22 @@ class LogLayout(NamedTuple):
     """A layout.
 
     Attributes:
-        matches: Returns whether a stripped line shows this layout, and no other.
+        matches: Returns something true if a stripped line shows this layout, and no other.
         read: Reads a file, or a folder of files of one home; `sort` sorts its lines by time.
         reads_folders: Whether it reads folders, too.
     """
 
-    matches: Callable[[str], bool]
-    read: "LogReader"
+    matches: Callable[[str], object]
+    read: Callable[..., ActivityLog]
     reads_folders: bool
-
-
-class LogReader(Protocol):
-    """What reads the files of a layout."""
-
-    def __call__(self, path: Path, *, sort: bool = False) -> ActivityLog:
-        """Return the log."""
 
 
 LAYOUTS = {
     "casas": LogLayout(_shows_casas, read_casas, reads_folders=False),
-    "homer": LogLayout(_shows_homer, read_homer, reads_folders=True),
-    "uci_adl": LogLayout(_shows_uci_adl, read_uci_adl, reads_folders=True),
+    "homer": LogLayout(AGENDA.fullmatch, read_homer, reads_folders=True),
+    "uci_adl": LogLayout(
+        re.compile(f"{UCI_ADL}|{HEAD}").fullmatch, read_uci_adl, reads_folders=True
+    ),
 }
 """The layouts of rooms and activities, by name."""
 

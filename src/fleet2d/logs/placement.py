@@ -125,9 +125,8 @@ class LogFrame(Settings):
 
 
 def _mean(points: list[Pair]) -> Pair:
-    return sum_in_order(x for x, _ in points) / len(points), sum_in_order(
-        y for _, y in points
-    ) / len(points)
+    x, y = (sum_in_order(axis) / len(points) for axis in zip(*points, strict=True))
+    return x, y
 
 
 def _direction(degrees: float) -> Pair:
@@ -189,10 +188,9 @@ def _check_overrides(
                 f"rooms: the log has no room {label!r}{suggest(label, sorted(labels), 'It has')}"
             )
         if choice is not None and _first_fit(choice, rooms) is None:
-            names = _names(rooms)
             raise LogError(
                 f"rooms: {label!r} is mapped to {' or '.join(choice)}, but there is no such room"
-                f"{suggest(choice[0], names)}, away, door"
+                f"{suggest(choice[0], _names(rooms))}, away, door"
             )
 
 
@@ -324,15 +322,11 @@ def visits_of(
     At each step the reading that began last holds; if it ends before an earlier one, that one holds
     again. A reading of an instant holds for the step that the instant lies in.
     """
-    intervals, unmapped = [], 0
-    for reading in log.readings:
-        choice = rooms[reading.room]
-        if choice is None:
-            unmapped += 1
-        else:
-            intervals.append(_interval(reading, choice[0], rule))
+    choices = [(reading, rooms[reading.room]) for reading in log.readings]
+    intervals = [_interval(reading, choice[0], rule) for reading, choice in choices if choice]
     pieces, overruled = _sweep(intervals)
-    return LoggedVisits(_without_gaps(_merge_pieces(pieces, rule), rule), unmapped, overruled)
+    visits = _without_gaps(_merge_pieces(pieces, rule), rule)
+    return LoggedVisits(visits, len(choices) - len(intervals), overruled)
 
 
 def _interval(reading: Reading, place: str, rule: VisitRule) -> RoomInterval:

@@ -96,9 +96,27 @@ class RawFixes(NamedTuple):
     notes: list[str]
 
     def local(self, path: Path, noun: str, *, time_zone: str | None, sort: bool) -> "LocalTimes":
-        """Return those that have a place in the local time of the home; see `local_times`."""
+        """Return the local times of those with a position; see `Stamps.local`."""
         usable, notes = np.isfinite(self.x) & np.isfinite(self.y), self.notes
-        return local_times(path, noun, self.stamps, usable, notes, time_zone=time_zone, sort=sort)
+        return self.stamps.local(path, noun, usable, notes, time_zone=time_zone, sort=sort)
+
+
+def _in_order(
+    time_us: I64, row: I64, path: Path, line: I64, *, sort: bool
+) -> tuple[I64, I64, list[str]]:
+    """Return times and rows in order of time, and a note if that differs from the file's."""
+    back = np.flatnonzero(np.diff(time_us) < 0)
+    if not len(back):
+        return time_us, row, []
+    if not sort:
+        raise LogError(
+            f"{path}, line {line[row[back[0] + 1]]}: the time runs backwards there ({len(back)}"
+            f" such lines, by up to {float(-np.diff(time_us).min()) / 1e6:g} s); check the clock of"
+            " the log, or put its lines in order by 'sort: true'"
+        )
+    order = np.argsort(time_us, kind="stable")
+    note = f"{len(back)} lines ran backwards in time and were sorted in"
+    return time_us[order], row[order], [note]
 
 
 def localize(
@@ -150,6 +168,60 @@ class Stamps(NamedTuple):
         line = np.arange(1, len(time_ns) + 1)
         return cls((time_ns - begin_ns) // 1000, line, has_date, has_date)
 
+    def local(
+        self,
+        path: Path,
+        noun: str,
+        usable: Bool,
+        notes: list[str],
+        *,
+        time_zone: str | None,
+        sort: bool,
+    ) -> "LocalTimes":
+        """Return the usable rows of the file in order of their local times.
+
+        Args:
+            path: The file.
+            noun: What its rows are called in notes, in the plural.
+            usable: Whether each row has a position, bool (n,).
+            notes: Gets a line for each kind of anomaly.
+            time_zone: The time zone of the home.
+            sort: Put rows in order of time instead of refusing times that run backwards.
+
+        Raises:
+            LogError: There is no row, times run backwards or are out of range, or a time zone is
+                missing or unknown.
+        """
+        time_us, line, has_date, has_zone = self
+        if not len(time_us):
+            raise LogError(f"{path} holds no position")
+        _check_times(time_us, path, line, has_date=has_date)
+        repeated = np.zeros(len(time_us), bool)
+        if has_zone:
+            if time_zone is None:
+                raise LogError(
+                    f"{path}: its times are of a time zone; say which local time the home has by"
+                    " time_zone, like 'Europe/Berlin' or 'UTC'"
+                )
+            time_us, repeated = _in_zone(time_us, time_zone)
+        if not usable.all():
+            notes.append(f"{np.count_nonzero(~usable)} {noun} without a position were left out")
+        if repeated.any():
+            notes.append(
+                f"{np.count_nonzero(repeated)} {noun} of the hour that the end of summer time"
+                " repeats were left out: a simulated day has 24 hours"
+            )
+        row = np.flatnonzero(usable & ~repeated)
+        if not len(row):
+            raise LogError(f"{path} has no row with a position")
+        time_us, row, order_notes = _in_order(time_us[row], row, path, line, sort=sort)
+        notes.extend([*order_notes, *_jumps(time_us, line[row])])
+        if not has_date:
+            return LocalTimes(time_us, row, None)
+        first_day = int(time_us[0]) // DAY_US
+        since_us = time_us - first_day * DAY_US
+        return LocalTimes(since_us, row, date(1970, 1, 1) + timedelta(days=first_day))
+
 
 class LocalTimes(NamedTuple):
     """The usable rows of a file in the local time of the home, in order.
@@ -163,72 +235,6 @@ class LocalTimes(NamedTuple):
     time_us: I64
     row: I64
     first_day: date | None
-
-
-def local_times(
-    path: Path,
-    noun: str,
-    stamps: Stamps,
-    usable: Bool,
-    notes: list[str],
-    *,
-    time_zone: str | None,
-    sort: bool,
-) -> LocalTimes:
-    """Return the usable rows of a file in order of their local times.
-
-    Args:
-        path: The file.
-        noun: What its rows are called in notes, in the plural.
-        stamps: Their times.
-        usable: Whether each row has a position, bool (n,).
-        notes: Gets a line for each kind of anomaly.
-        time_zone: The time zone of the home.
-        sort: Put rows in order of time instead of refusing times that run backwards.
-
-    Raises:
-        LogError: There is no row, times run backwards or are out of range, or a time zone is
-            missing or unknown.
-    """
-    time_us, line, has_date, has_zone = stamps
-    if not len(time_us):
-        raise LogError(f"{path} holds no position")
-    _check_times(time_us, path, line, has_date=has_date)
-    repeated = np.zeros(len(time_us), bool)
-    if has_zone:
-        if time_zone is None:
-            raise LogError(
-                f"{path}: its times are of a time zone; say which local time the home has by"
-                " time_zone, like 'Europe/Berlin' or 'UTC'"
-            )
-        time_us, repeated = _in_zone(time_us, time_zone)
-    if not usable.all():
-        notes.append(f"{np.count_nonzero(~usable)} {noun} without a position were left out")
-    if repeated.any():
-        notes.append(
-            f"{np.count_nonzero(repeated)} {noun} of the hour that the end of summer time repeats"
-            " were left out: a simulated day has 24 hours"
-        )
-    row = np.flatnonzero(usable & ~repeated)
-    if not len(row):
-        raise LogError(f"{path} has no row with a position")
-    time_us = time_us[row]
-    back = np.flatnonzero(np.diff(time_us) < 0)
-    if len(back) and not sort:
-        raise LogError(
-            f"{path}, line {line[row[back[0] + 1]]}: the time runs backwards there ({len(back)}"
-            f" such lines, by up to {float(-np.diff(time_us).min()) / 1e6:g} s); check the clock of"
-            " the log, or put its lines in order by 'sort: true'"
-        )
-    if len(back):
-        order = np.argsort(time_us, kind="stable")
-        time_us, row = time_us[order], row[order]
-        notes.append(f"{len(back)} lines ran backwards in time and were sorted in")
-    notes += _jumps(time_us, line[row])
-    first_day = date(1970, 1, 1) + timedelta(days=int(time_us[0] // DAY_US)) if has_date else None
-    if first_day:
-        time_us = time_us - time_us[0] // DAY_US * DAY_US
-    return LocalTimes(time_us, row, first_day)
 
 
 def read_table(path: Path) -> pa.Table:
