@@ -21,7 +21,7 @@ from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.robots.policy import COLUMNS, Policy
 from fleet2d.errors import InputError
-from fleet2d.gym.task import LearningTask, LifeScenario, Split, Variants, checked, load_task
+from fleet2d.gym.task import LearningTask, Split, Variants, checked, load_task
 from fleet2d.kernels import F32, F64, I64, Bool
 from fleet2d.runs.run import Run
 
@@ -156,7 +156,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         if not callable(self.reward):
             self.reward = checked(Document({"reward": self.reward}, {})).reward
         self.split, self.masked, self.truth, self.render_mode = split, masked, truth, render_mode
-        variant = self._first_variant()
+        variant = self.variants.first(self.split)
         self.robot = robot or variant.robots[0]
         self.robots: tuple[str, ...] = (self.robot,)  # those that have to choose in its lives
         if self.robot not in variant.robots or (robot is None and len(variant.robots) > 1):
@@ -245,15 +245,6 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
             return float(self.reward(self))
         before, self._terms = self._terms, self.present.terms(self.robot, self.reward)
         return sum(w * (self._terms[name] - before[name]) for name, w in self.reward.items())
-
-    def _first_variant(self) -> LifeScenario:
-        return self.variants.load(self.variants.task.draw(np.random.default_rng(0), self.split))
-
-    @classmethod
-    def robots_of(cls, task: Any, *overrides: str) -> tuple[str, ...]:
-        """Return the robots with policies in the scenarios of a task."""
-        variants = Variants(load_task(task), overrides)
-        return variants.load(variants.task.draw(np.random.default_rng(0), "train")).robots
 
     def branch(self) -> Self:
         """Return an independent copy of the environment and its life, for a search over futures."""
@@ -370,13 +361,11 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[F32, dict[str, Any]]:
         """Begin new lives; environment i has the seed `seed` + i."""
-        seeds = (
-            [None if seed is None else seed + i for i in range(self.num_envs)]
-            if seed is None or isinstance(seed, int)
-            else seed
-        )
+        if isinstance(seed, int):
+            seed = [seed + number for number in range(self.num_envs)]
         for number, env in enumerate(self.envs):
-            self._keep(number, *env.reset(seed=seeds[number], options=options))
+            own_seed = None if seed is None else seed[number]
+            self._keep(number, *env.reset(seed=own_seed, options=options))
         self._over[:] = False
         return self._observations.copy(), self._info()
 
@@ -388,9 +377,8 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore
             if self._over[number]:
                 self._keep(number, *env.reset())
                 continue
-            observation, rewards[number], terminated[number], truncated[number], info = env.step(
-                actions[number]
-            )
+            observation, *outcome, info = env.step(actions[number])
+            rewards[number], terminated[number], truncated[number] = outcome
             self._keep(number, observation, info)
         self._over = terminated | truncated
         return self._observations.copy(), rewards, terminated, truncated, self._info()
@@ -429,7 +417,7 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
     def __init__(
         self, task: str | Path | LearningTask = "hangout", *overrides: str, **settings: Any
     ) -> None:
-        robots = RobotEnv.robots_of(task, *overrides)
+        robots = Variants(load_task(task), overrides).first("train").robots
         self._envs = {
             robot: RobotEnv(task, *overrides, robot=robot, **settings) for robot in robots
         }
@@ -440,15 +428,11 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of a robot's observations."""
-        space = self._envs[agent].observation_space
-        assert isinstance(space, Box)
-        return space
+        return cast("Box", self._envs[agent].observation_space)
 
     def action_space(self, agent: str) -> Discrete:
         """Return the space of a robot's actions."""
-        space = self._envs[agent].action_space
-        assert isinstance(space, Discrete)
-        return space
+        return cast("Discrete", self._envs[agent].action_space)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

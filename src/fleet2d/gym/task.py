@@ -52,20 +52,14 @@ class Values(Settings):
     @field_validator("train", "test", mode="before")
     @classmethod
     def _spell_out(cls, value: Any) -> Any:
-        if isinstance(value, Mapping):
-            ends = value.get("range")
-            if set(value) != {"range"} or not (
-                isinstance(ends, list | tuple)
-                and len(ends) == 2
-                and all(isinstance(end, int) for end in ends)
-                and ends[0] < ends[1]
-            ):
-                raise problem(
-                    "expected a list of values, or {range: [first, end]} with whole numbers, first"
-                    " < end"
-                )
-            return tuple(range(*ends))
-        return value
+        if not isinstance(value, Mapping):
+            return value
+        match value:
+            case {"range": [int(first), int(end)], **others} if first < end and not others:
+                return tuple(range(first, end))
+        raise problem(
+            "expected a list of values, or {range: [first, end]} with whole numbers, first < end"
+        )
 
 
 class LearningTask(Settings):
@@ -129,6 +123,10 @@ class Variants:
         """
         return self._load(tuple(f"{key}={json.dumps(value)}" for key, value in values.items()))
 
+    def first(self, split: Split) -> LifeScenario:
+        """Return one of the scenarios, always the same; see `load`."""
+        return self.load(self.task.draw(np.random.default_rng(0), split))
+
     def _read(self, changes: tuple[str, ...]) -> LifeScenario:
         scenario = load_scenario(self.task.scenario, *self.overrides, *changes)
         robots = tuple(
@@ -167,9 +165,7 @@ def load_task(source: str | Path | Mapping[str, Any] | LearningTask) -> Learning
             raise InputError(f"there is no task {str(source)!r}{suggest(str(source), names)}")
         document = read_document(path)
     if "scenario" not in document.data:
-        return LearningTask(
-            scenario=str(source) if not isinstance(source, Mapping) else dict(source)
-        )
+        return LearningTask(scenario=document.data if isinstance(source, Mapping) else str(source))
     return checked(document)
 
 

@@ -13,7 +13,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
@@ -82,16 +82,7 @@ class LiveStep:
         stamp = {"step": self.step, "time": self.time.isoformat()}
         return [
             {"type": "poses", **stamp, "bodies": self.bodies},
-            *(
-                {
-                    "type": "event",
-                    "step": e.step,
-                    "entity": e.entity,
-                    "event": str(e.event),
-                    "detail": e.detail,
-                }
-                for e in self.events
-            ),
+            *({"type": "event", **e._asdict(), "event": str(e.event)} for e in self.events),
             *({"type": "row", "table": table, "row": row} for table, row in self.rows),
         ]
 
@@ -116,8 +107,11 @@ class Post(Protocol):
         """
 
 
-class Peer(Protocol):
-    """Another program, or a function: it may send messages to a run, and hear of it."""
+class Peer:
+    """Another program, or a function: it may send messages to a run, and hear of it.
+
+    Methods that a peer leaves out do nothing.
+    """
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Connect, before the first step."""
@@ -134,14 +128,6 @@ class Peer(Protocol):
 
 Sender = tuple[int, int]
 """The number of a peer, and of its client."""
-
-
-@dataclass
-class _Sender:
-    """What is known of the source of poses of a body."""
-
-    heard: float  # [s], of the clock of the machine
-    stands: bool = False
 
 
 def sources_of(scenario: Scenario) -> dict[tuple[str, str], str]:
@@ -232,7 +218,8 @@ class Bridge:
         self._inbox: queue.SimpleQueue[tuple[float, Sender, Any]] = queue.SimpleQueue()
         self._events: list[Event] = []
         self._rows: list[tuple[str, Mapping[str, Any]]] = []
-        self._senders: dict[str, _Sender] = {}
+        self._heard: dict[str, float] = {}  # when the last pose of each body arrived [s]
+        self._standing: set[str] = set()  # the bodies for which none has arrived for a while
         self._numbers: dict[Sender, int] = {}
         self._told: Counter[str] = Counter()
 
@@ -248,16 +235,13 @@ class Bridge:
             simulation.listen_rows(self._hear)
         for number, peer in enumerate(self._peers):
             peer.open(simulation, self._post_of(number))
-        status = "complete"
         try:
-            with _prompt_threads():
+            with suppress(KeyboardInterrupt), _prompt_threads():
                 self._simulate()
-        except KeyboardInterrupt:
-            status = "interrupted"
         finally:
             for note in self.notes():
                 simulation.note(note)
-            run = simulation.finish("complete" if status == "complete" else "interrupted")
+            run = simulation.finish()
             for peer in self._peers:
                 peer.close(run)
         return run
@@ -374,10 +358,10 @@ class Bridge:
                 self._goals[message.entity] = sender, message.to
             if isinstance(message, PoseMessage):
                 self._goals.pop(message.entity, None)
-                before = self._senders.setdefault(message.entity, _Sender(0.0))
-                if before.stands:
+                self._heard[message.entity] = time.monotonic()
+                if message.entity in self._standing:
+                    self._standing.remove(message.entity)
                     self._say("back", f"{message.entity}: poses arrive again")
-                self._senders[message.entity] = _Sender(time.monotonic())
 
     def _check(self, message: LiveMessage, sender: Sender) -> None:
         """Refuse messages from others than the source, and poses of bodies that decide."""
@@ -438,9 +422,9 @@ class Bridge:
     def _stop_the_silent(self) -> None:
         """Let bodies stand for which nothing has arrived for a while."""
         now = time.monotonic()
-        for name, sender in self._senders.items():
-            if not sender.stands and now - sender.heard > self.silence_s:
-                sender.stands = True
+        for name, heard in self._heard.items():
+            if name not in self._standing and now - heard > self.silence_s:
+                self._standing.add(name)
                 self.counts["silences"] += 1
                 self._say("silent", f"{name}: no pose arrived for {self.silence_s:g} s: it stands")
                 self.simulation.intervene({"hold": name})
@@ -471,11 +455,11 @@ class Bridge:
     def _send(self) -> None:
         simulation = self.simulation
         bodies = {n: s for n, s in simulation.state.items() if "heading" in s}
-        events, rows = self._events[:], self._rows[:]
+        step = simulation.step - 1
+        news = self._events[:], self._rows[:]
+        frame = LiveStep(step, simulation.clock.time(step), bodies, *news)
         self._events.clear()
         self._rows.clear()
-        step = simulation.step - 1
-        frame = LiveStep(step, simulation.clock.time(step), bodies, events, rows)
         for peer in self._peers:
             peer.send(frame)
 

@@ -1,6 +1,7 @@
 """Commands for other programs: live, mcp."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -63,25 +64,18 @@ def live(  # noqa: PLR0913 - options of the command line
                 " the source of something live"
             )
         simulation = Simulation(checked, out=out)
+        tell = partial(typer.echo, err=True)
         for address, peer in opened.items():
             port = getattr(peer, "port", None)
-            typer.echo(
-                f"{address}: {'connected' if port is None else f'listens at {port}'}", err=True
-            )
+            tell(f"{address}: {'connected' if port is None else f'listens at {port}'}")
         bridge = Bridge(
-            simulation,
-            opened,
-            speed,
-            silence_s=silence,
-            keeps_goals=keep_goals,
-            tell=lambda text: typer.echo(text, err=True),
+            simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell
         )
         run = bridge.run()
     for note in bridge.notes():
-        typer.echo(note, err=True)
-    typer.echo(
-        f"{run.status}, digest {(run.digest or '')[:8]}" + (f", stored in {out}" if out else "")
-    )
+        tell(note)
+    place = f", stored in {out}" if out else ""
+    typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
     if run.status != "complete":
         raise typer.Exit(130)
 

@@ -46,7 +46,7 @@ DEVICE_CLASSES = {
 WAIT_S = 5.0
 
 
-class FunctionPeer:
+class FunctionPeer(Peer):
     """A Python function that is called with each frame, or an iterator of messages."""
 
     def __init__(
@@ -70,12 +70,6 @@ class FunctionPeer:
     def send(self, frame: LiveStep) -> None:
         """Call the function."""
         self._function(frame)
-
-    def tell(self, text: str) -> None:
-        """Do nothing: the bridge tells its caller."""
-
-    def close(self, run: Run) -> None:
-        """Do nothing: a thread ends with its iterator."""
 
 
 def to_function(function: Callable[[LiveStep], object]) -> FunctionPeer:
@@ -106,7 +100,7 @@ def hello(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-class UdpPeer:
+class UdpPeer(Peer):
     """Messages in datagrams, one JSON object each; it only receives."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -134,19 +128,13 @@ class UdpPeer:
             with contextlib.suppress(TimeoutError, OSError):
                 post(self._socket.recv(MAX_BYTES))
 
-    def send(self, frame: LiveStep) -> None:
-        """Do nothing: it only receives."""
-
-    def tell(self, text: str) -> None:
-        """Do nothing: it only receives."""
-
     def close(self, run: Run) -> None:
         """Stop listening."""
         self._over = True
         self._socket.close()
 
 
-class WebSocketPeer:
+class WebSocketPeer(Peer):
     """A WebSocket server: clients get all that happens as JSON, and may send messages."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -288,7 +276,7 @@ def open_peers(scenario: Scenario, *addresses: str) -> dict[str, Peer]:
     return {address: open_peer(address) for address in dict.fromkeys([*addresses, *sources])}
 
 
-class MqttPeer:
+class MqttPeer(Peer):
     """A broker of MQTT.
 
     Attributes:

@@ -14,16 +14,18 @@ import numpy as np
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
 from fleet2d.kernels import F64, Mesh, region_outline, visible_region
-from fleet2d.live.bridge import LiveStep, Post
+from fleet2d.live.bridge import LiveStep, Peer, Post
 from fleet2d.runs.run import Run
 
 WAIT_S = 5
 BEAMS = 360
 """Number of beams of a laser scan, over a whole turn."""
 SCAN_RANGE_M = 12.0
+EXACT = [0.0] * 36
+"""The covariance of what is known exactly."""
 
 
-class RosbridgePeer:
+class RosbridgePeer(Peer):
     """A rosbridge server, such as that of the ROS package `rosbridge_server`."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -83,19 +85,16 @@ class RosbridgePeer:
         self._topics[topic].subscribe(receive)
 
     def _map(self, simulation: Simulation) -> dict[str, Any]:
-        plan = simulation.home.plan
-        x, y = plan.lattice.origin
-        return {
-            "header": self._header(0, "map"),
-            "info": {
-                "map_load_time": self._stamp(0),
-                "resolution": plan.lattice.cell,
-                "width": plan.lattice.columns,
-                "height": plan.lattice.rows,
-                "origin": _pose(x, y, 0.0),
-            },
-            "data": np.where(plan.free, 0, 100).ravel().tolist(),
+        plan, lattice = simulation.home.plan, simulation.home.plan.lattice
+        info = {
+            "map_load_time": self._stamp(0),
+            "resolution": lattice.cell,
+            "width": lattice.columns,
+            "height": lattice.rows,
+            "origin": _pose(*lattice.origin, 0.0),
         }
+        cells = np.where(plan.free, 0, 100).ravel().tolist()
+        return {"header": self._header(0, "map"), "info": info, "data": cells}
 
     def send(self, frame: LiveStep) -> None:
         """Publish a frame."""
@@ -133,17 +132,13 @@ class RosbridgePeer:
         self._last[name] = x, y, heading
         speed = math.hypot(x - before[0], y - before[1]) / self._step_s
         turn = (heading - before[2] + math.pi) % (2 * math.pi) - math.pi
+        linear = {"x": speed, "y": 0.0, "z": 0.0}
+        angular = {"x": 0.0, "y": 0.0, "z": turn / self._step_s}
         return {
             "header": self._header(step, f"{name}/odom"),
             "child_frame_id": f"{name}/base_link",
-            "pose": {"pose": _pose(x, y, heading), "covariance": [0.0] * 36},
-            "twist": {
-                "twist": {
-                    "linear": {"x": speed, "y": 0.0, "z": 0.0},
-                    "angular": {"x": 0.0, "y": 0.0, "z": turn / self._step_s},
-                },
-                "covariance": [0.0] * 36,
-            },
+            "pose": {"pose": _pose(x, y, heading), "covariance": EXACT},
+            "twist": {"twist": {"linear": linear, "angular": angular}, "covariance": EXACT},
         }
 
     def _scan(self, step: int, name: str, body: Any) -> dict[str, Any]:
@@ -165,29 +160,14 @@ class RosbridgePeer:
 
     def _detections(self, step: int, rows: list[Any]) -> dict[str, Any]:
         header = self._header(step, "map")
-        return {
-            "header": header,
-            "detections": [
-                {
-                    "header": header,
-                    "id": row["user"] or "unknown",
-                    "results": [
-                        {
-                            "hypothesis": {"class_id": row["user"] or "unknown", "score": 1.0},
-                            "pose": {
-                                "pose": _pose(row["x"], row["y"], 0.0),
-                                "covariance": [0.0] * 36,
-                            },
-                        }
-                    ],
-                    "bbox": {
-                        "center": _pose(row["x"], row["y"], 0.0),
-                        "size": {"x": 0.4, "y": 0.4, "z": 1.7},
-                    },
-                }
-                for row in rows
-            ],
-        }
+        detections = []
+        for row in rows:
+            user, pose = row["user"] or "unknown", _pose(row["x"], row["y"], 0.0)
+            hypothesis = {"class_id": user, "score": 1.0}
+            result = {"hypothesis": hypothesis, "pose": {"pose": pose, "covariance": EXACT}}
+            box = {"center": pose, "size": {"x": 0.4, "y": 0.4, "z": 1.7}}
+            detections.append({"header": header, "id": user, "results": [result], "bbox": box})
+        return {"header": header, "detections": detections}
 
     def _stamp(self, step: int) -> dict[str, int]:
         ns = int(self._start.timestamp()) * 10**9 + round(step * self._step_s * 1e9)
@@ -195,9 +175,6 @@ class RosbridgePeer:
 
     def _header(self, step: int, frame: str) -> dict[str, Any]:
         return {"stamp": self._stamp(step), "frame_id": frame}
-
-    def tell(self, text: str) -> None:
-        """Do nothing: there is no topic for notes."""
 
     def close(self, run: Run) -> None:
         """Disconnect."""
@@ -222,8 +199,8 @@ def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
         return np.zeros(BEAMS)
     ends = region_outline(walls, x, y, *pieces)[0].reshape(-1, 2, 2) - np.array([x, y])
     right, left = ends[:, 0], ends[:, 1]
-    angles = heading - math.pi + 2 * math.pi / BEAMS * np.arange(BEAMS)
     turn = 2 * math.pi
+    angles = heading - math.pi + turn / BEAMS * np.arange(BEAMS)
     begins = np.arctan2(right[:, 1], right[:, 0]) % turn
     order = np.argsort(begins, kind="stable")
     piece = order[np.searchsorted(begins[order], angles % turn, side="right") - 1]
@@ -237,12 +214,6 @@ def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
 
 
 def _pose(x: float, y: float, heading: float) -> dict[str, Any]:
-    return {
-        "position": {"x": x, "y": y, "z": 0.0},
-        "orientation": {
-            "x": 0.0,
-            "y": 0.0,
-            "z": math.sin(heading / 2),
-            "w": math.cos(heading / 2),
-        },
-    }
+    z, w = math.sin(heading / 2), math.cos(heading / 2)
+    orientation = {"x": 0.0, "y": 0.0, "z": z, "w": w}
+    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": orientation}

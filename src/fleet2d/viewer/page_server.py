@@ -94,7 +94,7 @@ class Guard:
         """Guard an application.
 
         Args:
-            app: The application that serves allowed requests.
+            app: The application that serves allowed requests, whose paths have no token.
             token: The first part of every allowed path.
             port: The port of the server.
             seen_at: Another address under which browsers reach it, such as that of a proxy.
@@ -119,7 +119,9 @@ class Guard:
             response = JSONResponse({"message": reason}, HTTPStatus.FORBIDDEN)
             await response(scope, receive, _with_headers(send))
             return
-        await self._app(scope, receive, _with_headers(send))
+        path = scope["path"].removeprefix(f"/{self._token}") or "/"
+        inner = {**scope, "path": path, "raw_path": path.encode(), "root_path": ""}
+        await self._app(inner, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope) -> str:
         """Return why a request is refused; empty if it is allowed."""
@@ -199,20 +201,7 @@ def page_app(
         *live.routes(),
         Route("/{name}", file),
     ]
-    return Guard(_strip_token(token, Starlette(routes=routes)), token, port, seen_at)
-
-
-def _strip_token(token: str, app: ASGIApp) -> ASGIApp:
-    """Remove the token from paths; the guard has compared it."""
-
-    async def serve(scope, receive, send) -> None:  # type: ignore[no-untyped-def]
-        path = scope.get("path", "")
-        if scope["type"] == "http":
-            path = path.removeprefix(f"/{token}") or "/"
-            scope = {**scope, "path": path, "raw_path": path.encode(), "root_path": ""}
-        await app(scope, receive, send)
-
-    return serve
+    return Guard(Starlette(routes=routes), token, port, seen_at)
 
 
 with extra("view", "watching needs a server"):
