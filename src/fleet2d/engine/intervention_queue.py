@@ -189,8 +189,9 @@ class InterventionQueue:
             if due.ends:
                 continue
             self._record(due)
-            if due.act.lasts is not None and any(act is due.act for act in self.lasting):
-                ends_us = due.step * self._clock.step_us + micros(due.act.lasts)
+            duration = due.act.duration if isinstance(due.act, Lasting) else None
+            if duration is not None and any(act is due.act for act in self.lasting):
+                ends_us = due.step * self._clock.step_us + micros(duration)
                 ends = max(self._clock.step_at_or_after(ends_us), due.step + 1)
                 self._ends += 1
                 self.add(DueIntervention(ends, ENDS, self._ends, due.act))

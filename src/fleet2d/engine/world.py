@@ -24,7 +24,7 @@ from fleet2d.engine.intervention_queue import (
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
-from fleet2d.entities.sensor import SensorFault
+from fleet2d.entities.sensor import Sensor, SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.slow_area import SlowArea
@@ -48,8 +48,10 @@ class EngineWorld:
     def __init__(self, state: State, step: int) -> None:
         self._state, self.step = state, step
         self.home, self.clock = state.home, state.changes.clock
-        self.doors, self.sensors = state.changes.names, state.sensors.names
-        self.algorithms = state.learners.known
+        self.doors = state.changes.names
+        sensors = zip(state.sensors.names, state.sensors.sensors, strict=True)
+        self.sensors: Mapping[str, Sensor] = dict(sensors)
+        self.algorithms: Sequence[str] = state.learners.known
 
     @cached_property
     def users(self) -> dict[str, DecidingActor]:
@@ -95,18 +97,6 @@ class EngineWorld:
         for area in self._state.layers.areas:
             if area.row == row:
                 area.darken(dark)
-
-    @property
-    def live_sensors(self) -> Sequence[str]:
-        """The names of the sensors whose states arrive from outside."""
-        sensors = self._state.sensors
-        pairs = zip(sensors.names, sensors.sensors, strict=True)
-        return [name for name, sensor in pairs if sensor.type_name == "live_sensor"]
-
-    def perceives_live(self, robot: str) -> bool:
-        """Whether a robot perceives what arrives from outside."""
-        source = getattr(self.robots[robot].entity, "perceives", None)
-        return source is not None and source.type_name == "live"
 
     def perceive(self, robot: str, sightings: Sequence[FalseSighting]) -> None:
         """Let a robot perceive people at the present step."""

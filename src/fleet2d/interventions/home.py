@@ -157,7 +157,7 @@ class Report(Intervention):
     def check(self, world: World) -> None:
         """Refuse an unknown sensor, and one that is simulated."""
         check_known(self.sensor, "sensor", world.sensors)
-        if self.sensor not in world.live_sensors:
+        if world.sensors[self.sensor].type_name != "live_sensor":
             raise ScenarioError(
                 f"{self.sensor} is simulated: only a sensor of the type live_sensor reports what"
                 " arrives"

@@ -42,7 +42,7 @@ from fleet2d.configuration.units import (
 )
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.sensor import SensorFault
+from fleet2d.entities.sensor import Sensor, SensorFault
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.home import Home, HomeChange, format_moment, parse_moment
 from fleet2d.floorplan.slow_area import SlowArea
@@ -52,19 +52,21 @@ from fleet2d.sight.camera import Disturbance, FalseSighting
 
 
 class World(Protocol):
-    """A run at the step of an intervention."""
+    """A run at the step of an intervention.
 
-    @property
-    def step(self) -> int:
-        """The present step."""
+    Attributes:
+        step: The present step.
+        clock: The clock of the run, which converts between times and steps.
+        home: The home, as it is at present.
+        sensors: The sensors, by name.
+        algorithms: The names of the algorithms.
+    """
 
-    @property
-    def clock(self) -> Clock:
-        """The clock of the run, which converts between times and steps."""
-
-    @property
-    def home(self) -> Home:
-        """The home, as it is at present."""
+    step: int
+    clock: Clock
+    home: Home
+    sensors: Mapping[str, Sensor]
+    algorithms: Sequence[str]
 
     @property
     def users(self) -> Mapping[str, DecidingActor]:
@@ -73,18 +75,6 @@ class World(Protocol):
     @property
     def robots(self) -> Mapping[str, DecidingActor]:
         """The robots, by name."""
-
-    @property
-    def doors(self) -> Sequence[str]:
-        """The names of the doors."""
-
-    @property
-    def sensors(self) -> Sequence[str]:
-        """The names of the sensors."""
-
-    @property
-    def algorithms(self) -> Sequence[str]:
-        """The names of the algorithms."""
 
     @property
     def lasting(self) -> Sequence[object]:
@@ -98,13 +88,6 @@ class World(Protocol):
 
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances of the cameras of a robot from the present step on."""
-
-    @property
-    def live_sensors(self) -> Sequence[str]:
-        """The names of the sensors whose states arrive from outside."""
-
-    def perceives_live(self, robot: str) -> bool:
-        """Whether a robot perceives what arrives from outside."""
 
     def perceive(self, robot: str, sightings: Sequence[FalseSighting]) -> None:
         """Let a robot perceive people at the present step."""
@@ -156,11 +139,6 @@ class Intervention(Component):
     # The field whose value follows the verb in the short form: `put: ana`.
     subject: ClassVar[str] = "entity"
 
-    @property
-    def lasts(self) -> timedelta | None:
-        """The time after which `end` is called; None: never."""
-        return None
-
     def check(self, world: World) -> None:
         """Refuse an impossible intervention; called before the run, or when it is requested.
 
@@ -187,11 +165,6 @@ class Lasting(Intervention):
     """
 
     duration: PositiveDuration | None = None
-
-    @property
-    def lasts(self) -> timedelta | None:
-        """Its duration."""
-        return self.duration
 
     def active(self, world: World) -> list[Self]:
         """Return the active interventions of this kind on the same subject, the latest last."""
@@ -249,10 +222,11 @@ class Verb(Codec):
             return value
         if not isinstance(value, Mapping):
             raise problem(f"expected a mapping like {{put: ana, to: kitchen}}, got {value!r}")
-        fields = dict(value)
+        fields, classes = dict(value), verbs()
         if "do" in fields:
-            return _of_name(fields.pop("do")).model_validate(fields, context=info.context)
-        classes = verbs()
+            name = fields.pop("do")
+            check_known(name, "intervention", classes, partial(problem_at, ("do",), value=name))
+            return classes[str(name)].model_validate(fields, context=info.context)
         keys = [key for key in fields if key in classes]
         if len(keys) != 1:
             raise _not_one_verb(keys, fields, classes)
@@ -275,12 +249,6 @@ class Verb(Codec):
 def verbs() -> dict[str, type[Intervention]]:
     """Return all interventions by their verbs."""
     return components("intervention")  # type: ignore[return-value]
-
-
-def _of_name(name: object) -> type[Intervention]:
-    classes = verbs()
-    check_known(name, "intervention", classes, partial(problem_at, ("do",), value=name))
-    return classes[str(name)]
 
 
 def _from_short_form(

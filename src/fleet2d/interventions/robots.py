@@ -422,7 +422,8 @@ class Perceive(RobotIntervention):
     def check(self, world: World) -> None:
         """Refuse a robot that perceives in another way, and unknown people."""
         super().check(world)
-        if not world.perceives_live(self.entity):
+        source = getattr(self.actor(world).entity, "perceives", None)
+        if source is None or source.type_name != "live":
             raise ScenarioError(
                 f"{self.entity} perceives what its cameras see: set"
                 f" robots.{self.entity}.perceives=live"
