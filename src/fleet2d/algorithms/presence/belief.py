@@ -83,25 +83,15 @@ class Presence:
         self.users, self.time, self.track = tuple(users), time, track
         self.names = (*self.users, ANYONE)
         self._home, self._away, self._interval = home, away, interval
-        self._check()
-        for array in (home, away, *(interval or ())):
-            array.setflags(write=False)
-
-    def _check(self) -> None:
-        rows = len(self.users) + 1
-        if self._home.ndim != 2 or self._home.shape[0] != rows or self._away.shape != (rows,):
+        rows = len(self.names)
+        if home.ndim != 2 or home.shape[0] != rows or away.shape != (rows,):
             raise ComponentError(
                 f"presence of {rows - 1} users and anyone needs shares of shape ({rows}, rooms) and"
-                f" away of shape ({rows},), got {self._home.shape} and {self._away.shape}"
+                f" away of shape ({rows},), got {home.shape} and {away.shape}"
             )
-        is_valid = are_distributions(self._home, self._away)
-        if not is_valid.all():
-            row = int(np.argmin(is_valid))
-            raise ComponentError(
-                f"presence of {self.names[row]!r} is not a distribution: shares"
-                f" {self._home[row].tolist()}, which sum to {self._home[row].sum():g}, away"
-                f" {self._away[row]:g}"
-            )
+        check_distributions(home, away, self.names)
+        for array in (home, away, *(interval or ())):
+            array.setflags(write=False)
 
     @property
     def arrays(self) -> tuple[F64, F64]:
@@ -201,6 +191,28 @@ def are_distributions(home: F64, away: F64) -> Bool:
     """
     is_share = (np.abs(home.sum(axis=-1) - 1) <= SUM_ERROR) & (home >= 0).all(axis=-1)
     return is_share & (away >= 0) & (away <= 1)
+
+
+def check_distributions(home: F64, away: F64, names: Sequence[str], source: str = "") -> None:
+    """Refuse a belief that is no distribution.
+
+    Args:
+        home: float64 (rows, rooms), or (bins, rows, rooms), shares of rooms.
+        away: float64 (rows,), or (bins, rows).
+        names: The names of the rows.
+        source: The beginning of the message.
+
+    Raises:
+        ComponentError: Shares don't sum to one, or one is below 0, above 1 or NaN.
+    """
+    is_valid = are_distributions(home, away)
+    if not is_valid.all():
+        at = *bins, row = tuple(np.argwhere(~is_valid)[0].tolist())
+        in_bin = f" in bin {bins[0]} of {len(home)}" if bins else ""
+        raise ComponentError(
+            f"{source}presence of {names[row]!r}{in_bin} is not a distribution: shares"
+            f" {home[at].tolist()}, which sum to {home[at].sum():g}, away {away[at]:g}"
+        )
 
 
 class WeeklyPresence(Presence):

@@ -18,8 +18,8 @@ from fleet2d.algorithms.presence.belief import (
     BeliefSeries,
     Presence,
     WeeklyPresence,
-    are_distributions,
     belief_labels,
+    check_distributions,
 )
 from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator, PresenceAlgorithm
 from fleet2d.configuration.components import Component, OneOf, register
@@ -235,15 +235,8 @@ class RealTimePresence(PresenceAlgorithm):
                 f" {shapes[1]}, expected {expected[0]} (rooms, given at home) and {expected[1]}"
                 f" (away) for {bins} bins, {users - 1} users and anyone, and {rooms} rooms"
             )
-        is_valid = are_distributions(home, away)
-        if not is_valid.all():
-            k, row = np.argwhere(~is_valid)[0].tolist()
-            raise ComponentError(
-                f"the model {self.model.type_name} returned no distribution for"
-                f" {(*state.users, ANYONE)[row]!r} in bin {k} of {bins}: shares"
-                f" {home[k, row].tolist()}, which sum to {home[k, row].sum():g}, away"
-                f" {away[k, row]:g}"
-            )
+        source = f"the model {self.model.type_name} returned a wrong belief: "
+        check_distributions(home, away, (*state.users, ANYONE), source)
 
 
 @register("algorithm", "belief_table")
