@@ -170,10 +170,8 @@ def camera_poses(
     dx, dy = turned(lenses.forward[camera], lenses.left[camera], 2 * heading)
     looks = heading + lenses.heading[camera]
     if lenses.pan_count[camera]:
-        looks = (
-            looks
-            + lenses.pans[camera][moments_us // lenses.pan_us[camera] % lenses.pan_count[camera]]
-        )
+        pan = moments_us // lenses.pan_us[camera] % lenses.pan_count[camera]
+        looks = looks + lenses.pans[camera][pan]
     return x + dx, y + dy, looks % TURN
 
 
@@ -247,11 +245,10 @@ class DetectionRule(NamedTuple):
 
 def new_memory(cameras: int, users: int, backlog: int) -> SightMemory:
     """Return the memory of a robot that has not seen anybody."""
-    never = -1
     about = np.zeros((cameras, users, len(About)), np.int64)
-    about[..., [About.DRAW_STEP.value, About.TRACK_STEP.value]] = never
+    about[..., [About.DRAW_STEP.value, About.TRACK_STEP.value]] = NEVER
     return SightMemory(
-        noticed=np.full(users + 1, never, np.int64),
+        noticed=np.full(users + 1, NEVER, np.int64),
         seen=np.zeros(users + 1, np.int64),
         about=about,
         backlog=np.zeros((cameras, backlog, len(SightingColumn)), np.int64),

@@ -41,6 +41,27 @@ class BodyIntervention(Intervention):
         """Refuse an unknown body."""
         self.actor(world)
 
+    def check_reach(self, world: World, place: RoomChoice | Point) -> None:
+        """Refuse a place that doesn't exist, or that the body can never reach.
+
+        While doors are shut only the name of the place is checked: they may open later.
+
+        Raises:
+            PlacementError: The message lists the places that there are.
+        """
+        actor = self.actor(world)
+        home = actor.home
+        if is_point(place):
+            x, y = home.plan.lattice.to_lattice(place).tolist()
+            if not home.may_block_routes or actor.space.part_at(x, y) < 0:
+                actor.point(place)  # type: ignore[arg-type]
+        elif home.may_block_routes:
+            names = {name for item in home.objects if item.uses for name in (item.name, item.type)}
+            if not names & set(place):
+                matching_rooms(place, home.rooms, home.rooms, home.objects)  # type: ignore[arg-type]
+        elif furniture_of(actor, place) is None:
+            actor.rooms(place)  # type: ignore[arg-type]
+
 
 @register("intervention", "put")
 class Put(BodyIntervention):
@@ -103,7 +124,7 @@ class Send(BodyIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a place that doesn't exist or can't be reached."""
-        check_reach(self.actor(world), self.to)
+        self.check_reach(world, self.to)
 
     def begin(self, world: World) -> None:
         """Give the order."""
@@ -251,27 +272,6 @@ def heading_of(heading_deg: float | None) -> int | None:
     return None if heading_deg is None else round(heading_deg / 360 * TURN) % TURN
 
 
-def check_reach(actor: Actor, place: RoomChoice | Point) -> None:
-    """Refuse a place that doesn't exist, or that a body can never reach.
-
-    While doors are shut only the name of the place is checked: they may open later.
-
-    Raises:
-        PlacementError: The message lists the places that there are.
-    """
-    home = actor.home
-    if is_point(place):
-        x, y = home.plan.lattice.to_lattice(place).tolist()
-        if not home.may_block_routes or actor.space.part_at(x, y) < 0:
-            actor.point(place)  # type: ignore[arg-type]
-    elif home.may_block_routes:
-        names = {name for item in home.objects if item.uses for name in (item.name, item.type)}
-        if not names & set(place):
-            matching_rooms(place, home.rooms, home.rooms, home.objects)  # type: ignore[arg-type]
-    elif furniture_of(actor, place) is None:
-        actor.rooms(place)  # type: ignore[arg-type]
-
-
 class PersonIntervention(BodyIntervention):
     """Base of interventions on a person.
 
@@ -313,7 +313,7 @@ class CallHome(PersonIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a place that doesn't exist or can't be reached."""
-        check_reach(self.actor(world), self.to)
+        self.check_reach(world, self.to)
 
     def begin(self, world: World) -> None:
         """Give the order."""
@@ -360,7 +360,7 @@ class StartActivity(PersonIntervention):
         """Refuse an activity for which the person has no place."""
         actor = self.actor(world)
         if self.to is not None:
-            check_reach(actor, self.to)
+            self.check_reach(world, self.to)
             return
         names = [name for behavior in actor.behaviors for name in behavior.activities()]
         if self.what not in names:

@@ -356,14 +356,10 @@ def parse_when(value: object) -> datetime | timedelta | ClockTime:
     return ClockTime(tuple(sorted(days)), time, f"{name}{format_time_of_day(time)}")
 
 
-def _format_when(when: datetime | timedelta | ClockTime) -> str:
-    return when.text if isinstance(when, ClockTime) else format_moment(when)
-
-
 When = Annotated[
     datetime | timedelta | ClockTime,
     BeforeValidator(parse_when),
-    PlainSerializer(_format_when),
+    PlainSerializer(lambda when: when.text if isinstance(when, ClockTime) else format_moment(when)),
     WithJsonSchema(
         {
             "description": "a time of day like 19:00, with days of the week before it like 'monday"

@@ -14,13 +14,7 @@ from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import Place
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
-from fleet2d.interventions.bodies import (
-    BodyIntervention,
-    Put,
-    behavior_number,
-    check_reach,
-    heading_of,
-)
+from fleet2d.interventions.bodies import BodyIntervention, Put, behavior_number, heading_of
 from fleet2d.interventions.intervention import Lasting, World, body, robot, user
 from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
@@ -84,7 +78,7 @@ class Call(RobotIntervention):
         """Refuse a call that none of its behaviors responds to."""
         actor, command = self.actor(world), self.order
         if self.to is not None:
-            check_reach(actor, self.to)
+            self.check_reach(world, self.to)
         if not any(behavior.takes(command) for behavior in actor.behaviors):
             hint = f": give it one, like behaviors: [{{type: {command.do}}}, …]"
             raise ScenarioError(

@@ -388,17 +388,16 @@ class LtpGap(LongTermMetric):
         """Compare the presence with the truth so far; return a row for each user and room."""
         counts, steps = self.count(steps_in_places(history, state), history)
         presence = presence_of(self.of, state)
-        users = [
-            (row, user) for row, user in enumerate((*state.users, ANYONE)) if counts[row, :-1].any()
-        ]
-        if presence is None or not users:
+        is_known = counts[:, :-1].any(axis=1)
+        users = np.array([*state.users, ANYONE], dtype=object)[is_known]
+        if presence is None or not len(users):
             return None
-        truth = np.array([shares(counts[row], steps)[0] for row, _ in users])
-        estimate = np.array([presence.share(user) for _, user in users])
+        truth, _ = shares(counts[is_known], steps)
+        estimate = np.array([presence.share(user) for user in users])
         gaps = room_gaps(truth, estimate)
-        self.last |= {user: gap for (_, user), gap in zip(users, gaps, strict=True)}
+        self.last |= dict(zip(users.tolist(), gaps, strict=True))
         columns = {
-            "user": np.repeat(np.array([user for _, user in users], dtype=object), len(self.rooms)),
+            "user": np.repeat(users, len(self.rooms)),
             "room": np.tile(np.array(self.rooms, dtype=object), len(users)),
             "true_share": truth.ravel(),
             "share": estimate.ravel(),
@@ -406,7 +405,7 @@ class LtpGap(LongTermMetric):
         }
         for name, end in (("low", presence.low), ("high", presence.high)):
             if end() is not None:
-                columns[name] = np.array([end(user) for _, user in users]).ravel()
+                columns[name] = np.array([end(user) for user in users]).ravel()
         return columns
 
     def result(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I64, Bool, points_in_sight
+from fleet2d.kernels import F64, I64, Bool, pairs_in_sight
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
@@ -174,15 +174,9 @@ def in_sight(plan: FloorPlan, pair: RobotUserPair, steps: I64) -> Bool:
     robot_xy = plan.lattice.to_lattice(pair.robot_poses.xy[steps])
     user_xy = plan.lattice.to_lattice(pair.user_poses.xy[steps])
     places = np.concatenate([robot_xy, user_xy], axis=1)
-    is_visible = np.zeros(len(steps), np.bool_)
-    if not len(places):
-        return is_visible
-    has_moved = (places[1:] != places[:-1]).any(axis=1)
-    begins = [0, *(np.flatnonzero(has_moved) + 1).tolist()]
-    for begin, end in zip(begins, [*begins[1:], len(places)], strict=True):
-        x, y = robot_xy[begin].tolist()
-        is_visible[begin:end] = points_in_sight(plan.sight_mesh, x, y, user_xy[[begin]])[0]
-    return is_visible
+    is_new = np.append(True, (places[1:] != places[:-1]).any(axis=1))[: len(places)]
+    is_visible = pairs_in_sight(plan.sight_mesh, robot_xy[is_new], user_xy[is_new])
+    return is_visible[np.cumsum(is_new) - 1]
 
 
 def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple[float, float]]:

@@ -249,7 +249,9 @@ class Fremen(Estimator):
         """Return the forecast for each hour of the week, evaluated at its middle."""
         if self.week is None or not self.span:  # it only changes when a day is over
             minutes = np.arange(HOURS, dtype=np.int64) * 60 + 30
-            self.week = self._with_away(self.forecast(minutes))
+            p = self.forecast(minutes)
+            away = 1 - np.minimum(p.sum(axis=-1) / self.detection, 1)
+            self.week = normalized(p), away if self.span else np.zeros_like(away)
         return WeeklyPresence(users, self.week, time)
 
     def weekly(self, users: Sequence[str], time: datetime, smoothing: float) -> Presence:
@@ -261,10 +263,6 @@ class Fremen(Estimator):
         order = self.fit.argmax(axis=2)[np.newaxis, ..., np.newaxis]
         p: F64 = np.take_along_axis(self._by_order(minutes), order, axis=3)
         return p[..., 0]
-
-    def _with_away(self, p: F64) -> tuple[F64, F64]:
-        away = 1 - np.minimum(p.sum(axis=-1) / self.detection, 1)
-        return normalized(p), away if self.span else np.zeros_like(away)
 
     def _waves(self, minutes: I64) -> F64:
         """Return cos and sin of 2 pi t / T_i: float64 (2, minutes, periods)."""

@@ -49,8 +49,6 @@ GROUPS = (
 GROUP_OF_KIND = {kind: number for number, kinds in enumerate(GROUPS) for kind in kinds}
 PLACE_FEATURES = len(GROUPS) + 5
 
-INPUTS = ("features", "places")
-
 
 class PlaceFacts(NamedTuple):
     """What is known of the places of a home, which mean the same in all homes.
@@ -342,7 +340,7 @@ def _session(path: Path) -> Any:
     except Exception as error:  # noqa: BLE001 - the runtime's own errors have no public base
         raise InputError(f"{path} is no ONNX model: {one_line(error, 120)}") from None
     names = tuple(sorted(part.name for part in session.get_inputs()))
-    if names != INPUTS:
+    if names != ("features", "places"):
         raise InputError(
             f"{path} has the inputs {', '.join(names)}, expected features (bins, places,"
             f" {TRACE_FEATURES}) and places (places, {PLACE_FEATURES})"
