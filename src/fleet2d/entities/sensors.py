@@ -245,16 +245,14 @@ class ReplaySensor(Sensor):
         Raises:
             LogError: It can't be read, lacks a column, has no such sensor, or a state is unknown.
         """
-        from fleet2d.logs.positions import LogTable, local_times
+        from fleet2d.logs.positions import LogTable
 
         table = LogTable.read(self.path, self.columns, NAMES, ("time", "state"))
         if "sensor" in table.named:
             table = table.of("sensor", self.sensor)
         states = [_is_on(value, self.path) for value in table.column("state").to_pylist()]
         stamps, usable, zone = table.stamps(), np.ones(len(states), bool), self.time_zone
-        local = local_times(
-            self.path, "readings", stamps, usable, [], time_zone=zone, sort=self.sort
-        )
+        local = stamps.local(self.path, "readings", usable, [], time_zone=zone, sort=self.sort)
         nothing = np.zeros((len(local.row), 2))
         log = PositionLog(
             self.path, "readings", local.first_day, local.time_us, nothing, nothing[:, 0]
