@@ -84,11 +84,9 @@ class Process(Algorithm):
             self.program = ExternalProgram(
                 self.command, self.arguments, self.timeout.total_seconds(), about
             )
-        blocks = {
-            name: data
-            for part in self.sends
-            for name, data in _TABLES[part](history, state).items()
-        }
+        blocks: dict[str, bytes] = {}
+        for part in self.sends:
+            blocks |= _TABLES[part](history, state)
         message = {"type": "update", "first": history.first, "end": history.end}
         answer = self.program.ask(message, blocks)
         return self._output(answer.content, state)

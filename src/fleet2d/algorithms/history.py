@@ -304,12 +304,8 @@ class Log:
     def observations(self, first: int, end: int) -> Observations:
         """Return the observations of the steps from `first` to `end` - 1."""
         _, blocks = self._observations.touching(first, end)
-        return Observations(
-            self.home.plan,
-            self._rooms,
-            [block.between(first, end) for block in blocks],
-            self.activities,
-        )
+        blocks = [block.between(first, end) for block in blocks]
+        return Observations(self.home.plan, self._rooms, blocks, self.activities)
 
     def count_looks(self, step: int, counts: Sequence[I64]) -> None:
         """Store how often each robot's cameras have looked and noticed before `step`."""
@@ -569,11 +565,8 @@ class History:
         """
         if name not in self.visible:
             available = ", ".join(sorted(self.visible))
-            reason = (
-                "only metrics know where users are"
-                if name in self.log.index
-                else "there is no such body"
-            )
+            is_user = name in self.log.index
+            reason = "only metrics know where users are" if is_user else "there is no such body"
             raise ComponentError(
                 f"poses of {name!r} were requested, but {reason}; available: {available}"
             )

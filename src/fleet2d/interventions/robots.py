@@ -241,14 +241,12 @@ class SwitchOn(Switch):
 
     def begin(self, world: World) -> None:
         """Switch it on."""
+        name = camera_name(self.camera)
         world.undo(
             lambda act: (
                 isinstance(act, SwitchOff)
                 and (act.entity, act.behavior) == (self.entity, self.behavior)
-                and (
-                    self.camera is True
-                    or camera_name(act.camera) in (None, camera_name(self.camera))
-                )
+                and (name is None or camera_name(act.camera) in (None, name))
             )
         )
 

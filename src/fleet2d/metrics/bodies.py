@@ -105,11 +105,8 @@ class Travel(Metric):
     def result(self) -> dict[str, Any]:
         """Return {robot: {relocations, metres}}, both per day."""
         return {
-            robot: {
-                "relocations": self.relocations[robot] / self.days,
-                "metres": metres / self.days,
-            }
-            for robot, metres in self.metres.items()
+            robot: {"relocations": count / self.days, "metres": self.metres[robot] / self.days}
+            for robot, count in self.relocations.items()
         }
 
 
@@ -124,12 +121,8 @@ class BatteryUse(Metric):
     too. `empty` is the share of steps with an empty battery, from which on the robot stands still.
     """
 
-    units: ClassVar[Mapping[str, str]] = {
-        "lowest": "share of a full charge",
-        "dockings": "a day",
-        "charging": "share of time",
-        "empty": "share of time",
-    }
+    unit: ClassVar[str] = "share of time"
+    units: ClassVar[Mapping[str, str]] = {"lowest": "share of a full charge", "dockings": "a day"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

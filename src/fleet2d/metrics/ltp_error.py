@@ -25,7 +25,6 @@ from fleet2d.runtime.clock import DAY_S, HOUR_US
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
 MEAN = "mean"
-COLUMNS = ("tv", "js", "kl", "max_gap", "mean_gap", "tau")
 
 
 def total_variation(truth: F64, estimate: F64) -> F64:
@@ -305,7 +304,7 @@ class LtpError(LongTermMetric):
         """Return each measure of the error, by its name: float64 (users,)."""
         if self.given == "hour_of_week":
             each = [self._by_hour(presence, u, counts[:, row]) for row, u in enumerate(users)]
-            return {name: np.array([one[name] for one in each]) for name in COLUMNS}
+            return {name: np.array([one[name] for one in each]) for name in each[0]}
         home, away = shares(counts, steps)
         if self.given == "away":
             truth = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
@@ -330,15 +329,14 @@ class LtpError(LongTermMetric):
     def _distances(self, truth: F64, estimate: F64) -> dict[str, F64]:
         """Return distances of shares (n, rooms), float64 (n,) each."""
         gaps = room_gaps(truth, estimate)
-        distances = (
-            total_variation(truth, estimate),
-            jensen_shannon(truth, estimate),
-            kl_divergence(truth, estimate, self.alpha),
-            gaps.max(axis=-1),
-            gaps.mean(axis=-1),
-            rank_correlation(truth, estimate),
-        )
-        return dict(zip(COLUMNS, distances, strict=True))
+        return {
+            "tv": total_variation(truth, estimate),
+            "js": jensen_shannon(truth, estimate),
+            "kl": kl_divergence(truth, estimate, self.alpha),
+            "max_gap": gaps.max(axis=-1),
+            "mean_gap": gaps.mean(axis=-1),
+            "tau": rank_correlation(truth, estimate),
+        }
 
     def _note(self, users: Sequence[str], columns: Mapping[str, F64], presence: Presence) -> None:
         """Store the newest rows, days since which tv is small, and changes of the best room."""

@@ -34,11 +34,8 @@ class Blocking(Metric):
         clearance: Distance between the centres [m].
     """
 
-    units: ClassVar[Mapping[str, str]] = {
-        "blocks": "a day",
-        "seconds": "s a day",
-        "asides": "a day",
-    }
+    unit: ClassVar[str] = "a day"
+    units: ClassVar[Mapping[str, str]] = {"seconds": "s a day"}
 
     clearance: Length = Field(default=0.4, gt=0, le=3)
 

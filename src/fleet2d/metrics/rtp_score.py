@@ -432,21 +432,21 @@ class RtpScore(Metric):
         }
 
 
-def _sums(scored: ScoredBins) -> list[tuple[str, int, float, float, float]]:
+def _sums(scored: ScoredBins) -> list[tuple[Any, ...]]:
     """Return the number of bins and the sums of scores of each class of gaps that occurs."""
-    belief, truth = scored.belief, scored.truth
-    columns = log_loss(belief, truth), brier_score(belief, truth), top_k(belief, truth, 1)
     bins = np.bincount(scored.gap, minlength=len(GAPS))
-    loss, brier, top = (np.bincount(scored.gap, values, len(GAPS)) for values in columns)
-    return [
-        (GAPS[g], int(bins[g]), float(loss[g]), float(brier[g]), float(top[g]))
-        for g in np.flatnonzero(bins).tolist()
-    ]
+    scores = _scores(scored.belief, scored.truth).values()
+    sums = [np.bincount(scored.gap, values, len(GAPS)).tolist() for values in scores]
+    return [(GAPS[g], int(bins[g]), *(sum_[g] for sum_ in sums)) for g in np.flatnonzero(bins)]
 
 
 def _mean_scores(belief: F64, truth: I64) -> dict[str, float]:
+    return {name: float(values.mean()) for name, values in _scores(belief, truth).items()}
+
+
+def _scores(belief: F64, truth: I64) -> dict[str, F64]:
     return {
-        "log_loss": float(log_loss(belief, truth).mean()),
-        "brier": float(brier_score(belief, truth).mean()),
-        "top_1": float(top_k(belief, truth, 1).mean()),
+        "log_loss": log_loss(belief, truth),
+        "brier": brier_score(belief, truth),
+        "top_1": top_k(belief, truth, 1),
     }

@@ -45,12 +45,8 @@ class ReachTime(Metric):
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset({"calls"})
-    units: ClassVar[Mapping[str, str]] = {
-        "mean": "s",
-        "p90": "s",
-        "calls": "calls",
-        "unreached": "calls",
-    }
+    unit: ClassVar[str] = "s"
+    units: ClassVar[Mapping[str, str]] = {"calls": "calls", "unreached": "calls"}
 
     every: PositiveDuration = timedelta(minutes=10)
     speed: Speed = Field(default=0.6, gt=0)
@@ -170,10 +166,10 @@ class TimeToFind(Metric):
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset({"p90", "spl", "out_mean"})
+    unit: ClassVar[str] = "s"
     units: ClassVar[Mapping[str, str]] = {
         "searches": "in all",
         **dict.fromkeys(("success", "spl", "out_told"), "share of searches"),
-        **dict.fromkeys(("median", "p90", "mean", "out_mean"), "s"),
         "ratio": "times the way",
         **dict.fromkeys(("false", "false_out"), "searches"),
     }

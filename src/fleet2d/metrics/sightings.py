@@ -29,8 +29,7 @@ class Sightings(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.seen: dict[str, int] = {}
-        self.at_home: dict[str, int] = {}
+        self.steps: dict[str, list[int]] = {}  # seen, at home
 
     def update(self, history: History, state: Present) -> Any:
         """Count detections by step."""
@@ -41,20 +40,16 @@ class Sightings(Metric):
         known = index[first & (index >= 0)]
         steps_seen = np.bincount(known, minlength=len(state.users)).tolist()
         for user, seen in zip(state.users, steps_seen, strict=True):
-            at_home = int(history.poses(user).time_in_rooms[:-1].sum())
             if user in history.log.untracked and seen:
                 steps = step[first & (index == state.users.index(user))] - history.first
                 seen = int((~history.poses(user).away[steps]).sum())
-            self.seen[user] = self.seen.get(user, 0) + seen
-            self.at_home[user] = self.at_home.get(user, 0) + at_home
+            counts = self.steps.setdefault(user, [0, 0])
+            counts[0] += seen
+            counts[1] += int(history.poses(user).time_in_rooms[:-1].sum())
 
     def result(self) -> dict[str, Any]:
         """Return {user: share}, without users who were never at home."""
-        return {
-            user: seen / self.at_home[user]
-            for user, seen in self.seen.items()
-            if self.at_home[user]
-        }
+        return {user: seen / at_home for user, (seen, at_home) in self.steps.items() if at_home}
 
 
 @register("metric", "detections")
@@ -177,11 +172,8 @@ class Coverage(Metric):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
-    units: ClassVar[Mapping[str, str]] = {
-        "share": "share of the floor",
-        "half_h": "h",
-        "most_h": "h",
-    }
+    unit: ClassVar[str] = "h"
+    units: ClassVar[Mapping[str, str]] = {"share": "share of the floor"}
 
     def start(self, home: Home) -> None:
         """Begin without any cells seen."""

@@ -56,13 +56,8 @@ class DayEvidence(NamedTuple):
         shown = evidence.by_patch.shown_255
         watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
         watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
-        return cls(
-            int(evidence.day[0]),
-            evidence.minute,
-            evidence.sightings.unknown,
-            *distinct(watched),
-            sightings,
-        )
+        number, unknown = int(evidence.day[0]), evidence.sightings.unknown
+        return cls(number, evidence.minute, unknown, *distinct(watched), sightings)
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -323,13 +318,9 @@ class People:
             weight: Weight of the day.
         """
         day, moments = self.days[number], self.layout.no_moments(self.count)
+        evidence = day.evidence.of_people(self.count)
         places, end, begin = smooth_people(
-            self.model,
-            day.evidence.of_people(self.count),
-            self.longest,
-            day.start,
-            day.backward,
-            moments,
+            self.model, evidence, self.longest, day.start, day.backward, moments
         )
         if number > 0:
             self.days[number - 1].backward = begin
@@ -337,12 +328,8 @@ class People:
             self.days[number + 1].start = end
         else:
             self.now = self.day_start = end
-        self.total = Moments(
-            *(
-                np.maximum(total + weight * (new - old), 0.0)
-                for total, new, old in zip(self.total, moments, day.moments, strict=True)
-            )
-        )
+        parts = zip(self.total, moments, day.moments, strict=True)
+        self.total = Moments(*(np.maximum(t + weight * (new - old), 0.0) for t, new, old in parts))
         day.moments = moments
         self.model = model_of(self.total, self.layout, self.prior)
         return PeoplePlaces(*places)
