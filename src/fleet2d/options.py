@@ -2,6 +2,7 @@
 
 import re
 from contextlib import AbstractContextManager
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -27,6 +28,14 @@ Scale = Annotated[
 ThemeChoice = Annotated[
     Literal["light", "dark"], typer.Option(help="Theme of pictures: a light or a dark background.")
 ]
+
+
+def resume_hint(time: datetime, directory: Path) -> str:
+    """Return a line about a run that was interrupted at a local time."""
+    return (
+        f"interrupted at {time:%Y-%m-%d %H:%M}; what was simulated until then is in {directory}:"
+        f" continue it by `fleet2d resume {directory}`"
+    )
 
 
 def split(arguments: list[str] | None) -> tuple[str | None, list[str]]:

@@ -1,6 +1,6 @@
 """Errors of perception in a scenario: their names, types and keys, and whose they may be."""
 
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, EntryPoints
 from typing import Any
 
 import jsonschema
@@ -74,7 +74,7 @@ def test_what_is_wrong_is_named(errors: Any, message: str) -> None:
 def test_a_plugin_is_found_by_the_name_of_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
     entry = EntryPoint("missing", "tests.own_errors:Missed", "fleet2d.perception_error")
     kinds = {"perception_error": [entry]}
-    monkeypatch.setattr(components, "_plugins", lambda kind: kinds.get(kind, []))
+    monkeypatch.setattr(components, "_plugins", lambda kind: EntryPoints(kinds.get(kind, [])))
     monkeypatch.setattr(Missed, "type_name", Missed.type_name)
     assert {"missing": Missed(person="ana")} == errors_of(content({"missing": {"person": "ana"}}))
     assert "missing" in components.components("perception_error")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, blame, own_frames
-from fleet2d.options import TrustFiles, TrustFolders, file_name, split, trust_of
+from fleet2d.options import TrustFiles, TrustFolders, file_name, resume_hint, split, trust_of
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
 if TYPE_CHECKING:
@@ -79,11 +79,8 @@ def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
         with watched():
             return _run_with_bar(simulation, show=show)
     except KeyboardInterrupt:
-        typer.echo(
-            f"interrupted at {simulation.time:%Y-%m-%d %H:%M}; what was simulated until then is in"
-            f" {simulation.directory}: continue it by `fleet2d resume {simulation.directory}`",
-            err=True,
-        )
+        assert simulation.directory is not None
+        typer.echo(resume_hint(simulation.time, simulation.directory), err=True)
         raise typer.Exit(130) from None
 
 

@@ -169,10 +169,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a scenario, for completion in an editor."""
     if floorplan:
-        from fleet2d.floorplan.formats.native import native_schema
-
-        typer.echo(json.dumps(native_schema(), indent=2))
-        return
-    from fleet2d.scenario.schema import schema as scenario_schema
-
-    typer.echo(json.dumps(scenario_schema(), indent=2))
+        from fleet2d.floorplan.formats.native import native_schema as content
+    else:
+        from fleet2d.scenario.schema import schema as content
+    typer.echo(json.dumps(content(), indent=2))

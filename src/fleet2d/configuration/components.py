@@ -59,7 +59,7 @@ from fleet2d.errors import (
 )
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+    from importlib.metadata import EntryPoints
 
 
 T = TypeVar("T")
@@ -453,9 +453,7 @@ def lookup(kind: str, name: str) -> type[Component]:
     _import_builtins(kind, name)
     if (cls := _registered(kind, name)) is not None:
         return cls
-    for entry in _plugins(kind):
-        if entry.name != name:
-            continue
+    for entry in _plugins(kind).select(name=name):
         cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
         cls.type_name = name
         return cls
@@ -482,16 +480,15 @@ def hook(kind: str, name: str) -> Any:
     Raises:
         InputError: Nothing is registered under that name.
     """
-    for entry in _plugins(kind):
-        if entry.name == name:
-            return entry.load()
+    for entry in _plugins(kind).select(name=name):
+        return entry.load()
     raise InputError(
         f"no installed package registers {name!r} as fleet2d.{kind}: reinstall fleet2d"
     )
 
 
 @cache
-def _plugins(kind: str) -> "Iterable[EntryPoint]":
+def _plugins(kind: str) -> "EntryPoints":
     """Return the components of a kind that installed packages declare."""
     from importlib.metadata import entry_points  # slow to import, and seldom used
 

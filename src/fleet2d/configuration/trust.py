@@ -16,7 +16,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -115,11 +115,9 @@ def restrict(trust: Trust | None) -> Iterator[None]:
         _TRUST.reset(token)
 
 
-@contextmanager
-def restrict_stored(trust: Trust | None = None) -> Iterator[None]:
+def restrict_stored(trust: Trust | None = None) -> AbstractContextManager[None]:
     """Restrict what is read from a stored run to what the command line, else the caller, trusts."""
-    with restrict(_TRUST.get() or trust or Trust()):
-        yield
+    return restrict(_TRUST.get() or trust or Trust())
 
 
 def current_trust() -> Trust | None:
@@ -469,7 +467,8 @@ class _SourceFinder(MetaPathFinder):
                 return _own(own, [str(file.parent)] if is_package else None)
         if not folders or _TRUST.get() is None:
             return None
-        spec = None if path else PathFinder.find_spec(fullname, _path_without(folders[0]))
+        elsewhere = [entry for entry in sys.path if Path(entry).resolve() != folders[0]]
+        spec = None if path else PathFinder.find_spec(fullname, elsewhere)
         packages = [str(folder / name) for folder in folders if _is_bare_package(folder / name)]
         if spec is None and packages:
             return _own(ModuleSpec(fullname, None, is_package=True), packages)
@@ -492,10 +491,6 @@ def _is_own_package(name: str) -> bool:
 def _is_bare_package(folder: Path) -> bool:
     """Whether a folder is a package without `__init__.py`, or any file in its place."""
     return folder.is_dir() and not any(folder.glob("__init__.*"))
-
-
-def _path_without(folder: Path) -> list[str]:
-    return [entry for entry in sys.path if Path(entry).resolve() != folder]
 
 
 class _SourceLoader(SourceFileLoader):

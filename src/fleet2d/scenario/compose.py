@@ -3,12 +3,13 @@
 import os.path
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
 from fleet2d.bounds import EXTENDED_FILES, YAML_VALUES, one_line
-from fleet2d.configuration.components import base_of, lookup
+from fleet2d.configuration.components import Component, base_of, lookup
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
@@ -240,7 +241,8 @@ class _Merger:
         elif "type" in change:
             # The type of an algorithm or a metric may be given by its name.
             old = base.get("type", keys[-1])
-            if not _same_type(kind, old, change["type"]):
+            cls, new_cls = (_class_of(kind, name) for name in (old, change["type"]))
+            if old != change["type"] and (cls is None or cls is not new_cls):
                 old_fields = {"behaviors", *_type_fields(kind, old)}
         for key in old_fields & base.keys():
             self.forget(base[key], (*keys, key))
@@ -263,20 +265,17 @@ def _unfold(value: Any, other: Any) -> Any:
     return {"type": value} if isinstance(value, str) and isinstance(other, Mapping) else value
 
 
-def _same_type(kind: str, one: Any, other: Any) -> bool:
-    try:
-        return bool(one == other or lookup(kind, one) is lookup(kind, other))
-    except (ScenarioError, TypeError):  # validation will report it
-        return False
+def _class_of(kind: str, name: Any) -> type[Component] | None:
+    """Return a class by its name; None if there is none, which validation will report."""
+    with suppress(ScenarioError, TypeError):
+        return lookup(kind, name)
+    return None
 
 
 def _type_fields(kind: str, name: Any) -> set[str]:
     """Return the fields of a type that its kind's base class doesn't have."""
-    try:
-        cls = lookup(kind, name)
-    except (ScenarioError, TypeError):
-        return set()
-    return set(cls.model_fields) - set(base_of(cls).model_fields)
+    cls = _class_of(kind, name)
+    return set() if cls is None else set(cls.model_fields) - set(base_of(cls).model_fields)
 
 
 def _refuse_unknown_deletions(base: Document, change: Document) -> None:

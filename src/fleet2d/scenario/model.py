@@ -11,14 +11,12 @@ from typing import Annotated, Any, Self
 from pydantic import (
     BeforeValidator,
     Field,
-    GetJsonSchemaHandler,
     PlainSerializer,
     PrivateAttr,
     ValidationError,
     model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, ErrorDetails
+from pydantic_core import ErrorDetails
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.artifacts.store import ArtifactSettings
@@ -71,22 +69,17 @@ def _read_expectation(value: Any) -> Any:
     return read_expectation(value)
 
 
-class _Described:
-    """Gives the field the schema of expectations."""
+def _describe_expectation(schema: dict[str, Any]) -> None:
+    from fleet2d.expectations.parse import JSON_SCHEMA
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        from fleet2d.expectations.parse import JSON_SCHEMA
-
-        return dict(JSON_SCHEMA)
+    schema.update(JSON_SCHEMA)
 
 
 ExpectationField = Annotated[
     Any,
     BeforeValidator(_read_expectation),
     PlainSerializer(str, return_type=str, when_used="json"),
-    _Described(),
+    Field(json_schema_extra=_describe_expectation),
 ]
 """Text or a mapping in a file, an `Expectation` in Python."""
 

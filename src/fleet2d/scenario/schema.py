@@ -1,5 +1,6 @@
 """The format of scenarios: a JSON Schema for editors, a list of components for people."""
 
+import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -57,10 +58,8 @@ def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
     # Interrupts are named by behaviors, not by the scenario.
     registry = {kind: components(kind) for kind in PACKAGES if kind != "interrupt"}
-    models: list[type[BaseModel]] = [
-        Scenario,
-        *(cls for classes in registry.values() for cls in classes.values()),
-    ]
+    classes = [cls for types in registry.values() for cls in types.values()]
+    models: list[type[BaseModel]] = [Scenario, *classes]
     references, definitions = models_json_schema(
         [(model, "validation") for model in models], schema_generator=_SchemaGenerator
     )
@@ -86,17 +85,16 @@ def schema() -> dict[str, Any]:
             names = [name, *aliases(kind, name)]
             type_schema = {"enum": names} if names[1:] else {"const": name}
             definition.update(title=name, properties={"type": type_schema, **properties})
-        definitions[kind] = {"anyOf": _any_of(kind, references, registry[kind])}
+        own = registry[kind].values()
+        forms = [{**references[cls, "validation"], "required": ["type"]} for cls in own]
+        definitions[kind] = {"anyOf": [*forms, *_forms_without_fields(kind, registry[kind])]}
     definitions = {
         key: _without_required(_expand(value, kinds)) for key, value in definitions.items()
     }
     result = definitions.pop(_key(references[Scenario, "validation"]))
     _allow_composition(result["properties"])
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **result,
-        "$defs": definitions,
-    }
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, **result, "$defs": definitions}
 
 
 def _by_verb(
@@ -118,14 +116,6 @@ def _by_verb(
 
 def _key(reference: Mapping[str, Any]) -> str:
     return str(reference["$ref"]).rpartition("/")[2]
-
-
-def _any_of(
-    kind: str, references: Mapping[Any, Any], classes: Mapping[str, type[Component]]
-) -> list[dict[str, Any]]:
-    """Return the ways to write a component: each type, a bare name, and a user's own."""
-    types = ({**references[cls, "validation"], "required": ["type"]} for cls in classes.values())
-    return [*types, *_forms_without_fields(kind, classes)]
 
 
 def _forms_without_fields(kind: str, names: Iterable[str]) -> list[dict[str, Any]]:
@@ -150,14 +140,9 @@ def _expand(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
         if result.pop("x-by-name", False):
             result = {"anyOf": [result, UNTYPED]}
     if (mark := value.get("x-short-form")) is not None:
-        result["anyOf"] += [
-            {
-                **definition,
-                "properties": definition["properties"] | mark["body"],
-                "required": ["type"],
-            }
-            for definition in kinds[mark["kind"]].values()
-        ]
+        for definition in kinds[mark["kind"]].values():
+            properties = definition["properties"] | mark["body"]
+            result["anyOf"].append({**definition, "properties": properties, "required": ["type"]})
         result["anyOf"] += _forms_without_fields(mark["kind"], kinds[mark["kind"]])
     return result
 
@@ -257,9 +242,7 @@ def _type_of(value: Mapping[str, Any]) -> str:
 
 
 def _default_text(default: Any) -> str:
-    if isinstance(default, bool) or default is None:
-        return {None: "null", True: "true", False: "false"}[default]
-    return str(default)
+    return json.dumps(default) if default is None or isinstance(default, bool) else str(default)
 
 
 def _without_required(value: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.options import ThemeChoice, TrustFiles, TrustFolders, restrict_to, split
+from fleet2d.options import ThemeChoice, TrustFiles, TrustFolders, restrict_to, resume_hint, split
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -74,10 +74,7 @@ def _where(run: "Run") -> str:
     if run.status == "complete":
         return f"stored in {run.directory}"
     time = run.clock.start + timedelta(seconds=run.manifest["simulated_s"])
-    return (
-        f"interrupted at {time:%Y-%m-%d %H:%M}; what was simulated until then is in"
-        f" {run.directory}: continue it by `fleet2d resume {run.directory}`"
-    )
+    return resume_hint(time, run.directory)
 
 
 def _view_runs(directories: list[Path], port: int, seen_at: str, *, browser: bool) -> None:

@@ -32,7 +32,7 @@ from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.viewer.moments import part_of_run
 from fleet2d.viewer.run_facts import bodies_of
-from fleet2d.viewer.stage import Stage, draw_strip, strip_rows
+from fleet2d.viewer.stage import Stage, draw_strip
 
 FigureKind = Literal["life", "heat", "strip", "answers"]
 
@@ -193,11 +193,10 @@ def stretch_figure(run: Run, first: int, end: int, kind: FigureKind = "life") ->
 def strip_figure(part: Run) -> Figure:
     """Return a figure of a strip of time: a row per body."""
     bodies = bodies_of(part.manifest["scenario"], part.manifest["entities"])
-    rows = strip_rows(part, [(body["name"], body["color"]) for body in bodies])
-    figure = Figure(figsize=(10.67, 0.7 + 0.34 * len(rows)), dpi=DPI, facecolor="white")
+    figure = Figure(figsize=(10.67, 0.7 + 0.34 * len(bodies)), dpi=DPI, facecolor="white")
     height = figure.get_figheight()
     axes = figure.add_axes((0.08, 0.32 / height, 0.9, 1 - 0.42 / height))
-    draw_strip(part, part.plan, rows, axes)
+    draw_strip(part, part.plan, bodies, axes)
     return figure
 
 

@@ -172,23 +172,17 @@ def write_film(
     stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MAX_FRAMES_PER_S))
     rate = Fraction(speed).limit_denominator(1000) * 1_000_000
     rate /= run.manifest["step_us"] * stride
+    kind, total = path.suffix.lower()[1:], -(-(end - first) // stride)
     with drawing_style():
         stage = stage_of(run, first, end, stride, height)
         moments = np.flatnonzero(stage.changes())
-        total = -(-(end - first) // stride)
         frames = draw_frames(stage, first, moments)
-        _store(path, frames, total, rate)
+        with os_errors_as(InputError, f"{path} can't be written"), partial_file(path) as partial:
+            if kind == "mp4":
+                _write_mp4(partial, frames, total, rate)
+            else:
+                _write_pictures(partial, kind, frames, total, rate)
     return len(moments)
-
-
-def _store(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: Fraction) -> None:
-    """Write a film under another name, and rename it when it is complete."""
-    kind = path.suffix.lower()[1:]
-    with os_errors_as(InputError, f"{path} can't be written"), partial_file(path) as partial:
-        if kind == "mp4":
-            _write_mp4(partial, frames, total, rate)
-        else:
-            _write_pictures(partial, kind, frames, total, rate)
 
 
 def _check(path: Path, speed: float, height: int) -> None:
@@ -203,18 +197,6 @@ def _check(path: Path, speed: float, height: int) -> None:
         raise InputError(f"--height {height}: choose from 120 to 2160 pixels")
 
 
-def _figure(run: Run, height: int) -> Figure:
-    """Return an empty figure whose width and height are even, as encoders require."""
-    plan_width, plan_height = figure_size(run.plan)
-    rows = height - height % 2
-    aspect = min(max(plan_width / plan_height, 1.0), 1.9)
-    columns = min(2 * round(rows * aspect / 2), 3840)
-    dpi = rows / HEIGHT_IN  # text grows with the film
-    figure = Figure(figsize=(columns / dpi, rows / dpi), dpi=dpi, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_PX) -> Stage:
     """Return the stage of a film, in the current theme; see `write_film`.
 
@@ -225,7 +207,13 @@ def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_P
         stride: Steps between two frames.
         height: The height of a frame [pixels].
     """
-    figure = _figure(run, height)
+    plan_width, plan_height = figure_size(run.plan)
+    rows = height - height % 2  # encoders require even sizes
+    aspect = min(max(plan_width / plan_height, 1.0), 1.9)
+    columns = min(2 * round(rows * aspect / 2), 3840)
+    dpi = rows / HEIGHT_IN  # text grows with the film
+    figure = Figure(figsize=(columns / dpi, rows / dpi), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
     stage = Stage(run, first, end, figure=figure, stride=stride)
     apply_theme(figure)
     return stage

@@ -228,8 +228,5 @@ def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
         return []
     events = compute.cast(table["event"], "string")
     rows = table.filter(compute.is_in(events, array(["opened", "shut", "moved"])))
-    columns: list[list[Any]] = [
-        rows["step"].to_pylist(),
-        *(rows[name].cast("string").to_pylist() for name in ("entity", "event", "detail")),
-    ]
-    return list(zip(*columns, strict=True))
+    columns = ("step", "entity", "event", "detail")
+    return [tuple(row.values()) for row in rows.select(columns).to_pylist()]

@@ -36,26 +36,26 @@ class LiveRuns:
             first: A simulation that somebody else starts and ends.
         """
         self._served = served
-        self._runs: list[LiveRun] = []
-        self._sessions: list[LiveSession] = []
+        self._lives: list[tuple[LiveRun, LiveSession]] = []
         self._lock = threading.Lock()
-        self._branches: list[LiveRun] = []
         if first is not None:
             title = first.engine.simulation.scenario.name or "live run"
             self._add(first, title, "", 0)
 
     def _add(self, live: LiveRun, title: str, of: str, since: int) -> LiveSession:
         live.serve = lambda run: self._served.add(PageData(run))
-        path = f"live/{len(self._runs)}"
+        path = f"live/{len(self._lives)}"
         session = LiveSession(path=path, title=title, of=of, since=since)
-        self._runs.append(live)
-        self._sessions.append(session)
+        self._lives.append((live, session))
         return session
 
     def sessions(self) -> list[LiveSession]:
         """Return the simulations that are under way."""
-        pairs = zip(self._runs, self._sessions, strict=True)
-        return [session for live, session in pairs if live.run is None]
+        return [session for live, session in self._lives if live.run is None]
+
+    @property
+    def _branches(self) -> list[LiveRun]:
+        return [live for live, session in self._lives if session["of"]]
 
     def branch(self, order: BranchOrder) -> LiveSession:
         """Continue a run from a step in a simulation of its own, which waits there.
@@ -72,11 +72,9 @@ class LiveRuns:
             simulation = self._branch(order["of"], order["step"])
             with restrict_stored():  # no code but the user's trusted one runs in its thread
                 live = LiveRun(simulation, paused=True)
-            title = (
-                simulation.directory.name if simulation.directory else f"branch of {order['of']}"
-            )
+            directory = simulation.directory
+            title = directory.name if directory else f"branch of {order['of']}"
             session = self._add(live, title, order["of"], order["step"])
-            self._branches.append(live)
         live.start()
         return session
 
@@ -91,21 +89,18 @@ class LiveRuns:
             raise InputError(f"step {step} is not simulated yet: the run is at {simulation.step}")
         scenario: dict[str, Any] = plain(simulation.scenario.resolved())
         scenario["simulation"]["seed"] = simulation.seed
-        content = {
-            "scenario": scenario,
-            "interventions": simulation.interventions,
-            "expectations": {},
-        }
-        return repeat_until(content, step, free_directory(simulation.directory))
+        content = {"scenario": scenario, "interventions": simulation.interventions}
+        directory = free_directory(simulation.directory)
+        return repeat_until({**content, "expectations": {}}, step, directory)
 
     def _live(self, number: int) -> LiveRun:
-        if not 0 <= number < len(self._runs):
+        if not 0 <= number < len(self._lives):
             raise InputError(f"there is no running simulation {number}")
-        return self._runs[number]
+        return self._lives[number][0]
 
     def end_streams(self) -> None:
         """End all open responses; lock-free for signal handlers."""
-        for live in self._runs:
+        for live, _ in self._lives:
             live.end_streams()
 
     def end_branches(self) -> list[Run]:

@@ -290,24 +290,21 @@ def embedded_run(data: PageData, first: int, end: int) -> dict[str, Any]:
 def html_of(runs: list[dict[str, Any]]) -> str:
     """Return the page with its script, its style and its data in one document."""
     # Escaped, so that no text of a run can end the element around it.
-    data = json.dumps(runs, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    data = compact_json(runs).decode().replace("<", "\\u003c")
     script = (PAGE / "page.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     style = (PAGE / "page.css").read_text(encoding="utf-8")
-    return "\n".join(
-        (
-            "<!doctype html>",
-            '<html lang="en"><head><meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="color-scheme" content="light dark">',
-            "<title>Fleet2D</title>",
-            f"<style>{style}</style></head>",
-            '<body><div id="page"></div>',
-            f'<script type="application/json" id="fleet2d-runs">{data}</script>',
-            f'<script type="module">{script}</script></body></html>',
-            "",
-        )
-    )
+    return f"""\
+<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>Fleet2D</title>
+<style>{style}</style></head>
+<body><div id="page"></div>
+<script type="application/json" id="fleet2d-runs">{data}</script>
+<script type="module">{script}</script></body></html>
+"""
 
 
 def _base64_table(data: PageData, name: str, part: tuple[int, int] | None) -> str:

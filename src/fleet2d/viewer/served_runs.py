@@ -80,7 +80,6 @@ class ServedRuns:
     def __init__(self, sources: Sequence[Path | PageData]) -> None:
         """Name run directories, or data of runs; nothing is opened."""
         self._sources = list(sources)
-        self._data: dict[int, PageData] = {}
 
     def add(self, data: PageData) -> int:
         """Serve another run; return its number."""
@@ -104,12 +103,10 @@ class ServedRuns:
         """
         if not 0 <= number < len(self._sources):
             raise ArtifactError(f"there is no run {number}")
-        if number not in self._data:
-            source = self._sources[number]
-            self._data[number] = (
-                source if isinstance(source, PageData) else PageData(open_run(source))
-            )
-        return self._data[number]
+        source = self._sources[number]
+        if not isinstance(source, PageData):
+            source = self._sources[number] = PageData(open_run(source))
+        return source
 
     def preload(self) -> None:
         """Compute the data that the page requests first; errors are reported on its request."""

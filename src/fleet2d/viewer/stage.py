@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib.dates as mdates
 import numpy as np
@@ -17,7 +17,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, I16, I64, Bool
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, deep_color
 from fleet2d.pictures.charts import AskedTime, asked_of
 from fleet2d.pictures.floorplan import floorplan_axes
@@ -35,51 +35,27 @@ MAX_SAMPLES = 100_000
 LABEL_PART = 0.05  # stretches longer than this share of the strip have the name of their room
 
 
-class StripRow(NamedTuple):
-    """A row of a strip: the rooms of a body at equal intervals, -1 while away."""
-
-    name: str
-    color: str
-    room: I16
-    time: NDArray[np.datetime64]
-
-
-def strip_rows(run: Run, colors: Sequence[tuple[str, str]]) -> list[StripRow]:
-    """Return the rows of some bodies.
-
-    Args:
-        run: The run, or a part of one.
-        colors: (name of a body, colour of its name) pairs.
-
-    Raises:
-        ArtifactError: The run stored no key frames.
-    """
-    step_us, steps = run.manifest["step_us"], run.manifest["steps"]
-    interval = timedelta(microseconds=int(step_us * -(-steps // MAX_SAMPLES)))
-    rows = []
-    for name, color in colors:
-        path = run.path(name, interval)
-        rows.append(StripRow(name, color, path.room, path.time))
-    return rows
-
-
-def draw_strip(run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes) -> None:
+def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axes) -> None:
     """Draw a strip of time: a row for each body, coloured by the room that it is in.
 
     Long stretches have the names of their rooms.
 
     Args:
-        run: The run, for its sightings.
+        run: The run, or a part of one.
         plan: Its home.
-        rows: The rows that `strip_rows` returned.
+        bodies: The bodies.
         axes: The axes to draw on; their limits are set.
+
+    Raises:
+        ArtifactError: The run stored no key frames.
     """
     clock = run.clock
+    interval = timedelta(microseconds=clock.step_us * -(-clock.steps // MAX_SAMPLES))
     begin, end = mdates.date2num([clock.start, clock.time(clock.steps)]).tolist()
     boxes: list[F64] = []
     faces: list[tuple[float, float, float]] = []
-    for number, row in enumerate(rows):
-        for start, stop, room in _stretches(row, end):
+    for number, body in enumerate(bodies):
+        for start, stop, room in _stretches(run.path(body["name"], interval), end):
             low, high = number, number + ROW_PART
             boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
@@ -89,24 +65,23 @@ def draw_strip(run: Run, plan: FloorPlan, rows: Sequence[StripRow], axes: Axes) 
                 at = (start + stop) / 2
                 axes.text(at, number + 0.42, name, clip_on=True, fontsize=6.5, **style)
     axes.add_collection(PolyCollection(boxes, facecolors=faces, lw=0, zorder=1), autolim=False)
-    _mark_sightings(run, rows, axes)
-    axes.set(xlim=(begin, end), ylim=(len(rows), -0.05))
-    _label(axes, rows)
+    _mark_sightings(run, [body["name"] for body in bodies], axes)
+    axes.set(xlim=(begin, end), ylim=(len(bodies), -0.05))
+    _label(axes, bodies)
 
 
-def _stretches(row: StripRow, end: float) -> list[tuple[float, float, int]]:
-    """Return start, end and room of the stretches in a row; times as matplotlib has them [days]."""
-    cuts = np.append(0, np.flatnonzero(np.diff(row.room)) + 1)
-    begins = mdates.date2num(row.time[cuts]).tolist()
+def _stretches(path: Trajectory, end: float) -> list[tuple[float, float, int]]:
+    """Return start, end and room, -1 while away, of the stretches in rooms; matplotlib's times."""
+    cuts = np.append(0, np.flatnonzero(np.diff(path.room)) + 1)
+    begins = mdates.date2num(path.time[cuts]).tolist()
     ends = [*begins[1:], end]
-    return list(zip(begins, ends, row.room[cuts].tolist(), strict=True))
+    return list(zip(begins, ends, path.room[cuts].tolist(), strict=True))
 
 
-def _mark_sightings(run: Run, rows: Sequence[StripRow], axes: Axes) -> None:
+def _mark_sightings(run: Run, names: Sequence[str], axes: Axes) -> None:
     """Mark at the foot of a user's row when robots noticed the user."""
     start = np.datetime64(run.manifest["start"], "us")
     step = np.timedelta64(run.manifest["step_us"], "us")
-    names = [row.name for row in rows]
     boxes = []
     for lane in sightings_of(run):
         if lane["user"] not in names:
@@ -120,15 +95,15 @@ def _mark_sightings(run: Run, rows: Sequence[StripRow], axes: Axes) -> None:
     axes.add_collection(PolyCollection(boxes, facecolors=TEXT_COLOR, lw=0, zorder=2), autolim=False)
 
 
-def _label(axes: Axes, rows: Sequence[StripRow]) -> None:
+def _label(axes: Axes, bodies: Sequence[BodyFacts]) -> None:
     locator = mdates.AutoDateLocator(minticks=3, maxticks=10)
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator))
     axes.xaxis.get_offset_text().set_visible(False)
-    axes.set_yticks(np.arange(len(rows)) + ROW_PART / 2, [row.name for row in rows])
+    axes.set_yticks(np.arange(len(bodies)) + ROW_PART / 2, [body["name"] for body in bodies])
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
-    for label, row in zip(axes.get_yticklabels(), rows, strict=True):
-        label.set(color=row.color, fontweight="bold")
+    for label, body in zip(axes.get_yticklabels(), bodies, strict=True):
+        label.set(color=body["color"], fontweight="bold")
     for side in axes.spines.values():
         side.set_visible(False)
     axes.grid(axis="x", color=HATCH_COLOR, lw=0.4, zorder=0)
@@ -293,14 +268,12 @@ class Stage:
 
     def _fill_strip(self, strip: Axes) -> Any:
         """Draw the strip; return its cursor."""
-        colors = [(body.facts["name"], body.facts["color"]) for body in self.bodies[:STRIP_ROWS]]
-        rows = strip_rows(self._part, colors)
-        draw_strip(self._part, self._plan, rows, strip)
+        bodies = [body.facts for body in self.bodies[:STRIP_ROWS]]
+        draw_strip(self._part, self._plan, bodies, strip)
         return strip.axvline(0, color=ACCENT_COLOR, lw=1.2, zorder=4)
 
     def _lay_out(self, figure: Figure) -> tuple[Axes, Axes]:
-        rows = len(self._run.manifest["entities"]["users"])
-        rows += len(self._run.manifest["entities"]["robots"])
+        rows = sum(map(len, self._run.manifest["entities"].values()))
         height = 0.075 + 0.032 * min(rows, STRIP_ROWS)
         plan = figure.add_axes((0.0, height, 1.0, 0.94 - height))
         strip = figure.add_axes((0.09, 0.055, 0.88, height - 0.06))
@@ -383,17 +356,11 @@ class Stage:
         x, y, heading = pose
         pans = self._pans(facts, step)
         for camera, pan in zip(facts["cameras"], pans, strict=True):
-            forward, left = camera["forward"], camera["left"]
-            eye = np.array(
-                [
-                    x + forward * np.cos(heading) - left * np.sin(heading),
-                    y + forward * np.sin(heading) + left * np.cos(heading),
-                ]
-            )
-            lens = {
-                "range": (camera["near"], camera["far"]),
-                "angle_deg": float(np.rad2deg(camera["angle"])),
-            }
+            ahead = np.array([np.cos(heading), np.sin(heading)])
+            beside = np.array([-ahead[1], ahead[0]])
+            eye = np.array([x, y]) + camera["forward"] * ahead + camera["left"] * beside
+            angle_deg = float(np.rad2deg(camera["angle"]))
+            lens = {"range": (camera["near"], camera["far"]), "angle_deg": angle_deg}
             region = field_of_view(sight, eye, heading + camera["heading"] + pan, lens)
             for part in shapely.get_parts(region):
                 yield shapely.get_coordinates(part.exterior)
