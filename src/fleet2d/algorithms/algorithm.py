@@ -286,18 +286,17 @@ def to_columns(output: Any, rooms: Sequence[str], where: str) -> dict[str, NDArr
             f"{where} returned {output!r}, expected a RoomDistribution, or a mapping of names to"
             " numbers or to arrays of one length"
         )
-    columns = {
-        str(name): _column(np.atleast_1d(np.asarray(value))) for name, value in output.items()
-    }
-    for name, values in columns.items():
-        _check_column(name, values, where)
+    columns = {str(name): _column(str(name), value, where) for name, value in output.items()}
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         raise ComponentError(f"{where} returned arrays of different lengths: {lengths}")
     return columns
 
 
-def _check_column(name: str, values: NDArray[Any], where: str) -> None:
+def _column(name: str, value: Any, where: str) -> NDArray[Any]:
+    """Return numbers, or texts as objects, of one dimension; refuse others."""
+    values = np.atleast_1d(np.asarray(value))
+    values = values.astype(object) if values.dtype.kind == "U" else values
     if name in RESERVED:
         raise ComponentError(f"{where} returned {name!r}, a column that every table has: rename it")
     if values.ndim != 1:
@@ -315,10 +314,7 @@ def _check_column(name: str, values: NDArray[Any], where: str) -> None:
         )
     if values.dtype.kind == "f" and not np.isfinite(values).all():
         raise ComponentError(f"{where} returned {name!r} with a value that is not finite: {values}")
-
-
-def _column(values: NDArray[Any]) -> NDArray[Any]:
-    return values.astype(object) if values.dtype.kind == "U" else values
+    return values
 
 
 @dataclass(frozen=True)

@@ -476,10 +476,8 @@ class Entry(Settings):
         if not isinstance(data, dict) or "act" in data:
             return data
         times = {key: value for key, value in data.items() if key in ENTRY_KEYS}
-        return {
-            **times,
-            "act": {key: value for key, value in data.items() if key not in ENTRY_KEYS},
-        }
+        act = {key: value for key, value in data.items() if key not in ENTRY_KEYS}
+        return {**times, "act": act}
 
     @classmethod
     def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:

@@ -341,8 +341,7 @@ class Fault(Trouble):
 
     def model_post_init(self, _: object, /) -> None:
         """Refuse a fault without effect."""
-        body_fails = self.immobilizes or self.charger
-        if not (body_fails or self.dark or self.detection < 1 or self.errs):
+        if not (self.immobilizes or self.charger or self.disturbance):
             raise problem(
                 "nothing fails: give 'wheels', 'lost', 'charger', 'dark', 'detection' or 'errs'"
             )

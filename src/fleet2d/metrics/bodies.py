@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import timedelta
+from itertools import pairwise
 from math import dist
 from typing import Any, ClassVar
 
@@ -79,20 +80,16 @@ class Travel(Metric):
         rest_steps = self.rest.total_seconds() / history.step_s
         for robot in state.robots:
             poses = history.poses(robot)
-            standing = self.standing.get(robot)
-            between = 0.0 if standing is None else dist(standing[0], poses.at(0))
+            standing = self.standing.get(robot, (poses.at(0), 0))
+            between = dist(standing[0], poses.at(0))
             self.metres[robot] = self.metres.get(robot, 0.0) + between + poses.distance
             self.relocations.setdefault(robot, 0)
             changes = np.flatnonzero((np.diff(poses.xy, axis=0) != 0).any(axis=1)) + 1
-            begins = [0, *changes.tolist()]
-            for begin, end in zip(begins, [*begins[1:], len(history)], strict=True):
+            for begin, end in pairwise([0, *changes.tolist(), len(history)]):
                 place, steps = poses.at(begin), end - begin
-                if standing is not None and standing[0] == place:
-                    steps += standing[1]
-                standing = place, steps
-                if steps >= rest_steps:
+                standing = place, steps + (standing[1] if standing[0] == place else 0)
+                if standing[1] >= rest_steps:
                     self._rest(robot, place)
-            assert standing is not None
             self.standing[robot] = standing
         self.days += len(history) * history.step_s / DAY_S
 

@@ -206,23 +206,21 @@ class LongTermMetric(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.counts: list[I64] = []  # of each period in the window
-        self.steps: list[int] = []
+        # Counts and steps of each period in the window; of all periods without one.
+        self.periods: list[tuple[I64, int]] = []
         self.days = 0.0
 
     def count(self, counts: I64, history: History) -> tuple[I64, int]:
         """Add a period; return the counts of the window and its steps."""
         self.days += len(history) * history.step_s / DAY_S
-        if self.window is None and self.counts:
-            self.counts = [self.counts[0] + counts]
-            self.steps = [self.steps[0] + len(history)]
-        else:
-            self.counts.append(counts)
-            self.steps.append(len(history))
+        self.periods.append((counts, len(history)))
         if self.window is not None:
-            most = max(1, math.floor(self.window / self.period))
-            self.counts, self.steps = self.counts[-most:], self.steps[-most:]
-        return np.sum(self.counts, axis=0), sum(self.steps)
+            del self.periods[: -max(1, math.floor(self.window / self.period))]
+        all_counts, steps = zip(*self.periods, strict=True)
+        total = np.sum(all_counts, axis=0), sum(steps)
+        if self.window is None:
+            self.periods = [total]
+        return total
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -341,15 +339,12 @@ class LtpError(LongTermMetric):
     def _note(self, users: Sequence[str], columns: Mapping[str, F64], presence: Presence) -> None:
         """Store the newest rows, days since which tv is small, and changes of the best room."""
         today = max(1, math.ceil(round(self.days, 9)))
-        for user, *row in zip(
-            users, *(values.tolist() for values in columns.values()), strict=True
-        ):
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        for user, row in zip(users, rows, strict=True):
             self.last[user] = dict(zip(columns, row, strict=True))
-            best, flips = int(presence.share(user).argmax()), 0
-            if user in self.best:
-                last_best, flips = self.best[user]
-                flips += best != last_best
-            self.best[user] = best, flips
+            best = int(presence.share(user).argmax())
+            last_best, flips = self.best.get(user, (best, 0))
+            self.best[user] = best, flips + (best != last_best)
             if self.last[user]["tv"] > self.burn_in:
                 self.within[user] = None
             elif self.within.get(user) is None:
