@@ -6,6 +6,7 @@ counts are what algorithms learn presence from.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple, Self
@@ -25,7 +26,7 @@ from fleet2d.kernels import (
     list_sightings,
     rasterize_cells,
 )
-from fleet2d.runtime.clock import DAY_US, MICROSECOND, Clock, midnight_of
+from fleet2d.runtime.clock import DAY_US, MICROSECOND, Clock
 
 # Side of a patch [m], approximately; larger where a room would have more than about MAX_PATCHES.
 SIDE_M = 1.0
@@ -378,7 +379,7 @@ def gather(
 
 def times_of_bins(clock: Clock, begin: int, bin_steps: int, bins: int) -> tuple[I64, I64]:
     """Return the day of each bin, as `date.toordinal` counts, and its first minute of the day."""
-    since_midnight = (clock.start - midnight_of(clock.start)) // MICROSECOND
     steps = begin + np.arange(bins, dtype=np.int64) * bin_steps
-    day, time_us = np.divmod(since_midnight + steps * clock.step_us, DAY_US)
-    return clock.start.toordinal() + day, time_us // 60_000_000
+    start_us = (clock.start - datetime.min) // MICROSECOND
+    day, time_us = np.divmod(start_us + steps * clock.step_us, DAY_US)
+    return datetime.min.toordinal() + day, time_us // 60_000_000

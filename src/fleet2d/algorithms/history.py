@@ -351,7 +351,8 @@ class Log:
             )
         begin, last = first // self.bin_steps, end // self.bin_steps
         since, blocks = self._bins.touching(begin, last)
-        bins = np.concatenate(blocks)[begin - since : last - since]
+        bins = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)  # often no copy
+        bins = bins[begin - since : last - since]
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         seen = self.observations(first, end)

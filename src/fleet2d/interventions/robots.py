@@ -275,12 +275,12 @@ class Trouble(RobotIntervention, Lasting):
 
     def begin(self, world: World) -> None:
         """Let it happen; a robot that is lost may find its place again by sight."""
-        self._apply(world)
         if self.loses_place:
             world.emit(self.entity, EventKind.LOCALIZATION_LOST, "")
             after = relocalizes_after(self.actor(world))
             if after is not None:
                 world.later(Relocalize(entity=self.entity, by_sight=True), after)
+        self._apply(world)
 
     def end(self, world: World) -> None:
         """Undo it; the robot knows its place again, unless it is lost for another reason."""
