@@ -1,16 +1,23 @@
-"""What came of what robots wanted of people."""
+"""Metrics of requests: what came of them, and what they would have been worth at the best time."""
 
+import copy
+from bisect import bisect_right
 from collections import Counter
+from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
-from fleet2d.interactions.answers import AnswerRecord
+from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
+from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.metrics.metric import Metric, columns_of
+from fleet2d.metrics.metric import Metric, columns_of, nested
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import EventKind
 
 # What happens between a person and a robot without a request.
 TOLD = frozenset({"called", "question", "replies", "sent_away", "banned", "switched_off"})
@@ -107,3 +114,211 @@ def _summary(records: list[AnswerRecord], wanted: int, worth: float) -> dict[str
     if answered:
         numbers["wait_s"] = sum_in_order(r.delay_s for r in answered) / len(answered)
     return numbers
+
+
+REGRET_COLUMNS = ("robot", "request", "due_at", "best_at", "best_chance", "best", "value")
+
+
+@dataclass
+class OpenRequest:
+    """A request whose deadline has not passed.
+
+    Attributes:
+        wanted: The request.
+        state: The attitude that the person would have had, if not addressed for this request.
+        deadline: The last step of it.
+        best: The largest expected value of asking once so far.
+        best_at: When that was.
+        chance: The probability of a yes then.
+        value: What was accepted in time.
+    """
+
+    wanted: Wanted
+    state: AttitudeState
+    deadline: int
+    best: float = 0.0
+    best_at: int = -1
+    chance: float = 0.0
+    value: float = 0.0
+
+
+@register("metric", "timing_regret")
+class TimingRegret(Metric):
+    """How much more value asking at the best time of the same life would have had.
+
+    The best time of a request maximizes the probability of a yes, by the model of answers, times
+    the value left. The robot is then imagined at the interaction's distance, in sight and in front
+    of the person, who lives as in the run; the attitude is that of the run without the prompts for
+    this request. What one request does to others isn't followed: a run under another policy tells
+    that. A robot that asks again after a refusal can do better than asking once, so regret may be
+    negative.
+
+    For each robot and person, over the requests whose deadline has passed: `best`, the expected
+    value of asking for each once, at its best time; `value`, that of what was accepted; `regret`,
+    the difference; `best_chance`, the mean probability of a yes at the best times. Its table has a
+    row for each request; `best_at` is -1 if the person was never at home in time.
+
+    Attributes:
+        every: Distance of the times compared; those at which the person was addressed are, too.
+    """
+
+    hidden: ClassVar[frozenset[str]] = frozenset({"requests", "value"})
+
+    every: PositiveDuration = timedelta(minutes=5)
+
+    def start(self, home: Home) -> None:
+        """Begin without requests."""
+        self.attitudes: dict[tuple[str, str], AttitudeState] = {}
+        self.open: list[OpenRequest] = []
+        self.closed: list[OpenRequest] = []
+        self.activities: dict[str, str] = {}  # what each user did at the end of the last history
+
+    def update(self, history: History, state: Present) -> Any:
+        """Compare the times of the history; return a row for each request that is over."""
+        life = _LifeOfPeriod(history, state, self.activities)
+        every = max(1, round(self.every.total_seconds() / history.step_s))
+        happened: list[tuple[int, int, Wanted | AnswerRecord | None]] = [
+            *((wanted.step, 0, wanted) for wanted in history.wanted),
+            *((record.step, 1, record) for record in history.answers),
+        ]
+        if self.open or happened:
+            begin = -(history.first // -every) * every
+            happened += ((step, 2, None) for step in range(begin, history.end, every))
+        closed = []
+        for step, _, event in sorted(happened, key=lambda row: row[:2]):
+            closed += [each for each in self.open if each.deadline < step]
+            self.open = [each for each in self.open if each.deadline >= step]
+            if isinstance(event, Wanted):
+                self._open(event, life)
+            elif event is not None:
+                self._take_answer(event, life)
+            else:
+                for request in self.open:
+                    _consider(request, step, life)
+        self.activities = life.last_activities
+        self.closed += closed
+        rows = [
+            (r.wanted.robot, r.wanted.text, r.wanted.step, r.best_at, r.chance, r.best, r.value)
+            for r in closed
+        ]
+        return columns_of(REGRET_COLUMNS, rows)
+
+    def _attitude(self, robot: str, user: str, life: "_LifeOfPeriod", step: int) -> AttitudeState:
+        """Return the attitude of a user to a robot at a step."""
+        months = life.answers[user].months
+        if (robot, user) not in self.attitudes:
+            self.attitudes[robot, user] = months.begin(life.start)
+        state = self.attitudes[robot, user]
+        months.pass_time(state, life.time(step))
+        return state
+
+    def _open(self, wanted: Wanted, life: "_LifeOfPeriod") -> None:
+        """Begin to compare the times for a request."""
+        state = self._attitude(wanted.robot, wanted.interaction.to, life, wanted.step)
+        lasts = int(wanted.interaction.within / timedelta(seconds=life.step_s))
+        self.open.append(OpenRequest(wanted, copy.deepcopy(state), wanted.step + lasts))
+        _consider(self.open[-1], wanted.step, life)
+
+    def _take_answer(self, record: AnswerRecord, life: "_LifeOfPeriod") -> None:
+        """Let a prompt change the attitude, except for the request that it was for."""
+        user = record.addressed
+        states = [self._attitude(record.robot, user, life, record.step)] if user else []
+        for request in self.open:
+            if request.wanted.robot != record.robot:
+                continue
+            if request.wanted.text == record.text:
+                request.value += record.value * (record.outcome == Outcome.ACCEPTED)
+                _consider(request, record.step, life)
+            elif request.wanted.interaction.to == user:
+                life.answers[user].months.pass_time(request.state, life.time(record.step))
+                states.append(request.state)
+        if record.outcome:
+            name, outcome = record.text.rpartition(" ")[0], Outcome(record.outcome)
+            for state in states:
+                life.answers[user].months.addressed(state, name, outcome, record.willingness)
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {user: {number: value}}}."""
+        by_pair: dict[tuple[str, str], list[OpenRequest]] = {}
+        for request in self.closed:
+            pair = request.wanted.robot, request.wanted.interaction.to
+            by_pair.setdefault(pair, []).append(request)
+        return nested({pair: _numbers(by_pair[pair]) for pair in sorted(by_pair)})
+
+
+class _LifeOfPeriod:
+    """What users do in the steps of a history."""
+
+    def __init__(self, history: History, state: Present, activities: dict[str, str]) -> None:
+        self.start, self.step_s, self.answers = state.start, history.step_s, history.answer_models
+        self._first, self._rooms = history.first, state.home.rooms
+        self._poses = {user: history.poses(user) for user in state.users}
+        self._activities = {user: ([-1], [activities.get(user, "")]) for user in state.users}
+        for event in history.events:
+            if event.event == EventKind.ACTIVITY and event.entity in self._activities:
+                steps, names = self._activities[event.entity]
+                steps.append(event.step)
+                names.append(event.detail)
+
+    @property
+    def last_activities(self) -> dict[str, str]:
+        """What each user does at the end."""
+        return {user: names[-1] for user, (_, names) in self._activities.items()}
+
+    def time(self, step: int) -> datetime:
+        """Return the local time of a step."""
+        return self.start + timedelta(seconds=step * self.step_s)
+
+    def circumstances(self, wanted: Wanted, step: int) -> Circumstances | None:
+        """Return how a well-placed robot would find the person; None: not at home."""
+        user, at = wanted.interaction.to, step - self._first
+        poses = self._poses[user]
+        if poses.away[at]:
+            return None
+        room = int(poses.room[at])
+        others = (self._poses[name].room[at] for name in self._poses if name != user)
+        steps, names = self._activities[user]
+        activity = names[bisect_right(steps, step) - 1]
+        after = min(at + 1, len(poses) - 1)
+        return Circumstances(
+            time=self.time(step),
+            name=wanted.text.rpartition(" ")[0],
+            interaction=wanted.interaction,
+            activity=activity,
+            room="" if room < 0 else self._rooms[room].type,
+            company=sum(room >= 0 and other == room for other in others),
+            is_moving=bool((poses.xy[at] != poses.xy[after]).any()),
+            is_lying=activity in ASLEEP,
+            distance=wanted.interaction.distance,
+            in_sight=True,
+            from_behind=False,
+        )
+
+
+def _consider(request: OpenRequest, step: int, life: _LifeOfPeriod) -> None:
+    """Compare a time with the best one of a request so far."""
+    now = life.circumstances(request.wanted, step)
+    if now is None:
+        return
+    interaction = request.wanted.interaction
+    answers: Answers = life.answers[interaction.to]
+    answers.months.pass_time(request.state, now.time)
+    chance = 1.0
+    for stage in ("notice", "available", "accept"):
+        chance *= answers.chance(stage, now, request.state)
+    value = chance * interaction.value_after(now.time - life.time(request.wanted.step))
+    if value > request.best:
+        request.best, request.best_at, request.chance = value, step, chance
+
+
+def _numbers(requests: list[OpenRequest]) -> dict[str, float]:
+    """Return the numbers of one robot and one person."""
+    best = sum_in_order(request.best for request in requests)
+    value = sum_in_order(request.value for request in requests)
+    return {
+        "requests": len(requests),
+        "best": best,
+        "value": value,
+        "regret": best - value,
+        "best_chance": sum_in_order(request.chance for request in requests) / len(requests),
+    }
