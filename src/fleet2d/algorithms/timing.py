@@ -152,9 +152,8 @@ class TimingAlgorithm(Algorithm):
             if event.event == "asks":
                 self._close(event.entity, "")
                 name, _, user = event.detail.rpartition(" ")
-                pose = history.poses(event.entity)
-                at = pose.xy[event.step - history.first]
-                room = state.home.plan.room_at(float(at[0]), float(at[1]))
+                at = history.poses(event.entity).at(event.step - history.first)
+                room = state.home.plan.room_at(*at)
                 hour = (state.start + event.step * timedelta(seconds=history.step_s)).hour
                 index = -1 if room is None else room.index
                 self.open[event.entity] = Asked(user, name, hour, index)

@@ -280,8 +280,7 @@ class InterventionMethods(ABC):
         Raises:
             ScenarioError: There is nothing of that name.
         """
-        fields = {"camera": camera, "behavior": behavior, "duration": duration}
-        self._do("switch_off", entity=name, **fields)
+        self._do("switch_off", entity=name, camera=camera, behavior=behavior, duration=duration)
 
     def switch_on(
         self, name: str, *, camera: bool | str | None = None, behavior: str | None = None

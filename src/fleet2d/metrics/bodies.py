@@ -89,15 +89,12 @@ class Travel(Metric):
                 place, steps = poses.at(begin), end - begin
                 standing = place, steps + (standing[1] if standing[0] == place else 0)
                 if standing[1] >= rest_steps:
-                    self._rest(robot, place)
+                    last = self.last_rest.setdefault(robot, place)
+                    if dist(last, place) > self.apart:
+                        self.relocations[robot] += 1
+                        self.last_rest[robot] = place
             self.standing[robot] = standing
         self.days += len(history) * history.step_s / DAY_S
-
-    def _rest(self, robot: str, place: RestPlace) -> None:
-        if robot in self.last_rest and dist(self.last_rest[robot], place) > self.apart:
-            self.relocations[robot] += 1
-            self.last_rest[robot] = place
-        self.last_rest.setdefault(robot, place)
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {relocations, metres}}, both per day."""

@@ -321,26 +321,24 @@ class RtpScore(Metric):
         """Score the bins of the period; return a row for each user and class of gaps in it."""
         size = steps_of_bin(round(history.step_s * 1e6))
         ends = np.arange(-(-(history.first + 1) // size) * size, history.end + 1, size) - 1
-        beliefs = [reader.at(history, state, ends) for reader in self.beliefs]
+        beliefs = [self._places(reader.at(history, state, ends)) for reader in self.beliefs]
         rows: list[tuple[Any, ...]] = []
         for row, user in enumerate(state.users):
             gap, last = self._sightings(user, row, history, ends)
             if beliefs[0] is None:
                 continue
-            places = [
-                None if shares is None else self._places(shares[0][:, row], shares[1][:, row])
-                for shares in beliefs
-            ]
-            scored = self._score(user, places, gap, last, history, ends)
+            of_user = [None if belief is None else belief[:, row] for belief in beliefs]
+            scored = self._score(user, of_user, gap, last, history, ends)
             self.scored.setdefault(user, []).append(scored)
             rows += [(user, *sums) for sums in _sums(scored)]
         return columns_of(("user", "gap", "bins", "log_loss", "brier", "top_1"), rows)
 
-    def _places(self, home: F64, away: F64) -> F64:
+    def _places(self, shares: tuple[F64, F64] | None) -> F64 | None:
         """Return the probability of each scored place: rooms, and away unless `given_home`."""
-        if self.given_home:
-            return home
-        return np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
+        if shares is None:
+            return None
+        home, away = shares[0], shares[1][..., np.newaxis]
+        return home if self.given_home else np.concatenate([home * (1 - away), away], axis=-1)
 
     def _sightings(self, user: str, row: int, history: History, ends: I64) -> tuple[I64, I64]:
         """Return the steps since the last correct sighting at the ends of bins, and its room."""

@@ -336,15 +336,13 @@ class BeliefReader:
         self._previous = presence if presence is not None else previous
         if not len(ends):
             return None
-        if presence is not None and presence.track is not None:
-            return self._tracked(presence.track, history, ends)
-        if previous is None:
-            return None
-        times = [state.start + timedelta(seconds=(int(e) + 1) * history.step_s) for e in ends]
-        arrays = [previous.at(time).arrays for time in times]
-        return np.array([home for home, _ in arrays]), np.array([away for _, away in arrays])
-
-    def _tracked(self, track: BeliefSeries, history: History, ends: I64) -> tuple[F64, F64] | None:
+        track = None if presence is None else presence.track
+        if track is None:
+            if previous is None:
+                return None
+            times = [state.start + timedelta(seconds=(int(e) + 1) * history.step_s) for e in ends]
+            home, away = zip(*(previous.at(time).arrays for time in times), strict=True)
+            return np.array(home), np.array(away)
         last = track.begin + len(track.away) * track.bin_steps - 1
         begin = int(ends[0]) + 1 - track.bin_steps
         if last < history.first:  # an output of an earlier period: this one had no whole bin

@@ -229,10 +229,11 @@ class Estimator(Component):
         sums = np.asarray(self.sums(evidence))
         expected = (len(evidence), self.users + 1, self.width(self.rooms))
         if sums.shape != expected:
+            code = type(self).sums.__code__
             raise ComponentError(
                 f"{type(self).__name__}.sums returned an array of shape {sums.shape}, expected"
                 f" {expected}: bins, users + 1, and width({self.rooms})"
-                f"{_source_line(type(self))}"
+                f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in sums)"
             )
         self.counts.add(evidence.day, evidence.minute, sums)
 
@@ -303,12 +304,6 @@ class Estimator(Component):
                 " with these users, or start without one"
             )
         self.counts.recall(learned["counts"], today)
-
-
-def _source_line(cls: type[Estimator]) -> str:
-    """Return the file and line of a class's `sums`, for messages."""
-    code = cls.sums.__code__
-    return f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in sums)"
 
 
 def normalized(weights: F64) -> F64:
