@@ -50,6 +50,9 @@ def file_name(name: str) -> str:
     return re.sub(r"[^\w.-]+", "-", name).strip(".-")
 
 
+Workers = Annotated[
+    int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
+]
 TrustFiles = Annotated[
     list[Path] | None,
     typer.Option("--trust", metavar="FILE", help="Code of the scenario that may run."),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.options import TrustFiles, TrustFolders, restrict_to
+from fleet2d.options import TrustFiles, TrustFolders, Workers, restrict_to
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,9 +29,7 @@ def _commands() -> None:
 def dataset(
     source: Annotated[Path, typer.Argument(metavar="FILE.yaml", help="What it is drawn from.")],
     out: Annotated[Path, typer.Option(help="The folder to write.")],
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
-    ] = None,
+    workers: Workers = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Compare the files of a made one with its manifest.")
     ] = False,

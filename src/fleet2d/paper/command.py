@@ -8,6 +8,7 @@ import typer
 
 from fleet2d.configuration.problems import check_known
 from fleet2d.errors import InputError, os_errors_as
+from fleet2d.options import Workers
 
 WIDTH = 200  # of lines in a file [characters]
 
@@ -29,9 +30,7 @@ def reproduce_paper(
         typer.Option(min=1, help="Months of each kind: seeds, robots of ltp-gap, runs of speed."),
     ] = None,
     days: Annotated[int | None, typer.Option(min=1, help="Days of a month.")] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
-    ] = None,
+    workers: Workers = None,
     real_map: Annotated[
         Path | None,
         typer.Option("--map", help="A real home, for speed: a ROS map's YAML file, or a vacuum's."),
@@ -52,14 +51,15 @@ def reproduce_paper(
     with os_errors_as(InputError, f"{out} can't be created", "; name another directory by --out"):
         out.mkdir(parents=True, exist_ok=True)  # an error is shown before hours of work
     can_draw = _can_draw()
-    console = Console(soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
+    width = None if sys.stdout.isatty() else WIDTH
+    console = Console(soft_wrap=True, width=width, highlight=False, markup=False)
     for name in [name for name in measures if name in (results or measures)]:
         result = measures[name](options)
-        console.print(f"\n{result.title}", highlight=False, markup=False)
+        console.print(f"\n{result.title}")
         for table in result.tables:
             console.print(table)
         for note in result.notes:
-            console.print(f"note: {note}", highlight=False, markup=False)
+            console.print(f"note: {note}")
         typer.echo(result.save(out))
         if can_draw:
             from fleet2d.paper.pictures import draw

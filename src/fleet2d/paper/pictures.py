@@ -1,24 +1,19 @@
 """The figures of the results."""
 
-import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from fleet2d.errors import extra
 from fleet2d.metrics.rtp_score import GAPS
-from fleet2d.paper import results
-from fleet2d.paper.results import Result
+from fleet2d.paper.results import RESULTS, Result
 from fleet2d.pictures.floorplan import write_picture
 from fleet2d.studies.figures import COLORS, DARK, draw_interaction
-
-with extra("viz", "drawing needs matplotlib"):
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
 
 DPI = 150
 SIZE = (8.4, 4.4)
@@ -53,15 +48,13 @@ def draw_speed(numbers: Mapping[str, Any]) -> Figure:
     for y, value in zip(positions, speedups, strict=True):
         axes.text(value * 1.12, float(y), f"{value:,.0f}", va="center", fontsize=8, color=DARK)
     axes.set_yticks(positions, [row["case"] for row in rows], fontsize=8)
-    axes.set_xscale("log")
-    axes.set_xlim(1, max(speedups) * 8)
+    axes.set(xlabel="times real time", xscale="log", xlim=(1, max(speedups) * 8))
     pairs = zip(rows, positions, strict=True)
     markers = [(row["paper_speedup"], y) for row, y in pairs if "paper_speedup" in row]
     axes.plot(
         *zip(*markers, strict=True), "D", ms=5, color=COLORS[0], label="the paper's", ls="none"
     )
     axes.legend(frameon=False, fontsize=8, loc="upper right", bbox_to_anchor=(1, 1.06))
-    axes.set_xlabel("times real time")
     return figure
 
 
@@ -79,10 +72,8 @@ def draw_ltp_gap(numbers: Mapping[str, Any]) -> Figure:
     label = f"all rooms, band of 80 % of {numbers['robots']} robots"
     axes.fill_between(days, overall["low"], overall["high"], color=DARK, alpha=0.18, lw=0, zorder=1)
     axes.plot(days, overall["mean"], lw=2.2, color=DARK, label=label, zorder=4)
-    axes.set_xlabel("day")
-    axes.set_ylabel("|estimated − true| share of time at home")
-    axes.set_ylim(bottom=0)
-    axes.set_xlim(1, max(2, numbers["days"]))
+    axes.set(xlabel="day", ylabel="|estimated − true| share of time at home")
+    axes.set(xlim=(1, max(2, numbers["days"])), ylim=(0, None))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(frameon=False, fontsize=8)
     return figure
@@ -92,34 +83,23 @@ def draw_rtp_gap(numbers: Mapping[str, Any]) -> Figure:
     """Draw the share of right rooms by gap, with intervals."""
     rows = [row for row in numbers["means"]["top_1"] if row["gap"] in DRAWN_GAPS]
     means = pl.DataFrame(rows).rename({"gap": "time since the user was last seen"})
-    figure = draw_interaction(means, means.columns[1], "model", "share of right rooms")
-    figure.set_size_inches(*SIZE)
-    figure.axes[0].set_ylim(0, 1)
-    figure.axes[0].legend(frameon=False, fontsize=8, loc="lower left")
-    return figure
+    return _draw_cells(means, "model", "share of right rooms")
 
 
 def draw_feedback(numbers: Mapping[str, Any]) -> Figure:
     """Draw the mean errors of estimators under each policy, with intervals."""
-    figure, axes = _figure()
-    estimators = pl.DataFrame(numbers["means"]).partition_by("estimator", maintain_order=True)
-    for number, of in enumerate(estimators):
-        x = np.arange(len(of)) + 0.16 * (number - (len(estimators) - 1) / 2)
-        mean, low, high = of.select("mean", "low", "high").to_numpy().T
-        label = of["estimator"][0].replace("_", " ")
-        ends = (mean - low, high - mean)
-        axes.bar(x, mean, 0.15, yerr=ends, color=COLORS[number], label=label, ecolor=DARK)
-    policies = [textwrap.fill(name, 18) for name in estimators[0]["robot"]]
-    axes.set_xticks(range(len(policies)), policies, fontsize=8)
-    axes.set_ylabel("total variation from the truth")
-    axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize=8, ncols=2)
+    means = pl.DataFrame(numbers["means"]).select("estimator", "robot", "mean", "low", "high")
+    means = means.with_columns(pl.col("estimator").str.replace_all("_", " "))
+    return _draw_cells(means, "estimator", "total variation from the truth")
+
+
+def _draw_cells(means: pl.DataFrame, second: str, label: str) -> Figure:
+    figure = draw_interaction(means, means.columns[1], second, label)
+    figure.set_size_inches(*SIZE)
+    figure.axes[0].set_ylim(0, 1)
     return figure
 
 
-DRAWERS: dict[str, Callable[[Mapping[str, Any]], Figure]] = {
-    results.SPEED: draw_speed,
-    results.LTP_GAP: draw_ltp_gap,
-    results.RTP_GAP: draw_rtp_gap,
-    results.FEEDBACK: draw_feedback,
-}
+DRAWERS: dict[str, Callable[[Mapping[str, Any]], Figure]] = dict(
+    zip(RESULTS, (draw_speed, draw_ltp_gap, draw_rtp_gap, draw_feedback), strict=True)
+)

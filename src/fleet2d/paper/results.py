@@ -5,18 +5,17 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.markup import escape
 from rich.table import Table
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import ComponentError, InputError, os_errors_as
 from fleet2d.metrics.rtp_score import ALL, GAPS
-from fleet2d.studies.api import study
-from fleet2d.studies.intervals import estimate
+from fleet2d.studies.answers import AnswerSource
+from fleet2d.studies.api import make_executor, study
 
 if TYPE_CHECKING:
     import polars as pl
@@ -100,13 +99,12 @@ class PaperOptions:
 
 def table_of(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     """Return a table: words to the left, numbers to the right."""
-    table = Table(title=escape(title), title_justify="left", title_style="", show_edge=False)
+    table = Table(title=title, title_justify="left", title_style="", show_edge=False)
     for number, head in enumerate(columns):
-        is_text = head == PAPER_COLUMN
-        justify: Literal["left", "right"] = "left" if is_text or not number else "right"
-        table.add_column(escape(head), justify=justify, no_wrap=not is_text)
+        is_text = not number or head == PAPER_COLUMN
+        table.add_column(head, justify="left" if is_text else "right", no_wrap=head != PAPER_COLUMN)
     for row in rows:
-        table.add_row(*map(escape, row))
+        table.add_row(*row)
     return table
 
 
@@ -117,11 +115,10 @@ def study_content(name: str, seeds: int, days: int) -> dict[str, Any]:
     if "replicates" in content:
         content["replicates"] = seeds
         return content
-    kinds = [robot for (robot,) in map(dict.values, content["axes"]["robot"]["options"].values())]
-    content["axes"]["robot"]["options"] = {
-        f"robot_{number}": {f"robots.robot_{number}": kinds[number % len(kinds)]}
-        for number in range(seeds)
-    }
+    axis = content["axes"]["robot"]
+    kinds = [robot for (robot,) in map(dict.values, axis["options"].values())]
+    robots = {f"robot_{number}": kinds[number % len(kinds)] for number in range(seeds)}
+    axis["options"] = {name: {f"robots.{name}": robot} for name, robot in robots.items()}
     return content
 
 
@@ -132,14 +129,9 @@ def run_months(name: str, options: PaperOptions) -> "Study":
         ComponentError: A month failed.
         InputError: polars or scipy is missing, or the folder can't be used.
     """
-    months = study(
-        study_content(name, *options.size(name)),
-        options.folder / name,
-        workers=options.workers,
-        executor="serial" if options.workers == 1 else "local",
-        fail_fast=True,
-        changed="redo",
-    )
+    content, folder = study_content(name, *options.size(name)), options.folder / name
+    executor = make_executor("serial" if options.workers == 1 else "local", options.workers)
+    months = study(content, folder, executor=executor, fail_fast=True, changed="redo")
     if months.counts.failed:
         raise ComponentError(f"a month failed: {months.failures['error'][0]}")
     return months
@@ -151,14 +143,8 @@ def estimates(rows: "pl.DataFrame", row: str, column: str) -> "pl.DataFrame":
     Returns:
         A frame with the two columns, `mean`, `low` and `high`.
     """
-    import polars as pl
-
-    cells = [
-        (*key, mean.mean, mean.low, mean.high)
-        for key, group in rows.group_by(row, column, maintain_order=True)
-        for mean in (estimate(group["value"].to_numpy()),)
-    ]
-    return pl.DataFrame(cells, [row, column, "mean", "low", "high"], orient="row")
+    means = AnswerSource(rows, (), "value").summary((row, column), ())
+    return means.select(row, column, "mean", "low", "high")
 
 
 def table_of_means(
@@ -198,10 +184,11 @@ def ltp_gap(options: PaperOptions) -> Result:
     gaps = rows["gap"].to_numpy().reshape(robots, days, len(rooms))
     gaps = np.ascontiguousarray(np.moveaxis(gaps, 2, 0))  # shape: (rooms, robots, days)
     overall = gaps.mean(axis=0)
-    low, high = np.quantile(overall, (0.1, 0.9), axis=0).tolist()
+    mean, (low, high) = overall.mean(axis=0), np.quantile(overall, (0.1, 0.9), axis=0)
+    band = {"mean": mean.tolist(), "low": low.tolist(), "high": high.tolist()}
     means = dict(zip(rooms, gaps.mean(axis=1).tolist(), strict=True))
-    mean = overall.mean(axis=0).tolist()
-    lines = {**means, "all rooms": mean, "  band, low": low, "  band, high": high}
+    lines = {**means, "all rooms": band["mean"]}
+    lines |= {f"  band, {end}": band[end] for end in ("low", "high")}
     listed_days = [day for day in SHOWN_DAYS if day <= days]
     table = table_of(
         f"mean |estimated - true| share of time at home; {counted(robots, 'robot')},"
@@ -215,11 +202,11 @@ def ltp_gap(options: PaperOptions) -> Result:
         "estimator": "likelihood",
         "seconds": duration_s,
         "mean": means,
-        "all_rooms": {"mean": mean, "low": low, "high": high},
+        "all_rooms": band,
         "gaps": [dict(zip(rooms, gaps[:, i].tolist(), strict=True)) for i in range(robots)],
     }
     speed = f"{robots * days} days of one home in {duration_s:.1f} s, {options.workers} at a time"
-    return Result(LTP_GAP, months.meta.description, (table,), numbers, (months.meta.notes, speed))
+    return Result(LTP_GAP, months.meta.description, [table], numbers, (months.meta.notes, speed))
 
 
 NAIVE_GUESS = "naive"
@@ -251,21 +238,15 @@ def rtp_gap(options: PaperOptions) -> Result:
         .with_columns(model=pl.when(is_naive).then(pl.lit(NAIVE_GUESS)).otherwise("model"))
         .select("score", "seed", "model", "gap", "value")
     )
-    means = {
-        score: estimates(scores.filter(pl.col("score") == score), "model", "gap")
-        for score in SCORES
-    }
+    scores_of = scores.partition_by("score", as_dict=True)
+    means = {score: estimates(scores_of[score,], "model", "gap") for score in SCORES}
     size = f"{counted(seeds, 'seed')} of {counted(days, 'day')}"
     tables = [
         table_of_means(f"{title}; {size}", means[score], (*GAPS, ALL))
         for score, title in SCORES.items()
     ]
-    numbers = {
-        "seeds": seeds,
-        "days": days,
-        "means": {score: frame.to_dicts() for score, frame in means.items()},
-        "scores": scores.to_dicts(),
-    }
+    rows = {score: frame.to_dicts() for score, frame in means.items()}
+    numbers = {"seeds": seeds, "days": days, "means": rows, "scores": scores.to_dicts()}
     return Result(RTP_GAP, months.meta.description, tables, numbers, (months.meta.notes,))
 
 
@@ -282,31 +263,24 @@ def feedback(options: PaperOptions) -> Result:
     difference to the naive estimator with each seed. A robot that hangs out uses the estimator of
     the column; with other policies all estimators watch the same robot.
     """
-    import polars as pl
-
     seeds, days = options.size(FEEDBACK)
     months = run_months(FEEDBACK, options)
-    errors = (
-        months.variants.select("robot", "seed", *(
-            pl.col(f"error_{estimator}.{USER}.tv").alias(estimator) for estimator in ESTIMATORS
-        ))
-        .unpivot(index=["robot", "seed"], variable_name="estimator")
-        .drop_nulls()
-    )  # fmt: skip
+    columns = {estimator: f"error_{estimator}.{USER}.tv" for estimator in ESTIMATORS}
+    errors = months.variants.select("robot", "seed", **columns)
+    errors = errors.unpivot(index=["robot", "seed"], variable_name="estimator").drop_nulls()
     size = f"{counted(seeds, 'paired seed')} of {counted(days, 'day')}"
     text = "{:.3f} ({:.3f} to {:.3f})"
     means = estimates(errors, "robot", "estimator")
+    less = estimates(differences(errors), "robot", "estimator")
+    title = f"total variation from the truth at the end; {size}: mean (95 %)"
+    less_title = (
+        f"the same less that of {_words(NAIVE_ESTIMATOR)} on the same seed, smaller is better:"
+        " mean (95 %)"
+    )
     tables = [
-        table_of_means(
-            f"total variation from the truth at the end; {size}: mean (95 %)",
-            means, ESTIMATORS, text,
-        ),
-        table_of_means(
-            f"the same less that of {_words(NAIVE_ESTIMATOR)} on the same seed, smaller is better:"
-            " mean (95 %)",
-            estimates(differences(errors), "robot", "estimator"), ESTIMATORS[1:], text,
-        ),
-    ]  # fmt: skip
+        table_of_means(title, means, ESTIMATORS, text),
+        table_of_means(less_title, less, ESTIMATORS[1:], text),
+    ]
     numbers = {"seeds": seeds, "days": days, "means": means.to_dicts(), "tv": errors.to_dicts()}
     return Result(FEEDBACK, months.meta.description, tables, numbers, (months.meta.notes,))
 

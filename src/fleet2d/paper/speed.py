@@ -8,7 +8,6 @@ order of magnitude only.
 
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from fleet2d.configuration.documents import read_document
@@ -28,13 +28,13 @@ from fleet2d.runtime.clock import HOUR_S
 from fleet2d.studies.progress import progress_bar
 
 REAL_MAP = "real-world map"  # the row of the user's own map
-PHASES = ("setup", "simulate", "save")
+PHASES = ("setup", "simulate", "save", "draw")
 QUICK_FRAMES = 100
 NO_NUMBER = "–"
 
 
-def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, float]:
-    """Draw frames of a film of the base scenario; return the wall time, and simulated over it.
+def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, Any]:
+    """Draw frames of a film of the base scenario; return its wall and simulated time, as a run's.
 
     The run that is watched is simulated before, which doesn't count.
 
@@ -55,8 +55,8 @@ def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, floa
         stage = stage_of(watched, first, end, period_s)
         for _ in draw_frames(stage, first, stage.changes().nonzero()[0]):
             pass
-    seconds = time.perf_counter() - start_s
-    return {"seconds": seconds, "speedup": count * period_s / seconds}
+    wall_s = {"draw": time.perf_counter() - start_s}
+    return {"wall_s": wall_s, "simulated_s": count * period_s}
 
 
 def read_table() -> dict[str, Any]:
@@ -70,6 +70,8 @@ def rows(options: PaperOptions, days: int) -> list[dict[str, Any]]:
     Raises:
         FloorPlanError: The map of `options` can't be read.
     """
+    from fleet2d.floorplan.load import load_floorplan
+
     cases: list[dict[str, Any]] = []
     for row in read_table()["rows"]:
         is_real, frames, users = row["case"] == REAL_MAP, row.get("frames"), row.get("users")
@@ -81,7 +83,9 @@ def rows(options: PaperOptions, days: int) -> list[dict[str, Any]]:
             user = "{type: routine, persona: works_outside}"
             overrides.append(f"users={{{', '.join(f'user_{i}: {user}' for i in range(users))}}}")
         if is_real and options.map is not None:
-            overrides += _home(options.map)
+            load_floorplan(options.map)  # raises an error before any row is measured
+            kind = "ros" if options.map.suffix.lower() in (".yaml", ".yml") else "valetudo"
+            overrides += [f"floorplan.type={kind}", f"floorplan.path={options.map.absolute()}"]
         if frames and options.quick:
             frames["count"] = QUICK_FRAMES
         case = row["case"].format(days=row.get("months", 1) * days)
@@ -89,28 +93,13 @@ def rows(options: PaperOptions, days: int) -> list[dict[str, Any]]:
     return cases
 
 
-def _home(path: Path) -> tuple[str, ...]:
-    """Return the overrides that set a map as the floor plan.
-
-    Raises:
-        FloorPlanError: The map can't be read.
-    """
-    from fleet2d.floorplan.load import load_floorplan
-
-    load_floorplan(path)  # raises an error before any row is measured
-    kind = "ros" if path.suffix.lower() in (".yaml", ".yml") else "valetudo"
-    return f"floorplan.type={kind}", f"floorplan.path={path.absolute()}"
-
-
 def measure_rows(options: PaperOptions) -> Result:
     """Measure all rows, one process at a time."""
     runs, days = options.size(SPEED)
-    content, cases, measured = read_table(), rows(options, days), []
+    content, cases = read_table(), rows(options, days)
     with _one_core(), progress_bar(show=sys.stderr.isatty()) as progress:
-        task = progress.add_task(SPEED, total=len(cases))
-        for row in cases:
-            measured.append({**row, **measure(row, runs)})
-            progress.advance(task)
+        shown = progress.track(cases, description=SPEED)
+        measured = [{**row, **measure(row, runs)} for row in shown]
     notes = content["notes"]
     if options.quick:
         notes.append("quick: short runs are mostly set-up")
@@ -122,74 +111,62 @@ def measure_rows(options: PaperOptions) -> Result:
         ("scenario", "ours [s]", "process [s]", "x real time", "memory", PAPER_COLUMN),
         map(_cells, measured),
     )
-    return Result(
-        SPEED,
-        content["description"],
-        (table,),
-        {"days": days, "runs": runs, "rows": measured},
-        notes,
-    )
+    numbers = {"days": days, "runs": runs, "rows": measured}
+    return Result(SPEED, content["description"], (table,), numbers, notes)
 
 
 def measure(row: Mapping[str, Any], runs: int) -> dict[str, Any]:
     """Measure a row: the seconds of each run, simulated over wall time, and memory [MB]."""
-    if "frames" in row:
-        try:
+    try:
+        if "frames" in row:
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-                timings = [pool.submit(time_frames, **row["frames"]).result() for _ in range(runs)]
-        except InputError as error:
-            return {"failed": str(error)}
-        return {
-            "seconds": [timing["seconds"] for timing in timings],
-            "speedup": statistics.median(timing["speedup"] for timing in timings),
-        }
-    results = [run_once(row["overrides"]) for _ in range(runs)]
-    if failed := [result for result in results if "failed" in result]:
-        return failed[0]
-    seconds = [sum(result["wall_s"][phase] for phase in PHASES) for result in results]
-    memory = [result["peak_rss_mb"] for result in results if result["peak_rss_mb"] is not None]
-    return {
-        "seconds": seconds,
-        "process_s": statistics.median(result["wall_s"]["total"] for result in results),
-        "speedup": results[0]["simulated_s"] / statistics.median(seconds),
-        "peak_mb": max(memory, default=None),
-    }
+                results = [pool.submit(time_frames, **row["frames"]).result() for _ in range(runs)]
+        else:
+            results = [run_once(row["overrides"]) for _ in range(runs)]
+    except InputError as error:
+        return {"failed": str(error)}
+    seconds = [sum(result["wall_s"].get(phase, 0) for phase in PHASES) for result in results]
+    measured = {"seconds": seconds, "speedup": results[0]["simulated_s"] / median(seconds)}
+    if "frames" not in row:
+        measured["process_s"] = median(result["wall_s"]["total"] for result in results)
+        memory = filter(None, (result["peak_rss_mb"] for result in results))
+        measured["peak_mb"] = max(memory, default=None)
+    return measured
 
 
 def run_once(overrides: list[str]) -> dict[str, Any]:
-    """Run the base scenario with changes in a process of its own; return its summary."""
+    """Run the base scenario with changes in a process of its own; return its summary.
+
+    Raises:
+        InputError: The run failed.
+    """
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "fleet2d.cli", "run", *overrides, "--json", "--quiet"]
-        process = subprocess.run(  # noqa: S603 - our own command
-            [*command, "--out", str(Path(folder) / "run")],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command += ["--out", str(Path(folder) / "run")]
+        process = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
     if process.returncode:
-        return {"failed": process.stderr.strip().removeprefix("error: ")}
+        raise InputError(process.stderr.strip().removeprefix("error: "))
     return json.loads(process.stdout)
 
 
 @contextmanager
 def _one_core() -> Iterator[None]:
     """Pin this process and its children to one core, on systems that can."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_setaffinity") else set()
+    if cores:
+        os.sched_setaffinity(0, {min(cores)})
     try:
         yield
     finally:
-        os.sched_setaffinity(0, cores)
+        if cores:
+            os.sched_setaffinity(0, cores)
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     if "failed" in row:
         return row["case"], "failed", "", "", "", row["failed"]
     times, peak = row["seconds"], row.get("peak_mb")
-    middle = f"{statistics.median(times):.2f}"
+    middle = f"{median(times):.2f}"
     spread = f" ({min(times):.2f} to {max(times):.2f})" if len(times) > 1 else ""
     return (
         row["case"],

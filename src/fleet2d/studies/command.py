@@ -15,7 +15,7 @@ import typer
 
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, end_by_signal, printable
-from fleet2d.options import TrustFiles, TrustFolders, restrict_to
+from fleet2d.options import TrustFiles, TrustFolders, Workers, restrict_to
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy
@@ -25,9 +25,6 @@ studying = typer.Typer(
     help="Run many scenarios as one experiment, resumable, ending in an answer.",
     no_args_is_help=True,
 )
-Workers = Annotated[
-    int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
-]
 ExecutorName = Annotated[
     Literal["local", "ray", "slurm", "serial"],
     typer.Option(help="Where the workers are; serial: in this process, for a debugger."),

@@ -10,6 +10,7 @@ import typer
 import yaml
 
 from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.options import Workers
 
 if TYPE_CHECKING:
     from fleet2d.testing.search import FailingPoint, FailureSearch, Subject, TryJob
@@ -45,9 +46,7 @@ def falsify(
         int, typer.Option(min=1, help="How many runs that fail to look for; see what they share.")
     ] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; left out: one per core.")
-    ] = None,
+    workers: Workers = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Look for a home, a household, a timing or a seed that breaks what is expected."""
