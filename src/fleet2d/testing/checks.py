@@ -2,7 +2,7 @@
 
 import copy
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -67,18 +67,25 @@ def _problems(cls: type[Algorithm], settings: Mapping[str, Any]) -> Iterator[str
     except Fleet2DError as error:
         yield str(error)
         return
-    tables, expected = run.manifest["tables"], _run_without(algorithm).manifest["tables"]
+    scenario = _scenario(algorithm).model_copy(update={"algorithms": {}})
+    tables, expected = run.manifest["tables"], Simulation(scenario).run().manifest["tables"]
     if any(tables[name] != expected[name] for name in ("key_frames", "events", "observations")):
         yield "users and robots behave differently with it: it changes its arguments"
-    if run.digest != _run(cls(**settings)).digest:
-        yield (
-            "two runs with one seed differ: draw by state.random(purpose), and use no clock,"
-            " no hash() and no global state"
-        )
-    elif run.digest != _run(cls(**settings), max_span=7).digest:
-        yield "a run in spans of 7 steps differs: use nothing but history and state"
+    draw, spans = "state.random(purpose)", "use nothing but history and state"
+    yield from _repeat_problems(lambda **keys: _run(cls(**settings), **keys), run, draw, spans)
     yield from _copy_problems(cls(**settings), run)
     yield from _state_problems(algorithm, cls, settings)
+
+
+def _repeat_problems(repeat: Callable[..., Run], run: Run, draw: str, spans: str) -> Iterator[str]:
+    """Compare a run with its repetition, and with one in short spans."""
+    if run.digest != repeat().digest:
+        yield (
+            f"two runs with one seed differ: draw by {draw}, and use no clock, no hash() and no"
+            " global state"
+        )
+    elif run.digest != repeat(max_span=7).digest:
+        yield f"a run in spans of 7 steps differs: {spans}"
 
 
 def _scenario(algorithm: Algorithm, **simulation: Any) -> Scenario:
@@ -90,11 +97,6 @@ def _scenario(algorithm: Algorithm, **simulation: Any) -> Scenario:
 
 def _run(algorithm: Algorithm, **simulation: Any) -> Run:
     return Simulation(_scenario(algorithm, **simulation)).run()
-
-
-def _run_without(algorithm: Algorithm) -> Run:
-    """Return the run of the same scenario without the algorithm."""
-    return Simulation(_scenario(algorithm).model_copy(update={"algorithms": {}})).run()
 
 
 def _copy_problems(algorithm: Algorithm, run: Run) -> Iterator[str]:
@@ -163,14 +165,13 @@ def check_perception_error(cls: type[PerceptionError], **settings: Any) -> None:
 
 def _error_problems(cls: type[PerceptionError], settings: dict[str, Any]) -> Iterator[str]:
     try:
-        digest = _run_with_error(cls(**settings)).digest
-        if digest != _run_with_error(cls(**settings)).digest:
-            yield (
-                "two runs with one seed differ: draw by sightings.uniform(purpose) or"
-                " sightings.bell(purpose), and use no clock, no hash() and no global state"
-            )
-        elif digest != _run_with_error(cls(**settings), max_span=7).digest:
-            yield "a run in spans of 7 steps differs: treat each sighting by itself"
+        draw = "sightings.uniform(purpose) or sightings.bell(purpose)"
+        spans = "treat each sighting by itself"
+
+        def repeat(**simulation: Any) -> Run:
+            return _run_with_error(cls(**settings), **simulation)
+
+        yield from _repeat_problems(repeat, repeat(), draw, spans)
     except Fleet2DError as error:
         yield str(error)
 

@@ -1,6 +1,7 @@
 """Claims of tests with trials: scenarios, seeds, and the sequential test of a claimed rate."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -63,11 +64,7 @@ class RateTest:
 
     def acceptance(self, rate: float) -> float:
         """Return the exact probability that the claim is accepted if this is the true rate."""
-        return _walk(self.accept, self.refuse, rate)[0]
-
-    def mean_seeds(self, rate: float) -> float:
-        """Return the exact mean number of seeds until a decision if this is the true rate."""
-        return sum_in_order(_walk(self.accept, self.refuse, rate)[1])
+        return sum_in_order(accepted for accepted, _, _ in steps_of(self.accept, self.refuse, rate))
 
 
 @lru_cache(maxsize=64)
@@ -120,23 +117,20 @@ def seeds_for(holds: float, alternative: float, error: float = 0.05) -> int | No
     """
     if holds == 1:
         return math.ceil(math.log(error) / math.log(alternative))
-    low, high = 1, 2
-    while _alternative(high, holds, error) < alternative:
-        low, high = high, 2 * high
+
+    def refused(seeds: int) -> float:
+        """Return the largest rate that is refused with so many seeds."""
+        try:
+            return rate_test(seeds, holds, error).alternative
+        except InputError:
+            return 0.0
+
+    high = 2
+    while refused(high) < alternative:
+        high *= 2
         if high > MAX_SEARCHED_SEEDS:
             return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        enough = _alternative(middle, holds, error) >= alternative
-        low, high = (low, middle) if enough else (middle, high)
-    return high
-
-
-def _alternative(seeds: int, holds: float, error: float) -> float:
-    try:
-        return rate_test(seeds, holds, error).alternative
-    except InputError:
-        return 0.0
+    return bisect_left(range(high), alternative, lo=high // 2 + 1, key=refused)
 
 
 def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, float]:
@@ -194,7 +188,8 @@ def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
         refuse = np.minimum(np.ceil(slope * number + shift), seeds + 1).astype(np.int64)
     accept[seeds] = -1
     refuse[seeds] = seeds + 2
-    refused, last = _ending(accept, refuse, holds)
+    steps = steps_of(accept, refuse, holds)
+    refused, last = sum(now for _, now, _ in steps[:-1]), steps[-1][2]
     # The fewest failures to refuse at the last seed so that refusals stay within the error.
     tail = refused + np.cumsum(last[::-1])[::-1]  # refusals if that many failures refuse
     most = int(np.argmax(np.append(tail, 0.0) <= error)) - 1
@@ -202,7 +197,7 @@ def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
     return RateTest(seeds, holds, error, other, accept, refuse)
 
 
-def _steps(accept: I64, refuse: I64, rate: float) -> "list[tuple[float, float, F64]]":
+def steps_of(accept: I64, refuse: I64, rate: float) -> "list[tuple[float, float, F64]]":
     """Return (accepted, refused, undecided by failures) after each seed: exact probabilities."""
     width = int(refuse[:-1].max()) + 2
     failures = np.arange(width)
@@ -216,24 +211,6 @@ def _steps(accept: I64, refuse: I64, rate: float) -> "list[tuple[float, float, F
         steps.append((float(mass[is_accepted].sum()), float(mass[is_refused].sum()), mass))
         undecided = np.where(is_accepted | is_refused, 0.0, mass)
     return steps
-
-
-def _walk(accept: I64, refuse: I64, rate: float) -> tuple[float, list[float]]:
-    """Return the probability of acceptance, and the probability that each seed is needed."""
-    accepted, undecided = 0.0, 1.0
-    needed = []
-    for accepted_now, refused_now, _ in _steps(accept, refuse, rate):
-        needed.append(undecided)
-        accepted += accepted_now
-        undecided -= accepted_now + refused_now
-    return accepted, needed
-
-
-def _ending(accept: I64, refuse: I64, rate: float) -> tuple[float, F64]:
-    """Return the probability of refusal before the last seed, and of each number of failures."""
-    steps = _steps(accept, refuse, rate)
-    refused = sum(refused_now for _, refused_now, _ in steps[:-1])
-    return refused, steps[-1][2]
 
 
 Test = TypeVar("Test", bound=Callable[..., Any])

@@ -152,14 +152,10 @@ def _folder(item: pytest.Function) -> Path:
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Print the decision on each test with several runs."""
-    lines = []
-    for reports in terminalreporter.stats.values():
-        for report in reports:
-            if getattr(report, "when", None) != "call":
-                continue
-            text = dict(report.user_properties).get(PROPERTY)
-            if text not in (None, "held", "failed"):
-                lines.append(f"{report.nodeid}: {text}")
+    reports = (report for of_kind in terminalreporter.stats.values() for report in of_kind)
+    calls = [report for report in reports if getattr(report, "when", None) == "call"]
+    decided = [(report.nodeid, dict(report.user_properties).get(PROPERTY)) for report in calls]
+    lines = [f"{test}: {text}" for test, text in decided if text not in (None, "held", "failed")]
     if lines:
         terminalreporter.section("trials")
         for line in sorted(lines):

@@ -6,6 +6,7 @@ import random
 import sys
 import time
 from collections.abc import Callable, Hashable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
@@ -361,8 +362,7 @@ class FailureSearch:
         """
         deadline = None if seconds is None else time.monotonic() + seconds
         schedule = TrySchedule(self, self._budget, deadline)
-        events = executor.run(self._job, schedule)
-        try:
+        with closing(executor.run(self._job, schedule)) as events:
             for event in events:
                 assert isinstance(event.task, TryTask)
                 margin, what, error = (
@@ -375,8 +375,6 @@ class FailureSearch:
                     observer(self)
                 if self.is_over:
                     break
-        finally:
-            events.close()
         return self.failure
 
     def ask(self, number: int) -> TryTask:

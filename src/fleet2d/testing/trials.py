@@ -3,11 +3,11 @@
 import dis
 import inspect
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+import traceback
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
-from types import CodeType
 from typing import Any
 
 from fleet2d.artifacts.store import ArtifactSettings
@@ -155,16 +155,16 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
         margin = -math.copysign(SMALLEST_MARGIN, margin)
     repeated = f"{verdict.expectation} is violated: {verdict.expectation}"  # without a name
     text = str(verdict).replace(repeated, f"{verdict.expectation} is violated")
-    untested = verdict.holds is None
+    names = (name for measurement in expectation.measures() for name in measurement.named())
     return ExpectationResult(
         verdict.name,
         text,
         not verdict.fails,
         margin,
         step,
-        untested,
-        kind_of(expectation),
-        frozenset(filter(None, map(str, names_of(expectation)))),
+        untested=verdict.holds is None,
+        kind=kind_of(expectation),
+        names=frozenset(part for name in names for part in str(name).split(".") if part),
     )
 
 
@@ -176,13 +176,6 @@ def kind_of(expectation: Term) -> str:
         is_at_once = isinstance(expectation, after) and within is None
         kinds += [] if is_at_once else [MISSED_BY_THE_END if within is None else MISSED]
     return next((kind for kind in (MISSED_BY_THE_END, MISSED) if kind in kinds), "")
-
-
-def names_of(term: Term) -> Iterator[str]:
-    """Yield the names that an expectation uses."""
-    for measurement in term.measures():
-        for name in measurement.named():
-            yield from str(name).split(".")
 
 
 def comparable(value: float, scale: float) -> float:
@@ -378,20 +371,15 @@ def asserts(function: Any, depth: int = 4) -> bool:
     if code is None or depth == 0:
         return False
     codes = [code, *(const for const in code.co_consts if inspect.iscode(const))]
-    if any("AssertionError" in each.co_names or _raises_assertion(each) for each in codes):
+    operations = {each.opname for code in codes for each in dis.get_instructions(code)}
+    if "LOAD_ASSERTION_ERROR" in operations or any("AssertionError" in c.co_names for c in codes):
         return True
     known = {name: function.__globals__.get(name) for each in codes for name in each.co_names}
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     return any(asserts(f, depth - 1) for f in [*known.values(), *cells] if inspect.isroutine(f))
 
 
-def _raises_assertion(code: CodeType) -> bool:
-    return any(each.opname == "LOAD_ASSERTION_ERROR" for each in dis.get_instructions(code))
-
-
 def _line_of(error: AssertionError) -> str:
     """Return the file and line at which an assertion failed."""
-    trace = error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    return "" if trace is None else f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""
