@@ -9,7 +9,7 @@ from typing import Any
 
 from fleet2d.scenario.compose import compose
 from fleet2d.studies.executors import SerialExecutor
-from fleet2d.testing.search import FailureSearch, Subject, TryJob, read_space
+from fleet2d.testing.search import FailureSearch, TryJob, read_space
 
 FOLDER = Path(__file__).parent
 SHARE = {"low": 0, "high": 1}
@@ -34,7 +34,7 @@ def job(fault: str) -> TryJob:
         },
         "expect": {"keeps_off": EXPECTED},
     }
-    return TryJob(Subject(compose(scenario), FOLDER), read_space(OVER[fault]))
+    return TryJob(compose(scenario), FOLDER, read_space(OVER[fault]))
 
 
 EXPECTED = "at_end(output(clearance.metres) > 0)"

@@ -13,7 +13,7 @@ from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import Workers
 
 if TYPE_CHECKING:
-    from fleet2d.testing.search import FailingPoint, FailureSearch, Subject, TryJob
+    from fleet2d.testing.search import FailingPoint, FailureSearch, SearchSpace, TryJob
 
 UNLIMITED_TRIES = 1_000_000  # if the budget is a time
 SHRINK_TRIES = 40
@@ -51,16 +51,13 @@ def falsify(
 ) -> None:
     """Look for a home, a household, a timing or a seed that breaks what is expected."""
     from fleet2d.studies.api import make_executor
-    from fleet2d.testing.search import FailureSearch, TryJob, parse_over, read_space
+    from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
     if out.exists():
         raise RunDirectoryError(f"{out} exists already: name another file by --out")
     tries, seconds = parse_budget(budget)
-    subject = subject_of(target)
-    _check_expects(subject, target)
-    space = read_space(parse_over(over))
-    space.check(subject.base, subject.folder)
-    job = TryJob(subject, space)
+    job = job_of(target, read_space(parse_over(over)))
+    job.check()
     search = FailureSearch(job, tries, seed=seed, finds=finds)
     shows_progress = sys.stderr.isatty() and not quiet
     search.run(make_executor("local", workers), seconds, _progress if shows_progress else None)
@@ -118,29 +115,24 @@ def parse_budget(text: str) -> tuple[int, float | None]:
         ) from None
 
 
-def subject_of(target: str) -> "Subject":
-    """Return the subject of a search.
+def job_of(target: str, space: "SearchSpace") -> "TryJob":
+    """Return the job of a search for a failure of a scenario or a test.
 
     Raises:
-        InputError: There is no such scenario or test.
+        InputError: There is no such scenario or test, or the scenario expects nothing.
     """
     from fleet2d.scenario.compose import compose
-    from fleet2d.testing.search import Subject, claimed_test
+    from fleet2d.scenario.model import scenario_of
+    from fleet2d.testing.search import TryJob, claimed_test
 
     path, separator, name = target.partition("::")
     if separator:
-        _, claim = claimed_test(Path(path), name)
-        scenario = claim.scenario
-        return Subject(scenario._document, scenario.folder, (Path(path), name))
-    return Subject(compose(path), Path(path).absolute().parent)
-
-
-def _check_expects(subject: "Subject", target: str) -> None:
-    from fleet2d.scenario.model import scenario_of
-
-    if subject.test is None and not scenario_of(subject.base, subject.folder).expect:
+        scenario = claimed_test(Path(path), name)[1].scenario
+        return TryJob(scenario._document, scenario.folder, space, (Path(path), name))
+    job = TryJob(compose(path), Path(path).absolute().parent, space)
+    if not scenario_of(job.base, job.folder).expect:
         raise InputError(f"{target} has no expectations: add a section `expect`, or name a test")
-    subject.body()
+    return job
 
 
 def describe_failure(
@@ -151,13 +143,13 @@ def describe_failure(
 
     trial = job.run(failure.point, failure.seed)
     command = f"fleet2d test {out}"
-    if job.subject.test is not None:
+    if job.test is not None:
         command = f"pytest {target} --fleet2d-scenario {out}"
     point = job.space.text(failure.point)
     lines = [f"fails at try {failure.number}: {point}, seed {failure.seed}"]
     folder = out.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
-    lines += describe_trial(trial, job.subject.body(), folder, shrink, command)
+    lines += describe_trial(trial, job.body(), folder, shrink, command)
     reason = trial.failures[0].text.splitlines()[0]
     out.write_text(_scenario_text(failure, job, target, out, reason), encoding="utf-8")
     return [*lines, "", f"written: {out}"]
@@ -175,13 +167,10 @@ def _scenario_text(
         content = merge(content, assignment(keys, value, ""))
     source = target.partition("::")[0]
     data: dict[str, Any]
-    if job.subject.test is None:
+    if job.test is None:
         data = {"extends": os.path.relpath(source, out.parent), **content.data}
     else:
-        scenario = job.space.scenario(
-            job.subject.base, job.subject.folder, failure.point, failure.seed
-        )
-        data = scenario.resolved()
+        data = job.scenario(failure.point, failure.seed).resolved()
     body = yaml.safe_dump(_plain(data), sort_keys=False, allow_unicode=True)
     return f"# This scenario fails, according to fleet2d falsify {target}: {reason}\n{body}"
 

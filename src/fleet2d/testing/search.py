@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 from fleet2d.bounds import one_line
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
 from fleet2d.configuration.problems import did_you_mean, refusal, suggest
-from fleet2d.errors import Fleet2DError, InputError, extra
+from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
@@ -85,36 +85,6 @@ class SearchSpace:
         parts += [self.choices[n][v].words for n, v in point.items() if n in self.choices]
         return ", ".join(parts)
 
-    def scenario(self, base: Document, folder: Path, point: Settings, seed: int) -> Scenario:
-        """Return the scenario of a point.
-
-        Raises:
-            InputError: It is not a valid scenario, or its home can't be built.
-        """
-        changes = [(("simulation", "seed"), seed), *self.changes(point)]
-        source = self.text(point)
-        assignments = [assignment(keys, value, source) for keys, value in changes]
-        return scenario_of(apply_changes(base, assignments), folder)
-
-    def check(self, base: Document, folder: Path) -> None:
-        """Build a scenario for each end of each range, and for each choice.
-
-        Raises:
-            InputError: A key or a value is wrong.
-        """
-        for name, parameter in self.ranges.items():
-            for value in parameter.choices or (parameter.at(0.0), parameter.at(1.0)):
-                self._check(base, folder, name, value)
-        for name, choices in self.choices.items():
-            for number in range(len(choices)):
-                self._check(base, folder, name, number)
-
-    def _check(self, base: Document, folder: Path, name: str, value: Any) -> None:
-        try:
-            self.scenario(base, folder, {name: value}, 0)
-        except Fleet2DError as error:
-            raise type(error)(f"over {name}: {error}") from None
-
 
 def read_space(content: Mapping[str, Any]) -> SearchSpace:
     """Return the space that a mapping of axes by name describes.
@@ -165,29 +135,6 @@ def parse_over(texts: list[str]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Subject:
-    """What to search for a failure: a scenario with expectations, or a test.
-
-    Attributes:
-        base: The composed scenario.
-        folder: The folder that its paths are relative to.
-        test: The file of a test and its name; None: the expectations of the scenario.
-    """
-
-    base: Document
-    folder: Path
-    test: tuple[Path, str] | None = None
-
-    def body(self) -> Body:
-        """Return the test function to call in each run.
-
-        Raises:
-            InputError: There is no such test.
-        """
-        return _empty_test if self.test is None else claimed_test(*self.test)[0]
-
-
-@dataclass(frozen=True)
 class TryTask(WorkerTask):
     """One run of the search.
 
@@ -202,11 +149,52 @@ class TryTask(WorkerTask):
 
 @dataclass
 class TryJob:
-    """Runs the tasks of a search, and returns the margin of each run."""
+    """Runs the tasks of a search for a failure, and returns the margin of each run.
 
-    subject: Subject
+    Attributes:
+        base: The composed scenario.
+        folder: The folder that its paths are relative to.
+        space: What varies.
+        test: The file of a test and its name; None: the expectations of the scenario.
+    """
+
+    base: Document
+    folder: Path
     space: SearchSpace
+    test: tuple[Path, str] | None = None
     _body: Body | None = None
+
+    def body(self) -> Body:
+        """Return the test function to call in each run.
+
+        Raises:
+            InputError: There is no such test.
+        """
+        return _empty_test if self.test is None else claimed_test(*self.test)[0]
+
+    def scenario(self, point: Settings, seed: int) -> Scenario:
+        """Return the scenario of a point.
+
+        Raises:
+            InputError: It is not a valid scenario, or its home can't be built.
+        """
+        source = self.space.text(point)
+        changes = [(("simulation", "seed"), seed), *self.space.changes(point)]
+        assignments = [assignment(keys, value, source) for keys, value in changes]
+        return scenario_of(apply_changes(self.base, assignments), self.folder)
+
+    def check(self) -> None:
+        """Build a scenario for each end of each range, and for each choice.
+
+        Raises:
+            InputError: A key or a value is wrong.
+        """
+        ends = {n: p.choices or (p.at(0.0), p.at(1.0)) for n, p in self.space.ranges.items()}
+        numbers = {name: range(len(choices)) for name, choices in self.space.choices.items()}
+        for name, values in {**ends, **numbers}.items():
+            for value in values:
+                with errors_as(None, f"over {name}", of=Fleet2DError):
+                    self.scenario({name: value}, 0)
 
     def run(self, point: dict[str, Any], seed: int) -> TrialResult:
         """Run the trial at a point.
@@ -214,11 +202,8 @@ class TryJob:
         Raises:
             Fleet2DError: The scenario is wrong, or a component failed.
         """
-        if self._body is None:
-            self._body = self.subject.body()
-        subject = self.subject
-        scenario = self.space.scenario(subject.base, subject.folder, point, seed)
-        return run_trial(Variant(scenario, {"seed": seed}), self._body)
+        self._body = self._body or self.body()
+        return run_trial(Variant(self.scenario(point, seed), {"seed": seed}), self._body)
 
     def __call__(self, task: WorkerTask) -> bytes:
         """Return (margin, what failed, error), pickled; margin or error is None."""
