@@ -31,16 +31,11 @@ from fleet2d.runtime.determinism import sum_in_order
 MIN_ROWS = 50
 MAX_METRES = 100.0  # a larger distance in a home is in another unit
 MAX_DEGREES = 360.0
-TRUE, FALSE = frozenset({"1", "true", "yes"}), frozenset({"0", "false", "no"})
-ANGLES = (
-    "bearing",
-    "bearing_deg",
-    "bearing_rad",
-    "orientation",
-    "orientation_deg",
-    "orientation_rad",
+FLAGS = {"1": 1.0, "true": 1.0, "yes": 1.0, "0": 0.0, "false": 0.0, "no": 0.0}
+COLUMNS = frozenset(
+    {"distance", "detected", "identity", "true_identity"}
+    | {f"{angle}{unit}" for angle in ("bearing", "orientation") for unit in ("", "_deg", "_rad")}
 )
-COLUMNS = frozenset({"distance", "detected", *ANGLES, "identity", "true_identity"})
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
@@ -89,11 +84,11 @@ def read_detections(path: Path) -> DetectionLog:
     table = _read_table(path)
     if len(table) < MIN_ROWS:
         raise InputError(f"{path} has {len(table)} rows: a fit needs at least {MIN_ROWS}")
-    has_identity = table.has("identity") and table.has("true_identity")
+    has_identity = {"identity", "true_identity"} <= table.cells.keys()
     log = DetectionLog(
         path,
-        table.column("distance", _distance),
-        table.column("detected", _flag).astype(bool),
+        table.numbers("distance", 0, MAX_METRES, f"a distance from 0 to {MAX_METRES:g} m"),
+        table.flags("detected"),
         table.angle("bearing"),
         table.angle("orientation"),
         table.names("true_identity") if has_identity else None,
@@ -160,8 +155,8 @@ class _PerceptionLog:
     def __init__(self, path: Path, columns: list[str]) -> None:
         self.path = path
         self.lines = array("q")  # a log has millions of rows
-        self._cells: dict[str, list[str]] = {name: [] for name in columns if name in COLUMNS}
-        self._places = [(columns.index(name), cells) for name, cells in self._cells.items()]
+        self.cells: dict[str, list[str]] = {name: [] for name in columns if name in COLUMNS}
+        self._places = [(columns.index(name), cells) for name, cells in self.cells.items()]
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -172,24 +167,32 @@ class _PerceptionLog:
         for place, cells in self._places:
             cells.append(row[place].strip() if place < len(row) else "")
 
-    def has(self, column: str) -> bool:
-        return column in self._cells
-
-    def column(self, name: str, read: Callable[[str], float]) -> F64:
-        """Return a column of numbers."""
-        values = np.empty(len(self))
-        for i, text in enumerate(self._cells[name]):
-            try:
-                values[i] = read(text)
-            except ValueError as error:
-                raise InputError(
-                    f"{self.path}:{self.lines[i]}: {name}: expected {error}, got {one_line(text)!r}"
-                ) from None
+    def numbers(self, name: str, low: float, high: float, expected: str) -> F64:
+        """Return a column of numbers from a range."""
+        values = self._values(name, _number, "a number")
+        self._refuse(name, ~((values >= low) & (values <= high)), expected)
         return values
+
+    def flags(self, name: str) -> Bool:
+        """Return a column of yes and no."""
+        return self._values(name, lambda text: FLAGS.get(text.lower(), math.nan), "0 or 1") > 0
+
+    def _values(self, name: str, read: Callable[[str], float], expected: str) -> F64:
+        values = np.fromiter(map(read, self.cells[name]), np.float64, len(self))
+        self._refuse(name, ~np.isfinite(values), expected)
+        return values
+
+    def _refuse(self, name: str, wrong: Bool, expected: str) -> None:
+        """Refuse the first wrong value of a column."""
+        for i in np.flatnonzero(wrong)[:1].tolist():
+            text = one_line(self.cells[name][i])
+            raise InputError(
+                f"{self.path}:{self.lines[i]}: {name}: expected {expected}, got {text!r}"
+            )
 
     def names(self, name: str) -> NDArray[np.str_]:
         """Return a column of names of people; empty for unknown people."""
-        texts = self._cells[name]
+        texts = self.cells[name]
         return np.array(["" if text.lower() in UNKNOWN else text for text in texts])
 
     def angle(self, name: str) -> F64 | None:
@@ -199,10 +202,12 @@ class _PerceptionLog:
             InputError: There is only a column without a unit.
         """
         for unit, factor in (("deg", 1.0), ("rad", 180 / math.pi)):
-            if self.has(f"{name}_{unit}"):
-                degrees = self.column(f"{name}_{unit}", _angle_up_to(MAX_DEGREES / factor)) * factor
+            if (column := f"{name}_{unit}") in self.cells:
+                most = MAX_DEGREES / factor
+                expected = f"an angle from -{most:.4g} to {most:.4g}"
+                degrees = self.numbers(column, -most - 1e-3, most + 1e-3, expected) * factor
                 return np.abs((degrees + 180) % 360 - 180)
-        if self.has(name):
+        if name in self.cells:
             raise InputError(
                 f"{self.path}: the unit of the column {name!r} is unknown: call it {name}_deg or"
                 f" {name}_rad"
@@ -212,37 +217,9 @@ class _PerceptionLog:
 
 def _number(text: str) -> float:
     try:
-        value = float(text)
+        return float(text)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError("a number")
-    return value
-
-
-def _distance(text: str) -> float:
-    value = _number(text)
-    if not 0 <= value <= MAX_METRES:
-        raise ValueError(f"a distance from 0 to {MAX_METRES:g} m")
-    return value
-
-
-def _angle_up_to(most: float) -> Callable[[str], float]:
-    """Return a function that reads an angle from -`most` to `most`."""
-
-    def read(text: str) -> float:
-        value = _number(text)
-        if abs(value) > most + 1e-3:
-            raise ValueError(f"an angle from -{most:.4g} to {most:.4g}")
-        return value
-
-    return read
-
-
-def _flag(text: str) -> float:
-    if text.lower() not in TRUE | FALSE:
-        raise ValueError("0 or 1")
-    return float(text.lower() in TRUE)
+        return math.nan
 
 
 @dataclass(frozen=True)
