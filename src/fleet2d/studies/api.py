@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.scenario.model import Scenario
+from fleet2d.scenario.model import Scenario, load_scenario
 from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import (
@@ -103,15 +104,14 @@ def map_runs(
         >>> hours = [fleet2d.load_scenario("simulation.duration=1 h", seed=s) for s in range(2)]
         >>> digests = fleet2d.map_runs(operator.attrgetter("digest"), hours)  # doctest: +SKIP
     """
-    resolved = tuple(_resolve(scenario) for scenario in scenarios)
+    resolved = tuple(load_scenario(scenario).resolved() for scenario in scenarios)
     if not resolved:
         return []
     homes = map(home_key, resolved)  # scenarios that share a home go to one worker in turn
     tasks = TaskSchedule(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
     job = FunctionJob(pickled(function), resolved)
     results: dict[int, Result] = {}
-    events = make_executor(executor, workers).run(job, tasks)
-    try:
+    with closing(make_executor(executor, workers).run(job, tasks)) as events:
         for event in events:
             if isinstance(event, LostTask):
                 raise ComponentError(f"scenario {event.task.index}: {event.reason}")
@@ -122,8 +122,6 @@ def map_runs(
             results[event.task.index] = value
             if on_result is not None:
                 on_result(event.task.index)
-    finally:
-        events.close()
     return [results[i] for i in range(len(resolved))]
 
 
@@ -185,13 +183,6 @@ def pickled(function: Callable[..., Any]) -> bytes:
             ' pip install "fleet2d[study]"'
         ) from None
     return cloudpickle.dumps(function)
-
-
-def _resolve(scenario: Any) -> Any:
-    """Return a scenario as plain data, which means the same in any process."""
-    from fleet2d.scenario.model import load_scenario
-
-    return load_scenario(scenario).resolved()
 
 
 @dataclass

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -149,14 +150,9 @@ class _RemoteJob:
 def _join(ray: Any, address: str | None) -> None:
     # Workers on this machine import the same modules as this process.
     paths = os.pathsep.join(filter(None, sys.path))
-    options: dict[str, Any] = {
-        "address": address,
-        "runtime_env": {"env_vars": {"PYTHONPATH": paths}},
-        "log_to_driver": False,
-        "logging_level": "ERROR",
-    }
+    environment = {"env_vars": {"PYTHONPATH": paths}}
     try:
-        ray.init(**options)
+        ray.init(address, runtime_env=environment, log_to_driver=False, logging_level="ERROR")
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise InputError(
             f"the Ray cluster can't be joined: {error}; RAY_ADDRESS names it, and without it one"
@@ -178,15 +174,9 @@ ASK_SLURM_EVERY_S = 2.0
 GRACE_S = 30.0  # until a job that has left the queue counts as lost: its files may arrive late
 
 
-@dataclass
-class ChunkJob:
-    """Runs some tasks in one job of the cluster."""
-
-    job: WorkerJob
-
-    def __call__(self, tasks: Sequence[WorkerTask]) -> list[Any]:
-        """Return the results of the tasks."""
-        return [self.job(task) for task in tasks]
+def run_chunk(job: WorkerJob, tasks: Sequence[WorkerTask]) -> list[Any]:
+    """Run some tasks in one job of the cluster; return their results."""
+    return [job(task) for task in tasks]
 
 
 class SlurmExecutor:
@@ -239,7 +229,7 @@ class SlurmExecutor:
         try:
             while chunks := [*retries, *self._chunks(tasks, len(running))] or running:
                 if chunks is not running:
-                    jobs = self._executor.map_array(ChunkJob(job), chunks)
+                    jobs = self._executor.map_array(partial(run_chunk, job), chunks)
                     running |= zip(jobs, chunks, strict=True)
                     retries = []
                 for ended in self._ended(running):

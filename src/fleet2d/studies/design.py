@@ -21,7 +21,7 @@ from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import Choice, Label, key_path
-from fleet2d.studies.simulator import files_of
+from fleet2d.studies.simulator import input_files
 from fleet2d.studies.specification import SEED, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
@@ -88,7 +88,7 @@ def input_hash(scenario: Scenario) -> str:
     Raises:
         InputError: A file can't be read.
     """
-    return content_hash({str(path): file_hash(path) for path in files_of(scenario)})
+    return content_hash({str(path): file_hash(path) for path in input_files(scenario)})
 
 
 def scenario_hashes(content: dict[str, Any], seeds: Sequence[int]) -> Iterator[str]:
@@ -218,7 +218,7 @@ class Design:
             ScenarioError: The scenario is wrong; the message names the axis and the value.
         """
         combination, seed = self._at(index)
-        labels = {**self._labels(combination), SEED: seed}
+        labels = self.parameters(index)
         changes = [
             axis.changes[choice]
             for axis, choice in zip(self.axes, combination, strict=True)

@@ -336,22 +336,17 @@ class StudyDirectory:
             columns["status"] = array_of(statuses, pa.string())
             yield pa.table(columns).replace_schema_metadata(state)
 
-    def write_variants(self, observe: "Callable[[pa.Table], None]") -> None:
+    def write_variants(self, observe: "Callable[[pa.Table], pa.Table]") -> None:
         """Write `variants.parquet`, which may be larger than the memory.
 
         Args:
-            observe: Receives some rows after the other.
+            observe: Receives some rows after the other, and returns them.
 
         Raises:
             ArtifactError: It can't be written.
         """
-
-        def tables() -> "Iterator[pa.Table]":
-            for table in self._variant_tables(self.parts(), ()):
-                observe(table)
-                yield table
-
-        self.storage.write_batches(VARIANTS, tables(), self.scratch)
+        tables = map(observe, self._variant_tables(self.parts(), ()))
+        self.storage.write_batches(VARIANTS, tables, self.scratch)
 
     def journal_path(self, parts: Iterable[Part]) -> Path:
         """Return the path of the journal of the next part."""

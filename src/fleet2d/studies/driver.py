@@ -40,7 +40,6 @@ from fleet2d.studies.plan import (
     Changed,
     KnownNames,
     PlanSchedule,
-    ReconciledPlan,
     ScenarioFile,
     StudyPlan,
     check_setups,
@@ -300,13 +299,15 @@ def run_study(
     with directory.locked():
         parts = directory.intact_parts(observer.on_note)
         status = directory.statuses(parts)
-        reconciled = reconcile(checked.plan, directory, status > 0, changed)
-        variants = reconciled.plan.variants
-        _write_plan(directory, checked, reconciled.plan)
+        adapt = checked.specification.file.adapt
+        # Of an adaptive study, new variants may be those of rounds that it doesn't need.
+        plan = reconcile(
+            checked.plan, directory, status > 0, changed, observer.on_note, notes_new=adapt is None
+        )
+        variants = plan.variants
+        _write_plan(directory, checked, plan)
         status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
         missing = np.flatnonzero(status[variants.number] != COMPLETE)
-        adapt = checked.specification.file.adapt
-        _describe(reconciled, directory, observer, is_adaptive=adapt is not None)
         keeper = _ResultKeeper(directory, parts)
         counts = Counts(len(variants), len(variants) - len(missing), 0)
         observer.on_start(counts, executor.workers)
@@ -314,9 +315,7 @@ def run_study(
         schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
         try:
             if adapt is not None:
-                schedule = AdaptiveSchedule(
-                    adapt, reconciled.plan, missing, directory, observer.on_note
-                )
+                schedule = AdaptiveSchedule(adapt, plan, missing, directory, observer.on_note)
             with closing(executor.run(checked.job, schedule)) as events:
                 for event in events:
                     record = _record(event)
@@ -361,8 +360,8 @@ class VariantSummary:
         self._lacking = {name: 0 for _, name in named if name != "*"}
         self._metrics: list[str] = []
 
-    def add(self, variants: "pa.Table") -> None:
-        """Add some variants."""
+    def add(self, variants: "pa.Table") -> "pa.Table":
+        """Add some variants; return them."""
         import pyarrow as pa
 
         from fleet2d.artifacts.arrow import values_of
@@ -380,6 +379,7 @@ class VariantSummary:
                 if is_kept(name, [pattern]):
                     lacks &= values_of(complete[name].is_null())
             self._lacking[pattern] += int(np.count_nonzero(lacks))
+        return variants
 
     def note_missing(self, observer: Observer) -> None:
         """Note which of the metrics that the study names are missing in complete variants."""
@@ -460,13 +460,3 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         file.notes,
     )
     directory.write_meta(meta)
-
-
-def _describe(
-    reconciled: ReconciledPlan, directory: StudyDirectory, observer: Observer, *, is_adaptive: bool
-) -> None:
-    # Of an adaptive study they may be those of rounds that it doesn't need.
-    if 0 < reconciled.new < len(reconciled.plan.variants) and not is_adaptive:
-        observer.on_note(f"{reconciled.new} variants are new in {directory.location}")
-    if reconciled.set_aside:
-        observer.on_note(f"{reconciled.set_aside} results no longer belong to the study: set aside")

@@ -53,13 +53,15 @@ class Spread:
             >>> round(spread.detectable({"home": 30}), 2)
             0.53
         """
+        from statistics import NormalDist
+
         parts = [(self.components[level] / n, n - 1) for level, n in units.items()]
         parts.append((self.residual / math.prod(units.values()), max(units.values()) - 1))
         variance = sum_in_order(part for part, _ in parts)
         if not variance:
             return 0.0
         freedom = variance**2 / sum_in_order(part**2 / df for part, df in parts)
-        return math.sqrt(variance) * (student_quantile(freedom) + _normal_quantile(power))
+        return math.sqrt(variance) * (student_quantile(freedom) + NormalDist().inv_cdf(power))
 
     def needed(self, size: float, level: str, power: float = POWER, **units: int) -> int | None:
         """Return how many units of a level tell a mean of `size` from zero; None: no number does.
@@ -124,15 +126,10 @@ class MeanEstimate:
         Each number is for one level while the others stay as they are; levels of which no number
         is enough are missing. The power is 80 %.
         """
-        counts = {
-            level: self.spread.needed(self.mean, level)
-            for level, current in self.spread.units.items()
-            if current >= 2
-        }
         return {
-            level: max(count, self.spread.units[level] + 1)
-            for level, count in counts.items()
-            if count is not None
+            level: max(count, current + 1)
+            for level, current in self.spread.units.items()
+            if current >= 2 and (count := self.spread.needed(self.mean, level)) is not None
         }
 
 
@@ -239,12 +236,6 @@ def _third_moment(values: F64) -> float:
         return 0.0
     cubes = float(((values - values.mean()) ** 3).sum())
     return cubes * count / ((count - 1) * (count - 2))
-
-
-def _normal_quantile(share: float) -> float:
-    from statistics import NormalDist
-
-    return NormalDist().inv_cdf(share)
 
 
 def student_quantile(freedom: float, level: float = LEVEL) -> float:

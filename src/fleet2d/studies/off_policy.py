@@ -13,6 +13,7 @@ the intervals contain the truth.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,40 +57,26 @@ def read_opportunities(run: Run) -> LoggedOpportunities:
     A reward belongs to the last opportunity of the same interaction and person before it. Days are
     those of the calendar.
     """
-    events = run.tables["events"]
+    events = (run.tables["events"][name].to_pylist() for name in ("step", "event", "detail"))
     wanted = {"opportunity", "accepted"}
-    rows = [
-        (int(step), str(event), str(detail))
-        for step, event, detail in zip(
-            events["step"].to_pylist(),
-            events["event"].to_pylist(),
-            events["detail"].to_pylist(),
-            strict=True,
-        )
-        if event in wanted
-    ]
-    texts: list[str] = []
-    steps: list[int] = []
-    chances: list[float] = []
-    asked: list[bool] = []
+    rows = (row for row in zip(*events, strict=True) if row[1] in wanted)
+    logged: list[tuple[str, int, bool, float]] = []
     rewards: list[float] = []
     last: dict[str, int] = {}
-    for step, event, detail in sorted(rows, key=lambda row: row[0]):
+    for step, event, detail in sorted(rows, key=itemgetter(0)):
         if event == "accepted":
             if detail in last:
                 rewards[last[detail]] = 1.0
             continue
         text, chance, action = detail.rsplit(" ", 2)
-        last[text] = len(texts)
-        texts.append(text)
-        steps.append(step)
-        chances.append(float(chance))
-        asked.append(action == "asks")
+        last[text] = len(logged)
+        logged.append((text, step, action == "asks", float(chance)))
         rewards.append(0.0)
+    texts, steps, asked, chances = zip(*logged, strict=True) if logged else ((), (), (), ())
     clock = run.clock
     first = midnight_of(clock.start)
     return LoggedOpportunities(
-        texts,
+        list(texts),
         np.array(steps, np.int64),
         np.array(asked, bool),
         np.array(chances),

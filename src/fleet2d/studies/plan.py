@@ -484,24 +484,15 @@ class ScenarioFile:
         self._rows = []
 
 
-@dataclass(frozen=True)
-class ReconciledPlan:
-    """A plan matched with the stored variants of a study.
-
-    Attributes:
-        plan: The plan, with the numbers of stored variants.
-        new: The number of variants that the study didn't have.
-        set_aside: The number of stored results that no longer belong to it.
-    """
-
-    plan: StudyPlan
-    new: int
-    set_aside: int
-
-
 def reconcile(
-    plan: StudyPlan, directory: StudyDirectory, finished: Bool, changed: Changed | None
-) -> ReconciledPlan:
+    plan: StudyPlan,
+    directory: StudyDirectory,
+    finished: Bool,
+    changed: Changed | None,
+    on_note: Callable[[str], None],
+    *,
+    notes_new: bool,
+) -> StudyPlan:
     """Number the variants of a plan as in the stored study; new variants get new numbers.
 
     Args:
@@ -509,6 +500,8 @@ def reconcile(
         directory: The study.
         finished: Whether there are results, by the number of the variant: bool (n,).
         changed: What to do with results of other code, inputs or scenarios.
+        on_note: Receives a remark about results that are set aside: they no longer belong to it.
+        notes_new: Whether it receives one about new variants, too.
 
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
@@ -519,7 +512,7 @@ def reconcile(
                 f"{directory.location}/{PLAN} is missing, and with it the variants of the results:"
                 " choose another --out"
             )
-        return ReconciledPlan(plan, len(plan.variants), 0)
+        return plan
     variants, (stored_number, stored_identity) = plan.variants, _stored(directory, "identity")
     place = _find(stored_identity, variants.identity)
     is_stored = place >= 0
@@ -541,12 +534,12 @@ def reconcile(
         identity[reused] = stored_identity[stale[same[reused]]]
     is_new = ~is_stored & ~reused
     number[is_new] = np.arange(count, count + np.count_nonzero(is_new))
-    numbered = replace(variants, number=number, identity=identity)
-    return ReconciledPlan(
-        StudyPlan(plan.design, numbered),
-        int(np.count_nonzero(is_new)),
-        len(stale) - int(np.count_nonzero(reused)),
-    )
+    new, set_aside = np.count_nonzero(is_new), len(stale) - np.count_nonzero(reused)
+    if 0 < new < len(variants) and notes_new:
+        on_note(f"{new} variants are new in {directory.location}")
+    if set_aside:
+        on_note(f"{set_aside} results no longer belong to the study: set aside")
+    return StudyPlan(plan.design, replace(variants, number=number, identity=identity))
 
 
 def _stored(directory: StudyDirectory, column: str) -> tuple[I32, Hashes]:

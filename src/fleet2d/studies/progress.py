@@ -5,7 +5,7 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
@@ -132,8 +132,8 @@ def forecast(
     planned = [variants.task(place) for place in places]
     # Groups of one task each start in their order.
     tasks = [replace(task, number=i, home=str(i)) for i, task in enumerate(planned)]
-    finished, measured, tried = dict[int, SpeedSample | None](), list[int](), 0
-    samples, speeds, total_s, error_s = list[SpeedSample](), list[RunSpeed](), 0.0, 0.0
+    finished, tried = dict[int, SpeedSample | None](), 0
+    measured, total_s, error_s = dict[int, SpeedSample](), 0.0, 0.0  # samples by place
     job, homes = checked.job, [task.home for task in planned]
     speed_job = SpeedJob(job.design, job.metrics, job.tables, job.trust, homes)
     with closing(executor.run(speed_job, TaskSchedule(tasks))) as events:
@@ -147,16 +147,15 @@ def forecast(
             # Those that finish early are short: a sample has all that began before its last.
             while tried in finished:
                 if (sample := finished[tried]) is not None:
-                    measured.append(places[tried])
-                    samples.append(sample)
-                    speeds.append(sample.speed)
+                    measured[places[tried]] = sample
                 tried += 1
-            if not samples:
+            if not measured:
                 continue
-            total_s, error_s = strata.total(measured, speeds)
+            total_s, error_s = strata.total(measured)
             is_late = elapsed_s - start_s > MEASURING_S
-            if len(samples) >= MIN_SAMPLES and (is_late or error_s < PRECISION * total_s):
+            if len(measured) >= MIN_SAMPLES and (is_late or error_s < PRECISION * total_s):
                 break
+    samples = list(measured.values())
     if not samples:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
     if observer is not None:
@@ -168,8 +167,8 @@ def forecast(
     wall_s = checked_s + start_s + (homes_s + total_s) / workers
     if job.tables:
         wall_s += _storing_s(samples) * variants.total_simulated_s
-    longest_s = float(strata.seconds(measured, speeds).max())
-    core_share = float(np.mean([speed.core_share for speed in speeds]))
+    longest_s = float(strata.seconds(measured).max())
+    core_share = float(np.mean([sample.speed.core_share for sample in samples]))
     error_s = error_s / workers + MODEL_ERROR * wall_s
     return Forecast(
         timedelta(seconds=variants.total_simulated_s),
@@ -209,7 +208,7 @@ class Strata:
         places = (place for each in rounds for place in each if place is not None)
         return list(itertools.islice(places, MAX_SAMPLES))
 
-    def total(self, places: Sequence[int], speeds: Sequence[RunSpeed]) -> tuple[float, float]:
+    def total(self, measured: Mapping[int, SpeedSample]) -> tuple[float, float]:
         """Return the wall time of all runs one after the other, and its error [s].
 
         Lengths are known, so all runs are estimated from the mean time of a set-up and that of a
@@ -218,19 +217,18 @@ class Strata:
         Assisted Survey Sampling, chapter 6).
 
         Args:
-            places: The places of the measured variants.
-            speeds: Their speeds.
+            measured: The samples of the measured variants, by their places.
         """
-        fixed_s = np.array([speed.fixed_s for speed in speeds])
-        lengths_s, seconds = self._lengths_s[places], self.seconds(places, speeds)
+        places, fixed_s = list(measured), _fixed_s(measured)
+        lengths_s, seconds = self._lengths_s[places], self.seconds(measured)
         fixed_mean_s = float(fixed_s.mean())
         ratio = float((seconds - fixed_s).sum() / lengths_s.sum())
         residuals_s = seconds - fixed_mean_s - ratio * lengths_s
         stratum, sizes = self._stratum[places], self._sizes
         counts = np.bincount(stratum, minlength=len(sizes))
         means_s = np.bincount(stratum, residuals_s, len(sizes)) / np.maximum(counts, 1)
-        within_s, freedom = residuals_s - means_s[stratum], len(speeds) - int((counts > 0).sum())
-        deviation_s = float(np.linalg.norm(residuals_s)) / math.sqrt(max(len(speeds) - 2, 1))
+        within_s, freedom = residuals_s - means_s[stratum], len(places) - int((counts > 0).sum())
+        deviation_s = float(np.linalg.norm(residuals_s)) / math.sqrt(max(len(places) - 2, 1))
         within = np.linalg.norm(within_s) / math.sqrt(max(freedom, 1))
         of_measured_s = float(within) if freedom >= MIN_FREEDOM else deviation_s
         inverse = 1 / np.maximum(counts, 1) - 1 / sizes
@@ -239,11 +237,15 @@ class Strata:
         total_s += float((sizes * means_s).sum())
         return total_s, CONFIDENCE * float(np.linalg.norm(sizes * errors_s))
 
-    def seconds(self, places: Sequence[int], speeds: Sequence[RunSpeed]) -> F64:
+    def seconds(self, measured: Mapping[int, SpeedSample]) -> F64:
         """Return the wall time of each measured variant, whole and in a home that is there [s]."""
+        speeds = [sample.speed for sample in measured.values()]
         moving = [speed.moving_s / max(speed.simulated_s, 1e-6) for speed in speeds]
-        fixed_s = np.array([speed.fixed_s for speed in speeds])
-        return np.asarray(fixed_s + self._lengths_s[places] * moving)
+        return np.asarray(_fixed_s(measured) + self._lengths_s[list(measured)] * moving)
+
+
+def _fixed_s(measured: Mapping[int, SpeedSample]) -> F64:
+    return np.array([sample.speed.fixed_s for sample in measured.values()])
 
 
 def _storing_s(samples: Sequence[SpeedSample]) -> float:

@@ -243,7 +243,7 @@ class Study:
         from fleet2d.studies.simulator import run_scenario
 
         with restrict_stored(Trust.of(trust)):
-            return run_scenario(self.scenario(variant), out, **settings)
+            return run_scenario(self.scenario(variant), out=out, **settings)
 
     @property
     def complete(self) -> "pl.DataFrame":

@@ -6,11 +6,10 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from fleet2d.engine.basis import input_files
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.basis import input_files as input_files
+from fleet2d.engine.simulation import Simulation, run
 from fleet2d.errors import ComponentError
 from fleet2d.runtime.clock import HOUR_S
 from fleet2d.runtime.memory import peak_memory_mb
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
 
 Status = Literal["complete", "failed"]
 SEPARATOR = "."
+run_scenario = run
+"""The function that runs a scenario, for the other modules."""
 
 
 @dataclass
@@ -50,11 +51,6 @@ class VariantOutcome:
     trace: str | None = None
 
 
-def files_of(scenario: Scenario) -> list[Path]:
-    """Return the files that a scenario reads, with the modules of the user's components."""
-    return input_files(scenario)
-
-
 def check_setup(scenario: Scenario) -> None:
     """Set a scenario up without running it.
 
@@ -63,19 +59,6 @@ def check_setup(scenario: Scenario) -> None:
         ComponentError: A component can't start.
     """
     Simulation(scenario)
-
-
-def run_scenario(
-    scenario: Scenario | Mapping[str, Any] | str | Path | None,
-    out: str | Path | None = None,
-    **settings: Any,
-) -> "Run":
-    """Run a scenario, in memory or stored.
-
-    Raises:
-        Fleet2DError: The scenario is wrong, or a component failed.
-    """
-    return Simulation(scenario, out=out, **settings).run()
 
 
 class StagedRun:
@@ -128,7 +111,7 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
     """
     start_s = time.perf_counter()
     try:
-        run = run_scenario(scenario)
+        finished = run(scenario)
     except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
         seconds = {"total": time.perf_counter() - start_s}
         return VariantOutcome(
@@ -138,7 +121,7 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
             error=describe_error(error),
             trace="".join(traceback.format_exception(error)),
         )
-    return _outcome_of(run, metrics, tables, start_s)
+    return _outcome_of(finished, metrics, tables, start_s)
 
 
 def _outcome_of(

@@ -30,7 +30,7 @@ from fleet2d.studies.driver import CheckedStudy, check_study, run_study
 from fleet2d.studies.executors import Executor, LostTask
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
-from fleet2d.studies.simulator import files_of
+from fleet2d.studies.simulator import input_files
 from fleet2d.studies.specification import (
     PairedComparison,
     Specification,
@@ -214,7 +214,7 @@ def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
         scenario = plan.design.scenario(variant.index)
         content = scenario_content(scenario)
         text = json.dumps({**content, "simulation": {**content["simulation"], "seed": None}})
-        for path in files_of(scenario):
+        for path in input_files(scenario):
             text = text.replace(json.dumps(str(path)), json.dumps(file_hash(path)))
         is_held_out = matches(settings.held_out, plan.parameters(variant))
         was_held_out, other = first_of.setdefault(text, (is_held_out, variant.index))
