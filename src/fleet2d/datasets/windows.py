@@ -75,9 +75,10 @@ def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
         names = rooms["room"].tolist()
         xy = np.stack([rooms["x"], rooms["y"]], axis=1).tolist()
         facts = PlaceFacts.of(rooms["kind"].tolist(), rooms["area_m2"], xy)
-        dense = _Dense(evidence, labels, names, np.datetime64(run["start"][0], "us"))
+        start = np.datetime64(run["start"][0], "us")
+        dense = _Dense(evidence, labels, beliefs, names, facts, start)
         for user in run["users"][0]:
-            yield _windows(number, run["home"][0], user, facts, dense, labels, beliefs)
+            yield dense.windows(number, run["home"][0], user)
 
 
 def windows_of_run(run: "Run") -> list[Windows]:
@@ -99,19 +100,18 @@ def windows_of_run(run: "Run") -> list[Windows]:
 
 
 class _Dense:
-    """The evidence of a run as arrays by bin and room.
-
-    Attributes:
-        step: int64 (bins,), the last step of each bin.
-    """
+    """The evidence of a run as arrays by bin and room, and what is known of its home."""
 
     def __init__(
         self,
         evidence: Mapping[str, Any],
         labels: Mapping[str, Any],
+        beliefs: Mapping[str, Any],
         rooms: Sequence[str],
+        facts: PlaceFacts,
         start: np.datetime64,
     ) -> None:
+        self.labels, self.beliefs, self.facts = labels, beliefs, facts
         step_us = int((labels["time"][0] - start) / MICROSECOND) // max(int(labels["step"][0]), 1)
         self.bin_steps = steps_of_bin(step_us)
         count = int(max(evidence["step"].max(initial=0), labels["step"].max()) + 1)
@@ -142,38 +142,28 @@ class _Dense:
         belief = np.ones((len(self.step), self.watched.shape[1] + 1))
         return TracedEvidence(self.day, self.minute, self.watched, seen, self.unknown, belief)
 
-
-def _windows(
-    number: int,
-    home: str,
-    user: str,
-    facts: PlaceFacts,
-    dense: _Dense,
-    labels: Mapping[str, Any],
-    beliefs: Mapping[str, Any],
-) -> Windows:
-    own = labels["user"] == user
-    place_of = {**dense.rooms, AWAY: len(dense.rooms)}
-    truth = np.full(len(dense.step), -1)
-    bins = (labels["step"][own] + 1) // dense.bin_steps - 1
-    truth[bins] = [place_of[name] for name in labels["place"][own]]
-    stored: dict[str, F64] = {}
-    kept: I64 | None = None
-    for model in dict.fromkeys(beliefs["model"].tolist()):
-        rows = (beliefs["user"] == user) & (beliefs["model"] == model)
-        belief = beliefs["probability"][rows].reshape(-1, len(place_of)).astype(np.float64)
-        at = (beliefs["step"][rows][:: len(place_of)] + 1) // dense.bin_steps - 1
-        if kept is None:
-            kept = at[truth[at] >= 0]
-        stored[model] = belief[np.isin(at, kept)]
-    assert kept is not None, "there are beliefs"
-    memory = np.zeros(trace_size(facts.rooms))
-    features = trace_evidence(memory, facts.rooms, dense.of(user))[kept]
-    features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
-    narrow = features.astype(np.float32)
-    return Windows(
-        number, home, user, facts.features, narrow, truth[kept], dense.step[kept], stored
-    )
+    def windows(self, number: int, home: str, user: str) -> Windows:
+        """Return the windows of a user of the run."""
+        labels, beliefs, rooms = self.labels, self.beliefs, self.facts.rooms
+        own = labels["user"] == user
+        place_of = {**self.rooms, AWAY: len(self.rooms)}
+        truth = np.full(len(self.step), -1)
+        bins = (labels["step"][own] + 1) // self.bin_steps - 1
+        truth[bins] = [place_of[name] for name in labels["place"][own]]
+        stored: dict[str, F64] = {}
+        kept: I64 | None = None
+        for model in dict.fromkeys(beliefs["model"].tolist()):
+            rows = (beliefs["user"] == user) & (beliefs["model"] == model)
+            belief = beliefs["probability"][rows].reshape(-1, len(place_of)).astype(np.float64)
+            at = (beliefs["step"][rows][:: len(place_of)] + 1) // self.bin_steps - 1
+            if kept is None:
+                kept = at[truth[at] >= 0]
+            stored[model] = belief[np.isin(at, kept)]
+        assert kept is not None, "there are beliefs"
+        features = trace_evidence(np.zeros(trace_size(rooms)), rooms, self.of(user))[kept]
+        features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
+        places, known = self.facts.features, features.astype(np.float32)
+        return Windows(number, home, user, places, known, truth[kept], self.step[kept], stored)
 
 
 def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:

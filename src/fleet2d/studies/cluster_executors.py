@@ -213,6 +213,7 @@ class SlurmExecutor:
         self.workers = workers or WORKERS
         self._cluster = cluster
         self._missing: dict[str, float] = {}
+        self._attempts: dict[int, int] = {}
         try:
             self._executor = submitit.AutoExecutor(folder=str(folder), cluster=cluster)
             self._executor.update_parameters(
@@ -223,7 +224,7 @@ class SlurmExecutor:
 
     def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
         """Yield an event for each task as its job ends; closing the iterator cancels all jobs."""
-        attempts: dict[int, int] = {}
+        self._attempts = {}
         retries: list[list[WorkerTask]] = []
         running: dict[Any, list[WorkerTask]] = {}
         try:
@@ -239,11 +240,10 @@ class SlurmExecutor:
                             raise RuntimeError("it has left the queue without results")
                         payloads = ended.result()
                     except Exception as error:  # noqa: BLE001 - a job may fail in any way
-                        yield from self._lost(chunk, error, attempts, retries)
+                        yield from self._lost(chunk, error, retries)
                         continue
                     for task, payload in zip(chunk, payloads, strict=True):
-                        attempt = attempts.get(task.number, 0) + 1
-                        yield FinishedTask(task, payload, attempt)
+                        yield FinishedTask(task, payload, self._attempts.get(task.number, 0) + 1)
                 if running and not retries:
                     time.sleep(ASK_SLURM_EVERY_S)
         finally:
@@ -278,17 +278,14 @@ class SlurmExecutor:
         return chunks
 
     def _lost(
-        self,
-        chunk: list[WorkerTask],
-        error: Exception,
-        attempts: dict[int, int],
-        retries: list[list[WorkerTask]],
+        self, chunk: list[WorkerTask], error: Exception, retries: list[list[WorkerTask]]
     ) -> Generator[LostTask]:
         """Let the tasks of a failed job be run again; yield those that failed too often."""
         reason = str(error).strip().splitlines()[-1:] or [type(error).__name__]
         for task in chunk:
-            attempts[task.number] = attempts.get(task.number, 0) + (len(chunk) == 1)
-            if attempts[task.number] == MAX_ATTEMPTS:
+            attempt = self._attempts.get(task.number, 0) + (len(chunk) == 1)
+            self._attempts[task.number] = attempt
+            if attempt == MAX_ATTEMPTS:
                 text = f"its job failed in each of {MAX_ATTEMPTS} attempts: {reason[0]}"
                 yield LostTask(task, text, MAX_ATTEMPTS)
             else:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.configuration.problems import Location, did_you_mean
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.scenario.model import Scenario
@@ -350,11 +350,7 @@ class VariantSummary:
         file = checked.specification.file
         self.counts = Counts(0, 0, 0)
         self._others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
-        named: list[tuple[Location, str]] = [
-            *((("compare", i, "metric"), each.metric) for i, each in enumerate(file.compare)),
-            *((("keep", "metrics", i), each) for i, each in enumerate(file.keep.metrics)),
-        ]
-        named += [(("adapt", "metric"), file.adapt.metric)] if file.adapt else []
+        named = [each for each in file.named_metrics() if each[0][0] != "tune"]
         place = checked.specification.places.place
         self._places = {name: place(location) for location, name in reversed(named)}
         self._lacking = {name: 0 for _, name in named if name != "*"}

@@ -225,6 +225,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
         """Create the executor; workers start with `run`."""
         self._crew: list[AnyWorker] = []
         self._failed_starts = 0
+        self._attempts: dict[int, int] = {}  # that failed, by the number of the task
 
     @property
     @abstractmethod
@@ -253,12 +254,12 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
         Raises:
             InputError: Workers can't be set up.
         """
-        attempts: dict[int, int] = {}
+        self._attempts = {}
         try:
             while tasks or any(worker.tasks for worker in self._crew):
                 self._fill(job, tasks)
                 for worker, message in self._messages():
-                    event = self._handle(worker, message, tasks, attempts)
+                    event = self._handle(worker, message, tasks)
                     if event is not None:
                         yield event
         finally:
@@ -284,11 +285,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
             self._crew += [self._start(job) for _ in range(min(most, len(tasks) - starting))]
 
     def _handle(
-        self,
-        worker: AnyWorker,
-        message: Ready | Broken | Done | Died,
-        tasks: TaskSchedule,
-        attempts: dict[int, int],
+        self, worker: AnyWorker, message: Ready | Broken | Done | Died, tasks: TaskSchedule
     ) -> Event | None:
         """Process the message of a worker; return the event of a task that has ended."""
         match message:
@@ -299,14 +296,12 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
             case Done(payload, rss_mb):
                 task = worker.tasks.popleft()
                 worker.is_full = rss_mb > self.memory_mb
-                return FinishedTask(task, payload, attempts.get(task.number, 0) + 1)
+                return FinishedTask(task, payload, self._attempts.get(task.number, 0) + 1)
             case Died(reason):
-                return self._replace(worker, reason, tasks, attempts)
+                return self._replace(worker, reason, tasks)
         return None
 
-    def _replace(
-        self, worker: AnyWorker, reason: str, tasks: TaskSchedule, attempts: dict[int, int]
-    ) -> LostTask | None:
+    def _replace(self, worker: AnyWorker, reason: str, tasks: TaskSchedule) -> LostTask | None:
         """Drop a dead worker; return the task that it ran if that was the last attempt."""
         self._crew.remove(worker)
         tasks.leave(worker.number)
@@ -317,8 +312,8 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
         while len(worker.tasks) > 1:
             tasks.put_back(worker.tasks.pop())
         for task in worker.tasks:
-            attempts[task.number] = attempts.get(task.number, 0) + 1
-            if attempts[task.number] == MAX_ATTEMPTS:
+            self._attempts[task.number] = self._attempts.get(task.number, 0) + 1
+            if self._attempts[task.number] == MAX_ATTEMPTS:
                 text = f"{reason} in each of {MAX_ATTEMPTS} attempts"
                 return LostTask(task, text, MAX_ATTEMPTS)
             tasks.put_back(task)
@@ -374,7 +369,9 @@ class LocalExecutor(CrewExecutor[LocalWorker]):
                 message = worker.connection.recv()
             except (EOFError, OSError):
                 self._end([worker])
-                message = Died(f"the worker process ended ({_cause(worker.process.exitcode)})")
+                code = worker.process.exitcode
+                cause = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+                message = Died(f"the worker process ended ({cause})")
             yield worker, message
 
     def _end(self, workers: list[LocalWorker]) -> None:
@@ -431,10 +428,6 @@ def _end_with_driver() -> None:
     assert driver is not None
     driver.join()
     os._exit(0)
-
-
-def _cause(code: int | None) -> str:
-    return f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
 
 
 def _memory_mb() -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.configuration.problems import Location, did_you_mean, suggest
+from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError, ScenarioError
@@ -218,15 +218,8 @@ class KnownNames:
                 hint = suggest(name, sorted(self._tables))
                 message = f"no variant has a table {name!r}{hint}"
                 raise specification.error(("keep", "tables", i), message)
-        # Where a metric is named, and whether it has to be kept.
-        named: list[tuple[Location, str, bool]] = []
-        named += [(("keep", "metrics", i), each, False) for i, each in enumerate(file.keep.metrics)]
-        named += [(("compare", i, "metric"), c.metric, True) for i, c in enumerate(file.compare)]
-        named += [(("adapt", "metric"), file.adapt.metric, True)] if file.adapt else []
-        objectives = file.tune.objectives if file.tune else ()
-        named += [(("tune", "objectives", name), name, False) for name in objectives]
-        for location, metric, must_be_kept in named:
-            problem = self._problem(metric)
+        for location, metric in file.named_metrics():
+            problem, must_be_kept = self._problem(metric), location[0] in ("compare", "adapt")
             if not problem and must_be_kept and not is_kept(metric, file.keep.metrics):
                 problem = f"the metric {metric!r} isn't kept: add it to keep.metrics"
             if problem:

@@ -237,6 +237,15 @@ class StudyFile(Settings):
         if self.tune is not None:
             yield ("tune", "held_out"), self.tune.held_out
 
+    def named_metrics(self) -> Iterator[tuple[Location, str]]:
+        """Yield the metrics that the file names, or patterns of some, and where they stand."""
+        yield from ((("compare", i, "metric"), each.metric) for i, each in enumerate(self.compare))
+        yield from ((("keep", "metrics", i), each) for i, each in enumerate(self.keep.metrics))
+        if self.adapt is not None:
+            yield ("adapt", "metric"), self.adapt.metric
+        if self.tune is not None:
+            yield from ((("tune", "objectives", name), name) for name in self.tune.objectives)
+
     @property
     def populations(self) -> tuple[str, ...]:
         """The columns whose values are a sample of a population, the seed last."""

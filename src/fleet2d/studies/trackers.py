@@ -1,7 +1,6 @@
 """Studies in experiment trackers: MLflow and Weights & Biases."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,17 +37,6 @@ def track(study: Study, tracker: TrackerName, project: str, uri: str | None = No
     return _to_wandb(study, project)
 
 
-def _rows(study: Study) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
-    """Yield the row of each complete variant, and its finite metrics."""
-    for row in study.complete.to_dicts():
-        numbers = {name: row[name] for name in study.metrics if row[name] is not None}
-        yield row, {name: value for name, value in numbers.items() if math.isfinite(value)}
-
-
-def _parameters(study: Study, row: dict[str, Any]) -> dict[str, Any]:
-    return {column: row[column] for column in study.columns if row[column] is not None}
-
-
 def _report(study: Study) -> Path | None:
     path = Path(study.location) / "report" / "report.html"
     return path if path.exists() else None
@@ -66,15 +54,17 @@ def _to_mlflow(study: Study, project: str, uri: str | None) -> int:
         experiment = found.experiment_id if found else client.create_experiment(project)
         parent, known = _mlflow_runs(client, experiment, study)
         count = 0
-        for row, numbers in _rows(study):
+        for row in study.complete.to_dicts():
             if row["identity"] in known:
                 continue
             tags = {IDENTITY: row["identity"], MLFLOW_PARENT_RUN_ID: parent}
             tags["fleet2d.digest"] = row["digest"]
             run = client.create_run(experiment, tags=tags, run_name=f"variant {row['variant']}")
-            parameters = _parameters(study, row).items()
-            metrics = [Metric(_mlflow_name(name), v, 0, 0) for name, v in numbers.items()]
-            params = [Param(_mlflow_name(name), str(value)) for name, value in parameters]
+            given = {name: value for name, value in row.items() if value is not None}
+            numbers = [name for name in study.metrics if math.isfinite(given.get(name, math.nan))]
+            metrics = [Metric(_mlflow_name(name), given[name], 0, 0) for name in numbers]
+            columns = [column for column in study.columns if column in given]
+            params = [Param(_mlflow_name(column), str(given[column])) for column in columns]
             client.log_batch(run.info.run_id, metrics, params)
             client.set_terminated(run.info.run_id)
             count += 1
@@ -111,7 +101,7 @@ def _mlflow_name(name: str) -> str:
 def _to_wandb(study: Study, project: str) -> int:
     with extra("wandb", "this needs Weights & Biases"):
         import wandb
-    meta, rows = study.meta, list(_rows(study))
+    meta, rows = study.meta, study.complete.to_dicts()
     columns = ["variant", *study.columns, "digest", *study.metrics]
     try:
         run = wandb.init(
@@ -121,7 +111,7 @@ def _to_wandb(study: Study, project: str) -> int:
             notes="\n\n".join(filter(None, (meta.description, meta.notes))),
             config={"code": meta.code, "study_file": meta.source},
         )
-        table = wandb.Table(columns, [[row[c] for c in columns] for row, _ in rows])
+        table = wandb.Table(columns, [[row[c] for c in columns] for row in rows])
         run.log({"variants": table})
         if report := _report(study):
             run.log({"report": wandb.Html(report.read_text(encoding="utf-8"), inject=False)})
