@@ -102,7 +102,8 @@ def fit_persona(
     fitter.rest(days)
     activities = fitter.activities
     if private:
-        used = {"rest", *(name for t in templates.values() for name in _activities_of(t))}
+        texts = [text for template in templates.values() for text in template["recorded"]]
+        used = {"rest", *(name for text in texts for name in parse_day(text).activities)}
         activities = {
             name: {key: value for key, value in fields.items() if key != "takes"}
             for name, fields in activities.items()
@@ -119,10 +120,6 @@ def fit_persona(
     return FittedPersona(document, persona, fitter.states, notes, log)
 
 
-def _activities_of(template: Mapping[str, Any]) -> set[str]:
-    return {name for text in template["recorded"] for name in parse_day(text).activities}
-
-
 def _kinds_of_days(
     timeline: Timeline, days: Sequence[LivedDay]
 ) -> tuple[dict[str, tuple[str, list[LivedDay]]], list[str]]:
@@ -135,10 +132,8 @@ def _kinds_of_days(
     weekdays = [day for day in days if timeline.weekdays[day.number] < WORKDAYS]
     weekend = [day for day in days if timeline.weekdays[day.number] >= WORKDAYS]
     if min(len(weekdays), len(weekend)) < MIN_TEMPLATE_DAYS:
-        note = (
-            f"{len(weekdays)} weekdays and {len(weekend)} days of weekends: too few for two kinds"
-        )
-        return {"every_day": ("daily", list(days))}, [note]
+        counts = f"{len(weekdays)} weekdays and {len(weekend)} days of weekends"
+        return {"every_day": ("daily", list(days))}, [f"{counts}: too few for two kinds"]
     return {"weekday": ("weekdays", weekdays), "weekend": ("weekend", weekend)}, []
 
 
@@ -171,9 +166,8 @@ def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
 def _names(timeline: Timeline) -> list[str]:
     """Return a name for each state: its activity, with its room if it is done in several."""
     asleep = sleep_states(timeline)
-    lasts = np.bincount(
-        timeline.minutes[timeline.minutes >= 0], minlength=len(timeline.states)
-    ).tolist()
+    known = timeline.minutes[timeline.minutes >= 0]
+    lasts = np.bincount(known, minlength=len(timeline.states)).tolist()
     most_frequent: dict[str, int] = {}
     for i in sorted(range(len(timeline.states)), key=lambda i: -lasts[i]):
         most_frequent.setdefault(_base_name(timeline.states[i], i in asleep), i)
@@ -240,7 +234,7 @@ class _Fitter:
                     # Below 1, so that it may be left out of a day that is too full.
                     "probability": round(min(len(stretches) / len(days), 0.99), 3),
                 }
-                self._add(self.names[state], state, stretches)
+                self._add(self.names[state], state, takes=_takes(stretches))
                 rest += [run for n, run in cluster if longest[n] is not run]
         return tasks, rest
 
@@ -263,11 +257,9 @@ class _Fitter:
                 state, is_main = self._main_state(done)
                 base = self.names[state] if is_main else f"in_{self.timeline.states[state].place}"
                 name = "_".join([base, *([kind] if kind else []), f"{first // 60 % 24:02}h"])
-                self._add(name, state, done)
-                leisure[name] = {
-                    "weight": float(len(done)),
-                    "between": [_clock(first), _clock(last)],
-                }
+                self._add(name, state, takes=_takes(done))
+                between = [_clock(first), _clock(last)]
+                leisure[name] = {"weight": float(len(done)), "between": between}
         return leisure
 
     @staticmethod
@@ -284,18 +276,18 @@ class _Fitter:
             for run in (*day.awake, *day.up):
                 by_state[run.state].append(run)
         for state, done in sorted(by_state.items()):
-            self._add(self.names[state], state, done)
+            self._add(self.names[state], state, takes=_takes(done))
         recorded = [_recorded_day(self.timeline, day, self.names) for day in days]
         used = {name for day in recorded for name in day.activities} - set(self.activities)
         for name in sorted(used - {"sleep", "rest"}):  # never for most of a minute
             state = self.names.index(name)
-            self._add(name, state, [Stretch(state, 0, 1)])
+            self._add(name, state, takes=_takes([Stretch(state, 0, 1)]))
         return recorded
 
     def sleep(self, days: Sequence[LivedDay], *, gets_up: bool) -> None:
         """Describe sleep, and how often and how long the person is up at night."""
         state = max(sleep_states(self.timeline), key=lambda s: (self.timeline.minutes == s).sum())
-        fields = self._where(state) | {"posture": "lie"}
+        fields: dict[str, Any] = {"posture": "lie"}
         places = self.timeline.states
         here = (AWAY, places[state].place)
         up = [run for day in days for run in day.up if places[run.state].place not in here]
@@ -308,19 +300,17 @@ class _Fitter:
                 "fetches_from": [usual, "any"],
                 "fetch_takes": _takes(up),
             }
-        self.activities["sleep"] = fields
-        self.states["sleep"] = state
+        self._add("sleep", state, **fields)
 
     def rest(self, days: Sequence[LivedDay]) -> None:
         """Describe rest, for times in which nothing else fits, by the most frequent state."""
         lasts = _time_by_state(run for day in days for run in day.awake)
         home = {s: n for s, n in lasts.items() if self.timeline.states[s].place != AWAY}
         state = max(home or lasts, key=lambda s: (lasts[s], -s))
-        self.activities["rest"] = self._where(state) | {"takes": "15 min"}
-        self.states["rest"] = state
+        self._add("rest", state, takes="15 min")
 
-    def _add(self, name: str, state: int, done: Sequence[Stretch]) -> None:
-        self.activities[name] = self._where(state) | {"takes": _takes(done)}
+    def _add(self, name: str, state: int, **fields: Any) -> None:
+        self.activities[name] = self._where(state) | fields
         self.states[name] = state
 
     def _where(self, state: int) -> dict[str, Any]:
@@ -377,9 +367,8 @@ def _time_by_state(done: Iterable[Stretch]) -> Counter[int]:
 
 def _clusters(done: Sequence[tuple[int, Stretch]]) -> list[list[tuple[int, Stretch]]]:
     """Return stretches, with the number of their day, in groups more than APART from each other."""
-    ordered = sorted(done, key=lambda entry: (entry[1].begin, entry[0]))
     groups: list[list[tuple[int, Stretch]]] = []
-    for entry in ordered:
+    for entry in sorted(done, key=lambda entry: (entry[1].begin, entry[0])):
         if not groups or entry[1].begin - groups[-1][-1][1].begin > APART:
             groups.append([])
         groups[-1].append(entry)

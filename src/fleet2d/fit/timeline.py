@@ -199,9 +199,8 @@ def runs(labels: I16) -> list[tuple[int, int, int]]:
     """Return the runs of equal labels in a row: label, first index, length."""
     begins = np.flatnonzero(np.append(True, labels[1:] != labels[:-1]))
     ends = np.append(begins[1:], len(labels))
-    return list(
-        zip(labels[begins].tolist(), begins.tolist(), (ends - begins).tolist(), strict=True)
-    )
+    columns = labels[begins], begins, ends - begins
+    return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 class Stretch(NamedTuple):
@@ -312,22 +311,15 @@ def distances(real: I16, other: I16, count: int) -> Distances:
     Durations are compared place by place, weighted by the number of stays in the real days. Stays
     that midnight cuts, or of which an end is unknown, are left out in both.
     """
-    pairs = [
-        (times, other_times)
-        for times, other_times in zip(
-            dwell_times(real, count), dwell_times(other, count), strict=True
-        )
-        if len(times) >= MIN_STAYS
-    ]
+    stays = zip(dwell_times(real, count), dwell_times(other, count), strict=True)
+    pairs = [pair for pair in stays if len(pair[0]) >= MIN_STAYS]
     total = max(sum(len(times) for times, _ in pairs), 1)
     return Distances(
         share=float(total_variation(shares(real, count), shares(other, count))),
         hours=float(np.mean(total_variation(by_hour(real, count), by_hour(other, count)))),
         ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,
         stay_min=sum_in_order(len(a) * wasserstein(a, b) for a, b in pairs) / total,
-        transitions=float(
-            total_variation(transition_shares(real, count), transition_shares(other, count))
-        ),
+        transitions=float(total_variation(*(transition_shares(d, count) for d in (real, other)))),
     )
 
 

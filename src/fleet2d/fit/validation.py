@@ -186,40 +186,38 @@ def validate(
     for fold in range(folds):
         held = days[fold::folds]
         rest = [day for day in days if day not in held]
-        by_fold.append(_fold(timeline, rest, held, seed, model, private))
+        fitted = fit_persona(timeline, rest, model=model, private=private)
+        by_fold.append(_fold(timeline, fitted, rest, held, seed))
     return Validation(len(days), folds, *(_mean(found) for found in zip(*by_fold, strict=True)))
 
 
 def _fold(
     timeline: Timeline,
+    fitted: FittedPersona,
     rest: Sequence[LivedDay],
     held: Sequence[LivedDay],
     seed: int,
-    model: Model,
-    private: bool,
 ) -> list[tuple[Distances, ...]]:
     """Return how far the days of each model are from days held back.
 
     They are compared in rooms and in activities by minutes, and in rooms by seconds.
     """
-    fitted = fit_persona(timeline, rest, model=model, private=private)
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
     rooms_by_second = sample_persona(fitted, timeline, SAMPLED_BY_SECOND, seed, to_second=True)[1]
     rest_days, held_days = ([day.number for day in part] for part in (rest, held))
-    place_count, state_count = len(timeline.places), len(timeline.states)
+    places, activities = len(timeline.places), len(timeline.states)
+    seconds = timeline.places_of(timeline.seconds)
     result = []
-    for sampled, of_log, places, count, chain_days in (
-        (rooms, timeline.minutes, True, place_count, CHAIN_DAYS),
-        (states, timeline.minutes, False, state_count, CHAIN_DAYS),
-        (rooms_by_second, timeline.seconds, True, place_count, CHAIN_DAYS_BY_SECOND),
+    for sampled, of_log, count, chain_days in (
+        (rooms, timeline.rooms, places, CHAIN_DAYS),
+        (states, timeline.minutes, activities, CHAIN_DAYS),
+        (rooms_by_second, seconds, places, CHAIN_DAYS_BY_SECOND),
     ):
-        real, known = of_log[held_days], of_log[rest_days]
-        if places:
-            real, known = timeline.places_of(real), timeline.places_of(known)
+        known = of_log[rest_days]
         copies = sample_days(known, len(sampled), seed)
         chain = sample_markov(known, count, chain_days, seed)
         models = (sampled, copies, chain, known)
-        result.append(tuple(distances(real, other, count) for other in models))
+        result.append(tuple(distances(of_log[held_days], other, count) for other in models))
     return result
 
 
