@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from datetime import timedelta
-from itertools import combinations
+from itertools import combinations, takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -209,12 +209,8 @@ class DatasetPlan:
 
     def _first_number(self, split: str) -> int:
         """Return the number of the first run of a split."""
-        numbers = 0
-        for name, settings in self.file.splits.items():
-            if name == split:
-                break
-            numbers += settings.runs
-        return numbers
+        before = takewhile(lambda name: name != split, self.file.splits)
+        return sum(self.file.splits[name].runs for name in before)
 
     def _scenario(self, home: Choice, household: Any, varied: Sequence[Choice]) -> dict[str, Any]:
         changes = [

@@ -76,7 +76,10 @@ def train(
     if not batches:
         raise InputError("there are no windows to train on: no label has a stored belief")
     mean, scale = _scales(batches)
-    batches, checks = ([_scaled(b, mean, scale) for b in part] for part in (batches, checks))
+    batches, checks = (
+        [batch._replace(inputs=(batch.inputs - mean) / scale) for batch in part]
+        for part in (batches, checks)
+    )
     random = np.random.default_rng(settings.seed)
     values = _initial(random, settings.hidden) if start is None else _unfolded(start, mean, scale)
     anchor = {k: np.zeros_like(v) if start is None else v.copy() for k, v in values.items()}
@@ -134,20 +137,11 @@ def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
     """Return batches of windows of homes with as many places, in a fixed random order."""
     batches = []
     for places, group in sorted(joined(parts).items()):
-        inputs = np.concatenate(
-            [
-                np.concatenate(
-                    [
-                        np.broadcast_to(
-                            w.places.astype(np.float32), (len(w.truth), *w.places.shape)
-                        ),
-                        w.features,
-                    ],
-                    axis=2,
-                )
-                for w in group
-            ]
-        )
+        parts_of = []
+        for w in group:
+            places_of = np.broadcast_to(w.places, (len(w.truth), *w.places.shape))
+            parts_of.append(np.concatenate([places_of.astype(np.float32), w.features], axis=2))
+        inputs = np.concatenate(parts_of)
         truth = np.concatenate([w.truth for w in group])
         order = np.random.default_rng(places).permutation(len(truth))
         batches += [
@@ -162,10 +156,6 @@ def _scales(batches: list[WindowBatch]) -> tuple[Any, Any]:
     rows = np.concatenate([b.inputs.reshape(-1, b.inputs.shape[2]) for b in batches[::4]])
     scale = rows.std(axis=0, dtype=np.float64).astype(np.float32)
     return rows.mean(axis=0, dtype=np.float64).astype(np.float32), np.maximum(scale, 1e-2)
-
-
-def _scaled(batch: WindowBatch, mean: Any, scale: Any) -> WindowBatch:
-    return batch._replace(inputs=(batch.inputs - mean) / scale)
 
 
 def _initial(random: np.random.Generator, hidden: int) -> Parameters:

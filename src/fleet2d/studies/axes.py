@@ -71,12 +71,10 @@ def label_values(values: Sequence[Any]) -> list[Label]:
 
 
 def _own_label(value: Any) -> Label:
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, bool | int | float):
-        return value
-    kind = value.get("type") if isinstance(value, Mapping) else None
-    return str(kind) if isinstance(kind, str) else None
+    name = value.get("type") if isinstance(value, Mapping) else value
+    if isinstance(name, str):
+        return str(name)
+    return value if isinstance(value, bool | int | float) else None
 
 
 class Axis(Settings):

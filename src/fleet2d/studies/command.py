@@ -160,9 +160,8 @@ def rerun(
     from fleet2d.studies.reader import open_study
 
     study = open_study(location)
-    number = _number_of(study, variant)
-    rows = study.arrow_variants.select(["variant", "digest", *study.columns]).to_pylist()
-    row = next(row for row in rows if row["variant"] == number)
+    row = _row_of(study, variant)
+    number = row["variant"]
     labels = ", ".join(f"{c} = {row[c]}" for c in study.columns if row[c] is not None)
     _print(f"variant {number}: {labels}")
     with restrict_to(trust, trust_dir):
@@ -329,20 +328,24 @@ def _print_failures(location: str) -> None:
         _print(f"… {len(failed) - MAX_LINES} more", err=True)
 
 
-def _number_of(study: "Study", variant: str) -> int:
-    table = study.arrow_variants.select(["variant", "identity"]).to_pylist()
-    if variant.isdigit() and any(row["variant"] == int(variant) for row in table):
-        return int(variant)
-    matches = []
-    if len(variant) >= IDENTITY_START:
-        matches = [row["variant"] for row in table if (row["identity"] or "").startswith(variant)]
-    if len(matches) != 1:
+def _row_of(study: "Study", variant: str) -> dict[str, Any]:
+    """Return the row of a variant, by its number or the start of its identity.
+
+    Raises:
+        InputError: There is no such variant, or several.
+    """
+    columns = ["variant", "identity", "digest", *study.columns]
+    rows: list[dict[str, Any]] = study.arrow_variants.select(columns).to_pylist()
+    found = [row for row in rows if str(row["variant"]) == variant]
+    if not found and len(variant) >= IDENTITY_START:
+        found = [row for row in rows if (row["identity"] or "").startswith(variant)]
+    if len(found) != 1:
         raise InputError(
-            f"{study.location} has {len(matches) or 'no'} variant{'s' * (len(matches) > 1)}"
-            f" {variant!r}: give a number from 0 to {len(table) - 1}, or the first"
+            f"{study.location} has {len(found) or 'no'} variant{'s' * (len(found) > 1)}"
+            f" {variant!r}: give a number from 0 to {len(rows) - 1}, or the first"
             f" {IDENTITY_START} characters or more of an identity"
         )
-    return int(matches[0])
+    return found[0]
 
 
 @contextmanager

@@ -105,10 +105,8 @@ def draw_unit_differences(
 ) -> Figure:
     """Draw the difference in each unit, the smallest first; a panel for each value of the axes."""
     tables = rows.partition_by(axes, maintain_order=True)[:MAX_LINES]
-    figure = Figure(figsize=(8.0, 2.6), dpi=DPI, layout="constrained")
-    panels = np.atleast_1d(figure.subplots(1, len(tables), sharey=True))
+    figure, panels = _panels(2.6, len(tables))
     for panel, table in zip(panels, tables, strict=True):
-        _tidy(panel)
         table = table.sort("difference", unit)
         panel.axhline(0, color=DARK, lw=0.8)
         values = table["difference"].to_numpy()
@@ -149,10 +147,8 @@ def draw_interaction(table: "pl.DataFrame", first: str, second: str, label: str)
 
 def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
     """Draw the mean of a metric by the values of each axis, one panel for each axis."""
-    figure = Figure(figsize=(8.0, 2.8), dpi=DPI, layout="constrained")
-    panels = np.atleast_1d(figure.subplots(1, max(len(tables), 1), sharey=True))
-    for panel, (axis, table) in zip(panels, tables.items(), strict=False):
-        _tidy(panel)
+    figure, panels = _panels(2.8, len(tables))
+    for panel, (axis, table) in zip(panels, tables.items(), strict=True):
         rows = table.to_dicts()
         x = np.arange(len(rows))
         means = np.array([row["mean"] for row in rows])
@@ -223,16 +219,19 @@ def draw_course(
     return figure
 
 
-def _figure(height: float) -> tuple[Figure, Axes]:
+def _panels(height: float, count: int) -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels next to each other."""
     figure = Figure(figsize=(8.0, height), dpi=DPI, layout="constrained")
-    axes = figure.subplots()
-    _tidy(axes)
+    panels = np.atleast_1d(figure.subplots(1, count, sharey=True)).tolist()
+    for axes in panels:
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=8)
+    return figure, panels
+
+
+def _figure(height: float) -> tuple[Figure, Axes]:
+    figure, (axes,) = _panels(height, 1)
     return figure, axes
-
-
-def _tidy(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(labelsize=8)
 
 
 def _label_y(axes: Axes, label: str) -> None:

@@ -419,12 +419,16 @@ def in_words(time_span: timedelta) -> str:
     ('3.3 min', '30.0 h')
     """
     seconds = time_span.total_seconds()
-    for name, unit in (("years", 31_557_600), ("months", 2_629_800), ("days", DAY_S)):
-        if seconds >= 2 * unit:
+    units = (
+        ("years", 31_557_600),
+        ("months", 2_629_800),
+        ("days", DAY_S),
+        ("h", HOUR_S),
+        ("min", 60),
+    )
+    for name, unit in units:
+        if seconds >= unit * (2 if unit >= DAY_S else 1):
             return f"{seconds / unit:,.1f} {name}"
-    for name, unit in (("h", HOUR_S), ("min", 60)):
-        if seconds >= unit:
-            return f"{seconds / unit:.1f} {name}"
     return f"{seconds:.1f} s"
 
 

@@ -31,9 +31,7 @@ MAX_INTERACTIONS = 3  # pairs of axes with a table of cell means, for each metri
 MAX_CELLS = 60  # of such a table
 LONG_NAME, SHORT_NAME = 16, 6  # from how many characters on names are shortened, and to how many
 INTERVAL = f"{LEVEL:.0%} interval"
-HEADINGS = {
-    "p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL,
-}  # fmt: skip
+HEADINGS = {"p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL}
 NOT_SHOWN = ("high", "variance_ratio", "verdict")  # columns that stand elsewhere on the page
 GLOSSARY = {
     "mean": "mean over the units, such as homes and seeds, each of equal weight",

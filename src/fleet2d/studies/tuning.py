@@ -1,11 +1,11 @@
 """Tuning: a search for settings on training homes with Optuna, judged on other homes."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import TypeAdapter
 
@@ -57,12 +57,8 @@ SETTING, BEFORE, TUNED = "setting", "base", "tuned"
 MAX_JUDGED_SETTINGS = 5  # settings to judge after a search for several objectives
 
 
-class TuneObserver(Protocol):
-    """Follows the progress of a search."""
-
-    def __call__(self, done: int, trials: int, best: list[float] | None) -> None:
-        """Receive the number of trials that are over, and the best objectives so far."""
-        ...
+TuneObserver = Callable[[int, int, list[float] | None], None]
+"""Receives the number of trials that are over, that of all, and the best objectives so far."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +151,8 @@ def tune(
         raise InputError(f"{folder} is not a local folder, which a search needs")
     with extra("tune", "this needs Optuna"):
         import optuna
+        from optuna.storages import JournalStorage
+        from optuna.storages.journal import JournalFileBackend
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     database, storage_name = _open_database(storage) if storage else (None, TRIALS)
     identity = search_identity(plan, settings, storage_name)
@@ -163,7 +161,9 @@ def tune(
         _check_identity(directory.storage, identity, changed)
         name = f"{specification.name} {content_hash(identity)}"
         with directory.storage.reading(TRIALS):
-            study = _open_trials(database or _open_journal(directory.storage), name, settings)
+            path = directory.storage.path(TRIALS)
+            trials = database or JournalStorage(JournalFileBackend(path))
+            study = _open_trials(trials, name, settings)
         _search(study, job, training, settings, executor, observer)
     best = _best(study, settings)
     held_out = _check_held_out(specification, plan.design, best, settings)
@@ -276,14 +276,6 @@ def _search(
             if over and observer is not None:
                 best = study.best_trials
                 observer(finished, settings.trials, list(best[0].values) if best else None)
-
-
-def _open_journal(folder: Storage) -> "optuna.storages.BaseStorage":
-    """Return the storage of the trials in the folder of the search."""
-    from optuna.storages import JournalStorage
-    from optuna.storages.journal import JournalFileBackend
-
-    return JournalStorage(JournalFileBackend(folder.path(TRIALS)))
 
 
 def _open_database(url: str) -> tuple["optuna.storages.BaseStorage", str]:

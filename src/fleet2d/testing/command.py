@@ -1,5 +1,6 @@
 """The command `fleet2d falsify`."""
 
+import json
 import os
 import re
 import sys
@@ -171,17 +172,9 @@ def _scenario_text(
         data = {"extends": os.path.relpath(source, out.parent), **content.data}
     else:
         data = job.scenario(failure.point, failure.seed).resolved()
-    body = yaml.safe_dump(_plain(data), sort_keys=False, allow_unicode=True)
+    plain = json.loads(json.dumps(data, default=str))  # YAML refuses subclasses of its types
+    body = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
     return f"# This scenario fails, according to fleet2d falsify {target}: {reason}\n{body}"
-
-
-def _plain(value: Any) -> Any:
-    """Return data with plain types that YAML can represent."""
-    if isinstance(value, dict):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return str(value) if isinstance(value, str) else value
 
 
 def _print_no_failure(search: "FailureSearch", job: "TryJob") -> None:

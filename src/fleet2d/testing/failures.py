@@ -243,14 +243,6 @@ def _edited(variant: Variant, **sections: Any) -> Variant | None:
         return None
 
 
-def failure_folder(parent: Path, test: str) -> Path:
-    """Return a folder for the artifacts of a failing test, without those of earlier failures."""
-    folder = parent / re.sub(r"[^\w.-]+", "-", test).strip("-")
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
 def explain(result: ClaimResult, body: Body, folder: Path, test: str, tries: int) -> str:
     """Store a failing run, and the smallest similar one, and return a report.
 
@@ -261,7 +253,10 @@ def explain(result: ClaimResult, body: Body, folder: Path, test: str, tries: int
         test: The test, as pytest names it.
         tries: Largest number of runs to make it smaller.
     """
-    folder, trial = failure_folder(folder, test), result.shown
+    folder /= re.sub(r"[^\w.-]+", "-", test).strip("-")
+    shutil.rmtree(folder, ignore_errors=True)  # of earlier failures
+    folder.mkdir(parents=True, exist_ok=True)
+    trial = result.shown
     command = f"pytest {shlex.quote(test)} --fleet2d-seed {trial.variant.seed}"
     lines = [result.text, *_by_expectation(result), ""]
     lines += describe_trial(trial, body, folder, tries, command)

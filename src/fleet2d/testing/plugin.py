@@ -67,7 +67,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     """Call a test with a claim once for each run, until the claim is decided."""
     claim = getattr(pyfuncitem.obj, CLAIM, None)
     if claim is None:
-        if TRIAL in pyfuncitem.fixturenames and _is_own_fixture(pyfuncitem):
+        fixtures = pyfuncitem._fixtureinfo.name2fixturedefs.get(TRIAL) or ()
+        if any(fixture.func.__module__ == __name__ for fixture in fixtures[-1:]):
             pytest.fail("a test with `trial` needs @fleet2d.testing.trial(…)", pytrace=False)
         return None
     from fleet2d.errors import Fleet2DError
@@ -131,12 +132,6 @@ def _body(item: pytest.Function) -> "Body":
         return function(trial=trial, **arguments)
 
     return body
-
-
-def _is_own_fixture(item: pytest.Function) -> bool:
-    """Return whether the fixture `trial` of a test is that of this plugin."""
-    definitions = item._fixtureinfo.name2fixturedefs.get(TRIAL) or ()
-    return any(definition.func.__module__ == __name__ for definition in definitions[-1:])
 
 
 def _folder(item: pytest.Function) -> Path:
