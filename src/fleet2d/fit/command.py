@@ -27,8 +27,7 @@ UNITS = {"distance": " m", "bearing": " deg"}
 
 
 @fitting.command(
-    "routine",
-    help="Learn a persona from a log, and report how well its days match days held back.",
+    "routine", help="Learn a persona from a log, and report how well its days match days held back."
 )
 def fit_routine(
     path: Annotated[

@@ -9,14 +9,7 @@ import numpy as np
 
 from fleet2d.fit.persona import FittedPersona, Model, fit_persona
 from fleet2d.fit.privacy import Repeats, repeats
-from fleet2d.fit.timeline import (
-    Distances,
-    LivedDay,
-    Timeline,
-    by_minute,
-    distances,
-    find_days,
-)
+from fleet2d.fit.timeline import Distances, LivedDay, Timeline, by_minute, distances, find_days
 from fleet2d.kernels import I16
 from fleet2d.logs.log import LogError
 from fleet2d.routines.activity import Activity, seconds

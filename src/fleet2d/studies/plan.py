@@ -29,13 +29,7 @@ from fleet2d.studies.design import (
     scenario_hashes,
 )
 from fleet2d.studies.directory import PLAN, MetricFacts, StudyDirectory
-from fleet2d.studies.executors import (
-    Executor,
-    LostTask,
-    SerialExecutor,
-    TaskSchedule,
-    WorkerTask,
-)
+from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
 from fleet2d.studies.records import VARIANT, array_of, numbers_of
 from fleet2d.studies.simulator import check_setup, is_kept
 from fleet2d.studies.specification import SEED, Specification
@@ -398,9 +392,7 @@ class SetupJob:
 
 
 def check_setups(
-    plan: StudyPlan,
-    executor: Executor,
-    on_progress: Callable[[int, int], None] = lambda *_: None,
+    plan: StudyPlan, executor: Executor, on_progress: Callable[[int, int], None] = lambda *_: None
 ) -> None:
     """Set up the variants that `setups_to_check` returns: homes with people and robots in them.
 

@@ -185,10 +185,7 @@ class RunSpeed:
 
 
 def measure(
-    build: Callable[[], Scenario],
-    metrics: Iterable[str],
-    tables: Iterable[str],
-    max_s: float = 2.0,
+    build: Callable[[], Scenario], metrics: Iterable[str], tables: Iterable[str], max_s: float = 2.0
 ) -> tuple[RunSpeed, VariantOutcome]:
     """Run a scenario for some time to measure its speed; return the results so far, too.
 

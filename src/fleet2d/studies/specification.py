@@ -269,10 +269,7 @@ def _long_form(name: str, axis: Any) -> Any:
 
 
 def _check_columns(
-    columns: Mapping[str, Any] | tuple[str, ...],
-    known: list[str],
-    location: Location,
-    noun: str,
+    columns: Mapping[str, Any] | tuple[str, ...], known: list[str], location: Location, noun: str
 ) -> None:
     for column in columns:
         if column not in known:

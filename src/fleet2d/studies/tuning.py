@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import TypeAdapter
 
 from fleet2d.bounds import one_line
-from fleet2d.errors import (
-    InputError,
-    RunDirectoryError,
-    ScenarioError,
-    extra,
-)
+from fleet2d.errors import InputError, RunDirectoryError, ScenarioError, extra
 from fleet2d.studies.axes import OptionsAxis, rounded
 from fleet2d.studies.design import (
     Design,
