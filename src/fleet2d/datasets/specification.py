@@ -20,7 +20,7 @@ from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, micros, parse_duration
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.routines.persona import origins_of
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.scenario.compose import apply_changes, assignment
@@ -186,26 +186,20 @@ class DatasetPlan:
         varied = {name: axis.choices(name) for name, axis in self.file.vary.items()}
         usual = [choices[0] for choices in varied.values()]
         for split, settings in self.file.splits.items():
-            homes = self.homes[split]
+            homes, households = self.homes[split], settings.households
             firsts = [axis.choices("home")[0] for axis in settings.homes]
-            cases = [
-                *((f"homes: {home.words}", home, settings.households[0], usual) for home in firsts),
-                *(
-                    (f"households: {' + '.join(personas_of(people))}", homes[0], people, usual)
-                    for people in settings.households
-                ),
+            cases = [(f"homes: {home.words}", home, households[0], usual) for home in firsts]
+            cases += [
+                (f"households: {' + '.join(personas_of(people))}", homes[0], people, usual)
+                for people in households
             ]
             for k, (name, choices) in enumerate(varied.items()):
                 for choice in choices:
                     values = [*usual[:k], choice, *usual[k + 1 :]]
-                    cases.append(
-                        (f"vary.{name}: {choice.words}", homes[0], settings.households[0], values)
-                    )
+                    cases.append((f"vary.{name}: {choice.words}", homes[0], households[0], values))
             for words, home, household, values in cases:
-                try:
+                with errors_as(ScenarioError, f"{split}, {words}"):
                     load_scenario(self._scenario(home, household, values))
-                except InputError as error:
-                    raise ScenarioError(f"{split}, {words}: {error}") from None
 
     def _first_number(self, split: str) -> int:
         """Return the number of the first run of a split."""
@@ -257,10 +251,8 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
     except ValidationError as error:
         raise explain(error, document) from None
     check_code("the data set", [document.data])
-    try:
+    with errors_as(ScenarioError, "base", of=ScenarioError):
         base = load_scenario(file.base).resolved()
-    except ScenarioError as error:
-        raise ScenarioError(f"base: {error}") from None
     base["users"] = {}
     homes = {
         name: [choice for axis in split.homes for choice in axis.choices("home")]

@@ -228,20 +228,6 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
         ) from None
 
 
-def draw(
-    parameters: Mapping[str, Parameter], method: Method, count: int, seed: int
-) -> list[dict[str, Any]]:
-    """Return `count` samples, each a mapping of parameter name to value."""
-    points = shares(method, count, len(parameters), seed)
-    return [
-        {
-            name: parameter.at(float(share))
-            for (name, parameter), share in zip(parameters.items(), row, strict=True)
-        }
-        for row in points
-    ]
-
-
 def _texts(value: Any) -> tuple[Any, ...]:
     """Return a text or a list of texts as a tuple; each keeps the folder of its file."""
     texts = (value,) if isinstance(value, str | Path) else value
@@ -501,20 +487,19 @@ class SampleAxis(Axis):
         Raises:
             InputError: scipy is missing, or the method has no such number of samples.
         """
-        choices = []
         labels = {
             column: dict(zip(map(repr, p.choices), label_values(p.choices), strict=True))
             for column, p in self.sample.items()
         }
-        for values in draw(self.sample, self.method, self.count, self.seed):
-            names: dict[str, Label] = {
-                column: labels[column].get(repr(value), value) for column, value in values.items()
-            }
-            changes = tuple(
-                (key_path(self.sample[column].key), self.sample[column].with_unit(value))
-                for column, value in values.items()
-            )
-            choices.append(Choice(names, changes))
+        choices = []
+        for row in shares(self.method, self.count, len(self.sample), self.seed).tolist():
+            names: dict[str, Label] = {}
+            changes = []
+            for (column, parameter), share in zip(self.sample.items(), row, strict=True):
+                value = parameter.at(share)
+                names[column] = labels[column].get(repr(value), value)
+                changes.append((key_path(parameter.key), parameter.with_unit(value)))
+            choices.append(Choice(names, tuple(changes)))
         return choices
 
 

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fleet2d.errors import InputError, extra
+from fleet2d.errors import InputError, errors_as, extra
 from fleet2d.studies.executors import (
     MAX_ATTEMPTS,
     Broken,
@@ -214,13 +214,12 @@ class SlurmExecutor:
         self._cluster = cluster
         self._missing: dict[str, float] = {}
         self._attempts: dict[int, int] = {}
-        try:
+        wrong = (RuntimeError, NameError, TypeError, ValueError)
+        with errors_as(InputError, "jobs of Slurm can't be submitted", of=wrong):
             self._executor = submitit.AutoExecutor(folder=str(folder), cluster=cluster)
             self._executor.update_parameters(
                 **{"name": "fleet2d", "slurm_array_parallelism": self.workers, **(parameters or {})}
             )
-        except (RuntimeError, NameError, TypeError, ValueError) as error:
-            raise InputError(f"jobs of Slurm can't be submitted: {error}") from error
 
     def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
         """Yield an event for each task as its job ends; closing the iterator cancels all jobs."""

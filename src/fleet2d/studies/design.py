@@ -16,7 +16,7 @@ import numpy as np
 from fleet2d import __version__
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import suggest
-from fleet2d.errors import InputError, ScenarioError, os_errors_as
+from fleet2d.errors import InputError, ScenarioError, errors_as, os_errors_as
 from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.model import Scenario, scenario_of
@@ -226,10 +226,8 @@ class Design:
         ]
         changes += [rule.change for rule in self.rules if matches(rule.when, labels)]
         changes.append(assignment(("simulation", "seed"), seed, f"seed {seed}"))
-        try:
+        with errors_as(None, self.describe(index)):
             return scenario_of(apply_changes(self.base, changes), self.folder)
-        except InputError as error:
-            raise type(error)(f"{self.describe(index)}: {error}") from None
 
     def describe(self, index: int) -> str:
         """Return a variant as messages call it: 'variant 3 (speed = 0.3, seed = 1)'."""
@@ -339,7 +337,7 @@ def _check_size(name: str, design: Design) -> None:
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:
     axis = specification.file.axes[name]
     place = specification.places.place(("axes", name))
-    try:
+    with errors_as(ScenarioError, f"{place}{': ' * bool(place)}axes.{name}"):
         choices = tuple(axis.choices(name))
         changes = tuple(
             _change(
@@ -348,8 +346,6 @@ def _axis_plan(specification: Specification, name: str) -> AxisPlan:
             )
             for choice in choices
         )
-    except InputError as error:
-        raise ScenarioError(f"{place}{': ' * bool(place)}axes.{name}: {error}") from None
     return AxisPlan(name, axis.columns(name), axis.when, choices, changes)
 
 

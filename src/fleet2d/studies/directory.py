@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as
 from fleet2d.kernels import I32, U8, Bool
 from fleet2d.storage.files import PARTIAL, FolderLock, path_in
 from fleet2d.studies.parts import (
@@ -194,11 +194,9 @@ class StudyDirectory:
         Raises:
             ArtifactError: It can't be written, or holds a Python value that JSON can't hold.
         """
-        try:
-            content = {"format": FORMAT, **asdict(meta)}
-            self.storage.write(META, json.dumps(content, indent=1).encode())
-        except (TypeError, ValueError) as error:
-            raise ArtifactError(f"the study can't be described: {error}") from error
+        with errors_as(ArtifactError, "the study can't be described", of=(TypeError, ValueError)):
+            content = json.dumps({"format": FORMAT, **asdict(meta)}, indent=1)
+        self.storage.write(META, content.encode())
 
     def parts(self) -> list[Part]:
         """Return the parts of the data set that are committed."""

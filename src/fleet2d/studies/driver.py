@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -50,6 +50,7 @@ from fleet2d.studies.plan import (
 from fleet2d.studies.reader import Study
 from fleet2d.studies.records import (
     RESULT_COLUMNS,
+    Journal,
     VariantRecord,
     array_of,
     record_of,
@@ -233,6 +234,12 @@ class CheckedStudy:
     scenarios: ScenarioFile
     metrics: Mapping[str, MetricFacts]
 
+    def note_missing(self, headers: Iterable[Mapping[str, Any]], observer: Observer) -> None:
+        """Note which metrics that the study names are missing in complete variants, by headers."""
+        summary = VariantSummary(self)
+        summary.add(results_table(headers))
+        summary.note_missing(observer)
+
     @property
     def job(self) -> StudyJob:
         """The job for the workers."""
@@ -324,9 +331,7 @@ def run_study(
                     observer.on_result(record)
                     failed += not record.is_complete
                     if record.is_complete and not is_checked:
-                        summary = VariantSummary(checked)
-                        summary.add(results_table([record.header]))
-                        summary.note_missing(observer)
+                        checked.note_missing([record.header], observer)
                         is_checked = True
                     if failed and fail_fast:
                         break
@@ -402,37 +407,35 @@ class _ResultKeeper:
 
     def __init__(self, directory: StudyDirectory, parts: list[Part]) -> None:
         self._directory, self._parts = directory, parts
-        self._journal = directory.open_journal(parts)
+        self._journal: Journal | None = directory.open_journal(parts)
         self._commit_time = time.monotonic()
-        self._is_open = True
 
     def add(self, record: VariantRecord) -> None:
         """Store the results of a variant."""
+        if self._journal is None:
+            self._journal = self._directory.open_journal(self._parts)
         self._journal.append(record)
         age_s = time.monotonic() - self._commit_time
         is_due = not self._directory.storage.is_local and age_s > PART_S_REMOTE
         if is_due or self._journal.size > PART_BYTES:
-            self._commit()
-            self._journal = self._directory.open_journal(self._parts)
-            self._is_open = True
+            self._commit(self._journal)
 
     def finish(self) -> None:
         """Move all results into parts."""
-        if len(self._journal):
-            self._commit()
-            return
-        self.pause()
-        self._journal.path.unlink()
+        if self._journal is not None and len(self._journal):
+            self._commit(self._journal)
+        elif self._journal is not None:
+            self._journal.close()
+            self._journal.path.unlink()
 
     def pause(self) -> None:
         """Close the journal; its results stay there until the study is continued."""
-        if self._is_open:
+        if self._journal is not None:
             self._journal.close()
-            self._is_open = False
 
-    def _commit(self) -> None:
-        self._parts.append(self._directory.commit(self._journal, self._parts))
-        self._is_open, self._commit_time = False, time.monotonic()
+    def _commit(self, journal: Journal) -> None:
+        self._parts.append(self._directory.commit(journal, self._parts))
+        self._journal, self._commit_time = None, time.monotonic()
 
 
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:

@@ -18,10 +18,10 @@ from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.kernels import F64
 from fleet2d.runtime.clock import DAY_S, HOUR_S
 from fleet2d.studies.directory import StudyDirectory
-from fleet2d.studies.driver import CheckedStudy, Observer, StudyJob, VariantSummary
+from fleet2d.studies.driver import CheckedStudy, Observer, StudyJob
 from fleet2d.studies.executors import Executor, FinishedTask, TaskSchedule, WorkerTask, cores
 from fleet2d.studies.plan import PlannedVariants
-from fleet2d.studies.records import VariantRecord, record_of, results_table
+from fleet2d.studies.records import VariantRecord, record_of
 from fleet2d.studies.simulator import RunSpeed, VariantOutcome, measure
 
 if TYPE_CHECKING:
@@ -159,9 +159,7 @@ def forecast(
     if not samples:
         raise ComponentError("all measured variants fail: run one of them with `fleet2d run`")
     if observer is not None:
-        summary = VariantSummary(checked)
-        summary.add(results_table(sample.record.header for sample in samples))
-        summary.note_missing(observer)
+        checked.note_missing((sample.record.header for sample in samples), observer)
     workers = min(executor.workers, len(variants))
     homes_s = max(len(variants.home_keys), workers) * max(sample.home_s for sample in samples)
     wall_s = checked_s + start_s + (homes_s + total_s) / workers

@@ -3,7 +3,7 @@
 import json
 import math
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,10 +94,8 @@ def _stream(table: "pa.Table") -> bytes:
 
 
 _HEADER_FIELDS = ("identity", "status", "digest", "error", "trace")
-_SECONDS = ("setup", "simulate", "total")
-RESULT_COLUMNS = (
-    VARIANT, *_HEADER_FIELDS, "attempts", "setup_s", "simulate_s", "wall_s", "peak_rss_mb",
-)  # fmt: skip
+_SECONDS = {"setup_s": "setup", "simulate_s": "simulate", "wall_s": "total"}
+RESULT_COLUMNS = (VARIANT, *_HEADER_FIELDS, "attempts", *_SECONDS, "peak_rss_mb")
 """The columns of the results beside the metrics."""
 
 
@@ -142,31 +140,27 @@ def numbers_of(table: "pa.Table") -> I32:
     return values_of(table.column(VARIANT)).astype(np.int32, copy=False)
 
 
-def results_table(
-    headers: Iterable[Mapping[str, Any]], metrics: Sequence[str] | None = None
-) -> "pa.Table":
+def results_table(headers: Iterable[Mapping[str, Any]]) -> "pa.Table":
     """Return one row for each variant: status, times, memory, and a column for each metric.
 
     Args:
         headers: The headers of their records.
-        metrics: The names of the metrics; None: all that a header has.
     """
     import pyarrow as pa
 
     rows = list(headers)
-    values = [row.get("metrics", {}) for row in rows]
-    columns: dict[str, pa.Array] = {VARIANT: array_of([row["number"] for row in rows], pa.int32())}
-    for name in _HEADER_FIELDS:
-        columns[name] = array_of([row.get(name) for row in rows], pa.string())
-    columns["attempts"] = array_of([row["attempts"] for row in rows], pa.int32())
-    for phase in _SECONDS:
-        seconds = [row.get("wall_s", {}).get(phase) for row in rows]
-        columns["wall_s" if phase == "total" else f"{phase}_s"] = array_of(seconds, pa.float64())
-    columns["peak_rss_mb"] = array_of([row.get("peak_rss_mb") for row in rows], pa.float64())
-    if metrics is None:
-        metrics = list(dict.fromkeys(name for row in values for name in row))
-    for name in metrics:
-        columns[name] = array_of([row.get(name) for row in values], pa.float64())
+
+    def column(kind: "pa.DataType", key: str, group: str = "") -> "pa.Array":
+        """Return the values of a key of all headers, or of one of their mappings."""
+        return array_of([(row.get(group, {}) if group else row).get(key) for row in rows], kind)
+
+    columns = {VARIANT: column(pa.int32(), "number")}
+    columns |= {name: column(pa.string(), name) for name in _HEADER_FIELDS}
+    columns["attempts"] = column(pa.int32(), "attempts")
+    columns |= {name: column(pa.float64(), phase, "wall_s") for name, phase in _SECONDS.items()}
+    columns["peak_rss_mb"] = column(pa.float64(), "peak_rss_mb")
+    metrics = dict.fromkeys(name for row in rows for name in row.get("metrics", {}))
+    columns |= {name: column(pa.float64(), name, "metrics") for name in metrics}
     return pa.table(columns)
 
 

@@ -14,7 +14,7 @@ from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import Location, problem, problem_at, suggest
 from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, folder_of
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.model import Scenario, explain
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
@@ -336,7 +336,8 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
 
 def _base(base: Any, document: Document) -> Document:
     """Compose the base scenario; messages name the lines of the study file."""
-    try:
+    place = document.place(("base",))
+    with errors_as(ScenarioError, f"{place}{': ' * bool(place)}base", of=ScenarioError):
         if isinstance(base, Scenario):
             return compose(base.resolved())
         if isinstance(base, Mapping):
@@ -346,9 +347,6 @@ def _base(base: Any, document: Document) -> Document:
         if not isinstance(base, str | Path):
             raise ScenarioError(f"expected the file of a scenario or a mapping, got {base!r}")
         return compose(os.path.relpath(folder_of(base) / Path(base).expanduser()))
-    except ScenarioError as error:
-        place = document.place(("base",))
-        raise ScenarioError(f"{place}{': ' * bool(place)}base: {error}") from None
 
 
 def _inline_base(base: Mapping[str, Any], document: Document) -> Document:

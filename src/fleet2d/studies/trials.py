@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.trust import Trust, current_trust, import_class, restrict
-from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError
+from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, errors_as
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
@@ -270,14 +270,13 @@ def make_sampler(settings: TuneSettings, finished: int) -> "optuna.samplers.Base
     if ":" not in name and name not in known:
         raise ScenarioError(f"tune.sampler: Optuna has no {name!r}{suggest(name, known)}")
     kind: Any = import_class(name) if ":" in name else getattr(samplers, name)
-    try:
+    wrong = (ImportError, TypeError, ValueError)
+    with errors_as(ScenarioError, f"tune.sampler: {name} can't be used", of=wrong):
         if "seed" in inspect.signature(kind).parameters:
             options.setdefault("seed", settings.seed + finished)
         sampler = kind(**options)
         if not isinstance(sampler, samplers.BaseSampler):
             raise TypeError("it is not a sampler of Optuna")
-    except (ImportError, TypeError, ValueError) as error:
-        raise ScenarioError(f"tune.sampler: {name} can't be used: {error}") from error
     return sampler
 
 
@@ -301,7 +300,5 @@ def check_settings(job: TrialJob, index: int) -> None:
     """
     for name, parameter in job.search.items():
         for value in parameter.choices or (parameter.at(0.0), parameter.at(1.0)):
-            try:
+            with errors_as(None, f"tune.search.{name}", of=Fleet2DError):
                 job.scenario(index, {name: value})
-            except Fleet2DError as error:
-                raise type(error)(f"tune.search.{name}: {error}") from None

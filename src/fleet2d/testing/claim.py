@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, errors_as
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario, load_scenario
@@ -304,10 +304,8 @@ class Claim:
         """
         if self.problem:
             raise SetUpError(self.problem)
-        try:
+        with errors_as(SetUpError):
             _ = self.variants, self.rate
-        except InputError as error:
-            raise SetUpError(str(error)) from error
         if self.only is None:
             self._check_power()
 

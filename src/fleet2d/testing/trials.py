@@ -13,7 +13,7 @@ from typing import Any
 from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.configuration.problems import counted
 from fleet2d.engine.simulation import Simulation
-from fleet2d.errors import InputError
+from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.temporal import after, at_end, eventually, until
 from fleet2d.expectations.verdict import Verdict, VerdictEvidence
@@ -341,10 +341,8 @@ def run_trial(
     scenario = variant.scenario
     if out is None:
         scenario = scenario.model_copy(update={"artifacts": NOTHING})
-    try:
+    with errors_as(SetUpError, variant.text):
         trial = Trial(scenario, out=out, without=without)
-    except InputError as problem:
-        raise SetUpError(f"{variant.text}: {problem}") from problem
     error: AssertionError | None = None
     __tracebackhide__ = True  # pytest shows the lines of the test
     try:
