@@ -9,8 +9,7 @@ from typing import Any, Literal, Self, SupportsFloat, cast
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete
-from gymnasium.vector import AutoresetMode
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import SyncVectorEnv
 from pettingzoo import ParallelEnv
 
 from fleet2d.configuration.documents import Document
@@ -22,7 +21,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.robots.policy import COLUMNS, Policy
 from fleet2d.errors import InputError
 from fleet2d.gym.task import LearningTask, Split, Variants, checked, load_task
-from fleet2d.kernels import F32, F64, I64, Bool
+from fleet2d.kernels import F32, Bool
 from fleet2d.runs.run import Run
 
 OPTIONS = ("values", "seed")
@@ -328,8 +327,8 @@ class DiscountByTime(gymnasium.Wrapper[Any, Any, Any, Any]):  # type: ignore[mis
         return observation, float(reward) * discount, terminated, truncated, info
 
 
-class VectorRobotEnv(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore[misc]
-    """Some environments that are stepped together.
+class VectorRobotEnv(SyncVectorEnv):  # type: ignore[misc]
+    """Some environments that are stepped together; they share their homes.
 
     Where a life is over, the next step begins a new one, and ignores the action. `info` has the
     arrays `action_mask`, bool (n, actions), and `elapsed_s`, float64 (n,).
@@ -339,70 +338,22 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[F32, I64, Any]):  # type: ignore
         settings: Those of `RobotEnv`.
     """
 
-    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it
-
     def __init__(self, num_envs: int = 1, *overrides: str, **settings: Any) -> None:
-        task = settings.pop("task", "hangout")
-        self.envs = [RobotEnv(task, *overrides, **settings) for _ in range(num_envs)]
-        for env in self.envs[1:]:
-            env.variants = self.envs[0].variants  # homes are shared
-        self.num_envs = num_envs
-        self.single_observation_space = self.envs[0].observation_space
-        self.single_action_space = self.envs[0].action_space
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        actions = int(self.single_action_space.n)
-        self._observations = np.zeros(self.observation_space.shape or (), np.float32)
-        self._masks = np.zeros((num_envs, actions), np.bool_)
-        self._elapsed_s = np.zeros(num_envs)
-        self._over = np.zeros(num_envs, np.bool_)
+        first = RobotEnv(settings.pop("task", "hangout"), *overrides, **settings)
 
-    def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[F32, dict[str, Any]]:
-        """Begin new lives; environment i has the seed `seed` + i."""
-        if isinstance(seed, int):
-            seed = [seed + number for number in range(self.num_envs)]
-        for number, env in enumerate(self.envs):
-            own_seed = None if seed is None else seed[number]
-            self._keep(number, *env.reset(seed=own_seed, options=options))
-        self._over[:] = False
-        return self._observations.copy(), self._info()
+        def make() -> RobotEnv:
+            env = RobotEnv(first.variants.task, *overrides, **settings)
+            env.variants = first.variants
+            return env
 
-    def step(self, actions: Any) -> tuple[F32, F64, Bool, Bool, dict[str, Any]]:
-        """Let all robots act."""
-        rewards = np.zeros(self.num_envs)
-        terminated, truncated = (np.zeros(self.num_envs, np.bool_) for _ in range(2))
-        for number, env in enumerate(self.envs):
-            if self._over[number]:
-                self._keep(number, *env.reset())
-                continue
-            observation, *outcome, info = env.step(actions[number])
-            rewards[number], terminated[number], truncated[number] = outcome
-            self._keep(number, observation, info)
-        self._over = terminated | truncated
-        return self._observations.copy(), rewards, terminated, truncated, self._info()
+        super().__init__([make] * num_envs)
 
     def action_masks(self) -> Bool:
         """Return which actions are possible, bool (n, actions)."""
-        return self._masks.copy()
-
-    def _keep(self, number: int, observation: F32, info: dict[str, Any]) -> None:
-        self._observations[number], self._masks[number] = observation, info["action_mask"]
-        self._elapsed_s[number] = info["elapsed_s"]
-
-    def _info(self) -> dict[str, Any]:
-        every = np.ones(self.num_envs, np.bool_)
-        return {
-            "action_mask": self._masks.copy(),
-            "_action_mask": every,
-            "elapsed_s": self._elapsed_s.copy(),
-            "_elapsed_s": every,
-        }
+        return np.stack([env.action_masks() for env in self.envs])
 
 
 Agents = dict[str, Any]
-Source = str | Path | LearningTask
 
 
 class RobotsEnv(ParallelEnv):  # type: ignore[misc]
