@@ -156,15 +156,13 @@ def shown(value: object) -> str:
     >>> shown("fast"), shown(3)
     ("'fast'", '3')
     """
-    return one_line(repr(str(value)) if isinstance(value, str) else _brief(value))
-
-
-def _brief(value: object) -> str:
-    """Return a value as text; of a huge number or a long list only its size."""
+    if isinstance(value, str):
+        return one_line(repr(str(value)))
+    # Of a huge number or a long list only the size.
     if isinstance(value, int) and value.bit_length() > 200:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, list | tuple) and len(value) > 20:
         return f"a list of {len(value)}"
     if isinstance(value, Mapping) and len(value) > 20:
         return f"a mapping of {len(value)} keys"
-    return str(value)
+    return one_line(value)

@@ -213,10 +213,9 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
     """
     code: dict[Path, list[str]] = {}
     for key, name in _class_paths(scenario, ()):
-        path = name.rpartition(":")[0].removesuffix(".py")
-        parent, slash, module = path.rpartition("/")
+        folder, module, _ = _parts_of(name)
         try:
-            files = _files_to_run((folder_of(name) / (parent + slash)).resolve(), module)
+            files = _files_to_run((folder_of(name) / folder).resolve(), module)
         except (OSError, ValueError):
             continue  # it is not a path: the import will fail
         if name.startswith("bundled:") and not any(file.is_file() for file in files):
@@ -241,10 +240,15 @@ def _class_paths(value: object, keys: tuple[str, ...]) -> Iterator[tuple[str, st
 
 def _is_class_path(text: str) -> bool:
     """Whether a text has the form of a path of a user's own component: 'folder/module:Class'."""
-    path, colon, qualname = text.rpartition(":")
-    module = path.removesuffix(".py").rpartition("/")[2]
-    parts = (*module.split("."), *qualname.split("."))
-    return bool(colon) and all(part.isidentifier() for part in parts)
+    _, module, qualname = _parts_of(text)
+    return all(part.isidentifier() for part in (*module.split("."), *qualname.split(".")))
+
+
+def _parts_of(path: str) -> tuple[str, str, str]:
+    """Return the folder, the module and the class of a path of a component."""
+    file, _, qualname = path.rpartition(":")
+    folder, slash, module = file.removesuffix(".py").rpartition("/")
+    return folder + slash, module, qualname
 
 
 def _files_to_run(folder: Path, name: str) -> list[Path]:
@@ -358,10 +362,9 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
         BrokenModule: the module fails while it is imported.
         ScenarioError: there is no such module, or no such class in it.
     """
-    path, _, qualname = name.rpartition(":")
-    parent, slash, module_name = path.removesuffix(".py").rpartition("/")
-    folder = (folder_of(name) / (parent + slash)).resolve()
-    if not all(part.isidentifier() for part in (*module_name.split("."), *qualname.split("."))):
+    parent, module_name, qualname = _parts_of(name)
+    folder = (folder_of(name) / parent).resolve()
+    if not _is_class_path(name):
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
     if not is_plugin:
         check_trust(name, _files_to_run(folder, module_name))

@@ -171,7 +171,7 @@ class Quantity:
             # By repr, 0.1 is one tenth, not the nearest binary fraction.
             exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
         except OverflowError:
-            raise problem(f"expected {self.name}, a finite number, got {shown(value)}") from None
+            exact = Decimal("Infinity")
         if not exact.is_finite() or exact.adjusted() > MAX_DIGITS:
             raise problem(f"expected {self.name}, a finite number, got {shown(value)}")
         return Fraction(exact)
@@ -195,18 +195,14 @@ class Quantity:
     def _examples(self) -> str:
         return ", ".join(f"'{example}'" for example in self.examples)
 
-    def schema(self, **more: Any) -> WithJsonSchema:
-        """Return the JSON Schema of the quantity; ``x-quantity`` is its short name."""
-        kinds: list[dict[str, Any]] = [{"type": "number"}, {"type": "string"}]
-        if "mapping" in more:
-            kinds.append(more.pop("mapping"))
+    def schema(self, *others: dict[str, Any]) -> WithJsonSchema:
+        """Return the JSON Schema of the quantity, or `others`; ``x-quantity`` is its short name."""
         return WithJsonSchema(
             {
                 "description": f"{self.name}: {self._forms()}",
                 "x-quantity": self.name.split(" ", 1)[1] + (f" [{self.base}]" if self.base else ""),
-                "anyOf": kinds,
+                "anyOf": [{"type": "number"}, {"type": "string"}, *others],
                 "examples": list(self.examples),
-                **more,
             }
         )
 
@@ -398,18 +394,16 @@ def _limit(is_valid: Callable[[Any], bool], expected: str) -> AfterValidator:
     return AfterValidator(check)
 
 
+_PLURALS = [unit for unit in DURATION.units if unit.endswith("s") and len(unit) > 3]
+
 Duration = Annotated[
     timedelta,
     BeforeValidator(parse_duration),
     PlainSerializer(format_duration, return_type=str, when_used="json"),
     DURATION.schema(
-        mapping={
+        {
             "type": "object",
-            "properties": {
-                unit: {"type": "number"}
-                for unit in DURATION.units
-                if unit.endswith("s") and len(unit) > 3
-            },
+            "properties": {unit: {"type": "number"} for unit in _PLURALS},
             "additionalProperties": {"type": "number"},
         }
     ),

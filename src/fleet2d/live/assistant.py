@@ -400,8 +400,3 @@ def server(folder: Path) -> Any:
     for tool in tools:
         app.tool()(told(tool))
     return app
-
-
-def serve(folder: Path) -> None:
-    """Serve the tools of a folder on stdin and stdout, until they are closed."""
-    server(folder).run("stdio")

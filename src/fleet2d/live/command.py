@@ -86,6 +86,6 @@ def mcp(
     ],
 ) -> None:
     """Serve assistants by the Model Context Protocol, on stdin and stdout, within one folder."""
-    from fleet2d.live.assistant import serve
+    from fleet2d.live.assistant import server
 
-    serve(folder)
+    server(folder).run("stdio")

@@ -1,6 +1,6 @@
 """Poses of ROS 1 and ROS 2 bags: odometry, pose topics and frames of `/tf`, without ROS."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -110,26 +110,18 @@ def _links(reader: Any, path: Path) -> dict[str, tuple[str, _PlanarPoses]]:
     FIXES.check(sum(c.msgcount for c in connections), path, LogError)
     rows: dict[str, list[tuple[int, float, float, float]]] = {}
     parents: dict[str, str] = {}
-    for child, parent, row in _transforms(reader, connections):
-        if parents.setdefault(child, parent) != parent:
-            raise LogError(
-                f"{path}: the frame {child!r} has two parents, {parents[child]!r} and {parent!r}"
-            )
-        rows.setdefault(child, []).append(row)
-        FIXES.check(len(rows[child]), path, LogError)
-    return {child: (parents[child], _columns(rows[child])) for child in rows}
-
-
-def _transforms(
-    reader: Any, connections: list[Any]
-) -> Iterator[tuple[str, str, tuple[int, float, float, float]]]:
     for connection, time, data in reader.messages(connections) if connections else ():
         for one in reader.deserialize(data, connection.msgtype).transforms:
-            pose = planar(one.transform.translation, one.transform.rotation)
-            names = one.child_frame_id.lstrip("/"), one.header.frame_id.lstrip("/")
+            child, parent = one.child_frame_id.lstrip("/"), one.header.frame_id.lstrip("/")
+            if parents.setdefault(child, parent) != parent:
+                both = f"{parents[child]!r} and {parent!r}"
+                raise LogError(f"{path}: the frame {child!r} has two parents, {both}")
             # A link that never changes holds at all times.
             stamp = 0 if connection.topic == "/tf_static" else stamp_of(one, time)
-            yield *names, (stamp, *pose)
+            pose = planar(one.transform.translation, one.transform.rotation)
+            rows.setdefault(child, []).append((stamp, *pose))
+            FIXES.check(len(rows[child]), path, LogError)
+    return {child: (parents[child], _columns(rows[child])) for child in rows}
 
 
 def _in_root(

@@ -265,37 +265,6 @@ def read_table(path: Path) -> pa.Table:
     return table
 
 
-def columns_of(
-    table: pa.Table,
-    overrides: Mapping[str, str],
-    path: Path,
-    usual: Mapping[str, Sequence[str]] = NAMES,
-    needed: Sequence[str] = ("time", "x", "y"),
-) -> dict[str, str]:
-    """Return the name of the column of each quantity: as the user says, else one of the usual.
-
-    Raises:
-        LogError: A quantity is unknown, or one that is needed has no column.
-    """
-    named = dict(overrides)
-    for quantity, name in named.items():
-        if quantity not in usual:
-            raise LogError(f"columns: unknown key {quantity!r}; allowed here: {', '.join(usual)}")
-        if name not in table.column_names:
-            raise LogError(f"{path} has no column {name!r}{did_you_mean(name, table.column_names)}")
-    lower = {name.strip().lower(): name for name in reversed(table.column_names)}
-    for quantity, names in usual.items():
-        column = next((lower[name] for name in names if name in lower), None)
-        if quantity not in named and column is not None:
-            named[quantity] = column
-        if quantity not in named and quantity in needed:
-            raise LogError(
-                f"{path} has no column {quantity!r}; it has: {', '.join(table.column_names)}. Say"
-                f" which it is by columns: {{{quantity}: …}}"
-            )
-    return named
-
-
 @dataclass(frozen=True)
 class LogTable:
     """A table of a log.
@@ -320,14 +289,37 @@ class LogTable:
         usual: Mapping[str, Sequence[str]] = NAMES,
         needed: Sequence[str] = ("time", "x", "y"),
     ) -> Self:
-        """Read a file; see `columns_of`.
+        """Read a file.
+
+        Args:
+            path: The file.
+            columns: The names of columns that the user gives.
+            usual: The names that the column of each quantity may have besides.
+            needed: The quantities without which it can't be read.
 
         Raises:
-            LogError: It can't be read, or lacks a column.
+            LogError: It can't be read, a quantity is unknown, or one that is needed has no column.
         """
-        rows = read_table(path)
+        rows, named = read_table(path), dict(columns)
+        for quantity, name in named.items():
+            if quantity not in usual:
+                known = ", ".join(usual)
+                raise LogError(f"columns: unknown key {quantity!r}; allowed here: {known}")
+            if name not in rows.column_names:
+                near = did_you_mean(name, rows.column_names)
+                raise LogError(f"{path} has no column {name!r}{near}")
+        lower = {name.strip().lower(): name for name in reversed(rows.column_names)}
+        for quantity, names in usual.items():
+            column = next((lower[name] for name in names if name in lower), None)
+            if quantity not in named and column is not None:
+                named[quantity] = column
+            if quantity not in named and quantity in needed:
+                raise LogError(
+                    f"{path} has no column {quantity!r}; it has: {', '.join(rows.column_names)}."
+                    f" Say which it is by columns: {{{quantity}: …}}"
+                )
         line = np.arange(rows.num_rows) + (2 if path.suffix.lower() == ".csv" else 1)
-        return cls(path, rows, columns_of(rows, columns, path, usual, needed), line)
+        return cls(path, rows, named, line)
 
     def column(self, quantity: str) -> pa.ChunkedArray:
         """Return the column of a quantity."""

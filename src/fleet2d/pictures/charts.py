@@ -214,23 +214,21 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
     with picture(path, 5.2, 6.4) as figure:
         curve, counts = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         curve.plot([0, 1], [0, 1], color="#9a9a9a", linewidth=1, linestyle="--")
-        ece, classwise = calibration_error(belief, truth), classwise_error(belief, truth)
-        _points(curve, highest, is_right, LIKELIEST_COLOR, f"likeliest place (ECE {ece:.3f})")
-        every = f"every place (mean {classwise:.3f})"
-        _points(curve, belief.ravel(), is_true.ravel(), EVERY_COLOR, every)
+        likeliest = f"likeliest place (ECE {calibration_error(belief, truth):.3f})"
+        every = f"every place (mean {classwise_error(belief, truth):.3f})"
+        for forecasts, outcomes, color, label in (
+            (highest, is_right, LIKELIEST_COLOR, likeliest),
+            (belief.ravel(), is_true.ravel(), EVERY_COLOR, every),
+        ):
+            confidence, share, _ = reliability_curve(forecasts, outcomes)
+            curve.plot(confidence, share, marker="o", markersize=4, color=color, label=label)
+            weights = np.full(len(forecasts), 1 / len(forecasts))
+            counts.hist(forecasts, np.linspace(0, 1, 21), weights=weights, color=color, alpha=0.6)
         curve.set(ylabel="observed frequency", xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
         curve.set_title(f"{name}: {len(truth):,} forecasts", fontsize=11, loc="left")
         curve.legend(loc="upper left", frameon=False)
-        for forecasts, color in ((highest, LIKELIEST_COLOR), (belief.ravel(), EVERY_COLOR)):
-            weights = np.full(len(forecasts), 1 / len(forecasts))
-            counts.hist(forecasts, np.linspace(0, 1, 21), weights=weights, color=color, alpha=0.6)
         counts.set(xlabel="forecast probability", ylabel="share")
         figure.tight_layout()
-
-
-def _points(axes: "Axes", forecasts: F64, outcomes: F64, color: str, label: str) -> None:
-    confidence, share, _ = reliability_curve(forecasts, outcomes)
-    axes.plot(confidence, share, marker="o", markersize=4, color=color, label=label)
 
 
 # What came of a request or question, in the order in which it is stacked, and its color.

@@ -1,8 +1,9 @@
 """Life in a home: traces of bodies, fields of view, and text and legends over a figure."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from math import pi
 from typing import Any, Literal, NamedTuple
 
@@ -199,6 +200,10 @@ class BodyTrace:
     note: str = ""
 
 
+NewTrace = Callable[..., BodyTrace]
+"""Returns a trace of a body from its samples."""
+
+
 def trace_of(run: Run, plan: FloorPlan, name: str, number: int, *, robot: bool) -> BodyTrace | None:
     """Return the trace of a body, None if nothing is stored of it.
 
@@ -209,34 +214,27 @@ def trace_of(run: Run, plan: FloorPlan, name: str, number: int, *, robot: bool) 
         number: Its number among the users or robots, for its colour.
         robot: Whether it is a robot.
     """
-    color = _color(run, name, number, robot=robot)
-    reason = "no key frames were stored"
-    if "key_frames" in run.tables:
-        try:
-            return _from_key_frames(run, plan, name, color, robot=robot)
-        except ArtifactError as error:
-            reason = str(error)
-    return _from_trajectories(run, plan, name, color, reason, robot=robot)
-
-
-def _color(run: Run, name: str, number: int, *, robot: bool) -> str:
     bucket = run.manifest["scenario"].get("robots" if robot else "users", {})
     color = bucket.get(name, {}).get("color")
-    if isinstance(color, str) and is_color_like(color):
-        return color
-    return body_color(number, robot=robot)
+    if not (isinstance(color, str) and is_color_like(color)):
+        color = body_color(number, robot=robot)
+    reason, trace = "no key frames were stored", partial(BodyTrace, name, color, robot)
+    if "key_frames" in run.tables:
+        try:
+            return _from_key_frames(run, plan, name, trace)
+        except ArtifactError as error:
+            reason = str(error)
+    return _from_trajectories(run, plan, name, trace, reason)
 
 
-def _from_key_frames(run: Run, plan: FloorPlan, name: str, color: str, *, robot: bool) -> BodyTrace:
+def _from_key_frames(run: Run, plan: FloorPlan, name: str, trace: NewTrace) -> BodyTrace:
     step_us, steps = run.manifest["step_us"], run.manifest["steps"]
     stride = max(1, min(SAMPLE_US, steps * step_us // SAMPLES) // step_us)
     every_us = stride * step_us
     path = rebuild_path(run, plan, name, timedelta(microseconds=every_us))
     xy = np.stack([path.x, path.y], axis=1)
     legs, note = _legs_of(run, plan, name)
-    return BodyTrace(
-        name, color, robot, every_us, path.step, xy, path.heading, path.room, legs, note
-    )
+    return trace(every_us, path.step, xy, path.heading, path.room, legs, note)
 
 
 def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
@@ -267,7 +265,7 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
 
 
 def _from_trajectories(
-    run: Run, plan: FloorPlan, name: str, color: str, reason: str, *, robot: bool
+    run: Run, plan: FloorPlan, name: str, trace: NewTrace, reason: str
 ) -> BodyTrace | None:
     """Return the samples of the table of trajectories; `reason` is for the note."""
     if "trajectories" not in run.tables:
@@ -284,8 +282,7 @@ def _from_trajectories(
     legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= MAX_LEG_GAP_US else NO_LEGS
     every = format_duration(timedelta(microseconds=every_us))
     note = f"{reason}: positions every {every}"
-    samples = (rows["step"], xy, rows["heading"], room)
-    return BodyTrace(name, color, robot, every_us, *samples, legs, note)
+    return trace(every_us, rows["step"], xy, rows["heading"], room, legs, note)
 
 
 def _rows(

@@ -143,18 +143,14 @@ def draw_actogram(
     gap = (1.1 if days <= 40 else 0.6) if days <= GAPS_UP_TO else 0.0  # points
     row = axes.bbox.height / axes.figure.dpi * 72 / max(1, days)
     # Marks keep a distance to the lines between rows, which are snapped to whole pixels.
-    _draw_marks(marks, axes, (gap / 2 + 0.25) / row if gap else 0.0)
+    lift = (gap / 2 + 0.25) / row if gap else 0.0
+    boxes = PolyCollection([*mark_boxes(marks, lift)], facecolors=TEXT_COLOR, lw=0, zorder=2)
+    boxes.set_snap(False)  # marks lower than a pixel are fainter, not a pixel high
+    axes.add_collection(boxes, autolim=False)
     if gap:
         axes.hlines(np.arange(1, days), 0, 24, color="white", lw=gap, zorder=3)
     axes.set(xlim=hours_shown(rooms), ylim=(days, 0))
     _label(axes, start, days, dates=dates)
-
-
-def _draw_marks(marks: F64, axes: Axes, lift: float) -> None:
-    """Draw a dark mark at the bottom of a row where somebody was seen."""
-    boxes = PolyCollection([*mark_boxes(marks, lift)], facecolors=TEXT_COLOR, lw=0, zorder=2)
-    boxes.set_snap(False)  # marks lower than a pixel are fainter, not a pixel high
-    axes.add_collection(boxes, autolim=False)
 
 
 def _label(axes: Axes, start: datetime, days: int, *, dates: bool) -> None:

@@ -1,6 +1,6 @@
 """A home with everyone in it at a step of a run, and a strip of time with a row for each body."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -335,12 +335,21 @@ class Stage:
         """Set the regions that the cameras of a body see, if they changed."""
         number = int(np.searchsorted(self._change_steps, step, side="right")) - 1
         walls = self._walls.changes[max(0, number)]["walls"]
-        key = (pose, walls, self._pans(body.facts, step))
+        pans = self._pans(body.facts, step)
+        key = (pose, walls, pans)
         if key == body.view_key:
             return
-        body.view_key = key
+        body.view_key, body.views = key, []
         sight = SightWalls(self._walls.mesh(walls), self._plan.lattice)
-        body.views = list(self._outlines(body.facts, pose, sight, step))
+        x, y, heading = pose
+        ahead = np.array([np.cos(heading), np.sin(heading)])
+        beside = np.array([-ahead[1], ahead[0]])
+        for camera, pan in zip(body.facts["cameras"], pans, strict=True):
+            eye = np.array([x, y]) + camera["forward"] * ahead + camera["left"] * beside
+            angle_deg = float(np.rad2deg(camera["angle"]))
+            lens = {"range": (camera["near"], camera["far"]), "angle_deg": angle_deg}
+            region = field_of_view(sight, eye, heading + camera["heading"] + pan, lens)
+            body.views += [shapely.get_coordinates(part.exterior) for part in region.geoms]
 
     def _pans(self, facts: BodyFacts, step: int) -> tuple[float, ...]:
         return tuple(
@@ -349,21 +358,6 @@ class Stage:
             else 0.0
             for camera in facts["cameras"]
         )
-
-    def _outlines(
-        self, facts: BodyFacts, pose: tuple[float, float, float], sight: SightWalls, step: int
-    ) -> Iterator[F64]:
-        x, y, heading = pose
-        pans = self._pans(facts, step)
-        for camera, pan in zip(facts["cameras"], pans, strict=True):
-            ahead = np.array([np.cos(heading), np.sin(heading)])
-            beside = np.array([-ahead[1], ahead[0]])
-            eye = np.array([x, y]) + camera["forward"] * ahead + camera["left"] * beside
-            angle_deg = float(np.rad2deg(camera["angle"]))
-            lens = {"range": (camera["near"], camera["far"]), "angle_deg": angle_deg}
-            region = field_of_view(sight, eye, heading + camera["heading"] + pan, lens)
-            for part in shapely.get_parts(region):
-                yield shapely.get_coordinates(part.exterior)
 
     def _draw_paths(self, index: int) -> list[F64]:
         """Draw the paths of the last minute; return them, each float64 (n, 2) [m]."""
