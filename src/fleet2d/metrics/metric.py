@@ -59,11 +59,16 @@ class Metric(Component):
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the part of a result that the closing table shows: by default all but `hidden`."""
-        return {
-            name: cls.summary(value) if isinstance(value, Mapping) else value
-            for name, value in result.items()
-            if isinstance(value, Mapping) or name not in cls.hidden
-        }
+        return _without(cls.hidden, result)
+
+
+def _without(hidden: Set[str], result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a result without the numbers of some names, however deep they are."""
+    return {
+        name: _without(hidden, value) if isinstance(value, Mapping) else value
+        for name, value in result.items()
+        if isinstance(value, Mapping) or name not in hidden
+    }
 
 
 def nested(numbers: Mapping[tuple[str, str], Any]) -> dict[str, Any]:
