@@ -7,6 +7,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -62,25 +63,21 @@ class Blocks:
 
     def __init__(self) -> None:
         """Begin without blocks."""
-        self._begins: list[int] = []
-        self._ends: list[int] = []
-        self._rows: list[Any] = []
+        self._blocks: list[tuple[int, int, Any]] = []  # begin, end, rows
 
     def append(self, begin: int, end: int, rows: NDArray[Any] | SightingTable) -> None:
         """Append the rows of the stretch from `begin` up to before `end`, the latest so far."""
-        self._begins.append(begin)
-        self._ends.append(end)
-        self._rows.append(rows)
+        self._blocks.append((begin, end, rows))
 
     def touching(self, begin: int, end: int) -> tuple[int, list[Any]]:
         """Return the blocks that overlap a stretch of time, and where the first one begins."""
-        overlap = slice(bisect_right(self._ends, begin), bisect_left(self._begins, end))
-        return next(iter(self._begins[overlap]), begin), self._rows[overlap]
+        first = bisect_right(self._blocks, begin, key=itemgetter(1))
+        blocks = self._blocks[first : bisect_left(self._blocks, end, key=itemgetter(0))]
+        return blocks[0][0] if blocks else begin, [rows for _, _, rows in blocks]
 
     def forget(self, before: int) -> None:
         """Drop the blocks that end by `before`."""
-        past = slice(bisect_right(self._ends, before))
-        del self._begins[past], self._ends[past], self._rows[past]
+        del self._blocks[: bisect_right(self._blocks, before, key=itemgetter(1))]
 
 
 class BodyPoses:

@@ -277,13 +277,12 @@ class Fremen(Estimator):
         missed = np.maximum(watched - seen, 0)[..., np.newaxis]
         gain = seen[..., np.newaxis] * natural_log(p) + missed * natural_log(1 - p)
         self.fit = RECENT * self.fit + gain.sum(axis=0)
+        weights = np.stack([watched, seen])
         for sums_by_state, wave in zip(self.waves, self._waves(minutes), strict=True):
-            for user in range(self.users + 1):
-                for room in range(self.rooms):
-                    for k, values in enumerate((watched, seen)):
-                        is_positive = values[:, user, room] > 0
-                        weight = values[is_positive, user, room, np.newaxis]
-                        sums_by_state[k, user, room] += (weight * wave[is_positive]).sum(axis=0)
+            for k, user, room in np.ndindex(sums_by_state.shape[:3]):
+                is_positive = weights[k, :, user, room] > 0
+                weight = weights[k, is_positive, user, room, np.newaxis]
+                sums_by_state[k, user, room] += (weight * wave[is_positive]).sum(axis=0)
         self.waves = self.waves * self.counts.faded(next_day - self.counts.today)
         self.day, self.week = [], None
         self.span = self.counts.today - self.first + 1
