@@ -122,14 +122,10 @@ class Detections(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {precision, recall, recognized, confusion}}, without undefined ratios."""
-        robots, users = self.names
-        return {
-            robot: self._summary(self.looks[r], self.confusion[r], users)
-            | ({"unknown_truth": int(self.unknown[r])} if self.unknown[r] else {})
-            for r, robot in enumerate(robots)
-        }
+        return {robot: self._numbers(r) for r, robot in enumerate(self.names[0])}
 
-    def _summary(self, looks: I64, counts: I64, users: tuple[str, ...]) -> dict[str, Any]:
+    def _numbers(self, robot: int) -> dict[str, Any]:
+        looks, counts, users = self.looks[robot], self.confusion[robot], self.names[1]
         real = counts[:-1].sum()
         ratios = {
             "precision": (real, counts.sum()),
@@ -150,6 +146,8 @@ class Detections(Metric):
         }
         if confusion:
             numbers["confusion"] = confusion
+        if self.unknown[robot]:
+            numbers["unknown_truth"] = int(self.unknown[robot])
         return numbers
 
     @classmethod
