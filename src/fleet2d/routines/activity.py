@@ -123,11 +123,7 @@ class DurationDistribution(Settings):
             return empirical([seconds(d) for d in self.quantiles]).within(low, high)
         if self.law == "exponential":
             return exponential(mean).within(low, high)
-        make = {
-            "lognormal": lognormal,
-            "gamma": gamma,
-            "normal": normal,
-        }[self.law]
+        make = {"lognormal": lognormal, "gamma": gamma, "normal": normal}[self.law]
         return make(mean, std).within(low, high)
 
 

@@ -34,9 +34,7 @@ from fleet2d.routines.activity import (
     find_activity,
 )
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, values_in
-from fleet2d.routines.planner import (
-    Episode,
-)
+from fleet2d.routines.planner import Episode
 from fleet2d.runtime.clock import DAY
 
 SECOND = timedelta(seconds=1)

@@ -9,13 +9,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
-from fleet2d.configuration.units import (
-    Duration,
-    Length,
-    PositiveDuration,
-    Share,
-    TimeOfDay,
-)
+from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share, TimeOfDay
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Command, Situation
 from fleet2d.entities.giving_way import resumed
 from fleet2d.entities.place import avoided_rooms

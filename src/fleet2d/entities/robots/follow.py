@@ -11,12 +11,7 @@ from fleet2d.configuration.units import Duration, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in, stop_at
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import (
-    approach,
-    centres,
-    check_has_camera,
-    is_in_rooms,
-)
+from fleet2d.entities.robots.approach import approach, centres, check_has_camera, is_in_rooms
 
 # Distance from where a person was lost at which it looks for the person [m].
 SEARCH_DISTANCE_M = 0.3

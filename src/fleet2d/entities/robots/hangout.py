@@ -13,11 +13,7 @@ from fleet2d.configuration.units import Duration, Length, PositiveDuration, Shar
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
 from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import (
-    BeliefBehavior,
-    sight_range,
-    viewpoints_of,
-)
+from fleet2d.entities.robots.approach import BeliefBehavior, sight_range, viewpoints_of
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space

@@ -22,10 +22,7 @@ from fleet2d.entities.place import (
     stops_at,
 )
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import (
-    stops_with_view,
-    unwatched,
-)
+from fleet2d.entities.robots.approach import stops_with_view, unwatched
 from fleet2d.floorplan.plan import Room
 from fleet2d.runtime.clock import DAY, midnight_of
 

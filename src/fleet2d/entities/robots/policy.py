@@ -54,13 +54,7 @@ from fleet2d.kernels import (
     sine,
 )
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.runtime.clock import (
-    DAY_MINUTES,
-    HOUR_S,
-    MICROSECOND,
-    Clock,
-    midnight_of,
-)
+from fleet2d.runtime.clock import DAY_MINUTES, HOUR_S, MICROSECOND, Clock, midnight_of
 
 # How many people have columns of their own, in the order of the scenario.
 PEOPLE = 4

@@ -255,12 +255,7 @@ _ORDERS: dict[str, Callable[[SearchProblem], list[int]]] = {
 }
 
 
-def after_empty_looks(
-    prior: F64,
-    age: F64,
-    memory: float,
-    detect: F64 | float = 1.0,
-) -> F64:
+def after_empty_looks(prior: F64, age: F64, memory: float, detect: F64 | float = 1.0) -> F64:
     """Return the probabilities of the sites after looks without success, not normalized.
 
     A look that finds the target with probability d reduces the probability of its site by the part

@@ -251,10 +251,7 @@ class Seating:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
             name, rooms = matching_rooms(
-                activity.rooms,
-                self._home.rooms,
-                self._reachable,
-                never_in=activity.never_in,
+                activity.rooms, self._home.rooms, self._reachable, never_in=activity.never_in
             )
         except PlacementError:  # then rest replaces the activity
             return ()
