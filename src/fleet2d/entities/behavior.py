@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
@@ -13,21 +13,16 @@ from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.units import Duration, format_time_of_day, parse_time_of_day, weekdays_of
 from fleet2d.entities.body import NEVER, Body, Motion, Pose
 from fleet2d.entities.equipment import Charge, Displacement
-from fleet2d.entities.place import ANY, Point, is_kind, is_point
+from fleet2d.entities.place import ANY, Point, RoomChoice, is_kind, is_point
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import blame
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
+from fleet2d.floorplan.plan import Room
+from fleet2d.interactions.interaction import RequestQueue
 from fleet2d.kernels import TURN
-from fleet2d.runtime.clock import DAY, midnight_of
+from fleet2d.runtime.clock import DAY, Sun, midnight_of
 from fleet2d.runtime.determinism import Draws
-
-if TYPE_CHECKING:
-    from fleet2d.entities.place import RoomChoice
-    from fleet2d.floorplan.home import Home
-    from fleet2d.floorplan.plan import Room
-    from fleet2d.interactions.interaction import RequestQueue
-    from fleet2d.runtime.clock import Sun
-
 
 # After this time, a body tries again to pass a shut door.
 DOOR_WAIT = timedelta(seconds=10)
@@ -180,7 +175,7 @@ class Command(NamedTuple):
 
     do: str
     target: str = ""
-    place: "RoomChoice | Point | tuple[()]" = ()
+    place: RoomChoice | Point | tuple[()] = ()
 
     @property
     def text(self) -> str:
@@ -238,7 +233,7 @@ class Situation:
         self.__dict__.update(actor=actor, step=step, events=events, outputs=outputs, time=time)
 
     @property
-    def home(self) -> "Home":
+    def home(self) -> Home:
         """The home."""
         return self.actor.home
 
@@ -249,7 +244,7 @@ class Situation:
         return self.home.plan.lattice.xy_of(state.x, state.y)
 
     @property
-    def room(self) -> "Room | None":
+    def room(self) -> Room | None:
         """The room that the body is in; None when it is away."""
         state = self.actor.state
         return None if state.away else self.home.plan.room_of_point(state.x, state.y)
@@ -268,7 +263,7 @@ class Situation:
         return self.actor.command
 
     @property
-    def requests(self) -> "RequestQueue | None":
+    def requests(self) -> RequestQueue | None:
         """What the robot wants of people at present; None: the scenario has no interactions."""
         return self.actor.requests
 
@@ -351,7 +346,7 @@ class Behavior(Component):
     def start(self, actor: "Actor") -> None:
         """Prepare for a run; check here that the places it names exist."""
 
-    def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
+    def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return where the body is when the run begins: None: drawn; (): away."""
         return None
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, PeerAddress, Speed, TurnRateDeg
-from fleet2d.entities.behavior import Behavior, LightHours
+from fleet2d.entities.behavior import Actor, Behavior, LightHours
 from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
@@ -21,10 +21,6 @@ from fleet2d.kernels import I64, SightingColumn
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
-
 
 SIGHTING = len(SightingColumn)
 
@@ -56,7 +52,7 @@ class EvidenceSource(Component):
         """Return the files that it reads."""
         return ()
 
-    def start(self, actor: "Actor", users: Sequence[str]) -> None:
+    def start(self, actor: Actor, users: Sequence[str]) -> None:
         """Prepare for a run of a robot among users."""
         self.notes: tuple[str, ...] = ()
 
@@ -87,7 +83,7 @@ class LiveDetections(EvidenceSource):
         """Whether positions are in the robot's frame."""
         return self.relative_to == "robot"
 
-    def start(self, actor: "Actor", users: Sequence[str]) -> None:
+    def start(self, actor: Actor, users: Sequence[str]) -> None:
         """Begin without detections."""
         super().start(actor, users)
         self._rows: list[I64] = []

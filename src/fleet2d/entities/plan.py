@@ -3,15 +3,16 @@
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import did_you_mean, problem, refusal
 from fleet2d.configuration.units import MAX_DURATION, micros
-from fleet2d.entities.body import STANDING, Motion, RandomWalk, Track
-from fleet2d.entities.place import seat_at
+from fleet2d.entities.body import STANDING, Body, Motion, RandomWalk, Track
+from fleet2d.entities.place import Point, RoomChoice, seat_at
 from fleet2d.errors import ComponentError, NoWayError, errors_as
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
@@ -28,11 +29,6 @@ from fleet2d.kernels import (
     turn_between,
 )
 from fleet2d.runtime.events import KINDS
-
-if TYPE_CHECKING:
-    from fleet2d.configuration.components import Component
-    from fleet2d.entities.body import Body
-    from fleet2d.entities.place import Point, RoomChoice
 
 
 class Note(NamedTuple):
@@ -64,7 +60,7 @@ class Plan:
         postures: When the posture changes [us since the start], and its number in POSTURES then.
     """
 
-    def __init__(self, body: "Body", step: int) -> None:
+    def __init__(self, body: Body, step: int) -> None:
         state = body.state
         self._body = body
         self.began = (step, state)
@@ -104,7 +100,7 @@ class Plan:
         return self._body.clock.start + timedelta(microseconds=self.time_us)
 
     def go_to(
-        self, place: "RoomChoice | Point | str | Iterable[object]", purpose: str = "spot"
+        self, place: RoomChoice | Point | str | Iterable[object], purpose: str = "spot"
     ) -> Self:
         """Walk to a place by the shortest path, turning on the spot towards every leg.
 
@@ -491,7 +487,7 @@ class _PlanForm(BaseModel):
     postures: list[Annotated[list[_Integer], AfterValidator(_check_posture)]]
 
 
-def plan_of(body: "Body", step: int, data: Mapping[str, Any]) -> Plan:
+def plan_of(body: Body, step: int, data: Mapping[str, Any]) -> Plan:
     """Return the plan that `data` describes, for a body to follow from a step on.
 
     Raises:
@@ -515,7 +511,7 @@ def plan_of(body: "Body", step: int, data: Mapping[str, Any]) -> Plan:
     return plan
 
 
-def _check_rows(body: "Body", begin_us: int, rows: I64) -> None:
+def _check_rows(body: Body, begin_us: int, rows: I64) -> None:
     """Refuse breakpoints that a body can't follow from a moment on."""
     size = body.home.plan.room_of_place.shape
     x, y = rows[:, 1] // SUB, rows[:, 2] // SUB

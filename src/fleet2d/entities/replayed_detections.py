@@ -11,6 +11,7 @@ from pydantic import Field
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, counted, suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
+from fleet2d.entities.behavior import Actor
 from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.errors import errors_as
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
@@ -19,7 +20,6 @@ from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
 from fleet2d.logs.placement import LogFrame
 
 if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
     from fleet2d.logs.detections import RobotDetections
 
 
@@ -77,7 +77,7 @@ class ReplayedDetections(EvidenceSource):
         """Return the files that it reads."""
         return files_of(self.path)
 
-    def start(self, actor: "Actor", users: Sequence[str]) -> None:
+    def start(self, actor: Actor, users: Sequence[str]) -> None:
         """Read the log.
 
         Raises:
@@ -101,7 +101,7 @@ class ReplayedDetections(EvidenceSource):
         begin, stop = np.searchsorted(self._rows[:, Column.STEP], (first, end)).tolist()
         return self._rows[begin:stop]
 
-    def _place(self, log: "RobotDetections", actor: "Actor", users: Sequence[str]) -> I64:
+    def _place(self, log: "RobotDetections", actor: Actor, users: Sequence[str]) -> I64:
         """Return the detections within the run as rows, and write the notes."""
         clock = actor.clock
         identity = identities(log.labels, log.counts, self.people, users)[log.label]
@@ -151,7 +151,7 @@ class ReplayedDetections(EvidenceSource):
         rows[:, Column.POSTURE] = rows[:, Column.TRUE_POSTURE] = 0
         return rows
 
-    def _inside(self, xy: F64, used: Bool, actor: "Actor", notes: list[str]) -> Bool:
+    def _inside(self, xy: F64, used: Bool, actor: Actor, notes: list[str]) -> Bool:
         """Return which detections are in the home, within `reach`.
 
         Raises:

@@ -1,23 +1,19 @@
 """Retrace: drive the path that a robot vacuum recorded in its map."""
 
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest, avoided_rooms, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
 from fleet2d.kernels import I64
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from fleet2d.entities.behavior import Actor
 
 
 @register("behavior", "retrace")
@@ -44,11 +40,11 @@ class Retrace(Behavior):
     reach: Length = Field(default=1.0, ge=0)
     avoid: tuple[str, ...] = ()
 
-    def files(self) -> tuple["Path", ...]:
+    def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
         return (self.path,)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Read the path and move its points to free places.
 
         Raises:

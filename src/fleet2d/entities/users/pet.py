@@ -1,21 +1,18 @@
 """Pet: a cat or a dog that sleeps most of the day, and roams through the home in between."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import available_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import Spots
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.runtime.determinism import Draws
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
 
 # How many naps are planned at once.
 NAPS = 10
@@ -54,7 +51,7 @@ class Pet(Behavior):
         if not 0 <= least <= most:
             raise problem(f"spots: expected [least, most] like [3, 12], got {list(self.spots)}")
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Find the rooms that it may enter."""
         rooms = available_rooms(actor, "pet.rooms", self.rooms)
         self.allowed_rooms = rooms or actor.reachable_rooms()

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from fleet2d.configuration.components import register
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
 from fleet2d.routines import survey
 from fleet2d.routines.activity import catalogue
@@ -19,10 +21,6 @@ from fleet2d.routines.interruptions import (
 from fleet2d.routines.planner import REST, Episode
 from fleet2d.routines.survey import activities, draw_works_at_home, to_activities
 from fleet2d.runtime.determinism import Draws, stream_key
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
-    from fleet2d.entities.place import Point, RoomChoice
 
 
 @register("behavior", "population")
@@ -44,7 +42,7 @@ class Population(ResidentBehavior):
 
     bodily_needs: bool = True
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Draw the person's group, and find where the activities are done in the home."""
         self.days = actor.stream("day")
         self.details = actor.stream("details")
@@ -62,7 +60,7 @@ class Population(ResidentBehavior):
             names |= activities_of(population_needs(), usual_errands())
         self.settle(actor, {name: known[name] for name in sorted(names)}, self.make_spots(actor))
 
-    def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
+    def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return the rooms of a typical activity of such people at the beginning of the run."""
         draws, known = Draws(stream_key(0, "", "likely"), 0), catalogue()
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)

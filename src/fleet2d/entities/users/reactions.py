@@ -1,19 +1,16 @@
 """Reactions: how people react to robots."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import micros
-from fleet2d.entities.behavior import Attention, Behavior, SightEvent, Situation
+from fleet2d.entities.behavior import Actor, Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
 
 # The events, the most important first, and the manner that is the probability of a reaction.
 PROBABILITIES = {
@@ -47,7 +44,7 @@ class Reactions(Behavior):
 
     manners: Manners | None = None
 
-    def attention(self, actor: "Actor") -> Attention:
+    def attention(self, actor: Actor) -> Attention:
         """Determine the manners, which may be those of a persona, and return their distances."""
         personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
         persona = next((p for p in personas if p is not None), None)
@@ -67,7 +64,7 @@ class Reactions(Behavior):
             hears=round(used.hears * units),
         )
 
-    def reacts_to(self, actor: "Actor", event: SightEvent, step: int) -> bool:
+    def reacts_to(self, actor: Actor, event: SightEvent, step: int) -> bool:
         """Return whether the person reacts to an event at a step; drawn by its probability."""
         if step < self.until and RANKS.index(event.event) >= self.rank:
             return False  # the present reaction is more important

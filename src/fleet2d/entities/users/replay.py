@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -19,7 +19,7 @@ from fleet2d.configuration.units import (
     Speed,
     micros,
 )
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
@@ -39,10 +39,6 @@ from fleet2d.logs.placement import (
     visits_of,
 )
 from fleet2d.runtime.determinism import sum_in_order
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
-
 
 # Coordinates are clipped to this, far outside of any home [m].
 COORDINATE_LIMIT_M = 1e6
@@ -69,7 +65,7 @@ class Fixes:
     outside: int
 
 
-def place_fixes(actor: "Actor", time_us: I64, xy: F64, turns: F64, reach: float) -> Fixes:
+def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -> Fixes:
     """Return fixes moved to the nearest place where the body can be.
 
     Args:
@@ -120,9 +116,7 @@ class FixFollower:
         fastest: A leg faster than this is counted as implausible [m/s].
     """
 
-    def __init__(
-        self, actor: "Actor", fixes: Fixes, gap_us: int, gaps: str, fastest: float
-    ) -> None:
+    def __init__(self, actor: Actor, fixes: Fixes, gap_us: int, gaps: str, fastest: float) -> None:
         self.actor = actor
         self.fixes = fixes
         self.gap_us, self.gaps = gap_us, gaps
@@ -243,7 +237,7 @@ class RoomFollower:
 
     def __init__(
         self,
-        actor: "Actor",
+        actor: Actor,
         visits: Sequence[LoggedVisit],
         at_once: bool = False,
         limit: float = float("inf"),
@@ -529,7 +523,7 @@ class Replay(Behavior):
         """Return the files that it reads."""
         return files_of(self.path)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Read the log, plan the way through it, and report on it in `notes`."""
         self.visits: list[LoggedVisit] = []
         with errors_as(LogError, actor.path, of=LogError):
@@ -562,7 +556,7 @@ class Replay(Behavior):
         current = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
         return self.follower.follow(plan, current, rejoin=now.step > 0)
 
-    def _start_rooms(self, actor: "Actor", log: ActivityLog, begin_us: int) -> None:
+    def _start_rooms(self, actor: Actor, log: ActivityLog, begin_us: int) -> None:
         mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)
         clock = actor.clock
         gap_us = micros(self.gap or GAP_OF_ROOMS)
@@ -583,7 +577,7 @@ class Replay(Behavior):
         follower.follow(Plan(actor, 0), 0, rejoin=False)
         self.notes = report_rooms(log, mapped, logged, rule, follower)
 
-    def _start_fixes(self, actor: "Actor", log: PositionLog, begin_us: int) -> None:
+    def _start_fixes(self, actor: Actor, log: PositionLog, begin_us: int) -> None:
         if self.rooms:
             raise LogError("a log of positions names no rooms: leave out 'rooms'")
         clock = actor.clock

@@ -6,15 +6,17 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Se
 from datetime import datetime, timedelta
 from functools import lru_cache, partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from fleet2d.entities.behavior import Behavior, Situation
-from fleet2d.entities.place import is_kind, matching_rooms
+from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
 from fleet2d.errors import PlacementError
-from fleet2d.floorplan.placed_objects import POSTURES
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.placed_objects import POSTURES, UsePlace
+from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import (
     ANY_ROOM,
     NO_GAP_S,
@@ -29,16 +31,8 @@ from fleet2d.kernels import (
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
-    from fleet2d.entities.place import RoomChoice
-    from fleet2d.floorplan.home import Home
-    from fleet2d.floorplan.placed_objects import UsePlace
-    from fleet2d.floorplan.plan import Room
-    from fleet2d.runtime.clock import Clock
-
 
 T = TypeVar("T")
 
@@ -87,7 +81,7 @@ class Spots:
     """
 
     def __init__(
-        self, actor: "Actor", rank: int = 0, members: int = 1, *, apart: bool = False
+        self, actor: Actor, rank: int = 0, members: int = 1, *, apart: bool = False
     ) -> None:
         self.rank = rank
         self.members = members
@@ -101,24 +95,24 @@ class Spots:
         """Leave out caches, which are computed again."""
         return {**self.__dict__, "_of_room": {}, "_at_furniture": {}}
 
-    def reachable(self, rooms: list["Room"]) -> list["Room"]:
+    def reachable(self, rooms: list[Room]) -> list[Room]:
         """Return those of some rooms that the body can get to at present: doors may be locked."""
         actor = self._actor
         if not actor.home.may_block_routes:
             return rooms
         return [room for room in rooms if len(actor.space.cells(room.index, actor.part))]
 
-    def nearest(self, rooms: list["Room"], x: int, y: int) -> "Room":
+    def nearest(self, rooms: list[Room], x: int, y: int) -> Room:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
         x_m, y_m = self._actor.home.plan.lattice.xy_of(x, y)
 
-        def distance(room: "Room") -> float:
+        def distance(room: Room) -> float:
             across, along = room.anchor_xy[0] - x_m, room.anchor_xy[1] - y_m
             return across * across + along * along
 
         return min(rooms, key=distance)
 
-    def in_room(self, room: "Room") -> list[Spot]:
+    def in_room(self, room: Room) -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""
         self._check_version()
         if room.index not in self._of_room:
@@ -134,7 +128,7 @@ class Spots:
     def at_furniture(
         self,
         kinds: Sequence[str],
-        rooms: Sequence["Room"],
+        rooms: Sequence[Room],
         posture: str,
         share: tuple[int, int] | None = None,
     ) -> list[Seat]:
@@ -178,12 +172,12 @@ class Spots:
         """Return whether the body can get to a place at furniture at present."""
         return self._can_reach(self._actor.home.object(seat.thing).uses[seat.place])
 
-    def _can_reach(self, use: "UsePlace") -> bool:
+    def _can_reach(self, use: UsePlace) -> bool:
         """Return whether the body can get to a place at furniture, or close enough to use it."""
         at = (use.x, use.y) if use.approach is None else use.approach
         return self._actor.space.part_about(at) == self._actor.part
 
-    def _grid(self, room: "Room") -> tuple[Spot, ...]:
+    def _grid(self, room: Room) -> tuple[Spot, ...]:
         """Return the spots of a room: a grid of cells, a finer one in a small room."""
         actor, lattice = self._actor, self._actor.home.plan.lattice
         cells = actor.space.cells(room.index, actor.part)
@@ -198,12 +192,12 @@ class Spots:
 
 
 def seats_at(
-    home: "Home",
+    home: Home,
     kinds: Sequence[str],
     indices: Set[int],
     posture: str,
     bodies: int,
-    can_reach: "Callable[[UsePlace], bool] | None" = None,
+    can_reach: Callable[[UsePlace], bool] | None = None,
 ) -> list[Seat]:
     """Return the places at the furniture in some rooms.
 
@@ -262,9 +256,9 @@ class Venue(NamedTuple):
     """
 
     activity: Activity
-    rooms: list["Room"]
+    rooms: list[Room]
     seats: list[Seat]
-    stores: list["Room"]
+    stores: list[Room]
     small_moves: tuple[tuple[str, int], ...]
     fetch_takes: Distribution | None
 
@@ -301,7 +295,7 @@ class KnownHome:
     as long as doors and furniture stay as they are.
     """
 
-    def __init__(self, person: "ResidentBehavior", actor: "Actor") -> None:
+    def __init__(self, person: "ResidentBehavior", actor: Actor) -> None:
         self._person, self._actor = person, actor
         self._last = LastStint()
         self._seats: Numbering[Seat] = Numbering()  # which `_last` refers to
@@ -471,11 +465,11 @@ class ResidentBehavior(Behavior):
         """Return what the resident does on a day, given by its ordinal, until the next begins."""
         raise NotImplementedError
 
-    def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
+    def wait_for(self, room: int, clock: Clock, begin_us: int, takes_us: int) -> int | None:
         """Return how long to wait before it may use a room [us]; None: not now."""
         return 0
 
-    def make_spots(self, actor: "Actor") -> Spots:
+    def make_spots(self, actor: Actor) -> Spots:
         """Return the spots of a person without a household."""
         if not self.own_places:
             return Spots(actor)
@@ -484,7 +478,7 @@ class ResidentBehavior(Behavior):
 
     def settle(
         self,
-        actor: "Actor",
+        actor: Actor,
         activities: dict[str, Activity],
         spots: Spots,
         sleeps_in: int | None = None,
@@ -531,7 +525,7 @@ class ResidentBehavior(Behavior):
         else:
             raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
 
-    def _leave_out(self, actor: "Actor") -> None:
+    def _leave_out(self, actor: Actor) -> None:
         """Replace activities that this home has no room for by rest, and note it."""
         impossible = [n for n, s in self.venues.items() if not (s.rooms or s.activity.away)]
         for name in impossible:
@@ -562,7 +556,7 @@ class ResidentBehavior(Behavior):
         self.planned_until = clock.step_at_or_after(plan.time_us)
         return plan
 
-    def furniture(self, actor: "Actor", kind: str) -> str | None:
+    def furniture(self, actor: Actor, kind: str) -> str | None:
         """Return the name of a piece of furniture of a kind that it uses, its bed before others."""
         sleeps = [self.venues[SLEEP]] if SLEEP in self.venues else []
         for venue in (*sleeps, *self.venues.values()):
@@ -629,13 +623,13 @@ class ResidentBehavior(Behavior):
             venue = venue if room is None else self._within(venue, [room])
         return self._at_present(venue) if self.is_hindered else venue
 
-    def _within(self, venue: Venue, rooms: list["Room"]) -> Venue:
+    def _within(self, venue: Venue, rooms: list[Room]) -> Venue:
         """Return the venue of an activity, in some of its rooms only."""
         activity = venue.activity
         seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
         return venue._replace(rooms=rooms, seats=seats)
 
-    def _venue(self, actor: "Actor", activity: Activity) -> Venue:
+    def _venue(self, actor: Actor, activity: Activity) -> Venue:
         if activity.away:
             return Venue(activity, [], [], [], (), None)
         rooms = (
@@ -659,23 +653,19 @@ class ResidentBehavior(Behavior):
             activity.fetch_takes.table() if activity.fetches else None,
         )
 
-    def _bed(self, actor: "Actor", sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
+    def _bed(self, actor: Actor, sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
         """Return the venue of sleep for a member of a household, whose bed it may share."""
         rooms = _match(actor, sleep.rooms, sleep.never_in)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
         return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
-    def _all_rooms(
-        self, actor: "Actor", names: "RoomChoice", never_in: "RoomChoice"
-    ) -> list["Room"]:
+    def _all_rooms(self, actor: Actor, names: RoomChoice, never_in: RoomChoice) -> list[Room]:
         """Return the reachable rooms of all kinds that a list names."""
         rooms = [r for name in names for r in self.reachable_rooms if name in (r.name, r.type)]
         return list(dict.fromkeys(rooms)) or _match(actor, names, never_in)[1]
 
-    def _own_rooms(
-        self, actor: "Actor", names: "RoomChoice", never_in: "RoomChoice"
-    ) -> list["Room"]:
+    def _own_rooms(self, actor: Actor, names: RoomChoice, never_in: RoomChoice) -> list[Room]:
         """Return the rooms of the first name that matches: of several of a kind, one for good."""
         name, rooms = _match(actor, names, never_in)
         if name == "any" or not rooms:
@@ -683,7 +673,7 @@ class ResidentBehavior(Behavior):
         return [Draws(actor.stream(f"room of {name}"), 0).choice(rooms)]
 
 
-def _match(actor: "Actor", names: "RoomChoice", never_in: "RoomChoice") -> tuple[str, list["Room"]]:
+def _match(actor: Actor, names: RoomChoice, never_in: RoomChoice) -> tuple[str, list[Room]]:
     try:
         return matching_rooms(names, actor.home.rooms, actor.reachable_rooms(), never_in=never_in)
     except PlacementError as error:
@@ -694,7 +684,7 @@ def _match(actor: "Actor", names: "RoomChoice", never_in: "RoomChoice") -> tuple
 
 def rooms_at(
     episodes: Iterable[Episode], time_s: int, activities: dict[str, Activity]
-) -> "RoomChoice":
+) -> RoomChoice:
     """Return the rooms of the episode at a time; () if that is out of the home."""
     for episode in episodes:
         if episode.begin <= time_s < episode.end:

@@ -2,27 +2,24 @@
 
 from collections.abc import Sequence
 from datetime import timedelta
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import available_places
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.routines.distributions import draw_weighted
 from fleet2d.runtime.determinism import Draws, sum_in_order
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
-    from fleet2d.floorplan.plan import Room
 
 AWAY = "away"
 SECOND_US = 1_000_000
@@ -43,7 +40,7 @@ class Stop(NamedTuple):
         chance: Its probability [per million].
     """
 
-    room: "Room | None"
+    room: Room | None
     chance: int
 
 
@@ -78,7 +75,7 @@ class RoomSampling(Behavior):
         if sum_in_order(self.shares.values()) <= 0:
             raise problem("all shares are 0: give one room a share above that")
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Find the rooms; those of a kind have equal parts of its share."""
         names = [(name,) for name in self.shares if name != AWAY]
         available = {name for (name,) in available_places(actor, "room_sampling.shares", names)}
@@ -112,7 +109,7 @@ class RoomSampling(Behavior):
             self._visit(now.actor, plan, draws)
         return plan
 
-    def _visit(self, actor: "Actor", plan: Plan, draws: Draws) -> None:
+    def _visit(self, actor: Actor, plan: Plan, draws: Draws) -> None:
         stop = self.stops[draw_weighted(draws, [stop.chance for stop in self.stops])]
         dwell_us = self.dwell_time.draw(draws) * SECOND_US
         if stop.room is None:
@@ -127,7 +124,7 @@ class RoomSampling(Behavior):
         self.debt_us[stop.room.index] = owed - (dwell_us - stay_us)
         plan.stay(timedelta(microseconds=stay_us))
 
-    def _walk(self, actor: "Actor", plan: Plan, goal: Spot) -> None:
+    def _walk(self, actor: Actor, plan: Plan, goal: Spot) -> None:
         """Walk to a spot, and add the time on the way to the debt of the rooms it leads through."""
         start, began_us = (plan.x, plan.y), plan.time_us
         if start == goal and not plan.away:
@@ -142,7 +139,7 @@ class RoomSampling(Behavior):
                 self.debt_us[room] += int(walk_us * share)
 
 
-def _rooms_along(actor: "Actor", route: I64) -> list[tuple[int, float]]:
+def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
     """Return the index of each room on a route, and its share of the route's length."""
     plan = actor.home.plan
     legs = np.diff(route, axis=0).astype(np.float64)

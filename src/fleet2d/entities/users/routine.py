@@ -5,11 +5,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
-from fleet2d.entities.place import ANY, matching_rooms
+from fleet2d.entities.behavior import Actor
+from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
 from fleet2d.entities.users.resident import (
     SECOND_US,
     ResidentBehavior,
@@ -21,29 +22,23 @@ from fleet2d.entities.users.resident import (
     seats_at,
 )
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.placed_objects import PlacedObject
+from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
 from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import PLANNED, REST, RESUMES, SLEEP, Episode
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import DAY_S, Clock
 from fleet2d.runtime.determinism import Draws, stream_key
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
-    from fleet2d.entities.place import Point, RoomChoice
-    from fleet2d.floorplan.home import Home
-    from fleet2d.floorplan.placed_objects import PlacedObject
-    from fleet2d.floorplan.plan import Room
-    from fleet2d.runtime.clock import Clock
-
 
 # All members must get the same rooms, whatever their radius: those of a body of this radius [m].
 DEFAULT_RADIUS = 0.2
 
 
-def private_rooms(household: Household, home: "Home") -> MemberRooms:
+def private_rooms(household: Household, home: Home) -> MemberRooms:
     """Return the rooms of each member's exclusive activities: indices by activity, by member.
 
     Activities that are done only in such rooms, like laundry in the bathroom, count as exclusive,
@@ -74,13 +69,13 @@ def private_rooms(household: Household, home: "Home") -> MemberRooms:
     }
 
 
-def usual_rooms(home: "Home") -> "list[Room]":
+def usual_rooms(home: Home) -> list[Room]:
     """Return the rooms that members of a household can get to, the same for all of them."""
     space = home.space(DEFAULT_RADIUS, opens_doors=True)
     return [room for room in home.rooms if len(space.cells(room.index, 0))]
 
 
-def _rooms_of(activity: "Activity", reachable: "list[Room]") -> "list[Room]":
+def _rooms_of(activity: "Activity", reachable: list[Room]) -> list[Room]:
     """Return the rooms of the activity's first kind that exists, or of all its kinds.
 
     All kinds count if the activity may be done in a different room each time.
@@ -133,7 +128,7 @@ class Seating:
     household, so that none has to know where the others are.
     """
 
-    def __init__(self, actor: "Actor", lives: Lives) -> None:
+    def __init__(self, actor: Actor, lives: Lives) -> None:
         """Prepare for the members of a household who are in the scenario."""
         self._home, self._lives = actor.home, lives
         names = list(lives.household.members)
@@ -247,7 +242,7 @@ class Seating:
         seats = seats_at(self._home, activity.objects, rooms, activity.posture, wanted)
         return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
-    def _rooms(self, rank: int, activity: "Activity", bedroom: int | None) -> "Sequence[Room]":
+    def _rooms(self, rank: int, activity: "Activity", bedroom: int | None) -> Sequence[Room]:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
             name, rooms = matching_rooms(
@@ -263,7 +258,7 @@ class Seating:
         return (Draws(key, 0).choice(rooms),)
 
 
-def _spots(objects: Sequence["PlacedObject"]) -> dict[Seat, Seat]:
+def _spots(objects: Sequence[PlacedObject]) -> dict[Seat, Seat]:
     """Return the first of the places at which bodies would touch, as of a table and its chairs."""
     points: dict[Seat, Point] = {}
     spots = {}
@@ -336,7 +331,7 @@ class Routine(ResidentBehavior):
         if self.household is not None and self.own_places:
             raise problem("members of a household have places of their own: leave out own_places")
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Set up the days of the person, and find where the activities are done in the home."""
         self.name = actor.name
         sleeps_in, side = None, (0, 1)
@@ -359,7 +354,7 @@ class Routine(ResidentBehavior):
         actor.speed *= self.resolved_persona.pace
         self.settle(actor, self._activities(), spots, sleeps_in, side)
 
-    def _note_strangers(self, actor: "Actor") -> None:
+    def _note_strangers(self, actor: Actor) -> None:
         """Note, once per scenario, that people without a household may share a seat."""
         strangers = (
             name
@@ -377,7 +372,7 @@ class Routine(ResidentBehavior):
                 " own_places: true"
             )
 
-    def _join_household(self, actor: "Actor") -> None:
+    def _join_household(self, actor: Actor) -> None:
         """Share the days and places of the members, or prepare them if it is the first of them."""
         assert self.household is not None
         others = (actor.people.get(name) for name in self.household.members)
@@ -408,7 +403,7 @@ class Routine(ResidentBehavior):
             used |= {name: self.resolved_persona.activity(name) for name in (*names, WELCOME)}
         return used
 
-    def begins_at(self, time: datetime) -> "RoomChoice | Point | None":
+    def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return the rooms of a likely activity at that time."""
         likely_day, today = Life(self.resolved_persona, 0, "").day, time.toordinal()
         time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
@@ -422,7 +417,7 @@ class Routine(ResidentBehavior):
             return self._with_absences(self.life.day(ordinal), ordinal)
         return self.lives.day(ordinal)[self.name]
 
-    def wait_for(self, room: int, clock: "Clock", begin_us: int, takes_us: int) -> int | None:
+    def wait_for(self, room: int, clock: Clock, begin_us: int, takes_us: int) -> int | None:
         """Return how long to wait before it may use a room [us]; None: not now.
 
         Members of a household take turns in private rooms: for short visits, each of them has a

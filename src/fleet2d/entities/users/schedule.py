@@ -2,20 +2,17 @@
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, format_time_of_day, weekdays_of
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
 from fleet2d.runtime.clock import DAY, midnight_of, midnights
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
 
 AWAY: tuple[()] = ()
 
@@ -95,7 +92,7 @@ class Schedule(Behavior):
         for number, day in enumerate(self.days):
             _entries(day, self.rest, number)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Resolve the week, and check that every place exists and can be reached."""
         self.week = self._week()
         self.plan: Plan | None = None  # the last one that it returned

@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.trust import check_trust
 from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
-from fleet2d.entities.behavior import Behavior, Situation
+from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.runtime.program import ExternalProgram
-
-if TYPE_CHECKING:
-    from fleet2d.entities.behavior import Actor
 
 MAX_ITEMS = 1000
 """The number of items of a plan."""
@@ -91,7 +88,7 @@ class ProcessBehavior(Behavior):
     settings: dict[str, Any] = Field(default={})
     timeout: PositiveDuration = timedelta(seconds=10)
 
-    def start(self, actor: "Actor") -> None:
+    def start(self, actor: Actor) -> None:
         """Check that the program may run; it starts at the first decision."""
         check_trust("process", [self.command])
         about = {
