@@ -12,7 +12,7 @@ ends after its duration, with the next order, or on release.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from typing import Protocol
 
@@ -83,7 +83,8 @@ class Arbiter:
         is_time = self.wake_step == now.step and not now.events
         if self.active is None or plan.is_over(now.step) or not (is_time or only_preempting):
             return False
-        if self._closed(self.active, now):
+        active = self.behaviors[self.active]
+        if active.when and not active.busy() and holds(active.when, now.time) is None:
             return False
         for number in range(self.active):
             if self.behaviors[number].preempts and self._may_decide(number, now):
@@ -171,12 +172,6 @@ class Arbiter:
         when = self.behaviors[number].when
         return holds(when, now.time) if when else None
 
-    def _closed(self, number: int, now: Situation) -> bool:
-        behavior = self.behaviors[number]
-        return (
-            bool(behavior.when) and holds(behavior.when, now.time) is None and not behavior.busy()
-        )
-
     def _activate(self, number: int | None, now: Situation, plan: Plan) -> None:
         """Make a behavior the active one; the plan of the one before may be resumed later."""
         last, self.active = self.active, number
@@ -214,42 +209,41 @@ class Order(Protocol):
         """Return what to do from now on; None: it is over."""
 
 
+@dataclass
 class StandStill:
     """Stand still, wherever it is.
 
-    Args:
+    Attributes:
         duration: For how long; None: for good.
         posture: Its posture; None: as before.
     """
 
-    def __init__(self, duration: timedelta | None = None, posture: Posture | None = None) -> None:
-        self._lasts_us = None if duration is None else micros(duration)
-        self._until_us: int | None = None
-        self._posture = posture
+    duration: timedelta | None = None
+    posture: Posture | None = None
+    _until: datetime | None = None
 
     def decide(self, now: Situation) -> Plan | None:
         """Stay for the rest of the time."""
         plan = now.plan()
-        if self._posture is not None:
-            plan.take(self._posture)
-        if self._lasts_us is None:
+        if self.posture is not None:
+            plan.take(self.posture)
+        if self.duration is None:
             return plan.stay()
-        if self._until_us is None:
-            self._until_us = plan.time_us + self._lasts_us
-        return None if plan.time_us >= self._until_us else plan.stay_until(self._until_us)
+        self._until = self._until or now.time + self.duration
+        return None if now.time >= self._until else plan.stay(until=self._until)
 
 
+@dataclass
 class Trip:
     """Go somewhere and stay there: the base of orders that move the body.
 
-    Args:
+    Attributes:
         duration: For how long it stays once it is there; None: for good.
     """
 
-    def __init__(self, duration: timedelta | None = None) -> None:
-        self._lasts_us = None if duration is None else micros(duration)
-        self._until_us: int | None = None
-        self._goal: tuple[int, int, int] | None = None  # where it stays: x, y, away
+    duration: timedelta | None = field(default=None, kw_only=True)
+    _until: datetime | None = field(default=None, init=False)
+    _goal: tuple[int, int, int] | None = field(default=None, init=False)  # x, y, away
 
     def decide(self, now: Situation) -> Plan | None:
         """Go there, unless it is there already, and stay for the rest of the time."""
@@ -257,59 +251,53 @@ class Trip:
         if self._goal != (plan.x, plan.y, plan.away):
             self.go(now, plan)
             self._goal = plan.x, plan.y, plan.away
-            self._until_us = None if self._lasts_us is None else plan.time_us + self._lasts_us
-        elif self._until_us is not None and plan.time_us >= self._until_us:
+            self._until = None if self.duration is None else plan.time + self.duration
+        elif self._until is not None and now.time >= self._until:
             return None
-        return plan.stay() if self._until_us is None else plan.stay_until(self._until_us)
+        return plan.stay(until=self._until)
 
     def go(self, now: Situation, plan: Plan) -> None:
         """Add the way there to the plan."""
         raise NotImplementedError
 
 
+@dataclass
 class GoTo(Trip):
     """Walk to a place and stay there; a body that is away comes home first.
 
-    Args:
+    Attributes:
         place: A room, furniture, or a point [m].
         heading: Where it faces on arrival [1/4096 turn]; None: as on its last leg.
-        duration: For how long it stays; None: for good.
     """
 
-    def __init__(
-        self,
-        place: RoomChoice | Point,
-        heading: int | None = None,
-        duration: timedelta | None = None,
-    ) -> None:
-        super().__init__(duration)
-        self._place, self._heading = place, heading
+    place: RoomChoice | Point
+    heading: int | None = None
 
     def go(self, now: Situation, plan: Plan) -> None:
         """Go to the place, and turn."""
-        plan.come_home().go_to(self._place, "send")
-        if self._heading is not None:
-            plan.turn_to(self._heading)
+        plan.come_home().go_to(self.place, "send")
+        if self.heading is not None:
+            plan.turn_to(self.heading)
 
 
+@dataclass
 class LeaveRoom:
     """Leave a room that it was told to keep out of, for the nearest one that is allowed.
 
-    Args:
+    Attributes:
         about: What it was told, for the events table.
     """
 
-    def __init__(self, about: str) -> None:
-        self._about, self._tried = about, False
+    about: str
+    _has_tried: bool = False
 
     def decide(self, now: Situation) -> Plan | None:
         """Go to the nearest room that it may be in and isn't shut in by bans; once."""
-        actor, room = now.actor, now.room
-        if self._tried or room is None or room.index not in actor.banned(now.step):
+        actor, room, banned = now.actor, now.room, now.actor.banned(now.step)
+        if self._has_tried or room is None or room.index not in banned:
             return None
-        self._tried = True
-        plan = now.plan().note("withdraws", self._about)
-        banned = actor.banned(now.step)
+        self._has_tried = True
+        plan = now.plan().note("withdraws", self.about)
         allowed = actor.space_without(banned).rooms_of(0)
         others = [r for r in actor.reachable_rooms() if r.index in allowed - banned]
         if others:
@@ -327,29 +315,26 @@ class GoOut(Trip):
         plan.leave_home()
 
 
+@dataclass
 class DoActivity(Trip):
     """Do an activity at its place.
 
-    Args:
+    Attributes:
         activity: The activity's name, for the events table.
         place: Where to do it; None: where the body's own behavior does it.
-        duration: For how long; None: for good.
     """
 
-    def __init__(
-        self, activity: str, place: RoomChoice | Point | None, duration: timedelta | None
-    ) -> None:
-        super().__init__(duration)
-        self._activity, self._place = activity, place
+    activity: str
+    place: RoomChoice | Point | None
 
     def go(self, now: Situation, plan: Plan) -> None:
         """Go to where it is done, and begin."""
-        if self._place is not None:
-            plan.come_home().go_to(self._place, "send")
+        if self.place is not None:
+            plan.come_home().go_to(self.place, "send")
         else:
-            capable = (b for b in now.actor.behaviors if self._activity in b.activities())
-            next(capable).perform(plan, self._activity)
-        plan.note("activity", self._activity)
+            capable = (b for b in now.actor.behaviors if self.activity in b.activities())
+            next(capable).perform(plan, self.activity)
+        plan.note("activity", self.activity)
 
 
 # Without a plan from any behavior, stand still this long, then ask again.
@@ -418,11 +403,12 @@ class DecidingActor(Actor):
         room = self.home.plan.room_of_point(self.state.x, self.state.y)
         return None if room is None else room.index
 
-    def _keep_to_bans(self, step: int) -> None:
-        """Let the present bans hold for its ways, from when it is outside of those rooms on."""
-        banned = self.banned(step)
-        if banned != self.kept_out and self._room_index() not in banned:
-            self.kept_out = banned
+    def _runs_down(self, now: Situation) -> bool:
+        """Update the charge of its battery, if it has one; return whether it is empty."""
+        if self.charge is None:
+            return False
+        self.charge.follow(self.motion, now.step * self.clock.step_us)
+        return self.charge.is_empty
 
     def receive(self, command: Command, step: int) -> bool:
         """Keep a command until a behavior takes it up; return whether one is asked at once.
@@ -455,12 +441,12 @@ class DecidingActor(Actor):
 
         If one of them returns another plan, `decide` takes that.
         """
-        if self.charge is not None:
-            self.charge.follow(self.motion, now.step * self.clock.step_us)
-            if self.charge.is_empty:
-                return False
-        if self.bans or self.kept_out:
-            self._keep_to_bans(now.step)
+        if self._runs_down(now):
+            return False
+        if self.bans or self.kept_out:  # they hold for its ways once it is outside of those rooms
+            banned = self.banned(now.step)
+            if banned != self.kept_out and self._room_index() not in banned:
+                self.kept_out = banned
         if self._chosen is not None or self.order is not None or self.is_stuck:
             return False
         if self.arbiter.active is None or self.plan.is_over(now.step):
@@ -480,10 +466,8 @@ class DecidingActor(Actor):
         """
         if self.is_stuck or self._chosen is not None or self.order is not None:
             return False
-        if self.charge is not None:
-            self.charge.follow(self.motion, now.step * self.clock.step_us)
-            if self.charge.is_empty:
-                return False
+        if self._runs_down(now):
+            return False
         waits = self._waiting is not None and not now.events
         if waits and self._waiting.continued(now) is not None:  # type: ignore[union-attr]
             return False
@@ -508,9 +492,7 @@ class DecidingActor(Actor):
             plan = now.plan()
             plan = plan.stay(PAUSE) if self.behaviors else plan.stay()
         if not isinstance(plan, Plan):
-            raise ComponentError(
-                f"{self.path}: decide() returned {plan!r}, expected a plan or None"
-            )
+            raise ComponentError(f"{self.path}: decide() returned {plan!r}, not a plan or None")
         if plan.began != (step, self.state):
             raise ComponentError(
                 f"{self.path}: decide() returned a plan that doesn't begin here and now: make one"
@@ -573,8 +555,7 @@ class DecidingActor(Actor):
     def follow_instead(self, plan: Plan, now: Situation) -> None:
         """Follow a plan from now on in place of the present one, which may have begun just now."""
         step, now_us = now.step, now.step * self.clock.step_us
-        if self.charge is not None:
-            self.charge.follow(self.motion, now_us)
+        self._runs_down(now)
         if self.plan.began[0] == step:  # its first rows happened, though it ends at once
             plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]
         self.plan, self.motion, self.planned_at = plan, plan.finish(), step

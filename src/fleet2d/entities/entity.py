@@ -17,12 +17,12 @@ from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
-from fleet2d.kernels import I64, SightingColumn
+from fleet2d.kernels import I64
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 
-SIGHTING = len(SightingColumn)
+SIGHTING = len(Column)
 
 
 class EvidenceSource(Component):
@@ -45,8 +45,8 @@ class EvidenceSource(Component):
 
     @property
     def relative(self) -> bool:
-        """Whether positions are in the robot's frame: x ahead, y to the left."""
-        return False
+        """Whether positions are in the robot's frame (`relative_to`): x ahead, y to the left."""
+        return getattr(self, "relative_to", "map") == "robot"
 
     def files(self) -> Sequence[Path]:
         """Return the files that it reads."""
@@ -77,11 +77,6 @@ class LiveDetections(EvidenceSource):
 
     relative_to: Literal["map", "robot"] = "map"
     source: PeerAddress | None = None
-
-    @property
-    def relative(self) -> bool:
-        """Whether positions are in the robot's frame."""
-        return self.relative_to == "robot"
 
     def start(self, actor: Actor, users: Sequence[str]) -> None:
         """Begin without detections."""

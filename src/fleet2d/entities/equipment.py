@@ -282,7 +282,7 @@ class Drift:
 
         def sample(purpose: str, noise: int) -> I64:
             """Return for each step the draw of its interval."""
-            draws = [self._draw(purpose, interval) for interval in intervals]
+            draws = [random_bell(self._keys[purpose], interval) for interval in intervals]
             return (np.array(draws, np.int64) * noise)[which]
 
         x, y = (
@@ -292,15 +292,10 @@ class Drift:
             for axis in "xy"
         )
         turn = _after(sample("turn", self._turn), elapsed_us)
-        off = Offsets(x // FINE, y // FINE, turn // FINE)
-        for moved in self._displacements:
-            is_moved = (steps >= moved.first) & (steps < moved.end)
-            off = Offsets(
-                off.x + is_moved * moved.x,
-                off.y + is_moved * moved.y,
-                off.turn + is_moved * moved.turn,
-            )
-        return off
+        off = np.array([x, y, turn]) // FINE
+        for first, end, *moved in self._displacements:
+            off[:, (steps >= first) & (steps < end)] += np.array([moved]).T
+        return Offsets(*off)
 
     def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:
         """Return where the robot takes points that it sees to be: x and y [lattice].
@@ -320,19 +315,13 @@ class Drift:
         """Return the poses that the robot believes it has."""
         lengths = np.diff(runs.step, append=runs.end)
         steps = np.arange(runs.first, runs.end, dtype=np.int64)
-        off = self.at(steps)
-        x, y, heading = (np.repeat(column, lengths) for column in (runs.x, runs.y, runs.heading))
-        return Window(
-            runs.first,
-            (x + off.x)[np.newaxis],
-            (y + off.y)[np.newaxis],
-            ((heading + off.turn) % TURN)[np.newaxis],
-            np.repeat(runs.away, lengths)[np.newaxis],
-            np.zeros((1, len(steps)), np.int8),
-        )
-
-    def _draw(self, purpose: str, interval: int) -> int:
-        return int(random_bell(self._keys[purpose], interval))
+        x, y, turn = self.at(steps)
+        x += np.repeat(runs.x, lengths)
+        y += np.repeat(runs.y, lengths)
+        heading = (np.repeat(runs.heading, lengths) + turn) % TURN
+        away, postures = np.repeat(runs.away, lengths), np.zeros(len(steps), np.int8)
+        rows = (column[np.newaxis] for column in (x, y, heading, away, postures))
+        return Window(runs.first, *rows)
 
     def _jumps_at(self, interval: int) -> int:
         """Return when the error jumps in an interval [us]; the interval's length if it doesn't."""

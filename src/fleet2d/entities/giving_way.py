@@ -95,7 +95,7 @@ def _rest(
         for n in interrupted.notes
         if n.time_us > interrupted_us
     ]
-    rest = np.stack([column[stop + 1 :].astype(np.int64) for column in track], axis=-1)
+    rest = _rows(track)[stop + 1 :]
     rest[:, 0] += later
     plan.follow(rest).endless = interrupted.endless
     plan.asks_us, plan.root = interrupted.asks_us, interrupted.root
@@ -164,8 +164,8 @@ class Surroundings(NamedTuple):
 
     def is_unchanged_since(self, other: "Surroundings") -> bool:
         """Return whether no person and no object has moved."""
-        same = np.array_equal(self.users, other.users)
-        return same and self.arrangement == other.arrangement
+        is_same = self.arrangement == other.arrangement
+        return is_same and np.array_equal(self.users, other.users)
 
 
 class WaitForPeople:

@@ -150,16 +150,12 @@ def matching_rooms(
     hint = f"; did you mean {close[0]!r}?" if close else ""
     if any(name.split(OWNER_SEPARATOR)[0] in (t.name, t.type) for name in names for t in objects):
         raise PlacementError(f"no place from which {requested} is used can be reached")
+    kinds = sorted({thing.type for thing in objects if thing.uses})
+    furniture = f" The furniture is: {', '.join(kinds)}." if kinds else ""
     raise PlacementError(
         f"there is no room {requested}{hint or '.'} The rooms are: {room_names}."
-        f"{_furniture(objects)} A list that ends in 'any' works in every home"
+        f"{furniture} A list that ends in 'any' works in every home"
     )
-
-
-def _furniture(objects: Sequence[PlacedObject]) -> str:
-    """Return a sentence that lists the kinds of furniture that are places, for messages."""
-    kinds = sorted({thing.type for thing in objects if thing.uses})
-    return f" The furniture is: {', '.join(kinds)}." if kinds else ""
 
 
 def furniture_of(body: "Body", place: RoomChoice | Point) -> PlacedObject | None:
@@ -173,12 +169,8 @@ def furniture_of(body: "Body", place: RoomChoice | Point) -> PlacedObject | None
     for name in place:
         if name == ANY or name in rooms:
             return None
-        pieces = [
-            thing
-            for thing in body.home.objects
-            if name in (thing.name, thing.type) and _gets_to(body, thing)
-        ]
-        if pieces:
+        named = (thing for thing in body.home.objects if name in (thing.name, thing.type))
+        if pieces := [thing for thing in named if _gets_to(body, thing)]:
             return Draws(body.stream(f"object of {name}"), 0).choice(pieces)
         if OWNER_SEPARATOR in str(name):
             owned = _owned(body, *str(name).split(OWNER_SEPARATOR, 1))
@@ -198,9 +190,7 @@ def _owned(body: "Body", kind: str, person: str) -> PlacedObject | None:
             f"there is no user {person!r} who could have a {kind}"
             f"{did_you_mean(person, body.people)}"
         )
-    owner = body.people[person]
-    if owner is None:  # not built yet; asked again when somebody goes there
-        owner = body
+    owner = body.people[person] or body  # not built yet; asked again when somebody goes there
     return owner.own_furniture(kind) or furniture_of(owner, (kind,))
 
 
@@ -226,18 +216,16 @@ def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
     Raises:
         PlacementError: There is no such place, or it can't be reached.
     """
-    if is_point(place):
-        return body.point(place)  # type: ignore[arg-type]
-    thing = furniture_of(body, place)
-    if thing is not None:
-        return body.place_at(thing, 0).approach
-    return body.middle(body.rooms(place)[0])  # type: ignore[arg-type]
+    return stops_at(body, place)[0]
 
 
 def stops_at(body: "Body", place: RoomChoice | Point) -> list[tuple[int, int]]:
     """Return the lattice points at which a body stops for a place: one per room of its kind."""
-    if is_point(place) or furniture_of(body, place) is not None:
-        return [stop_at(body, place)]
+    if is_point(place):
+        return [body.point(place)]  # type: ignore[arg-type]
+    thing = furniture_of(body, place)
+    if thing is not None:
+        return [body.place_at(thing, 0).approach]
     return [body.middle(room) for room in body.rooms(place)]  # type: ignore[arg-type]
 
 
@@ -282,9 +270,8 @@ def available_places(
         raise PlacementError(f"{key}: this home has none of these places: {last_error}") from None
     if missing:
         names = ", ".join(missing)
-        body.notes.append(
-            f"{key}: left out, because this home has none that can be reached: {names}"
-        )
+        note = f"{key}: left out, because this home has none that can be reached: {names}"
+        body.notes.append(note)
     return available
 
 
@@ -320,8 +307,8 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
     if is_point(place):
         return False
-    names = {room.name for room in body.home.rooms} | {t.name for t in body.home.objects}
-    types = {room.type for room in body.home.rooms} | {t.type for t in body.home.objects}
+    things = *body.home.rooms, *body.home.objects
+    names, types = {thing.name for thing in things}, {thing.type for thing in things}
     return all(
         name not in names
         and not str(name)[-1:].isdigit()  # bathroom_7 is a single bathroom

@@ -155,25 +155,18 @@ class Plan:
 
     def _walk(self, route: I64) -> None:
         body = self._body
-        if body.slows:
-            self.follow(self._slowed(route))
+        walk = self.time_us, self.heading, route, body.speed, body.turn_rate
+        if body.drive is None and not body.slows:
+            self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(*walk)
             return
-        if body.drive is not None:
-            self.follow(body.breakpoints(route, self.time_us, self.heading))
-            return
-        self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(
-            self.time_us, self.heading, route, body.speed, body.turn_rate
-        )
-
-    def _slowed(self, route: I64) -> I64:
-        """Return the breakpoints on a route that may lead through areas that slow robots down."""
-        body, legs = self._body, Legs()
+        legs = Legs()
         legs.mark(self.time_us, self.x, self.y, self.heading, self.away)
-        if body.drive is not None:
-            legs.add(body.breakpoints(route, self.time_us, self.heading))
+        if body.drive is None:
+            legs.walk(*walk)
         else:
-            legs.walk(self.time_us, self.heading, route, body.speed, body.turn_rate)
-        return slowed(legs.rows(), body.slows)[1:]
+            legs.add(body.breakpoints(route, self.time_us, self.heading))
+        rows = legs.rows()
+        self.follow((slowed(rows, body.slows) if body.slows else rows)[1:])
 
     def use(self, thing: PlacedObject | str, place: int = 0) -> Self:
         """Walk to an object and use it, with the heading and the posture of one of its places.
@@ -448,10 +441,9 @@ _FIVE = Field(min_length=5, max_length=5)
 def data_of(plan: Plan) -> dict[str, Any]:
     """Return a plan as numbers and texts, from which `plan_of` makes the same plan again."""
     motion = plan.finish()
-    walk: list[Any] | None = list(motion.rule) if isinstance(motion, RandomWalk) else None
     return {
         "rows": plan.legs.rows().tolist(),
-        "walk": None if walk is None else [int(number) for number in walk],
+        "walk": [int(n) for n in motion.rule] if isinstance(motion, RandomWalk) else None,
         "notes": [list(note) for note in plan.notes],
         "interrupts": sorted(plan.interrupts),
         "asks_us": plan.asks_us,

@@ -68,11 +68,6 @@ class ReplayedDetections(EvidenceSource):
     day: Day = 0
     reach: Length = Field(default=1.0, ge=0)
 
-    @property
-    def relative(self) -> bool:
-        """Whether positions are in the robot's frame."""
-        return self.relative_to == "robot"
-
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
         return files_of(self.path)

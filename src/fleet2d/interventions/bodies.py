@@ -128,7 +128,7 @@ class Send(BodyIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        order = GoTo(self.to, heading_of(self.heading_deg), self.duration)
+        order = GoTo(self.to, heading_of(self.heading_deg), duration=self.duration)
         self.actor(world).follow_order(order, world.step)
 
 
@@ -296,7 +296,7 @@ class Away(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        self.actor(world).follow_order(GoOut(self.duration), world.step)
+        self.actor(world).follow_order(GoOut(duration=self.duration), world.step)
 
 
 @register("intervention", "call_home")
@@ -317,7 +317,7 @@ class CallHome(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        self.actor(world).follow_order(GoTo(self.to, None, self.duration), world.step)
+        self.actor(world).follow_order(GoTo(self.to, duration=self.duration), world.step)
 
 
 @register("intervention", "guest")
@@ -371,4 +371,6 @@ class StartActivity(PersonIntervention):
 
     def begin(self, world: World) -> None:
         """Give the order."""
-        self.actor(world).follow_order(DoActivity(self.what, self.to, self.duration), world.step)
+        self.actor(world).follow_order(
+            DoActivity(self.what, self.to, duration=self.duration), world.step
+        )
