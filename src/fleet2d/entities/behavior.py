@@ -90,23 +90,21 @@ def _parse_hours(value: object) -> tuple[HoursSpan, ...]:
     return (parse_span(value),)
 
 
-_AS_TEXTS = PlainSerializer(lambda spans: [span.text for span in spans])
-_HOURS_FORMS: dict[str, Any] = {
-    "x-quantity": "hours",
-    "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
-}
+def _hours_schema(description: str, *examples: str | list[str]) -> WithJsonSchema:
+    forms = [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]
+    head = {"description": description, "x-quantity": "hours", "anyOf": forms}
+    return WithJsonSchema({**head, "examples": list(examples)})
 
+
+_AS_TEXTS = PlainSerializer(lambda spans: [span.text for span in spans])
 Hours = Annotated[
     tuple[HoursSpan, ...],
     BeforeValidator(_parse_hours),
     _AS_TEXTS,
-    WithJsonSchema(
-        {
-            "description": "hours of the week, like '08:00-22:00' or 'weekdays 9:00-17:00', or a"
-            " list of them",
-            **_HOURS_FORMS,
-            "examples": ["08:00-22:00", ["weekdays 9:00-17:00", "weekend 10:00-20:00"]],
-        }
+    _hours_schema(
+        "hours of the week, like '08:00-22:00' or 'weekdays 9:00-17:00', or a list of them",
+        "08:00-22:00",
+        ["weekdays 9:00-17:00", "weekend 10:00-20:00"],
     ),
 ]
 """Hours of the week, in one or several spans; what an empty list means is up to the field."""
@@ -128,13 +126,10 @@ LightHours = Annotated[
     tuple[HoursSpan, ...],
     BeforeValidator(_parse_light_hours),
     _AS_TEXTS,
-    WithJsonSchema(
-        {
-            "description": "hours of the week, like '17:00-08:00', a list of them, or 'dark', from"
-            " sunset to sunrise",
-            **_HOURS_FORMS,
-            "examples": ["17:00-08:00", "dark"],
-        }
+    _hours_schema(
+        "hours of the week, like '17:00-08:00', a list of them, or 'dark', from sunset to sunrise",
+        "17:00-08:00",
+        "dark",
     ),
 ]
 """Hours of the week, or those in which it is dark."""
@@ -142,8 +137,7 @@ LightHours = Annotated[
 
 def holds(hours: "Sequence[HoursSpan | Sun]", time: datetime) -> datetime | None:
     """Return the end of the hours that a moment lies in; None if it lies outside."""
-    ends = [end for span in hours if (end := span.end_at(time))]
-    return max(ends, default=None)
+    return max((end for span in hours if (end := span.end_at(time))), default=None)
 
 
 class Attention(NamedTuple):
@@ -180,9 +174,10 @@ class Command(NamedTuple):
     @property
     def text(self) -> str:
         """The command for the table of events."""
-        names = self.place if self.place and isinstance(self.place[0], str) else None
-        point = [f"({self.place[0]:g}, {self.place[1]:g})"] if self.place and not names else []
-        return " ".join([self.do, *filter(None, [self.target]), *(names or point)])
+        place: Sequence[object] = self.place
+        if self.place and is_point(self.place):
+            place = [f"({self.place[0]:g}, {self.place[1]:g})"]
+        return " ".join(map(str, filter(None, [self.do, self.target, *place])))
 
 
 class SightEvent(NamedTuple):
@@ -279,11 +274,10 @@ class Situation:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
         actor, lattice = self.actor, self.home.plan.lattice
         at_x, at_y = lattice.point_at((x, y))
-        point = (at_x, at_y)
         if actor.space.part_at(at_x, at_y) != actor.part:
-            point = actor.space.nearest(at_x, at_y, actor.part) or (actor.state.x, actor.state.y)
-        near_x, near_y = lattice.to_metres(point).tolist()
-        return near_x, near_y
+            near = actor.space.nearest(at_x, at_y, actor.part)
+            at_x, at_y = near or (actor.state.x, actor.state.y)
+        return lattice.xy_of(at_x, at_y)
 
     def random(self, purpose: str) -> Draws:
         """Return the random draws of this body at this step, for one purpose of the behavior."""

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import Settings, components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import AngleDeg, Length, Speed, TurnRateDeg
@@ -41,9 +41,7 @@ from fleet2d.kernels import (
     PoseBlock,
     Poses,
     Timelines,
-    WalkRule,
     Window,
-    due_rows,
 )
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -84,7 +82,7 @@ class RandomWalk:
 
     walls: Mesh
     space: Mesh
-    rule: WalkRule
+    rule: kernels.WalkRule
 
 
 Motion = Track | RandomWalk
@@ -244,8 +242,10 @@ class Bodies:
             window = self.window(first, end)
             rows = [window.dense(row, first, end) for row in range(len(self))]
             columns = (np.array(column) for column in zip(*rows, strict=True))
-            block = PoseBlock(*columns) if rows else PoseBlock(*_none(end - first))
-            self._block = first, end, block
+            if not rows:
+                types = np.int64, np.int64, np.int64, np.uint8, np.int8
+                columns = (np.zeros((0, end - first), t) for t in types)
+            self._block = first, end, PoseBlock(*columns)
         return self._block[2]
 
     def next_decision(self) -> int:
@@ -255,16 +255,11 @@ class Bodies:
 
     def due(self, step: int) -> Sequence[int]:
         """Return the rows of the bodies that decide at a step."""
-        return due_rows(self.ask_at, step)
+        return kernels.due_rows(self.ask_at, step)
 
     def forget(self, before: int) -> None:
         """Drop the poses at steps earlier than `before`."""
         self._timelines.forget(before)
-
-
-def _none(steps: int) -> list[NDArray[Any]]:
-    """Return the columns of a block without bodies."""
-    return [np.zeros((0, steps), t) for t in (np.int64, np.int64, np.int64, np.uint8, np.int8)]
 
 
 class PlaceAt(NamedTuple):
@@ -533,7 +528,10 @@ class Body:
         name, rooms = self._match(target)  # type: ignore[arg-type]
         habit = Draws(self.stream(f"room of {name}"), 0)
         room = (draws if name == ANY else habit).choice(rooms)
-        cells = self.space.cells(room.index, self.part)
+        return self._spot_of(self.space.cells(room.index, self.part), draws)
+
+    def _spot_of(self, cells: I64, draws: Draws) -> tuple[int, int]:
+        """Return the centre of one of some cells (row, column), drawn at random."""
         row, column = cells[draws.below(len(cells))].tolist()
         return self.home.plan.lattice.cell_centre(row, column)
 
@@ -546,21 +544,14 @@ class Body:
         target = parse_place(place)
         if not is_point(target):
             rooms = matching_rooms(target, self.home.rooms, self.home.rooms)[1]  # type: ignore[arg-type]
-            draws = Draws(self.stream(purpose), time_us)
             for part in range(self.space.parts):
                 cells = self.space.cells(rooms[0].index, part)
                 if len(cells):
-                    row, column = cells[draws.below(len(cells))].tolist()
-                    return self.home.plan.lattice.cell_centre(row, column)
+                    return self._spot_of(cells, Draws(self.stream(purpose), time_us))
             raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
         x, y = self.home.plan.lattice.point_at(target)  # type: ignore[arg-type]
         if self.space.part_at(x, y) < 0:
-            near = self.space.nearest(x, y)
-            free = None if near is None else self._shown(near)
-            raise PlacementError(
-                f"{self.path}: the point {list(target)} is in a wall or nearer to one than its"
-                f" radius of {self.entity.radius:g} m; the nearest free point is {free}"
-            )
+            raise self._is_not_free(target, self.space.nearest(x, y))  # type: ignore[arg-type]
         return x, y
 
     def middle(self, room: Room) -> tuple[int, int]:
@@ -589,24 +580,26 @@ class Body:
         part = self.space.part_at(x, y)
         if part == self.part:
             return x, y
-        near = self.space.nearest(x, y, self.part)
-        free = None if near is None else self._shown(near)
-        why = f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
+        why = ""
         if part >= 0:
             why = "can't be reached from where it starts"
         elif self.home.space(self.entity.radius).part_at(x, y) >= 0:
             why = "is where the costmap lets no route pass"
-        raise PlacementError(
+        raise self._is_not_free(xy, self.space.nearest(x, y, self.part), why)
+
+    def _is_not_free(
+        self, xy: Point, near: tuple[int, int] | None, why: str = ""
+    ) -> PlacementError:
+        """Return the error about a point; it names the nearest free one, in few decimals."""
+        why = why or f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
+        lattice, free = self.home.plan.lattice, None
+        if near is not None:
+            free = lattice.to_metres(near).round(2).tolist()
+            if self.space.part_at(*lattice.point_at(free)) != self.part:
+                free = lattice.to_metres(near).round(4).tolist()
+        return PlacementError(
             f"{self.path}: the point {list(xy)} {why}; the nearest free point is {free}"
         )
-
-    def _shown(self, point: tuple[int, int]) -> list[float]:
-        """Return a free lattice point [m], with two decimals if it is still free then, else 4."""
-        lattice = self.home.plan.lattice
-        short: list[float] = lattice.to_metres(point).round(2).tolist()
-        if self.space.part_at(*lattice.point_at(short)) == self.part:
-            return short
-        return lattice.to_metres(point).round(4).tolist()
 
     def _has_any(self, names: RoomChoice | Point) -> bool:
         """Return whether the home has such furniture, or a reachable room of that name or kind."""

@@ -7,28 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import AngleDeg, Length, PositiveDuration, Share, micros
 from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.kernels import (
-    BELL_STD,
-    F64,
-    I64,
-    TURN,
-    BatteryState,
-    Breakpoints,
-    Window,
-    charge_at,
-    charge_falls_to,
-    charge_pieces,
-    random_bell,
-    random_below,
-    random_uniform,
-    turned,
-)
+from fleet2d.kernels import BELL_STD, F64, I64, TURN, BatteryState, Breakpoints, Window
 from fleet2d.runtime.determinism import stream_key
 
 # The table of events gets a row `battery` when the charge has changed by this much.
@@ -117,16 +103,16 @@ class Charge:
 
     def follow(self, motion: Motion, until_us: int) -> None:
         """Update the charge: a motion was followed from the last decision to a moment."""
-        self.level = charge_at(_track(motion), self._state, until_us)
+        self.level = kernels.charge_at(_track(motion), self._state, until_us)
         self._since_us = until_us
 
     def course(self, motion: Motion) -> ChargeCurve:
         """Return the charge from the last decision on, if a motion is followed."""
-        return ChargeCurve(*charge_pieces(_track(motion), self._state))
+        return ChargeCurve(*kernels.charge_pieces(_track(motion), self._state))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
         """Return when the charge falls to a level [us], if a motion is followed; None: never."""
-        return charge_falls_to(_track(motion), self._state, level)
+        return kernels.charge_falls_to(_track(motion), self._state, level)
 
     def time_to_charge(self, level: float) -> int:
         """Return how long it takes to charge to a level [us]."""
@@ -282,7 +268,7 @@ class Drift:
 
         def sample(purpose: str, noise: int) -> I64:
             """Return for each step the draw of its interval."""
-            draws = [random_bell(self._keys[purpose], interval) for interval in intervals]
+            draws = [kernels.random_bell(self._keys[purpose], interval) for interval in intervals]
             return (np.array(draws, np.int64) * noise)[which]
 
         x, y = (
@@ -308,7 +294,7 @@ class Drift:
             steps: The steps, int64 (n,).
         """
         off = self.at(steps)
-        dx, dy = turned(x - robot_x, y - robot_y, 2 * off.turn)
+        dx, dy = kernels.turned(x - robot_x, y - robot_y, 2 * off.turn)
         return robot_x + off.x + dx, robot_y + off.y + dy
 
     def believed(self, runs: Window) -> Window:
@@ -325,9 +311,9 @@ class Drift:
 
     def _jumps_at(self, interval: int) -> int:
         """Return when the error jumps in an interval [us]; the interval's length if it doesn't."""
-        if random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
+        if kernels.random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
             return self._every_us
-        return int(random_below(self._keys["when"], interval, self._every_us))
+        return int(kernels.random_below(self._keys["when"], interval, self._every_us))
 
 
 def _noise(deviation: float) -> int:

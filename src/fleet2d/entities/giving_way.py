@@ -88,18 +88,8 @@ def _rest(
     except NoWayError:
         return None
     plan.turn_to(heading_at(track, stop, goes_on_us))
-    later = plan.time_us - goes_on_us
-    # Rows that were planned for the way there are written on arrival.
-    plan.notes += [
-        Note(max(n.time_us, goes_on_us) + later, n.event, n.detail)
-        for n in interrupted.notes
-        if n.time_us > interrupted_us
-    ]
     rest = _rows(track)[stop + 1 :]
-    rest[:, 0] += later
-    plan.follow(rest).endless = interrupted.endless
-    plan.asks_us, plan.root = interrupted.asks_us, interrupted.root
-    return plan
+    return _continue(plan, interrupted, interrupted_us, goes_on_us, rest, catches_up=False)
 
 
 def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None:
@@ -293,8 +283,7 @@ class RoutesAround:
         xs, ys = body.home.plan.lattice.centre_axes()
         self.cost = np.zeros(body.space.part_of_cell.shape, np.int32)
         for x, y, reach in people.tolist():
-            near = (xs[None, :] - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach
-            self.cost[near] = CLOSED
+            self.cost[(xs - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach] = CLOSED
 
     def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
@@ -316,7 +305,7 @@ def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = (
     plan.notes += notes
     if isinstance(motion, Track):
         first = int(np.searchsorted(motion.breakpoints.time, begin_us, side="right"))
-        _continue(plan, interrupted, begin_us, begin_us, _rows(motion.breakpoints)[first:])
+        return _continue(plan, interrupted, begin_us, begin_us, _rows(motion.breakpoints)[first:])
     return plan
 
 
@@ -349,7 +338,6 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         if beside is None:
             return None
         goal = beside
-        rest = rest.copy()
         rest[:, 1:3] = goal
     plan = now.plan()
     route = detour((plan.x, plan.y), goal)
@@ -357,16 +345,22 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         return None
     since_us = max(int(rows[stop, 0]), begin_us)
     plan.go_to_point(*goal, route=route)
-    plan.turn_to(heading_at(motion.breakpoints, stop, since_us))
-    _continue(plan.stay_until(since_us), interrupted, begin_us, since_us, rest)
-    return plan
+    plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
+    return _continue(plan, interrupted, begin_us, since_us, rest)
 
 
-def _continue(plan: Plan, interrupted: Plan, begin_us: int, since_us: int, rest: I64) -> None:
-    """Continue a plan with the part of another one after a moment, delayed.
+def _continue(
+    plan: Plan,
+    interrupted: Plan,
+    begin_us: int,
+    since_us: int,
+    rest: I64,
+    *,
+    catches_up: bool = True,
+) -> Plan:
+    """Continue a plan with the part of another one after a moment, delayed, and return it.
 
-    The first rest that is long enough is shortened by the delay, so that the body is on time again
-    after it.
+    Rows for the events that were planned before that moment are written at it.
 
     Args:
         plan: A plan that ends where the other one is at that moment; the delay is from that moment
@@ -374,32 +368,31 @@ def _continue(plan: Plan, interrupted: Plan, begin_us: int, since_us: int, rest:
         interrupted: The other plan.
         begin_us: The moment up to which the other plan was followed; its later rows are copied.
         since_us: The moment.
-        rest: The breakpoints of the other plan after the moment, int64 (n, 5).
+        rest: The breakpoints of the other plan after the moment, int64 (n, 5); they are delayed.
+        catches_up: Whether the first rest that is long enough is shortened by the delay, so that
+            the body is on time again after it.
     """
     later = plan.time_us - since_us
     row = np.array([[since_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
     rows = np.concatenate([row, rest])
     rests = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1) & (np.diff(rows[:, 0]) >= later)
-    edge = int(rows[np.argmax(rests), 0]) if rests.any() else int(rows[-1, 0])
+    shortens = catches_up and rests.any()
+    edge = int(rows[np.argmax(rests) if shortens else -1, 0])
 
     def delayed(time_us: int) -> int:
         return time_us + later if time_us <= edge else max(time_us, edge + later)
 
-    times, shifted = rest[:, 0], rest.copy()
-    shifted[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
-    plan.notes += [
-        Note(delayed(max(note.time_us, since_us)), note.event, note.detail)
-        for note in interrupted.notes
-        if note.time_us > begin_us
-    ]
-    plan.postures += [
-        (delayed(max(time_us, since_us)), code)
-        for time_us, code in interrupted.postures
-        if time_us > begin_us
-    ]
-    plan.posture = interrupted.posture
-    plan.follow(shifted).endless = interrupted.endless
+    times = rest[:, 0]
+    rest[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
+    notes = (note for note in interrupted.notes if note.time_us > begin_us)
+    plan.notes += [Note(delayed(max(at, since_us)), event, detail) for at, event, detail in notes]
+    postures = ((at, code) for at, code in interrupted.postures if at > begin_us)
+    plan.postures += [(delayed(max(at, since_us)), code) for at, code in postures]
+    if interrupted.postures:
+        plan.posture = interrupted.posture
+    plan.follow(rest).endless = interrupted.endless
     plan.asks_us, plan.root = interrupted.asks_us, interrupted.root
+    return plan
 
 
 def _rows(track: Breakpoints) -> I64:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from fleet2d import kernels
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import did_you_mean, problem, refusal
 from fleet2d.configuration.units import MAX_DURATION, micros
@@ -17,17 +18,7 @@ from fleet2d.errors import ComponentError, NoWayError, errors_as
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
-from fleet2d.kernels import (
-    I8,
-    I64,
-    SUB,
-    TURN,
-    Breakpoints,
-    Legs,
-    WalkRule,
-    heading_of,
-    turn_between,
-)
+from fleet2d.kernels import I8, I64, SUB, TURN, Breakpoints, Legs, WalkRule
 from fleet2d.runtime.events import KINDS
 
 
@@ -262,12 +253,12 @@ class Plan:
 
     def turn_to(self, heading: int) -> Self:
         """Turn on the spot to a heading [1/4096 turn], the shorter way."""
-        self._turn(turn_between(self.heading, heading))
+        self._turn(kernels.turn_between(self.heading, heading))
         return self
 
     def face(self, x: int, y: int) -> Self:
         """Turn on the spot towards a lattice point."""
-        return self.turn_to(heading_of(x - self.x, y - self.y))
+        return self.turn_to(kernels.heading_of(x - self.x, y - self.y))
 
     def _turn(self, headings: int) -> None:
         self._check_goes_on()

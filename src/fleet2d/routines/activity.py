@@ -1,5 +1,6 @@
 """Activities: what people do, where, for how long, and how much they move meanwhile."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import cache
@@ -13,15 +14,8 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
-from fleet2d.routines.distributions import (
-    Distribution,
-    empirical,
-    exponential,
-    gamma,
-    lognormal,
-    normal,
-    uniform,
-)
+from fleet2d.routines import distributions
+from fleet2d.routines.distributions import Distribution
 
 FORMS: dict[str, dict[str, Any]] = {
     "text": {"type": "string"},
@@ -116,14 +110,14 @@ class DurationDistribution(Settings):
         low = None if self.at_least is None else seconds(self.at_least)
         high = None if self.at_most is None else seconds(self.at_most)
         if self.law == "fixed" or (std == 0 and self.law != "measured" and self.law != "uniform"):
-            return uniform(mean, mean)
+            return distributions.uniform(mean, mean)
         if self.law == "uniform":
-            return uniform(low or 0, high or 0)
+            return distributions.uniform(low or 0, high or 0)
         if self.law == "measured":
-            return empirical([seconds(d) for d in self.quantiles]).within(low, high)
+            return distributions.empirical([seconds(d) for d in self.quantiles]).within(low, high)
         if self.law == "exponential":
-            return exponential(mean).within(low, high)
-        make = {"lognormal": lognormal, "gamma": gamma, "normal": normal}[self.law]
+            return distributions.exponential(mean).within(low, high)
+        make: Callable[[float, float], Distribution] = getattr(distributions, self.law)
         return make(mean, std).within(low, high)
 
 

@@ -13,6 +13,7 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Share, TimeOfDay
 from fleet2d.kernels import CHANCE_BITS, QUANTILE_BITS, Interruptions
+from fleet2d.routines import planner
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
@@ -29,7 +30,6 @@ from fleet2d.routines.planner import (
     SLEEP,
     Episode,
     PrivateRooms,
-    new_episode,
 )
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
@@ -278,7 +278,7 @@ def interrupt(
         use = private.use
         rooms = [private.of(name) if name in rules.exclusive else () for name in rules.names]
     return [
-        new_episode((rules.names[activity], begin, end, "", room, role))
+        planner.new_episode((rules.names[activity], begin, end, "", room, role))
         if planned < 0
         else _part(day[planned], begin, end, role)
         for planned, activity, begin, end, role, room in rules.core.interrupt(
@@ -292,7 +292,7 @@ def _part(episode: Episode, begin: int, end: int, role: int) -> Episode:
     if begin == episode.begin and end == episode.end:
         return episode
     role = episode.role if role == PLANNED else role
-    return new_episode((episode.activity, begin, end, episode.task, episode.room, role))
+    return planner.new_episode((episode.activity, begin, end, episode.task, episode.room, role))
 
 
 def without_interruptions(day: Sequence[Episode]) -> list[Episode]:

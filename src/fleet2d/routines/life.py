@@ -12,6 +12,7 @@ import numpy as np
 
 from fleet2d.configuration.units import weekdays_of
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S, RoomUse
+from fleet2d.routines import planner
 from fleet2d.routines.activity import find_activity, seconds
 from fleet2d.routines.distributions import exponential, uniform
 from fleet2d.routines.household import SECOND, Household, Period, RandomVisits, with_absences
@@ -19,8 +20,6 @@ from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.persona import Persona, YearEvent, holds_on
 from fleet2d.routines.planner import (
     INTERRUPTS,
-    MILLION,
-    NEVER,
     PLANNED,
     RESUMES,
     SLEEP,
@@ -28,11 +27,6 @@ from fleet2d.routines.planner import (
     Episode,
     Job,
     PrivateRooms,
-    draw_recorded,
-    draw_source,
-    in_free_rooms,
-    plan_day,
-    with_jobs,
 )
 from fleet2d.routines.templates import starts
 from fleet2d.runtime.clock import DAY_S
@@ -244,7 +238,7 @@ class Life:
         """Return when a day begins [s since its midnight]."""
         plan, draws = self.template(ordinal), Draws(self._wake, ordinal)
         if plan.recorded is not None:
-            return plan.recorded.days[draw_source(plan.recorded, draws)].begins[0]
+            return plan.recorded.days[planner.draw_source(plan.recorded, draws)].begins[0]
         return plan.wake.draw(draws)
 
     def draws(self, ordinal: int) -> Draws:
@@ -278,11 +272,11 @@ class Life:
         """Draw a day from a plan, without interruptions."""
         next_wake = self.wake(ordinal + 1) + DAY_S
         if plan.recorded is not None:
-            first = draw_source(plan.recorded, Draws(self._wake, ordinal))
-            day = draw_recorded(plan.recorded, first, self.draws(ordinal), next_wake)
+            first = planner.draw_source(plan.recorded, Draws(self._wake, ordinal))
+            day = planner.draw_recorded(plan.recorded, first, self.draws(ordinal), next_wake)
             exclusive = self.persona.interruptions.exclusive
-            return in_free_rooms(with_jobs(day, plan.jobs), exclusive, private)
-        return plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, private)
+            return planner.in_free_rooms(planner.with_jobs(day, plan.jobs), exclusive, private)
+        return planner.plan_day(plan, self.draws(ordinal), self.wake(ordinal), next_wake, private)
 
 
 class Lives:
@@ -459,7 +453,7 @@ class Lives:
                 if not comes_home or absence.end - absence.begin < LONG_GONE_S:
                     continue
                 for name in result:
-                    comes = draws.below(MILLION) < self.household.welcome * MILLION
+                    comes = draws.below(planner.MILLION) < self.household.welcome * planner.MILLION
                     if name == member or comes:
                         result[name] = self._with_welcome(name, result[name], return_home.begin)
         return result
@@ -488,13 +482,13 @@ class Lives:
             if day.weekday() not in weekdays_of(joint.on) and not holds_on(joint.dates, day):
                 continue
             draws = Draws(stream_key(self._seed, self._path, f"together {name}"), ordinal)
-            if draws.below(MILLION) >= joint.probability * MILLION:
+            if draws.below(planner.MILLION) >= joint.probability * planner.MILLION:
                 continue
             activity = joint.activity or name
             begin = starts(joint, 0).draw(draws)
             takes = (joint.takes or find_activity(activity, {}).takes).table().draw(draws)
             at, duration = uniform(begin, begin), uniform(takes, takes)
-            job = Job(name, activity, at, duration, until=NEVER, needed=False)
+            job = Job(name, activity, at, duration, until=planner.NEVER, needed=False)
             jobs.append((job, joint.who))
         return jobs
 

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import OneOf, Settings
 from fleet2d.configuration.problems import check_known, problem, problem_at
 from fleet2d.configuration.units import (
@@ -26,23 +27,14 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import (
     BELL_STD,
-    BINS,
-    DOUBLINGS,
     HALF_TURN,
     I64,
-    MAX_GHOSTS,
-    MINUTES,
     ONE,
-    TABLE,
     TURN,
     UNIT,
     ErrorTables,
-    GhostDraw,
     Lenses,
     TablePart,
-    UserDraw,
-    cosine,
-    sine,
 )
 from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
@@ -104,10 +96,9 @@ class Lens(NamedTuple):
         """Return the points of a body of `radius` [lattice units] to look at: its centre first."""
         steps = [round(i * TURN / self.points) for i in range(self.points)]
         along, half = round(radius), UNIT // 2
-        circle = [
-            ((along * cosine(h) + half) // UNIT, (along * sine(h) + half) // UNIT) for h in steps
-        ]
-        return [(0, 0), *((int(x), int(y)) for x, y in circle)]
+        units = ((kernels.cosine(step), kernels.sine(step)) for step in steps)
+        circle = [(int(along * x + half) // UNIT, int(along * y + half) // UNIT) for x, y in units]
+        return [(0, 0), *circle]
 
 
 class Camera(Settings):
@@ -283,21 +274,21 @@ def error_tables(
     # If no camera errs, no table is ever read.
     errs = any(perception is not None for perception in perceptions)
     tables = ErrorTables(
-        table=np.zeros((cameras, TABLE if errs else 1), np.int64),
+        table=np.zeros((cameras, kernels.TABLE if errs else 1), np.int64),
         confusion=np.zeros((cameras, users, users), np.int64),
         has_ghosts=np.zeros(cameras, np.int64),
-        ghosts=np.full((cameras, MAX_GHOSTS), ONE, np.int64),
+        ghosts=np.full((cameras, kernels.MAX_GHOSTS), ONE, np.int64),
         source=np.full((cameras, sources), ONE, np.int64),
         spot=np.zeros((cameras, sources, 3), np.int64),
         looks_like=np.zeros((cameras, users + 1), np.int64),
-        keys=np.zeros((cameras, users, len(UserDraw)), np.uint64),
-        ghost_keys=np.zeros((cameras, len(GhostDraw)), np.uint64),
+        keys=np.zeros((cameras, users, len(kernels.UserDraw)), np.uint64),
+        ghost_keys=np.zeros((cameras, len(kernels.GhostDraw)), np.uint64),
     )
     for c, (lens, perception) in enumerate(zip(lenses, perceptions, strict=True)):
         if perception is not None:
             reach = lens.far + max((round(radius) + 2 for radius in context.radii), default=0)
             table = tables.table[c]
-            table[TablePart.SHIFT] = max(0, reach.bit_length() - (BINS - 1).bit_length())
+            table[TablePart.SHIFT] = max(0, reach.bit_length() - (kernels.BINS - 1).bit_length())
             _fill_detection(table, lens, perception.detection, context)
             _fill_identity(table, tables.confusion[c], perception.identity, context)
             _fill_attributes(table, perception.attributes, context)
@@ -308,7 +299,7 @@ def error_tables(
 def _distances(table: I64, context: TableContext) -> list[float]:
     """Return the distance at the middle of each entry of the tables by distance [m]."""
     width = 1 << int(table[TablePart.SHIFT])
-    return [(i + 0.5) * width / context.lattice.units_per_m for i in range(BINS)]
+    return [(i + 0.5) * width / context.lattice.units_per_m for i in range(kernels.BINS)]
 
 
 def _put(table: I64, at: int, values: Sequence[int] | I64) -> None:
@@ -328,11 +319,11 @@ def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableCont
     count = lens.points + 1
     shares = [i / count for i in range(count + 1)]
     _put(table, TablePart.SHOWN, model.visible_share.chances(shares))
-    hours = [(minute + 0.5) / 60 for minute in range(MINUTES)]
+    hours = [(minute + 0.5) / 60 for minute in range(kernels.MINUTES)]
     _put(table, TablePart.LIGHT, model.light.around_the_clock().chances(hours))
     if model.memory:
         steps = Decimal(context.step_us) / micros(model.memory)
-        _put(table, TablePart.STAY, [chance(decay(steps * 2**i)) for i in range(DOUBLINGS)])
+        _put(table, TablePart.STAY, [chance(decay(steps * 2**i)) for i in range(kernels.DOUBLINGS)])
 
 
 def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableContext) -> None:
@@ -402,7 +393,7 @@ def _fill_false_positives(
         )
     # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
     term, total = decay(mean), 0.0
-    for count in range(MAX_GHOSTS):
+    for count in range(kernels.MAX_GHOSTS):
         total += term
         tables.ghosts[camera, count] = chance(min(total, 1.0))
         term *= float(mean) / (count + 1)

@@ -13,32 +13,13 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import Component, register
 from fleet2d.configuration.problems import problem_at
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.kernels import (
-    CELL_CENTRE,
-    F64,
-    I32,
-    I64,
-    SUB,
-    TURN,
-    U8,
-    Bool,
-    Mesh,
-    Reach,
-    cells_in_view,
-    mark_spans,
-    points_in_reach,
-    points_in_sight,
-    rasterize_cells,
-    region_contains_points,
-    region_outline,
-    regions_of_cells,
-    visible_region,
-)
+from fleet2d.kernels import CELL_CENTRE, F64, I32, I64, SUB, TURN, U8, Bool, Mesh, Reach
 from fleet2d.kernels import visible_region as visible_region_fast
 
 __all__ = ["Bool", "FieldOfView", "Flashlight", "LineOfSight", "Reach", "VisibilityPolygon"]
@@ -104,7 +85,7 @@ class VisibleRegion:
 
     @cached_property
     def _outline(self) -> tuple[F64, float]:
-        return region_outline(self._mesh, *self.eye, self.right, self.wall)
+        return kernels.region_outline(self._mesh, *self.eye, self.right, self.wall)
 
     @property
     def area_m2(self) -> float:
@@ -128,7 +109,9 @@ class VisibleRegion:
         """
         lattice_points = self._lattice.to_lattice(points)
         flat = np.ascontiguousarray(lattice_points.reshape(-1, 2))
-        is_inside = region_contains_points(self._mesh, *self.eye, self.right, self.wall, flat)
+        is_inside = kernels.region_contains_points(
+            self._mesh, *self.eye, self.right, self.wall, flat
+        )
         return is_inside.reshape(lattice_points.shape[:-1])
 
 
@@ -182,7 +165,7 @@ class FieldOfView(Component):
         Returns:
             bool (n,).
         """
-        in_view = points_in_reach(x, y, heading, reach, points)
+        in_view = kernels.points_in_reach(x, y, heading, reach, points)
         if in_view.any():
             in_view[in_view] = self.visible(home, x, y, points[in_view])
         return in_view
@@ -205,7 +188,7 @@ class LineOfSight(FieldOfView):
 
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points have a line of sight to (x, y)."""
-        return points_in_sight(home.walls, x, y, points)
+        return kernels.points_in_sight(home.walls, x, y, points)
 
 
 class Regions(NamedTuple):
@@ -255,7 +238,7 @@ class VisibilityPolygon(FieldOfView):
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points are in the region of (x, y)."""
         right, wall = self._region(home, x, y)
-        return region_contains_points(home.walls, x, y, right, wall, points)
+        return kernels.region_contains_points(home.walls, x, y, right, wall, points)
 
     def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells have their centre in the region, cut by range and angle."""
@@ -272,7 +255,7 @@ class VisibilityPolygon(FieldOfView):
                 if cell >= 0:
                     pieces = slice(start[cell], start[cell + 1])
                     return np.array(right[pieces]), np.array(wall[pieces])  # of a file: read only
-        region = self._visited.pop((x, y), None) or visible_region(home.walls, x, y)
+        region = self._visited.pop((x, y), None) or kernels.visible_region(home.walls, x, y)
         self._visited[x, y] = region
         if len(self._visited) > self.keep:
             self._visited.popitem(last=False)
@@ -294,15 +277,15 @@ def filled_cells(home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool
     lattice = home.plan.lattice
     grid = (lattice.rows, lattice.columns)
     mask = np.zeros(grid, np.bool_)
-    mark_spans(cells_in_view(home.walls, x, y, heading, reach, *grid), mask)
+    kernels.mark_spans(kernels.cells_in_view(home.walls, x, y, heading, reach, *grid), mask)
     return mask
 
 
 def _regions_of(home: Home) -> Regions:
     lattice = home.plan.lattice
-    triangles = rasterize_cells(home.walls, lattice.rows, lattice.columns)
+    triangles = kernels.rasterize_cells(home.walls, lattice.rows, lattice.columns)
     cells = np.ascontiguousarray(np.argwhere(triangles >= 0))
-    start, right, wall = regions_of_cells(home.walls, cells, triangles)
+    start, right, wall = kernels.regions_of_cells(home.walls, cells, triangles)
     return Regions(_numbers(triangles), start.astype(np.int32), right, wall)
 
 
@@ -326,7 +309,7 @@ def _shared_regions(home: Home, folder: Path) -> Regions:
         raise ScenarioError(
             f"sight.method.path: {file} can't be used: {error}; remove it, or name another folder"
         ) from None
-    triangles = rasterize_cells(walls, lattice.rows, lattice.columns)
+    triangles = kernels.rasterize_cells(walls, lattice.rows, lattice.columns)
     cells = int((triangles >= 0).sum())
     pieces = int(numbers[cells]) if numbers.ndim == 1 and len(numbers) > cells else -1
     if numbers.dtype != np.dtype("<i4") or len(numbers) != cells + 1 + 2 * pieces:

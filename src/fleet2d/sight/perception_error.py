@@ -12,27 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import Component, register
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import (
-    BELL_STD,
-    F64,
-    I16,
-    I64,
-    NOBODY,
-    ONE,
-    QUARTER,
-    TURN,
-    UNIT,
-    Bool,
-    half_sines,
-    random_bells,
-    random_shares,
-    rooms_at,
-)
+from fleet2d.kernels import BELL_STD, F64, I16, I64, NOBODY, ONE, QUARTER, TURN, UNIT, Bool
 from fleet2d.runtime.clock import DAY_US, HOUR_US, midnight_of
 from fleet2d.runtime.determinism import stream_key
 
@@ -143,7 +129,7 @@ class CameraSightings:
         """Room of the true position, an index of `home.rooms`, -1 in none: int16 (n,)."""
         plan = self.home.plan
         x, y = plan.lattice.to_lattice(np.stack([self.true_x, self.true_y], axis=1)).T
-        rooms: I16 = rooms_at(plan.room_of_place, x.copy(), y.copy())
+        rooms: I16 = kernels.rooms_at(plan.room_of_place, x.copy(), y.copy())
         return rooms
 
     def replace(
@@ -204,7 +190,7 @@ class CameraSightings:
             self._numbers("scale", scale, MAX_VALUE),
             self._numbers("offset", offset, MAX_VALUE),
         )
-        distance, sines = self.distance, half_sines()
+        distance, sines = self.distance, kernels.half_sines()
         target = np.maximum(0.0, distance * factor + added)
         stretch = target / np.where(distance > 0, distance, 1.0)
         angle = np.rint(turns).astype(np.int64)
@@ -226,14 +212,14 @@ class CameraSightings:
                 step. `step // 60` gives all sightings of a person in sixty steps the same number.
             shared: Whether all people have the same numbers.
         """
-        return self._draw(random_shares, purpose, at, shared) / ONE
+        return self._draw(kernels.random_shares, purpose, at, shared) / ONE
 
     def bell(self, purpose: str, *, at: ArrayLike | None = None, shared: bool = False) -> F64:
         """Return bell-shaped random numbers, mean 0, standard deviation 1: float64 (n,).
 
         They are cut at 4.88; arguments are those of `uniform`.
         """
-        return self._draw(random_bells, purpose, at, shared) / BELL_STD
+        return self._draw(kernels.random_bells, purpose, at, shared) / BELL_STD
 
     def _draw(self, draw: Any, purpose: str, at: ArrayLike | None, shared: bool) -> F64:
         steps = self.step if at is None else np.floor(self._numbers("at", at, 2.0**53))

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath, PositiveDuration
@@ -46,11 +47,7 @@ from fleet2d.kernels import (
     Bool,
     RoomMemory,
     ShownMemory,
-    best_view,
     cosine,
-    remember,
-    rooms_at,
-    show_memory,
     sine,
 )
 from fleet2d.kernels import SightingColumn as Column
@@ -133,9 +130,9 @@ class SightingMemory:
 
     def take(self, step: I64, index: I32, distinct: I64) -> None:
         """Add sightings; see `fleet2d.algorithms.observations.SightingTable`."""
-        room = rooms_at(self._room_of_place, distinct[:, Column.X], distinct[:, Column.Y])
+        room = kernels.rooms_at(self._room_of_place, distinct[:, Column.X], distinct[:, Column.Y])
         identity = distinct[:, Column.IDENTITY]
-        remember(step, index, identity, room, self._start_us, self._step_us, self.rooms)
+        kernels.remember(step, index, identity, room, self._start_us, self._step_us, self.rooms)
 
 
 class WaitingPoses:
@@ -173,7 +170,9 @@ class WaitingPoses:
         goals = centres(spread(cells_of(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
         limit = cosine(self._half_angle) / UNIT
         reach = sight_range(actor)
-        best = best_view(actor.home.walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit)
+        best = kernels.best_view(
+            actor.home.walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit
+        )
         if best is None:
             return *actor.middle(room), 0
         place, facing = best
@@ -345,7 +344,7 @@ class Policy(BeliefBehavior):
             0.0 if since is None else min((time - since) / self.deadline, 1.0),
         ]
         visits, shown = self.visited, self._shown
-        show_memory(memory, shown, visits, now.step, time.hour, step_s, common, table)
+        kernels.show_memory(memory, shown, visits, now.step, time.hour, step_s, common, table)
         return table
 
     def mask(self) -> Bool:

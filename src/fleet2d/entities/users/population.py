@@ -8,16 +8,9 @@ from fleet2d.configuration.components import register
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
-from fleet2d.routines import survey
+from fleet2d.routines import interruptions, survey
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.distributions import draw_weighted
-from fleet2d.routines.interruptions import (
-    activities_of,
-    interrupt,
-    interruption_rules,
-    population_needs,
-    usual_errands,
-)
 from fleet2d.routines.planner import REST, Episode
 from fleet2d.routines.survey import activities, draw_works_at_home, to_activities
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -56,8 +49,12 @@ class Population(ResidentBehavior):
         names = {*activities(self.people), REST}
         self.rules, self.interruptions = None, actor.stream("needs")
         if self.bodily_needs:
-            self.rules = interruption_rules(population_needs(), usual_errands(), known)
-            names |= activities_of(population_needs(), usual_errands())
+            self.rules = interruptions.interruption_rules(
+                interruptions.population_needs(), interruptions.usual_errands(), known
+            )
+            names |= interruptions.activities_of(
+                interruptions.population_needs(), interruptions.usual_errands()
+            )
         self.settle(actor, {name: known[name] for name in sorted(names)}, self.make_spots(actor))
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
@@ -88,7 +85,7 @@ class Population(ResidentBehavior):
         day = to_activities(self.people, episodes, self.works_at_home, Draws(self.details, ordinal))
         if self.rules is None:
             return day
-        return interrupt(self.rules, Draws(self.interruptions, ordinal), day)
+        return interruptions.interrupt(self.rules, Draws(self.interruptions, ordinal), day)
 
 
 def _draw_group(draws: Draws) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Se
 from datetime import datetime, timedelta
 from functools import lru_cache, partial
 from operator import attrgetter
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from fleet2d import kernels
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
@@ -17,17 +18,7 @@ from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES, UsePlace
 from fleet2d.floorplan.plan import Room
-from fleet2d.kernels import (
-    ANY_ROOM,
-    NO_GAP_S,
-    CoreVenue,
-    Happening,
-    LastStint,
-    MoveKind,
-    Resident,
-    RoomPolicy,
-    Waits,
-)
+from fleet2d.kernels import ANY_ROOM, NO_GAP_S, CoreVenue, Resident
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
@@ -104,13 +95,8 @@ class Spots:
 
     def nearest(self, rooms: list[Room], x: int, y: int) -> Room:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
-        x_m, y_m = self._actor.home.plan.lattice.xy_of(x, y)
-
-        def distance(room: Room) -> float:
-            across, along = room.anchor_xy[0] - x_m, room.anchor_xy[1] - y_m
-            return across * across + along * along
-
-        return min(rooms, key=distance)
+        at_x, at_y = self._actor.home.plan.lattice.xy_of(x, y)
+        return min(rooms, key=lambda r: (r.anchor_xy[0] - at_x) ** 2 + (r.anchor_xy[1] - at_y) ** 2)
 
     def in_room(self, room: Room) -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""
@@ -145,12 +131,14 @@ class Spots:
         """
         self._check_version()
         key = (tuple(kinds), *[room.index for room in rooms], posture, share, self._actor.part)
-        seats = self._at_furniture.get(key)
-        if seats is None:
+        if key not in self._at_furniture:
             indices = frozenset(room.index for room in rooms)
-            seats = self._find_seats(kinds, indices, posture, share or (self.rank, self.members))
-            self._at_furniture[key] = seats
-        return seats
+            rank, members = share or (self.rank, self.members)
+            seats = seats_at(self._actor.home, kinds, indices, posture, members, self._can_reach)
+            if self.apart and len(seats) <= rank % members and not FIXTURES.intersection(kinds):
+                seats = []
+            self._at_furniture[key] = list(part_of(seats, rank, members)) if seats else []
+        return self._at_furniture[key]
 
     def _check_version(self) -> None:
         """Forget the places of an earlier arrangement of doors and furniture."""
@@ -158,15 +146,6 @@ class Spots:
             self._version = self._actor.home.version
             self._of_room.clear()
             self._at_furniture.clear()
-
-    def _find_seats(
-        self, kinds: Sequence[str], indices: Set[int], posture: str, share: tuple[int, int]
-    ) -> list[Seat]:
-        rank, members = share
-        seats = seats_at(self._actor.home, kinds, indices, posture, members, self._can_reach)
-        if self.apart and len(seats) <= rank % members and not FIXTURES.intersection(kinds):
-            return []
-        return list(part_of(seats, rank, members)) if seats else []
 
     def can_reach(self, seat: Seat) -> bool:
         """Return whether the body can get to a place at furniture at present."""
@@ -231,14 +210,14 @@ SECOND_US = 1_000_000
 # How the core numbers ways of choosing rooms, small moves, and what happens.
 POLICIES, MOVE_KINDS, EVENTS = (
     tuple(member.name.lower() for member in numbers)
-    for numbers in (RoomPolicy, MoveKind, Happening)
+    for numbers in (kernels.RoomPolicy, kernels.MoveKind, kernels.Happening)
 )
 
 
 @lru_cache(512)  # most are the same for all people
-def exponential_waits(mean_s: int) -> Waits:
+def exponential_waits(mean_s: int) -> kernels.Waits:
     """Return random times between two moves, of a mean [s]."""
-    return Waits(np.array(exponential(mean_s).knots, np.int64) * SECOND_US)
+    return kernels.Waits(np.array(exponential(mean_s).knots, np.int64) * SECOND_US)
 
 
 class Venue(NamedTuple):
@@ -263,29 +242,12 @@ class Venue(NamedTuple):
     fetch_takes: Distribution | None
 
 
-Thing = TypeVar("Thing", bound=Hashable)
-
 PlanEnd = tuple[int, int, int, int, int]
 """Time [us], x, y [lattice], heading [1/4096 turn], and whether the body is away."""
 Course = tuple[PlanEnd, int, list[tuple[int, int]], list[tuple[int, int, int]]]
 """The end of a plan, its posture, and the postures and notes that were added; see `Resident`."""
 Stint = tuple[CoreVenue, int, int, int, bool]
 """A time in which an activity is done; see `Resident.live`."""
-
-
-class Numbering(Generic[Thing]):
-    """Numbers of things, in the order of their first use."""
-
-    def __init__(self) -> None:
-        self.things: list[Thing] = []
-        self._numbers: dict[Thing, int] = {}
-
-    def of(self, thing: Thing) -> int:
-        """Return the number of a thing."""
-        number = self._numbers.setdefault(thing, len(self.things))
-        if number == len(self.things):
-            self.things.append(thing)
-        return number
 
 
 class KnownHome:
@@ -297,9 +259,10 @@ class KnownHome:
 
     def __init__(self, person: "ResidentBehavior", actor: Actor) -> None:
         self._person, self._actor = person, actor
-        self._last = LastStint()
-        self._seats: Numbering[Seat] = Numbering()  # which `_last` refers to
-        self._names: Numbering[str] = Numbering()  # of activities
+        self._last = kernels.LastStint()
+        # The number of each place and of each activity's name, in the order of their first use.
+        self._seats: dict[Seat, int] = {}  # `_last` refers to them
+        self._names: dict[str, int] = {}
         self._core_venues: dict[str, tuple[Venue, CoreVenue]] = {}
         self._rooms: dict[int, Room] = {}
         self._resident: tuple[object, Resident | None] = None, None
@@ -334,11 +297,8 @@ class KnownHome:
         of, resident = self._resident
         if resident is None or of != present:
             routes = space.shortest if actor.drive is None else None
-            steps_off = [
-                (*at, *off)
-                for at in actor.home.approaches
-                if (off := actor.step_off(*at)) is not None
-            ]
+            steps = ((at, actor.step_off(*at)) for at in actor.home.approaches)
+            steps_off = [(*at, *off) for at, off in steps if off is not None]
             resident = Resident(self._person.key, *rates, routes, steps_off)
             self._resident = present, resident
             self._rooms = {room.index: room for room in actor.home.rooms}
@@ -369,7 +329,7 @@ class KnownHome:
         Raises:
             PlacementError: There is no such furniture now, or no place to use it from.
         """
-        at = self._actor.place_at(*self._seats.things[number])
+        at = self._actor.place_at(*list(self._seats)[number])
         return at.x, at.y, at.heading, POSTURES.index(at.posture), *at.approach
 
     def nearest(self, venue: Venue, x: int, y: int) -> int:
@@ -395,7 +355,7 @@ class KnownHome:
         activity = venue.activity
         return CoreVenue(
             venue,
-            self._names.of(name),
+            self._names.setdefault(name, len(self._names)),
             activity.away,
             POLICIES.index(activity.choose),
             POSTURES.index(activity.posture),
@@ -410,7 +370,7 @@ class KnownHome:
         )
 
     def _numbers_of(self, seats: Sequence[Seat]) -> list[int]:
-        return [self._seats.of(seat) for seat in seats]
+        return [self._seats.setdefault(seat, len(self._seats)) for seat in seats]
 
     def _walk(self, plan: Plan, course: Course, place: tuple[int, int, int]) -> tuple[PlanEnd, int]:
         """Go where no shortest route leads, as plans do: wait, take another way, or raise."""
@@ -419,7 +379,7 @@ class KnownHome:
         if number < 0:
             plan.go_to_point(x, y)
         else:
-            plan.use(*self._seats.things[number])
+            plan.use(*list(self._seats)[number])
         return _end_of(plan)
 
     def _take(self, plan: Plan, course: Course) -> None:
@@ -428,7 +388,7 @@ class KnownHome:
         plan.time_us, plan.x, plan.y, plan.heading, plan.away = end
         plan.posture = POSTURES[posture]
         plan.postures += postures
-        names, things = self._names.things, [seat.thing for seat in self._seats.things]
+        names, things = list(self._names), [seat.thing for seat in self._seats]
         details = names, names, things, [""], [""]  # by event
         plan.notes += [
             new_note((time_us, EVENTS[what], details[what][number]))
@@ -505,7 +465,12 @@ class ResidentBehavior(Behavior):
         self.given_up: tuple[int, int] | None = None  # the episode that is not to be continued
         self.reachable_rooms = actor.reachable_rooms()
         self.venues = {name: self._venue(actor, a) for name, a in activities.items()}
-        self._leave_out(actor)
+        for name, venue in self.venues.items():
+            if not (venue.rooms or venue.activity.away):  # rest replaces it
+                rooms = " or ".join(venue.activity.rooms)
+                note = f"activities.{name}.rooms: left out, because this home has no {rooms}"
+                actor.notes.append(note)
+                self.venues[name] = self.venues[REST]
         exclusive = (s for s in self.venues.values() if s.activity.exclusive)
         self.private_rooms = {room.index for venue in exclusive for room in venue.rooms}
         if sleeps_in is not None:
@@ -524,16 +489,6 @@ class ResidentBehavior(Behavior):
             self.known_home.go(plan.come_home(), activity, venue, Draws(self.key, plan.time_us))
         else:
             raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
-
-    def _leave_out(self, actor: Actor) -> None:
-        """Replace activities that this home has no room for by rest, and note it."""
-        impossible = [n for n, s in self.venues.items() if not (s.rooms or s.activity.away)]
-        for name in impossible:
-            rooms = " or ".join(self.venues[name].activity.rooms)
-            actor.notes.append(
-                f"activities.{name}.rooms: left out, because this home has no {rooms}"
-            )
-            self.venues[name] = self.venues[REST]
 
     def decide(self, now: Situation) -> Plan:
         """Plan the rest of the date.
@@ -632,26 +587,19 @@ class ResidentBehavior(Behavior):
     def _venue(self, actor: Actor, activity: Activity) -> Venue:
         if activity.away:
             return Venue(activity, [], [], [], (), None)
-        rooms = (
-            self._own_rooms(actor, activity.rooms, activity.never_in)
-            if activity.choose == "own"
-            else self._all_rooms(actor, activity.rooms, activity.never_in)
-        )
-        small_moves = [
-            (kind, max(1, seconds(mean)))
-            for kind in MOVE_KINDS
-            if self.small_moves and (mean := getattr(activity, kind)) is not None
-        ]
-        return Venue(
-            activity,
-            rooms,
-            self.spots.at_furniture(activity.objects, rooms, activity.posture),
-            self._own_rooms(actor, activity.fetches_from, activity.never_in)
-            if activity.fetches
-            else [],
-            tuple(small_moves),
-            activity.fetch_takes.table() if activity.fetches else None,
-        )
+        names, never_in = activity.rooms, activity.never_in
+        if activity.choose == "own":
+            rooms = self._own_rooms(actor, names, never_in)
+        else:
+            named = (r for name in names for r in self.reachable_rooms if name in (r.name, r.type))
+            rooms = list(dict.fromkeys(named)) or _match(actor, names, never_in)[1]
+        means = {kind: getattr(activity, kind) for kind in MOVE_KINDS if self.small_moves}
+        moves = ((kind, max(1, seconds(mean))) for kind, mean in means.items() if mean is not None)
+        seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
+        if not activity.fetches:
+            return Venue(activity, rooms, seats, [], tuple(moves), None)
+        stores = self._own_rooms(actor, activity.fetches_from, never_in)
+        return Venue(activity, rooms, seats, stores, tuple(moves), activity.fetch_takes.table())
 
     def _bed(self, actor: Actor, sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
         """Return the venue of sleep for a member of a household, whose bed it may share."""
@@ -660,12 +608,8 @@ class ResidentBehavior(Behavior):
         seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
         return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
-    def _all_rooms(self, actor: Actor, names: RoomChoice, never_in: RoomChoice) -> list[Room]:
-        """Return the reachable rooms of all kinds that a list names."""
-        rooms = [r for name in names for r in self.reachable_rooms if name in (r.name, r.type)]
-        return list(dict.fromkeys(rooms)) or _match(actor, names, never_in)[1]
-
-    def _own_rooms(self, actor: Actor, names: RoomChoice, never_in: RoomChoice) -> list[Room]:
+    @staticmethod
+    def _own_rooms(actor: Actor, names: RoomChoice, never_in: RoomChoice) -> list[Room]:
         """Return the rooms of the first name that matches: of several of a kind, one for good."""
         name, rooms = _match(actor, names, never_in)
         if name == "any" or not rooms:

@@ -44,27 +44,17 @@ def private_rooms(household: Household, home: Home) -> MemberRooms:
     Activities that are done only in such rooms, like laundry in the bathroom, count as exclusive,
     too. If the home has none of the rooms of an activity, the activity has no entry.
     """
-    reachable = usual_rooms(home)
-    rooms = {
-        name: {
-            activity: [room.index for room in _rooms_of(fields, reachable)]
-            for activity, fields in persona.used_activities.items()
-            if not fields.away
+    reachable, private = usual_rooms(home), set[int]()
+    rooms: dict[str, dict[str, list[int]]] = {}
+    for name, persona in household.members.items():
+        at_home = {a: fields for a, fields in persona.used_activities.items() if not fields.away}
+        rooms[name] = {
+            a: [r.index for r in _rooms_of(fields, reachable)] for a, fields in at_home.items()
         }
-        for name, persona in household.members.items()
-    }
-    private = {
-        room
-        for name, persona in household.members.items()
-        for activity in persona.interruptions.exclusive & set(rooms[name])
-        for room in rooms[name][activity]
-    }
+        for activity in persona.interruptions.exclusive & set(at_home):
+            private.update(rooms[name][activity])
     return {
-        name: {
-            activity: indices
-            for activity, indices in own.items()
-            if indices and private.issuperset(indices)
-        }
+        name: {a: indices for a, indices in own.items() if indices and private.issuperset(indices)}
         for name, own in rooms.items()
     }
 
@@ -75,7 +65,7 @@ def usual_rooms(home: Home) -> list[Room]:
     return [room for room in home.rooms if len(space.cells(room.index, 0))]
 
 
-def _rooms_of(activity: "Activity", reachable: list[Room]) -> list[Room]:
+def _rooms_of(activity: Activity, reachable: list[Room]) -> list[Room]:
     """Return the rooms of the activity's first kind that exists, or of all its kinds.
 
     All kinds count if the activity may be done in a different room each time.
@@ -182,22 +172,18 @@ class Seating:
         }
         places: dict[tuple[int, int], Seat | None] = {}
         for claim in sorted(self._claims(ordinal), key=lambda c: (not c.is_asleep, *c[1:3])):
-            time = claim.begin, claim.end
-            free = (s for s in self._by_preference(claim, ordinal) if self._is_free(s, time))
-            seat = next(free, None)
+            address = ordinal * EPISODES_PER_DAY + claim.episodes[0]
+            first = Draws(self._keys[claim.rank], address).below(claim.own)
+            seats = (claim.seats[first], *claim.seats[:first], *claim.seats[first + 1 :])
+            seat = next((s for s in seats if self._is_free(s, claim)), None)
             places |= {(claim.rank, number): seat for number in claim.episodes}
             if seat is not None:
-                self._taken.setdefault(self._spot[seat], []).append(time)
+                self._taken.setdefault(self._spot[seat], []).append((claim.begin, claim.end))
         return places
 
-    def _is_free(self, seat: Seat, time: tuple[int, int]) -> bool:
+    def _is_free(self, seat: Seat, claim: SeatClaim) -> bool:
         taken = self._taken.get(self._spot[seat], ())
-        return all(end <= time[0] or begin >= time[1] for begin, end in taken)
-
-    def _by_preference(self, claim: SeatClaim, ordinal: int) -> Sequence[Seat]:
-        address = ordinal * EPISODES_PER_DAY + claim.episodes[0]
-        first = Draws(self._keys[claim.rank], address).below(claim.own)
-        return (claim.seats[first], *claim.seats[:first], *claim.seats[first + 1 :])
+        return all(end <= claim.begin or begin >= claim.end for begin, end in taken)
 
     def _claims(self, ordinal: int) -> Iterator[SeatClaim]:
         """Yield the claims of all members on a day."""
@@ -218,17 +204,15 @@ class Seating:
             return (), 0
         key = rank, episode.activity
         if key not in self._wanted:
-            persona = self._lives.household.members[self._members[rank]]
-            self._wanted[key] = self._find(
-                rank, persona.activity(episode.activity), episode.activity
-            )
+            self._wanted[key] = self._find(*key)
         return self._wanted[key]
 
-    def _find(self, rank: int, activity: "Activity", name: str) -> tuple[Sequence[Seat], int]:
+    def _find(self, rank: int, name: str) -> tuple[Sequence[Seat], int]:
+        household, member = self._lives.household, self._members[rank]
+        activity = household.members[member].activity(name)
         is_shared = activity.objects and activity.choose == "own"
         if activity.away or activity.exclusive or not is_shared:
             return (), 0
-        household, member = self._lives.household, self._members[rank]
         bedroom = household.bedrooms()[member] if name == SLEEP else None
         rooms = self._rooms(rank, activity, bedroom)
         share = household.side_of_bed(member) if name == SLEEP else (rank, self._count)
@@ -237,12 +221,12 @@ class Seating:
         own = list(part_of(self._seats(activity, indices, share[1]), *share)) if seats else []
         return (*own, *(seat for seat in seats if seat not in own)), len(own)
 
-    def _seats(self, activity: "Activity", rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
+    def _seats(self, activity: Activity, rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
         """Return the places for an activity in some rooms, of those at one spot the first."""
         seats = seats_at(self._home, activity.objects, rooms, activity.posture, wanted)
         return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
-    def _rooms(self, rank: int, activity: "Activity", bedroom: int | None) -> Sequence[Room]:
+    def _rooms(self, rank: int, activity: Activity, bedroom: int | None) -> Sequence[Room]:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
             name, rooms = matching_rooms(
