@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from datetime import timedelta
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d import kernels
@@ -306,8 +307,8 @@ class Drift:
         y += np.repeat(runs.y, lengths)
         heading = (np.repeat(runs.heading, lengths) + turn) % TURN
         away, postures = np.repeat(runs.away, lengths), np.zeros(len(steps), np.int8)
-        rows = (column[np.newaxis] for column in (x, y, heading, away, postures))
-        return Window(runs.first, *rows)
+        columns: tuple[NDArray[Any], ...] = (x, y, heading, away, postures)
+        return Window(runs.first, *(column[np.newaxis] for column in columns))
 
     def _jumps_at(self, interval: int) -> int:
         """Return when the error jumps in an interval [us]; the interval's length if it doesn't."""

@@ -307,7 +307,7 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
     if is_point(place):
         return False
-    things = *body.home.rooms, *body.home.objects
+    things: tuple[Room | PlacedObject, ...] = (*body.home.rooms, *body.home.objects)
     names, types = {thing.name for thing in things}, {thing.type for thing in things}
     return all(
         name not in names

@@ -16,7 +16,7 @@ from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.interactions.attitude import Attitude, AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome
-from fleet2d.runtime.determinism import Draws, logistic, stream_key
+from fleet2d.runtime.determinism import Draws, logistic, stream_key, sum_in_order
 
 Stage = Literal["notice", "available", "accept"]
 
@@ -379,11 +379,12 @@ class Start(NamedTuple):
 
     Attributes:
         day_share: The time, as a part of the day.
-        kind: What the person wants: that it comes, an answer, or to be left alone.
+        kind: What the person wants: that it comes (call), an answer (question), or to be left alone
+            (complaint).
     """
 
     day_share: float
-    kind: Literal["call", "question", "complaint"]
+    kind: str
 
 
 @register("initiative", "rates")
@@ -407,11 +408,9 @@ class Initiative(Component):
 
     def starts(self, draws: Draws) -> list[Start]:
         """Return the moments of one day, from its random draws."""
-        rates: tuple[tuple[Literal["call", "question", "complaint"], float], ...] = (
-            ("call", self.calls), ("question", self.questions), ("complaint", self.complaints)
-        )  # fmt: skip
+        rates = {"call": self.calls, "question": self.questions, "complaint": self.complaints}
         starts = []
-        for kind, rate in rates:
+        for kind, rate in rates.items():
             count = int(rate) + (draws.uniform() < rate - int(rate))
             starts += [Start(draws.uniform(), kind) for _ in range(count)]
         return sorted(starts)
@@ -495,11 +494,8 @@ class Answers(Component):
 
     def chance(self, stage: Stage, now: Circumstances, state: AttitudeState) -> float:
         """Return the probability of a stage."""
-        total = 0.0
-        for part in self.parts:
-            if part.stage == stage:
-                total += part.logit(now, state)
-        return logistic(total)
+        parts = (part for part in self.parts if part.stage == stage)
+        return logistic(sum_in_order(part.logit(now, state) for part in parts))
 
     def reply(
         self, now: Circumstances, state: AttitudeState, seed: int, path: str, step: int

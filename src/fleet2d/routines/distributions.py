@@ -128,11 +128,8 @@ def _bounded(knots: tuple[int, ...], shortest: int, longest: int) -> Distributio
 
 def _from_normal(quantile: Callable[[float], float]) -> Distribution:
     """Return the distribution whose quantiles are a function of standard normal ones."""
-    knots: list[int] = []
-    for z in NORMAL:
-        value = int(quantile(z) + 0.5)
-        knots.append(max(value, knots[-1] if knots else 0))
-    return _bounded(tuple(knots), knots[0], knots[-1])
+    knots = tuple(accumulate((max(int(quantile(z) + 0.5), 0) for z in NORMAL), max))
+    return _bounded(knots, knots[0], knots[-1])
 
 
 @lru_cache(None)

@@ -34,7 +34,7 @@ from fleet2d.routines.activity import (
     find_activity,
 )
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, values_in
-from fleet2d.routines.planner import Episode
+from fleet2d.routines.planner import Episode, with_episode
 from fleet2d.runtime.clock import DAY
 
 SECOND = timedelta(seconds=1)
@@ -109,22 +109,11 @@ def with_absences(
         stays = sorted(period.seconds_since(midnight) for period in visits)
         lasts, firsts = [begin, *(b for _, b in stays)], [*(a for a, _ in stays), end]
         absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
-    for first, last in absences:
-        day = _cut(day, max(first, begin), min(last, end))
+    for leaves, returns in absences:
+        first, last = max(leaves, begin), min(returns, end)
+        if first < last:
+            day = with_episode(day, Episode(AWAY, first, last))
     return list(day)
-
-
-def _cut(day: Sequence[Episode], first: int, last: int) -> list[Episode]:
-    """Return a day with an absence from `first` to `last` [s]."""
-    if first >= last:
-        return list(day)
-    before = [
-        episode._replace(end=min(episode.end, first)) for episode in day if episode.begin < first
-    ]
-    after = [
-        episode._replace(begin=max(episode.begin, last)) for episode in day if episode.end > last
-    ]
-    return [*before, Episode(AWAY, first, last), *after]
 
 
 class JointActivity(Timing):
@@ -243,11 +232,9 @@ class Household(Settings):
             partners.setdefault(first, []).append(second)
             partners.setdefault(second, []).append(first)
         groups: dict[str, int] = {}
-        count = 0
         for member in self.members:
-            known = [name for name in partners.get(member, ()) if name in groups]
-            groups[member] = groups[known[0]] if known else count
-            count += not known
+            known = (groups[name] for name in partners.get(member, ()) if name in groups)
+            groups[member] = next(known, len(set(groups.values())))
         return groups
 
     def side_of_bed(self, member: str) -> tuple[int, int]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime, timedelta
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -96,13 +95,8 @@ class Year:
             for name, span in self.on(day).items()
             if self.events[name].away
         }
-        return [
-            Period(
-                begins=datetime.fromordinal(first) + LEAVES,
-                ends=datetime.fromordinal(last) + RETURNS,
-            )
-            for first, last in sorted(found)
-        ]
+        spans = (map(datetime.fromordinal, span) for span in sorted(found))
+        return [Period(begins=first + LEAVES, ends=last + RETURNS) for first, last in spans]
 
     def _of_year(self, year: int) -> dict[str, list[Days]]:
         if year not in self._drawn:
@@ -173,18 +167,6 @@ WELCOME = "welcome"
 WELCOME_S = 90
 
 MemberRooms = Mapping[str, Mapping[str, Sequence[int]]]
-
-
-class PrivateUses(NamedTuple):
-    """The uses of private rooms on a day.
-
-    Attributes:
-        by_begin: Their begin and end [s since midnight], member and room, in order of time.
-        longest: The duration of the longest [s].
-    """
-
-    by_begin: list[tuple[int, int, str, int]]
-    longest: int
 
 
 class Life:
@@ -316,7 +298,7 @@ class Lives:
             for name in household.members
         }
         self._cache: dict[int, Mapping[str, Sequence[Episode]]] = {}
-        self._uses: dict[int, PrivateUses] = {}
+        self._uses: dict[int, tuple[list[tuple[int, int, str, int]], int]] = {}
         self.first = self._next = first
 
     def day(self, ordinal: int) -> Mapping[str, Sequence[Episode]]:
@@ -362,15 +344,18 @@ class Lives:
             last: The last time.
         """
         for day, shift in ((ordinal - 1, -DAY_S), (ordinal, 0), (ordinal + 1, DAY_S)):
-            uses = self._private_uses(day) if day >= self.first else PrivateUses([], 0)
-            begin = bisect_left(uses.by_begin, (first - shift - uses.longest,))
-            end = bisect_left(uses.by_begin, (last - shift,))
-            for _, use_end, name, of in uses.by_begin[begin:end]:
+            uses, longest = self._private_uses(day) if day >= self.first else ([], 0)
+            begin = bisect_left(uses, (first - shift - longest,))
+            for _, use_end, name, of in uses[begin : bisect_left(uses, (last - shift,))]:
                 if use_end + shift > first and name != member and of in (ANY_ROOM, room):
                     return True
         return False
 
-    def _private_uses(self, ordinal: int) -> PrivateUses:
+    def _private_uses(self, ordinal: int) -> tuple[list[tuple[int, int, str, int]], int]:
+        """Return the uses of private rooms on a day, in order, and how long the longest is [s].
+
+        Of each use: its begin and end [s since midnight], the member, and the room.
+        """
         days = self.day(ordinal)
         if ordinal not in self._uses:
             uses = sorted(
@@ -380,7 +365,7 @@ class Lives:
                 if self._is_exclusive(name, episode)
             )
             longest = max((end - begin for begin, end, *_ in uses), default=0)
-            self._uses[ordinal] = PrivateUses(uses, longest)
+            self._uses[ordinal] = uses, longest
         return self._uses[ordinal]
 
     def _is_exclusive(self, name: str, episode: Episode) -> bool:

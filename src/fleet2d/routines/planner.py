@@ -22,7 +22,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import attrgetter
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
@@ -305,8 +306,8 @@ def to_recording(days: Sequence[RecordedDay]) -> Recording:
             ends.setdefault(name, []).append((day.begins[i + 1], (d, i)))
     endings = {}
     for name, of_activity in ends.items():
-        of_activity.sort()
-        endings[name] = ([time for time, _ in of_activity], [at for _, at in of_activity])
+        times, positions = zip(*sorted(of_activity), strict=True)
+        endings[name] = list(times), list(positions)
     return Recording(tuple(days), endings)
 
 
@@ -362,13 +363,8 @@ def _draw_ending(
 
 def _merge_repeats(day: Sequence[Episode]) -> list[Episode]:
     """Merge successive episodes of the same activity."""
-    result: list[Episode] = []
-    for episode in day:
-        if result and result[-1].activity == episode.activity:
-            result[-1] = result[-1]._replace(end=episode.end)
-        else:
-            result.append(episode)
-    return result
+    groups = (list(group) for _, group in groupby(day, key=attrgetter("activity")))
+    return [group[0]._replace(end=group[-1].end) for group in groups]
 
 
 def in_free_rooms(
@@ -408,9 +404,14 @@ def with_jobs(day: Sequence[Episode], jobs: Iterable[Job]) -> list[Episode]:
         begin = job.starts.shortest
         end = begin + job.takes.shortest
         asleep = any(d.activity == SLEEP and d.begin < end and begin < d.end for d in day)
-        if asleep or begin < day[0].begin:
-            continue
-        before = [d._replace(end=min(d.end, begin)) for d in day if d.begin < begin]
-        after = [d._replace(begin=max(d.begin, end)) for d in day if d.end > end]
-        day = [*before, Episode(job.activity, begin, end, job.task), *after]
+        if not asleep and begin >= day[0].begin:
+            day = with_episode(day, Episode(job.activity, begin, end, job.task))
     return list(day)
+
+
+def with_episode(day: Sequence[Episode], episode: Episode) -> list[Episode]:
+    """Return a day with an episode in place of what is planned then."""
+    begin, end = episode.begin, episode.end
+    before = [d._replace(end=min(d.end, begin)) for d in day if d.begin < begin]
+    after = [d._replace(begin=max(d.begin, end)) for d in day if d.end > end]
+    return [*before, episode, *after]

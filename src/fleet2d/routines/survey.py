@@ -128,16 +128,12 @@ def group(name: str) -> SurveyGroup:
 
 def _targets(facts: dict[str, Any]) -> F64:
     """Return the survey's shares at each step of a week from Monday 04:00, (WEEK_STEPS, 9)."""
-    points = []
-    for day in range(7):
-        hours = np.array(facts["weekend" if day > 4 else "weekday"], np.float64) / 10_000
-        points += [hours[hour % 24] for hour in range(4, 28)]
-    at = np.array(points)  # at 04:30, 05:30, …: three steps after each hour's begin
-    targets = np.empty((WEEK_STEPS, len(CATEGORIES)))
-    for step in range(WEEK_STEPS):
-        hour, part = divmod(step - 3, 6)
-        targets[step] = (at[hour] * (6 - part) + at[(hour + 1) % 168] * part) / 6
-    return targets
+    days = [np.array(facts[kind], np.float64) / 10_000 for kind in ("weekday", "weekend")]
+    from_dawn = [np.roll(day, -4, axis=0) for day in days]
+    # At 04:30, 05:30, …: three steps after each hour's begin.
+    at = np.concatenate([from_dawn[day > 4] for day in range(7)])
+    hour, part = np.divmod(np.arange(-3, WEEK_STEPS - 3)[:, None], 6)
+    return (at[hour[:, 0]] * (6 - part) + at[(hour[:, 0] + 1) % 168] * part) / 6
 
 
 def _survival(facts: dict[str, Any], category: str) -> list[float]:

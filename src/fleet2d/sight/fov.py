@@ -231,10 +231,6 @@ class VisibilityPolygon(FieldOfView):
         if (self.path is not None) != (self.precompute == "file"):
             raise problem_at(("path",), "give 'path' with precompute: file, and only with it")
 
-    def start(self, home: Home) -> None:
-        """Compute the regions of all cells, if configured."""
-        self._reset(home)
-
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points are in the region of (x, y)."""
         right, wall = self._region(home, x, y)
@@ -246,7 +242,7 @@ class VisibilityPolygon(FieldOfView):
 
     def _region(self, home: Home, x: int, y: int) -> Pieces:
         if getattr(self, "_walls", None) is not home.walls:
-            self._reset(home)
+            self.start(home)
         row, column = y // SUB, x // SUB
         if self._regions is not None and (x, y) == home.plan.lattice.cell_centre(row, column):
             number, start, right, wall = self._regions
@@ -261,8 +257,8 @@ class VisibilityPolygon(FieldOfView):
             self._visited.popitem(last=False)
         return region
 
-    def _reset(self, home: Home) -> None:
-        """Empty the cache, for the present walls of the home."""
+    def start(self, home: Home) -> None:
+        """Empty the cache, for the present walls; compute all regions, if configured."""
         self._walls: Mesh = home.walls
         self._visited: OrderedDict[tuple[int, int], Pieces] = OrderedDict()
         self._regions: Regions | None = None
@@ -352,10 +348,6 @@ class Flashlight(FieldOfView):
 
     memory_mb: float = Field(default=64.0, gt=0)
 
-    def start(self, home: Home) -> None:
-        """Begin with an empty cache."""
-        self._reset(home)
-
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points lie in cells whose centre is visible from (x, y)."""
         everything = Reach(near_squared=0, far_squared=1 << 50, half_angle=TURN)
@@ -386,7 +378,7 @@ class Flashlight(FieldOfView):
 
     def _lookup(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> CellBits:
         if getattr(self, "_walls", None) is not home.walls:
-            self._reset(home)
+            self.start(home)
         key = (x, y, heading, *reach)
         cells = self._cache.pop(key, None)
         if cells is None:
@@ -398,7 +390,7 @@ class Flashlight(FieldOfView):
             self._bytes -= ENTRY_BYTES + oldest.bits.nbytes
         return cells
 
-    def _reset(self, home: Home) -> None:
+    def start(self, home: Home) -> None:
         """Empty the cache, for the present walls of the home."""
         self._walls: Mesh = home.walls
         self._cache: OrderedDict[tuple[int, ...], CellBits] = OrderedDict()

@@ -149,7 +149,7 @@ def decay(steps: Decimal) -> float:
     0.36787944117144233
     """
     with localcontext(prec=EXACT):
-        return float(_exp(-steps))
+        return float(min(max(-steps, Decimal(-LIMIT)), Decimal(LIMIT)).exp())
 
 
 def exponential(x: F64) -> F64:
@@ -167,12 +167,6 @@ def exponential(x: F64) -> F64:
     for term in range(TERMS, 0, -1):
         value = 1 + rest * value / term
     return np.ldexp(value, doublings.astype(np.int32))
-
-
-def _exp(x: Decimal) -> Decimal:
-    """Return exp(x), with x clipped to -LIMIT … LIMIT."""
-    limit = Decimal(LIMIT)
-    return (limit if x > limit else -limit if x < -limit else x).exp()
 
 
 def cumulative(weights: Mapping[Any, float], order: Sequence[Any]) -> list[int]:

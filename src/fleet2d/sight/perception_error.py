@@ -186,10 +186,8 @@ class CameraSightings:
             ComponentError: A value has another shape, isn't finite, or moves them out of bounds.
         """
         turns = self._numbers("turn_deg", turn_deg, MAX_VALUE) / 360 * (2 * TURN)
-        factor, added = (
-            self._numbers("scale", scale, MAX_VALUE),
-            self._numbers("offset", offset, MAX_VALUE),
-        )
+        factor = self._numbers("scale", scale, MAX_VALUE)
+        added = self._numbers("offset", offset, MAX_VALUE)
         distance, sines = self.distance, kernels.half_sines()
         target = np.maximum(0.0, distance * factor + added)
         stretch = target / np.where(distance > 0, distance, 1.0)

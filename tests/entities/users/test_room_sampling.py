@@ -73,8 +73,9 @@ def test_rooms_of_a_kind_share_its_part() -> None:
         users={"ana": {"type": "room_sampling", "shares": {"bedroom": 3, "kitchen": 1}}}
     )
     content["floorplan"] = {"type": "bundled"}
-    stops = Simulation(content).actors["ana"].behaviors[0].stops
-    chances = {stop.room.name: stop.chance for stop in stops}
+    ana = Simulation(content).actors["ana"]
+    by_room = ana.behaviors[0].chances.items()
+    chances = {ana.home.rooms[room].name: chance for room, chance in by_room}
     bedrooms = [chance for name, chance in chances.items() if name.startswith("bedroom")]
     assert 250_000 == chances["kitchen_0"]
     assert 3 == len(bedrooms)

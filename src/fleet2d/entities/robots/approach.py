@@ -36,41 +36,6 @@ class RoomBelief(NamedTuple):
         return self.share * (1 - self.away)
 
 
-def room_belief(now: Situation, source: str | None, user: str) -> RoomBelief:
-    """Return the probabilities of where a person is now.
-
-    The output of a presence algorithm is evaluated at the present time, for the user; any other
-    output with a `share` per room holds for everybody. Without a source, and before its first
-    output, the probability of a room is proportional to its area.
-
-    Args:
-        now: The situation.
-        source: The algorithm, by its name in the scenario.
-        user: The person, or ANYONE.
-
-    Raises:
-        ComponentError: The output has no probabilities of rooms.
-    """
-    output = now.outputs.get(source) if source else None
-    if output is None:
-        cells = np.array([room.cells for room in now.home.rooms], np.float64)
-        return RoomBelief(cells / cells.sum(), 0.0)
-    if callable(getattr(output, "at", None)):
-        output = output.at(now.time)
-    share: Any = getattr(output, "share", None)
-    away: Any = getattr(output, "away", 0.0)
-    if callable(share):
-        share = share(user)
-        away = away(user) if callable(away) else away
-    rooms = len(now.home.rooms)
-    if share is None or np.shape(share) != (rooms,):
-        raise ComponentError(
-            f"the output of {source!r} has no room probabilities: name a presence algorithm, or"
-            f" one whose output is a RoomDistribution over the {rooms} rooms"
-        )
-    return RoomBelief(np.asarray(share, np.float64), float(away))
-
-
 class BeliefBehavior(Behavior):
     """Base of behaviors that depend on where a person is believed to be.
 
@@ -92,8 +57,33 @@ class BeliefBehavior(Behavior):
         return () if self.source is None else (self.source,)
 
     def belief(self, now: Situation, user: str) -> RoomBelief:
-        """Return the probabilities of where a user is now, by its source."""
-        return room_belief(now, self.source, user)
+        """Return the probabilities of where a user, or ANYONE, is now.
+
+        The output of a presence algorithm is evaluated at the present time, for the user; any other
+        output with a `share` per room holds for everybody. Without a source, and before its first
+        output, the probability of a room is proportional to its area.
+
+        Raises:
+            ComponentError: The output has no probabilities of rooms.
+        """
+        output = now.outputs.get(self.source) if self.source else None
+        if output is None:
+            cells = np.array([room.cells for room in now.home.rooms], np.float64)
+            return RoomBelief(cells / cells.sum(), 0.0)
+        if callable(getattr(output, "at", None)):
+            output = output.at(now.time)
+        share: Any = getattr(output, "share", None)
+        away: Any = getattr(output, "away", 0.0)
+        if callable(share):
+            share = share(user)
+            away = away(user) if callable(away) else away
+        rooms = len(now.home.rooms)
+        if share is None or np.shape(share) != (rooms,):
+            raise ComponentError(
+                f"the output of {self.source!r} has no room probabilities: name a presence"
+                f" algorithm, or one whose output is a RoomDistribution over the {rooms} rooms"
+            )
+        return RoomBelief(np.asarray(share, np.float64), float(away))
 
 
 # Maximum number of cells of a room tried as viewpoints, and as targets to be seen, evenly spread.

@@ -1,8 +1,9 @@
 """Find: look for a person, room by room, by probabilities and distances."""
 
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -115,20 +116,14 @@ class Sites:
         return BLOCKED_ROUTE_S if seconds is None else seconds
 
 
-class EmptyLook(NamedTuple):
-    """A look at a site, by number, that did not find the person, and when it ended."""
-
-    site: int
-    at: datetime
-
-
-class SearchState(NamedTuple):
+@dataclass
+class SearchState:
     """A search in progress.
 
     Attributes:
         since: When it began.
         user: The person to find, or ANYONE.
-        empty_looks: The looks so far, in order.
+        looked_at: When the last look at each site ended that did not find the person, by number.
         route: The sites to go to next, by number.
         goal: The site that it is going to; None: none.
         blocked: Sites that a person in the way kept it from.
@@ -136,10 +131,10 @@ class SearchState(NamedTuple):
 
     since: datetime
     user: str
-    empty_looks: tuple[EmptyLook, ...] = ()
+    looked_at: dict[int, datetime] = field(default_factory=dict)
     route: tuple[int, ...] = ()
     goal: int | None = None
-    blocked: frozenset[int] = frozenset()
+    blocked: set[int] = field(default_factory=set)
 
 
 @register("behavior", "find")
@@ -231,8 +226,8 @@ class Find(BeliefBehavior):
         """Leave out the site that it was going to, for this search."""
         search = self.search
         if search is not None and search.goal is not None:
-            blocked = search.blocked | {search.goal}
-            self.search = search._replace(blocked=blocked, route=search.route[1:], goal=None)
+            search.blocked.add(search.goal)
+            search.route, search.goal = search.route[1:], None
 
     def dismiss(self) -> None:
         """End the search."""
@@ -240,23 +235,22 @@ class Find(BeliefBehavior):
 
     def decide(self, now: Situation) -> Plan | None:
         """Begin a search that is due, continue one, or leave the robot to other behaviors."""
-        plan = now.plan()
+        plan, search = now.plan(), self.search
         user = self._commanded_user(now)
-        if user is None and self.search is None and self._is_due(now):
+        if user is None and search is None and self._is_due(now):
             user = self.user
         if user is not None:
-            self.search = SearchState(now.time, user)
+            search = self.search = SearchState(now.time, user)
             plan.note("find_begins", user)
-        elif self.search is None:
+        elif search is None:
             return None
         else:
-            self._note_empty_look(now)
-            user = self.search.user
+            self._note_empty_look(now, search)
         in_view = now.in_view
-        name = user if user != ANYONE else next(iter(sorted(in_view)), ANYONE)
+        name = search.user if search.user != ANYONE else min(in_view, default=ANYONE)
         if name in in_view:
             return self._approach(now, plan, *in_view[name])
-        return self._resume(now) or self._look_further(now, plan)
+        return self._resume(now) or self._look_further(now, plan, search)
 
     def _commanded_user(self, now: Situation) -> str | None:
         """Take a command to find somebody, and return the person; None: there is no command."""
@@ -280,21 +274,17 @@ class Find(BeliefBehavior):
             due, self.due = self.due, self._next(self.due, start)
         return due is not None and due <= now.time <= due + self.late
 
-    def _note_empty_look(self, now: Situation) -> None:
+    def _note_empty_look(self, now: Situation, search: SearchState) -> None:
         """Note that the look of the last plan did not find the person, if it is complete."""
-        search = self.search
-        assert search is not None
         plan = now.actor.plan
         is_complete = plan.root is self.plan and plan.is_over(now.step)
         if search.goal is not None and is_complete and not now.events:
-            looks = (*search.empty_looks, EmptyLook(search.goal, now.time))
-            self.search = search._replace(empty_looks=looks, route=search.route[1:], goal=None)
+            search.looked_at[search.goal] = now.time
+            search.route, search.goal = search.route[1:], None
 
     def _approach(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
         """End the search: approach the person, at (x, y) [m], and stay."""
-        assert self.search is not None
-        user, self.search = self.search.user, None
-        plan.note("found", user)
+        self._end(plan, "found")
         if is_in_rooms(now, x, y, self.avoided):
             return plan.face(*now.home.plan.lattice.point_at((x, y))).stay(self.stay)
         approach(now, plan, x, y, self.distance)
@@ -304,15 +294,15 @@ class Find(BeliefBehavior):
         plan.face(*now.home.plan.lattice.point_at((x, y)))
         return plan.stay(self.stay)
 
-    def _look_further(self, now: Situation, plan: Plan) -> Plan | None:
+    def _look_further(self, now: Situation, plan: Plan, search: SearchState) -> Plan | None:
         """Go to the next site and look round there, or end the search."""
-        search = self.search
-        assert search is not None
         ends = search.since + self.deadline
         if now.time >= ends:
             return self._end(plan, "gave_up")
-        prior, away = self._prior(now)
-        age, memory = self._ages(search, now), self.memory.total_seconds()
+        prior, away = self._prior(now, search.user)
+        age, memory = np.full(len(self.sites), np.inf), self.memory.total_seconds()
+        for site, at in search.looked_at.items():
+            age[site] = (now.time - at).total_seconds()
         remaining = after_empty_looks(prior, age, memory, self.sites.share)
         is_out = away >= self.out_at * (away + sum_in_order(remaining.tolist()))
         unseen = np.flatnonzero(np.isinf(age)).tolist()
@@ -324,7 +314,7 @@ class Find(BeliefBehavior):
             route = tuple(order_by(self.policy, problem, now.random("order")))
         while route and (route[0] in search.blocked or not self.sites.can_go(plan, route[0])):
             route = route[1:]
-        self.search = search._replace(route=route, goal=route[0] if route else None)
+        search.route, search.goal = route, route[0] if route else None
         if route:
             self.sites.look_round(plan, route[0]).interrupt_on("user_seen")
         else:  # shut doors block all sites
@@ -332,10 +322,9 @@ class Find(BeliefBehavior):
         self.plan = plan.ask_by(ends)
         return plan
 
-    def _prior(self, now: Situation) -> tuple[F64, float]:
+    def _prior(self, now: Situation, user: str) -> tuple[F64, float]:
         """Return the probability of each site, and that of being out, disregarding all looks."""
-        assert self.search is not None
-        belief = self.belief(now, self.search.user)
+        belief = self.belief(now, user)
         sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
         shares = belief.share[self.sites.rooms]
         total = sum_in_order(shares.tolist())
@@ -345,13 +334,6 @@ class Find(BeliefBehavior):
         has_output = self.source is not None and now.outputs.get(self.source) is not None
         away = belief.away if has_output else self.out
         return mixed * (1 - away), away
-
-    def _ages(self, search: SearchState, now: Situation) -> F64:
-        """Return the time since the last empty look at each site [s], infinite without one."""
-        ages = np.full(len(self.sites), np.inf)
-        for look in search.empty_looks:
-            ages[look.site] = (now.time - look.at).total_seconds()
-        return ages
 
     def _end(self, plan: Plan, event: str) -> Plan:
         """End the search with an event."""

@@ -76,7 +76,7 @@ class Follow(Behavior):
         """Follow the person, look where the person was lost, or leave it to later behaviors."""
         in_view = now.in_view
         if self.person is None:
-            self.person = self._person_in_view(now)
+            self.person = min((n for n in in_view if self.user in ("", n)), default=None)
             if self.person is None:
                 return None
             self.since = now.time
@@ -94,12 +94,6 @@ class Follow(Behavior):
         if not is_in_rooms(now, *self.last, self.avoided):
             approach(now, plan, *self.last, SEARCH_DISTANCE_M)
         return plan.turn_by(1.0)
-
-    def _person_in_view(self, now: Situation) -> str | None:
-        names = sorted(now.in_view)
-        if self.user:
-            return self.user if self.user in names else None
-        return names[0] if names else None
 
     def _follow(self, now: Situation, plan: Plan) -> Plan:
         self.is_searching = False
@@ -154,13 +148,11 @@ class Come(Behavior):
 
     def decide(self, now: Situation) -> Plan | None:
         """Go where it is called to, if it is."""
-        command = now.take_command("come")
-        if command is not None:
-            self.command = command
-        if self.command is None:
+        command = self.command = now.take_command("come") or self.command
+        if command is None:
             return None
-        goal = self._outside(now.actor, stop_at(now.actor, self.command.place))
-        plan = now.plan().go_to_point(*goal).note("visits", self.command.text.partition(" ")[2])
+        goal = self._outside(now.actor, stop_at(now.actor, command.place))
+        plan = now.plan().go_to_point(*goal).note("visits", command.text.partition(" ")[2])
         self.command = None
         return plan.stay(self.stay)
 

@@ -1,6 +1,7 @@
 """Hangout: stand near people without blocking their way, and move rarely."""
 
 from datetime import datetime, timedelta
+from functools import partial
 from itertools import combinations
 from typing import ClassVar, Literal
 
@@ -87,9 +88,9 @@ class HangoutPlaces:
 
     def _compute_nearness(self, by: Nearness, tau: float) -> F64:
         rooms = self._actor.home.rooms
-        if by == "path":
-            return np.stack([self._path(room, tau) for room in rooms], axis=1)
-        column = self._same_room if by == "room" else self._view
+        if by == "room":
+            return (self.room[:, None] == np.arange(len(rooms))).astype(np.float64)
+        column = self._view if by == "view" else partial(self._path, tau=tau)
         return np.stack([column(room) for room in rooms], axis=1)
 
     def _candidates(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64]:
@@ -125,9 +126,6 @@ class HangoutPlaces:
         cells = cells_of(plan.room_of_cell == room.index)
         cells = cells[:: max(1, len(cells) // MAX_SEATS)]
         return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
-
-    def _same_room(self, room: Room) -> F64:
-        return (self.room == room.index).astype(np.float64)
 
     def _view(self, room: Room) -> F64:
         walls, reach = self._actor.home.walls, sight_range(self._actor)
@@ -319,10 +317,9 @@ class Hangout(BeliefBehavior):
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
         if room in now.actor.kept_out:
             return
-        plan.note("explores", now.home.rooms[room].name)
-        for point in viewpoints_of(
-            now.actor, now.home.rooms[room], SHARE_TO_SHOW, MAX_VIEWS
-        ).points:
+        target = now.home.rooms[room]
+        plan.note("explores", target.name)
+        for point in viewpoints_of(now.actor, target, SHARE_TO_SHOW, MAX_VIEWS).points:
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 

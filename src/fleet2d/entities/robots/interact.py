@@ -1,6 +1,6 @@
 """Interacting with people: those whom a robot has a request for, and those who come by."""
 
-from collections.abc import Mapping
+import math
 from datetime import datetime, timedelta
 from typing import ClassVar, Literal, NamedTuple
 
@@ -228,11 +228,10 @@ class Interact(BeliefBehavior):
         plan, ready = self._reply(now), self._ready(now)
         if plan is not None or not ready:
             return plan
-        in_view = now.in_view
         return (
-            self._address(now, ready, in_view, served)
-            or self._look_on(now, ready, in_view, served)
-            or self._look_for_somebody(now, [r for r in ready if r.to not in in_view])
+            self._address(now, ready, served)
+            or self._look_on(now, ready, served)
+            or self._look_for_somebody(now, [r for r in ready if r.to not in now.in_view])
         )
 
     def _take_served(self, now: Situation) -> ServedRequest | None:
@@ -256,13 +255,10 @@ class Interact(BeliefBehavior):
         return plan.note("replies", event.user).stay(REPLY_TAKES)
 
     def _address(
-        self,
-        now: Situation,
-        ready: list[Request],
-        in_view: Mapping[str, Point],
-        served: ServedRequest | None,
+        self, now: Situation, ready: list[Request], served: ServedRequest | None
     ) -> Plan | None:
         """Address the person of a request who is in view; None: of none."""
+        in_view = now.in_view
         for request in ready:
             place = in_view.get(request.to)
             if place is not None and self._may_address(now, request, place):
@@ -317,8 +313,8 @@ class Interact(BeliefBehavior):
             return False
         if is_in_rooms(now, *place, now.actor.banned(now.step)):
             return False
-        quiet_at = self.unanswered.get(request.to)
-        if quiet_at is not None and _squared(quiet_at, place) < MOVED_M**2:
+        x, y = self.unanswered.get(request.to, (math.inf, math.inf))
+        if (x - place[0]) ** 2 + (y - place[1]) ** 2 < MOVED_M**2:
             return False
         self.unanswered.pop(request.to, None)
         self.not_sought.pop(request.to, None)
@@ -410,27 +406,19 @@ class Interact(BeliefBehavior):
         return self.plan.interrupt_on("user_seen")
 
     def _look_on(
-        self,
-        now: Situation,
-        ready: list[Request],
-        in_view: Mapping[str, Point],
-        served: ServedRequest | None,
+        self, now: Situation, ready: list[Request], served: ServedRequest | None
     ) -> Plan | None:
         """Continue an interrupted round; None if it is over and nobody was found."""
         if served is None or served.step != "seek" or served.request not in ready:
             return None
-        last, plan = now.actor.plan, None
-        if served.request.to not in in_view and not last.is_over(now.step):
+        last, plan, is_in_view = now.actor.plan, None, served.request.to in now.in_view
+        if not is_in_view and not last.is_over(now.step):
             plan = resumed(now.actor, now.plan(), last, now.step)
         if plan is None:
-            self._end_round(now, served.request.to, is_in_view=served.request.to in in_view)
+            self._end_round(now, served.request.to, is_in_view=is_in_view)
             return None
         self.served = served
         return plan.interrupt_on("user_seen")
-
-
-def _squared(one: Point, other: Point) -> float:
-    return (one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2
 
 
 @register("behavior", "opportunistic")
@@ -477,27 +465,24 @@ class Opportunistic(Behavior):
 
     def decide(self, now: Situation) -> Plan | None:
         """Approach somebody in view, or leave the decision to later behaviors."""
-        if (accepted := self._accepted(now)) is not None:
-            request, text = accepted
+        asked, self.asked = self.asked, None
+        texts = [event.user for event in now.events if event.event == "accepted"]
+        if asked is not None and asked[1] in texts:
+            request, text = asked
             person = text.rpartition(" ")[2]
             done = "delivered" if person == request.interaction.to else "collects"
             plan = now.plan().stay(request.interaction.takes).note(done, text)
             return plan.note("interaction_over", person)
         avoided = self.avoided | now.actor.banned(now.step)
         for name, (x, y) in sorted(now.in_view.items()):
-            if not self._is_opportunity(name, now) or is_in_rooms(now, x, y, avoided):
+            last, is_meant = self.last_opportunity.get(name), not self.users or name in self.users
+            is_left_alone = last is not None and now.time - last < self.again
+            if not is_meant or is_left_alone or is_in_rooms(now, x, y, avoided):
                 continue
             self.last_opportunity[name] = now.time
             if now.random(f"chance {name}").uniform() < self.chance:
                 return self._approach(now, name, x, y)
         return None
-
-    def _is_opportunity(self, name: str, now: Situation) -> bool:
-        """Return whether it may approach a person: one of its users, left alone for long enough."""
-        if self.users and name not in self.users:
-            return False
-        last = self.last_opportunity.get(name)
-        return last is None or now.time - last >= self.again
 
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note("approaches", name)
@@ -509,9 +494,3 @@ class Opportunistic(Behavior):
         if self.asked is not None:
             plan.note("asks", self.asked[1]).interrupt_on("accepted")
         return plan.stay(self.interaction).note("interaction_over", name)
-
-    def _accepted(self, now: Situation) -> tuple[Request, str] | None:
-        """Return the request that the person it is with has just accepted, and its text."""
-        asked, self.asked = self.asked, None
-        texts = [event.user for event in now.events if event.event == "accepted"]
-        return asked if asked is not None and asked[1] in texts else None

@@ -78,31 +78,23 @@ class Patrol(Behavior):
             stops = [stop for stop in stops if not lies_in(actor, stop, avoided)]
         self.stops = stops if self.waypoints else list(dict.fromkeys(stops))
         only_patrols = all(isinstance(each, Patrol) for each in actor.behaviors)
-        if actor.entity.eyes and self.look_around and only_patrols:
-            self._note_unwatched(actor)
+        sees = actor.entity.eyes and self.look_around and only_patrols
+        if sees and (hidden := unwatched(actor, self.stops)):
+            more = f", and {len(hidden) - MAX_NAMED} more" if len(hidden) > MAX_NAMED else ""
+            hint = "" if self.stop_at == "view" else "; stop_at: view stops where it sees them"
+            actor.notes.append(
+                f"patrol: people there are never in view from its {len(self.stops)} stops:"
+                f" {', '.join(hidden[:MAX_NAMED])}{more}{hint}"
+            )
 
     def _stops_at(self, actor: Actor, place: Place) -> list[tuple[int, int]]:
         if self.stop_at == "middle" or is_point(place) or furniture_of(actor, place) is not None:
             return stops_at(actor, place)
-        return [
-            stop
-            for room in actor.rooms(place)  # type: ignore[arg-type]
-            for stop in self._stops_in(actor, room)
-        ]
+        rooms = actor.rooms(place)  # type: ignore[arg-type]
+        return [stop for room in rooms for stop in self._stops_in(actor, room)]
 
     def _stops_in(self, actor: Actor, room: Room) -> Sequence[tuple[int, int]]:
         return stops_with_view(actor, room) if self.stop_at == "view" else [actor.middle(room)]
-
-    def _note_unwatched(self, actor: Actor) -> None:
-        hidden = unwatched(actor, self.stops)
-        if not hidden:
-            return
-        more = f", and {len(hidden) - MAX_NAMED} more" if len(hidden) > MAX_NAMED else ""
-        hint = "" if self.stop_at == "view" else "; stop_at: view stops where it sees them"
-        actor.notes.append(
-            f"patrol: people there are never in view from its {len(self.stops)} stops:"
-            f" {', '.join(hidden[:MAX_NAMED])}{more}{hint}"
-        )
 
     def decide(self, now: Situation) -> Plan:
         """Plan one round."""
@@ -191,11 +183,8 @@ class Scheduled(Behavior):
                 return self._visit(now, number)
         blocked = [number for due, number in self.pending if (due, number) in fresh]
         if blocked:
-            return (
-                now.plan()
-                .note("way_blocked", self._room_name(now.actor, blocked[0]))
-                .stay(DOOR_WAIT)
-            )
+            name = self._room_name(now.actor, blocked[0])
+            return now.plan().note("way_blocked", name).stay(DOOR_WAIT)
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:

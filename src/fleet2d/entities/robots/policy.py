@@ -29,7 +29,6 @@ from fleet2d.entities.robots.approach import (
     BeliefBehavior,
     centres,
     check_has_camera,
-    room_belief,
     sight_range,
     spread,
 )
@@ -325,10 +324,10 @@ class Policy(BeliefBehavior):
                 part[seen.index, _AT["in_view"]] = 1
         away = 0.0
         if self.source is not None:
-            belief = room_belief(now, self.source, self.user)
+            belief = self.belief(now, self.user)
             part[:, _AT["belief"]], away = belief.joint, belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
-                part[:, _AT[f"belief_{number}"]] = room_belief(now, self.source, name).joint
+                part[:, _AT[f"belief_{number}"]] = self.belief(now, name).joint
         step_s = actor.clock.step_us / 1e6
         newest = max(memory.last[self._person].tolist())
         age_s = (now.step - newest) * step_s
@@ -433,10 +432,9 @@ class Policy(BeliefBehavior):
         return int(np.argmax(np.where(mask, scores, -np.inf)))
 
     def _action(self, now: Situation) -> int:
-        mask, action = self.mask(), self.given
+        mask, action, self.given = self.mask(), self.given, None
         if action is None:
             action = self.act(self.observe(now), mask)
-        self.given = None
         self.check(now, action, mask)
         return int(action)
 

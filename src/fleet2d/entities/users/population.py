@@ -12,7 +12,6 @@ from fleet2d.routines import interruptions, survey
 from fleet2d.routines.activity import catalogue
 from fleet2d.routines.distributions import draw_weighted
 from fleet2d.routines.planner import REST, Episode
-from fleet2d.routines.survey import activities, draw_works_at_home, to_activities
 from fleet2d.runtime.determinism import Draws, stream_key
 
 
@@ -40,22 +39,24 @@ class Population(ResidentBehavior):
         self.days = actor.stream("day")
         self.details = actor.stream("details")
         draws = Draws(actor.stream("who"), 0)
-        self.people = survey.group(_draw_group(draws) if self.group == "any" else self.group)
-        self.works_at_home = draw_works_at_home(self.people, draws)
+        group: str = self.group
+        if group == "any":  # by its share of the people
+            names = survey.groups()
+            shares = [survey.table()["groups"][name]["share"] for name in names]
+            group = names[draw_weighted(draws, shares)]
+        self.people = survey.group(group)
+        self.works_at_home = survey.draw_works_at_home(self.people, draws)
         self.first = actor.clock.start.toordinal() - 1
         self.states = [survey.first_state(self.people, draws, self.first)]
         self.cache: dict[int, Sequence[Episode]] = {}
         known = catalogue()
-        names = {*activities(self.people), REST}
+        used = {*survey.activities(self.people), REST}
         self.rules, self.interruptions = None, actor.stream("needs")
         if self.bodily_needs:
-            self.rules = interruptions.interruption_rules(
-                interruptions.population_needs(), interruptions.usual_errands(), known
-            )
-            names |= interruptions.activities_of(
-                interruptions.population_needs(), interruptions.usual_errands()
-            )
-        self.settle(actor, {name: known[name] for name in sorted(names)}, self.make_spots(actor))
+            needs, errands = interruptions.population_needs(), interruptions.usual_errands()
+            self.rules = interruptions.interruption_rules(needs, errands, known)
+            used |= interruptions.activities_of(needs, errands)
+        self.settle(actor, {name: known[name] for name in sorted(used)}, self.make_spots(actor))
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return the rooms of a typical activity of such people at the beginning of the run."""
@@ -65,7 +66,7 @@ class Population(ResidentBehavior):
         state = survey.first_state(people, draws, ordinal)
         episodes, _ = survey.draw_episodes(people, draws, ordinal, state)
         time_s = (time - datetime.fromordinal(ordinal)) // timedelta(seconds=1)
-        return rooms_at(to_activities(people, episodes, False, draws), time_s, known)
+        return rooms_at(survey.to_activities(people, episodes, False, draws), time_s, known)
 
     def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what is done from 04:00 on the day of a date's ordinal to 04:00 on the next."""
@@ -76,20 +77,12 @@ class Population(ResidentBehavior):
         return self.cache[ordinal]
 
     def _live(self, ordinal: int) -> Sequence[Episode]:
-        state = self.states[ordinal - self.first]
-        episodes, after = survey.draw_episodes(
-            self.people, Draws(self.days, ordinal), ordinal, state
-        )
+        people, state = self.people, self.states[ordinal - self.first]
+        episodes, after = survey.draw_episodes(people, Draws(self.days, ordinal), ordinal, state)
         if len(self.states) == ordinal - self.first + 1:
             self.states.append(after)
-        day = to_activities(self.people, episodes, self.works_at_home, Draws(self.details, ordinal))
+        details = Draws(self.details, ordinal)
+        day = survey.to_activities(people, episodes, self.works_at_home, details)
         if self.rules is None:
             return day
         return interruptions.interrupt(self.rules, Draws(self.interruptions, ordinal), day)
-
-
-def _draw_group(draws: Draws) -> str:
-    """Draw a group by its share of the people."""
-    names = survey.groups()
-    shares = [survey.table()["groups"][name]["share"] for name in names]
-    return names[draw_weighted(draws, shares)]

@@ -49,11 +49,8 @@ class Reactions(Behavior):
         personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
         persona = next((p for p in personas if p is not None), None)
         self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
-        self.durations = {
-            "looks": self.used_manners.looks.table(),
-            "leaves_for": self.used_manners.leaves_for.table(),
-            "comes_for": self.used_manners.comes_for.table(),
-        }
+        durations = ("looks", "leaves_for", "comes_for")
+        self.durations = {name: getattr(self.used_manners, name).table() for name in durations}
         self.rank, self.until = 0, -1  # of the present reaction, and the step at which it ends
         units, used = actor.home.plan.lattice.units_per_m, self.used_manners
         return Attention(

@@ -87,21 +87,13 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
     off = np.flatnonzero(~np.array(fits, bool))
     near = Nearest(actor).of(points[off])
     away: I64 = near - points[off]
-    far = (away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2
+    outside = off[(away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2]
     points[off] = near
-    is_inside = np.ones(len(points), bool)
-    is_inside[off[far]] = False
     known = np.isfinite(turns)
     heading = np.full(len(turns), -1, np.int64)
     heading[known] = np.floor(turns[known] * TURN + 0.5).astype(np.int64) % TURN
-    outside = int(np.count_nonzero(~is_inside))
-    return Fixes(
-        time_us[is_inside],
-        points[is_inside],
-        heading[is_inside],
-        snapped=len(off) - outside,
-        outside=outside,
-    )
+    columns = (np.delete(column, outside, axis=0) for column in (time_us, points, heading))
+    return Fixes(*columns, snapped=len(off) - len(outside), outside=len(outside))
 
 
 class FixFollower:
@@ -328,7 +320,7 @@ class RoomFollower:
             return spot
         if room.index not in self._nearest:
             self._nearest[room.index] = Nearest(self.actor, room.index)
-        x, y = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64))[0].tolist()
+        ((x, y),) = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64)).tolist()
         return x, y
 
     def _way(self, plan: Plan, spot: tuple[int, int]) -> I64:
@@ -421,14 +413,13 @@ def report_fixes(
     if frame.matches:
         off = frame.errors()
         lines.append(f"the frame fits its {len(off)} matches to {float(off.max()):.2f} m")
-    if thinned:
-        lines.append(f"{thinned} fixes are left out: one in a step is enough")
-    if fixes.outside:
-        lines.append(f"{fixes.outside} fixes are outside the home and left out")
-    if fixes.snapped:
-        lines.append(f"{fixes.snapped} fixes are moved to the nearest place where the body fits")
-    if follower.around:
-        lines.append(f"{follower.around} legs go around a wall that a straight line would cross")
+    counts = (
+        (thinned, "fixes are left out: one in a step is enough"),
+        (fixes.outside, "fixes are outside the home and left out"),
+        (fixes.snapped, "fixes are moved to the nearest place where the body fits"),
+        (follower.around, "legs go around a wall that a straight line would cross"),
+    )
+    lines += [f"{count} {text}" for count, text in counts if count]
     if follower.gap_count:
         hours = follower.unknown_us / 3.6e9
         lines.append(f"nobody knows where it is in {follower.gap_count} gaps, {hours:.2f} h in all")

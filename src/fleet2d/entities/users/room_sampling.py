@@ -1,8 +1,6 @@
 """Room sampling: rooms drawn from a long-term distribution, each for a while."""
 
-from collections.abc import Sequence
 from datetime import timedelta
-from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -15,7 +13,6 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.users.resident import Spot, Spots
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.routines.distributions import draw_weighted
@@ -30,18 +27,6 @@ SHORTEST_US = 10 * SECOND_US
 # Points per metre of a way at which the room is looked up.
 POINTS_PER_M = 10
 MILLION = 1_000_000
-
-
-class Stop(NamedTuple):
-    """A destination of visits.
-
-    Attributes:
-        room: The room; None is out of the home.
-        chance: Its probability [per million].
-    """
-
-    room: Room | None
-    chance: int
 
 
 @register("behavior", "room_sampling")
@@ -87,17 +72,15 @@ class RoomSampling(Behavior):
                 " have a share of 0"
             )
         chances: dict[int | None, float] = {}
-        self.rooms: dict[int | None, Room | None] = {None: None}
         for name, share in shares.items():
-            rooms: Sequence[Room | None] = [None] if name == AWAY else actor.rooms((name,))
-            for room in rooms:
-                index = None if room is None else room.index
-                self.rooms[index] = room
+            rooms = [None] if name == AWAY else [room.index for room in actor.rooms((name,))]
+            for index in rooms:
                 chances[index] = chances.get(index, 0.0) + share / total / len(rooms)
-        self.stops = [Stop(self.rooms[i], round(p * MILLION)) for i, p in chances.items()]
+        # By the room's index, None is out of the home [per million].
+        self.chances = {index: round(chance * MILLION) for index, chance in chances.items()}
         self.dwell_time = self.dwell.table()
         self.spots = Spots(actor)
-        self.debt_us: dict[int, int] = dict.fromkeys((i for i in chances if i is not None), 0)
+        self.debt_us = {room: 0 for room in self.chances if room is not None}
         self.visits = 0
 
     def decide(self, now: Situation) -> Plan:
@@ -110,18 +93,18 @@ class RoomSampling(Behavior):
         return plan
 
     def _visit(self, actor: Actor, plan: Plan, draws: Draws) -> None:
-        stop = self.stops[draw_weighted(draws, [stop.chance for stop in self.stops])]
+        room = list(self.chances)[draw_weighted(draws, list(self.chances.values()))]
         dwell_us = self.dwell_time.draw(draws) * SECOND_US
-        if stop.room is None:
+        if room is None:
             if not plan.away:
                 self._walk(actor, plan, Spot(*actor.way_out))
                 plan.leave_home()
             plan.stay(timedelta(microseconds=dwell_us))
             return
-        self._walk(actor, plan, draws.choice(self.spots.in_room(stop.room)))
-        owed = self.debt_us[stop.room.index]
+        self._walk(actor, plan, draws.choice(self.spots.in_room(actor.home.rooms[room])))
+        owed = self.debt_us[room]
         stay_us = max(dwell_us - owed, SHORTEST_US)
-        self.debt_us[stop.room.index] = owed - (dwell_us - stay_us)
+        self.debt_us[room] = owed - (dwell_us - stay_us)
         plan.stay(timedelta(microseconds=stay_us))
 
     def _walk(self, actor: Actor, plan: Plan, goal: Spot) -> None:
@@ -153,11 +136,7 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
     weight = np.repeat(lengths / steps, steps)
     rooms = plan.room_of_place[cells[:, 1], cells[:, 0]]
     total = np.cumsum(weight)[-1]
-    return (
-        [
-            (room, float(np.cumsum(weight[rooms == room])[-1] / total))
-            for room in np.unique(rooms).tolist()
-        ]
-        if total > 0
-        else []
-    )
+    if not total > 0:
+        return []
+    by_room = ((room, weight[rooms == room]) for room in np.unique(rooms).tolist())
+    return [(room, float(np.cumsum(weights)[-1] / total)) for room, weights in by_room]
