@@ -50,7 +50,7 @@ def venue_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) ->
         for kind in MOVE_KINDS
         if draw(st.booleans()) and not activity.away
     ]
-    seats = spots.at_furniture(activity.objects, own, activity.posture)
+    seats = spots.at_furniture(activity, own)
     stores = draw(st.lists(st.sampled_from(rooms), max_size=2))
     takes = draw(st.sampled_from([(0, 0), (1, 90), (600, 600), (9, 50_000)]))
     return Venue(activity, own, list(seats), stores, tuple(moves), uniform(*takes))

@@ -92,7 +92,7 @@ class SlowHome(KnownHome):
 
     def seats_in(self, venue: Venue, room: Any) -> list[Seat]:
         activity = venue.activity
-        return self._person.spots.at_furniture(activity.objects, (room,), activity.posture)
+        return self._person.spots.at_furniture(activity, (room,))
 
     def settle(self, plan: Plan, venue: Venue, place: AnyPlace) -> None:
         if isinstance(place, Seat):

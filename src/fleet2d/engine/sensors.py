@@ -18,7 +18,6 @@ from fleet2d.entities.sensor import (
     SensorReading,
     SensorState,
     SensorView,
-    in_order,
 )
 from fleet2d.errors import blame, errors_as
 from fleet2d.kernels import PoseBlock
@@ -114,7 +113,8 @@ class Sensors(Watcher):
             for number, state in enumerate(self._states):
                 new = self._read(number, state, view, end)
                 readings += [(number, reading) for reading in new]
-        self._readings += in_order(readings)
+        # By step, then by sensor.
+        self._readings += sorted(readings, key=lambda item: (item[1].step, item[0]))
         return ()
 
     def _read(

@@ -92,18 +92,11 @@ class Charge:
         """The charge for the table of events."""
         return f"{100 * self.level:.1f} %"
 
-    def set(self, level: float, motion: Motion, now_us: int) -> None:
-        """Set the charge at a moment, up to which a motion was followed."""
-        self.follow(motion, now_us)
-        self.level = level
-
-    def set_broken(self, is_broken: bool, motion: Motion, now_us: int) -> None:
-        """Let the charger fail, or work again, at a moment up to which a motion was followed."""
-        self.follow(motion, now_us)
-        self.is_broken = is_broken
-
     def follow(self, motion: Motion, until_us: int) -> None:
-        """Update the charge: a motion was followed from the last decision to a moment."""
+        """Update the charge: a motion was followed from the last decision to a moment.
+
+        Before `level` or `is_broken` is set at that moment, this is to be called.
+        """
         self.level = kernels.charge_at(_track(motion), self._state, until_us)
         self._since_us = until_us
 

@@ -6,6 +6,7 @@ is by then.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import NamedTuple
 
@@ -89,7 +90,7 @@ def _rest(
         return None
     plan.turn_to(heading_at(track, stop, goes_on_us))
     rest = _rows(track)[stop + 1 :]
-    return _continue(plan, interrupted, interrupted_us, goes_on_us, rest, catches_up=False)
+    return _continue(plan, interrupted, interrupted_us, goes_on_us, rest, hurries=False)
 
 
 def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None:
@@ -158,6 +159,7 @@ class Surroundings(NamedTuple):
         return is_same and np.array_equal(self.users, other.users)
 
 
+@dataclass(eq=False)
 class WaitForPeople:
     """The wait of a robot that has stopped in front of a person.
 
@@ -173,17 +175,11 @@ class WaitForPeople:
         surroundings: The people and obstacles at its last look.
     """
 
-    def __init__(
-        self,
-        interrupted: Plan,
-        step: int,
-        since: int,
-        interrupts: frozenset[str],
-        surroundings: Surroundings,
-    ) -> None:
-        self.interrupted, self.step, self.since = interrupted, step, since
-        self.interrupts, self.surroundings = interrupts, surroundings
-        self._step_us = interrupted.step_us
+    interrupted: Plan
+    step: int
+    since: int
+    interrupts: frozenset[str]
+    surroundings: Surroundings
 
     def look_from(self, step: int) -> int:
         """Return the first step from `step` on at which it looks."""
@@ -202,11 +198,11 @@ class WaitForPeople:
     def _look_after(self, look: int) -> int:
         shortest, longest = (micros(interval) for interval in LOOK_INTERVALS)
         interval = min(max(shortest, self._waited(look) // 10), longest)
-        return look + max(-(-interval // self._step_us), 1)
+        return look + max(-(-interval // self.interrupted.step_us), 1)
 
     def _waited(self, step: int) -> int:
         """Return how long it has waited at a step [us]."""
-        return (step - self.since) * self._step_us
+        return (step - self.since) * self.interrupted.step_us
 
     def stand_still(self, now: Situation, person: str, gives_way: GivesWay) -> Plan:
         """Return a plan to stand still until the next look at whether the way is free.
@@ -221,8 +217,7 @@ class WaitForPeople:
         # At its first look it may still turn towards its next leg.
         while self.interrupted.began[0] == now.step and self._waited(look) < patience:
             look = self._look_after(look)
-        plan.stay_until(look * self._step_us)
-        plan.interrupts = self.interrupts
+        plan.stay_until(look * plan.step_us).interrupts = self.interrupts
         return plan
 
     def continued(self, now: Situation) -> Plan | None:
@@ -248,10 +243,9 @@ class WaitForPeople:
 
     def skip_stop(self, now: Situation, person: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""
-        plan = self._stand_for_a_step(now).note("gives_up", person)
-        return self._with_interrupts(
-            without_next_stop(now.actor, plan, self.interrupted, self.step)
-        )
+        plan = self.give_up(now, person)
+        rest = without_next_stop(now.actor, plan, self.interrupted, self.step)
+        return self._with_interrupts(rest)
 
     def give_up(self, now: Situation, person: str) -> Plan:
         """Stand for a step, after which the behaviors are asked again."""
@@ -350,13 +344,7 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
 
 
 def _continue(
-    plan: Plan,
-    interrupted: Plan,
-    begin_us: int,
-    since_us: int,
-    rest: I64,
-    *,
-    catches_up: bool = True,
+    plan: Plan, interrupted: Plan, begin_us: int, since_us: int, rest: I64, *, hurries: bool = True
 ) -> Plan:
     """Continue a plan with the part of another one after a moment, delayed, and return it.
 
@@ -369,15 +357,14 @@ def _continue(
         begin_us: The moment up to which the other plan was followed; its later rows are copied.
         since_us: The moment.
         rest: The breakpoints of the other plan after the moment, int64 (n, 5); they are delayed.
-        catches_up: Whether the first rest that is long enough is shortened by the delay, so that
-            the body is on time again after it.
+        hurries: Whether the first rest that is long enough is shortened by the delay, so that the
+            body is on time again after it.
     """
     later = plan.time_us - since_us
     row = np.array([[since_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
     rows = np.concatenate([row, rest])
     rests = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1) & (np.diff(rows[:, 0]) >= later)
-    shortens = catches_up and rests.any()
-    edge = int(rows[np.argmax(rests) if shortens else -1, 0])
+    edge = int(rows[np.argmax(rests) if hurries and rests.any() else -1, 0])
 
     def delayed(time_us: int) -> int:
         return time_us + later if time_us <= edge else max(time_us, edge + later)

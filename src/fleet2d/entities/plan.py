@@ -411,13 +411,6 @@ class Plan:
         self.legs.mark(self.time_us, self.x, self.y, self.heading, self.away)
 
 
-def _check_note(note: list[Any]) -> list[Any]:
-    time_us, event, detail = note
-    if type(time_us) is not int or not isinstance(event, str) or not isinstance(detail, str):
-        raise ValueError("expected the time of a note [us], its event and a detail")
-    return note
-
-
 def _check_posture(change: list[int]) -> list[int]:
     _, code = change
     if not 0 <= code < len(POSTURES):
@@ -463,7 +456,7 @@ class _PlanForm(BaseModel):
 
     rows: list[Annotated[list[_Integer], _FIVE]]
     walk: Annotated[list[Annotated[int, Field(ge=0, lt=2**64)]], _FIVE] | None
-    notes: list[Annotated[list[Any], AfterValidator(_check_note)]]
+    notes: list[Annotated[tuple[int, str, str], Field(strict=False)]]
     interrupts: list[str]
     asks_us: _Integer | None
     endless: bool

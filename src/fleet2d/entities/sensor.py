@@ -1,6 +1,5 @@
 """What all sensors are: how they notice bodies, their readings, and their state between spans."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import ClassVar, Literal, NamedTuple
@@ -146,11 +145,6 @@ class SensorState:
     def _off(self) -> SensorReading:
         self.on = False
         return SensorReading(self.last + self.hold + 1, False, self.user)
-
-
-def in_order(readings: Sequence[tuple[int, SensorReading]]) -> list[tuple[int, SensorReading]]:
-    """Return (sensor number, reading) pairs ordered by step, then by sensor."""
-    return sorted(readings, key=lambda item: (item[1].step, item[0]))
 
 
 class FurnitureSensor(Sensor):

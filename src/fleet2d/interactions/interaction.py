@@ -1,19 +1,20 @@
 """Interactions as data: what a robot wants of a person, when it is worth what, and its queue."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from enum import StrEnum
-from typing import Annotated, Literal, NamedTuple
+from itertools import count
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import (
-    Days,
     Duration,
     Length,
+    OnDays,
     PositiveDuration,
     Share,
     TimeOfDay,
@@ -81,7 +82,7 @@ class Interaction(Settings):
     about: str = ""
     fetch_from: str | None = None
     at: tuple[TimeOfDay, ...] = ()
-    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = "daily"
+    on: OnDays = "daily"
     every: PositiveDuration | None = None
     within: PositiveDuration = timedelta(minutes=30)
     worth: float = Field(default=1.0, ge=0, le=1e6)
@@ -103,7 +104,7 @@ class Interaction(Settings):
     @property
     def people(self) -> list[str]:
         """The persons whom the robot addresses for it, in order."""
-        return [person for person in (self.fetch_from, self.to) if person is not None]
+        return [self.to] if self.fetch_from is None else [self.fetch_from, self.to]
 
     def value_after(self, age: timedelta) -> float:
         """Return its value when it is carried out some time after it came up; 0 if too late."""
@@ -120,14 +121,10 @@ class Interaction(Settings):
         """
         if self.every is not None:
             passed = max(timedelta(0), after - start)
-            number = -(-passed // self.every)
-            while True:
+            for number in count(-(-passed // self.every)):
                 yield start + number * self.every
-                number += 1
-        names = (self.on,) if isinstance(self.on, str) else self.on
-        days = weekdays_of(names)
         for midnight in midnights(after):
-            if midnight.weekday() in days:
+            if midnight.weekday() in weekdays_of(self.on):
                 yield from (midnight + at for at in sorted(self.at) if midnight + at >= after)
 
 
@@ -242,19 +239,16 @@ class RequestQueue:
         """Return the first open request that a text, as in events, names."""
         return next((request for request in self.open if request.text == text), None)
 
-    def ready(self, time: datetime, people: Iterable[str] | None = None) -> list[Request]:
+    def ready(self, time: datetime, people: Sequence[str] | None = None) -> list[Request]:
         """Return the requests that may be tried now, the most valuable and urgent first.
 
         Args:
             time: The present time.
             people: Only those to these people.
         """
-        chosen = None if people is None else frozenset(people)
-        ready = [
-            request
-            for request in self.open
-            if request.not_before <= time and (chosen is None or request.to in chosen)
-        ]
+        ready = [request for request in self.open if request.not_before <= time]
+        if people is not None:
+            ready = [request for request in ready if request.to in people]
         return sorted(ready, key=lambda r: (-r.interaction.worth, r.until, r.name))
 
     def next_ready(self, time: datetime) -> datetime | None:

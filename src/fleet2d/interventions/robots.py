@@ -166,8 +166,10 @@ class SetBattery(RobotIntervention):
 
     def begin(self, world: World) -> None:
         """Set it, and make the behaviors replan."""
-        actor, now_us = self.actor(world), world.step * world.clock.step_us
-        battery_of(actor).set(self.charge, actor.motion, now_us)
+        actor = self.actor(world)
+        charge = battery_of(actor)
+        charge.follow(actor.motion, world.step * world.clock.step_us)
+        charge.level = self.charge
         actor.decide_again(world.step)
 
 
@@ -378,9 +380,10 @@ class Fault(Trouble):
     def _apply(self, world: World) -> None:
         super()._apply(world)
         if self.charger:
-            actor, now_us = self.actor(world), world.step * world.clock.step_us
-            is_broken = any(act.charger for act in self.active(world))
-            battery_of(actor).set_broken(is_broken, actor.motion, now_us)
+            actor = self.actor(world)
+            charge = battery_of(actor)
+            charge.follow(actor.motion, world.step * world.clock.step_us)
+            charge.is_broken = any(act.charger for act in self.active(world))
             actor.decide_again(world.step)
 
 

@@ -1,7 +1,6 @@
 """Activities: what people do, where, for how long, and how much they move meanwhile."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import timedelta
 from functools import cache
 from pathlib import Path
@@ -25,14 +24,11 @@ FORMS: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, init=False)
 class SchemaForms:
     """Lists the short forms of a field: ``Annotated[Period, SchemaForms("pair")]``."""
 
-    forms: tuple[str, ...]
-
     def __init__(self, *forms: Literal["text", "number", "pair", "extension"]) -> None:
-        object.__setattr__(self, "forms", forms)
+        self.forms = forms
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -109,12 +105,12 @@ class DurationDistribution(Settings):
         std = seconds(self.std) if self.std is not None else int(mean * DEFAULT_SPREAD)
         low = None if self.at_least is None else seconds(self.at_least)
         high = None if self.at_most is None else seconds(self.at_most)
-        if self.law == "fixed" or (std == 0 and self.law != "measured" and self.law != "uniform"):
-            return distributions.uniform(mean, mean)
         if self.law == "uniform":
             return distributions.uniform(low or 0, high or 0)
         if self.law == "measured":
             return distributions.empirical([seconds(d) for d in self.quantiles]).within(low, high)
+        if self.law == "fixed" or std == 0:
+            return distributions.uniform(mean, mean)
         if self.law == "exponential":
             return distributions.exponential(mean).within(low, high)
         make: Callable[[float, float], Distribution] = getattr(distributions, self.law)

@@ -370,32 +370,28 @@ class Persona(Settings):
 
     def model_post_init(self, _: object, /) -> None:
         """Require that every activity, day and event that is named exists."""
+        named: list[tuple[tuple[str, ...], str]] = []
         for name, day in self.days.items():
-            for task, fields in day.do.items():
-                self._check_activity(fields.activity or task, ("days", name, "do", task))
-            for recorded in day.recorded:
-                for activity in recorded.activities:
-                    self._check_activity(activity, ("days", name, "recorded"))
-            for pastime in day.leisure or ():
-                self._check_activity(pastime, ("days", name, "leisure", pastime))
-        for pastime in self.leisure:
-            self._check_activity(pastime, ("leisure", pastime))
-        for key, name in named_activities(self.needs, self.errands):
-            self._check_activity(name, key)
-        self._check_year()
+            of_day, recorded = ("days", name), [n for r in day.recorded for n in r.activities]
+            named += [((*of_day, "do", key), task.activity or key) for key, task in day.do.items()]
+            named += [((*of_day, "recorded"), activity) for activity in recorded]
+            named += [((*of_day, "leisure", pastime), pastime) for pastime in day.leisure or ()]
+        named += [(("leisure", pastime), pastime) for pastime in self.leisure]
+        for key, name in (*named, *named_activities(self.needs, self.errands)):
+            try:
+                self.activity(name)
+            except ValueError as error:
+                raise problem_at(key, str(error)) from None
+        for name, event in self.year.items():
+            if event.days is not None:
+                wrong = partial(problem_at, ("year", name, "days"))
+                check_known(event.days, "template", [*bundled_days(), *self.days], wrong)
         covered = {weekday for day in self.days.values() for weekday in day.weekdays}
         if missing := [WEEKDAYS[i] for i in range(7) if i not in covered]:
             raise problem_at(
                 ("days",), f"no day is described for {', '.join(missing)}: add them to 'on'"
             )
         check(self)
-
-    def _check_year(self) -> None:
-        for name, event in self.year.items():
-            known = {**bundled_days(), **self.days}
-            if event.days is not None:
-                error = partial(problem_at, ("year", name, "days"))
-                check_known(event.days, "template", known, error)
 
     @cached_property
     def plans(self) -> dict[str, DayPlan]:
@@ -414,12 +410,6 @@ class Persona(Settings):
     def interruptions(self) -> InterruptionRules:
         """The rules of its needs and errands."""
         return interruption_rules(self.needs, self.errands, {**catalogue(), **self.activities})
-
-    def _check_activity(self, name: str, key: tuple[str, ...]) -> None:
-        try:
-            self.activity(name)
-        except ValueError as error:
-            raise problem_at(key, str(error)) from None
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> "Persona":
         """Return itself, as personas never change."""
@@ -497,12 +487,12 @@ def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
     if not isinstance(data, Mapping):
         return data
     result = dict(data)
-    for key in ("needs", "errands"):
-        if key in keys and key in result and result[key] is None:
-            result[key] = {}
     for key in keys:
-        if isinstance(result.get(key), Mapping):
-            result[key] = {k: v for k, v in result[key].items() if v is not None}
+        entries = result.get(key, ())
+        if isinstance(entries, Mapping):
+            result[key] = {k: v for k, v in entries.items() if v is not None}
+        elif entries is None and key in ("needs", "errands"):
+            result[key] = {}
     return result
 
 

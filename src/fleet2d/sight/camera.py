@@ -228,15 +228,14 @@ def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableCon
     shape = (len(lenses), len(context.users))
     bodies = np.zeros((*shape, max(lens.points for lens in lenses) + 1, 2), np.int64)
     reach, widest = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    pans = np.zeros((len(lenses), max(1, *(len(lens.pans) for lens in lenses), 0)), np.int64)
     for c, lens in enumerate(lenses):
+        pans[c, : len(lens.pans)] = lens.pans
         for u, radius in enumerate(context.radii):
             body = lens.body(radius)
             bodies[c, u, : len(body)] = body
             reach[c, u] = round(radius) + 1 if lens.points else 0
             widest[c, u] = (lens.far + reach[c, u]) ** 2
-    pans = np.zeros((len(lenses), max(1, *(len(lens.pans) for lens in lenses), 0)), np.int64)
-    for c, lens in enumerate(lenses):
-        pans[c, : len(lens.pans)] = lens.pans
     return Lenses(
         near_squared=_row(lens.near**2 for lens in lenses),
         far_squared=_row(lens.far**2 for lens in lenses),
@@ -344,16 +343,15 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
     for u, user in enumerate(context.users):
         others = model.confusion.get(user)
         if others is None:
-            rest = [name for name in context.users if name != user]
-            others = {name: 1 / len(rest) for name in rest}
+            others = {u: 1 / (len(context.users) - 1) for u in context.users if u != user}
         _check_users(others, f"confusion.{user}", context)
-        confusion[u] = _whole(cumulative(others, context.users), others, context.users)
+        confusion[u] = _whole_sums(others, context.users)
 
 
-def _whole(sums: list[int], shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
-    """Set cumulative probabilities to 1 from the last possible outcome on, despite rounding."""
+def _whole_sums(shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
+    """Return cumulative probabilities, 1 from the last possible outcome on, despite rounding."""
     last = max((i for i, name in enumerate(order) if shares.get(name)), default=len(order))
-    return [*sums[:last], *[ONE] * (len(sums) - last)]
+    return [*cumulative(shares, order)[:last], *[ONE] * (len(order) - last)]
 
 
 def _check_users(names: Mapping[str, object], key: str, context: TableContext) -> None:
@@ -370,8 +368,7 @@ def _fill_attributes(table: I64, model: Attributes, context: TableContext) -> No
     for i, posture in enumerate(POSTURES):
         others: dict[str, float] = dict(model.posture.get(posture, {}).items())
         others[posture] = 1 - sum_in_order(others.values())
-        sums = _whole(cumulative(others, POSTURES), others, POSTURES)
-        _put(table, TablePart.SEEMS + len(POSTURES) * i, sums)
+        _put(table, TablePart.SEEMS + len(POSTURES) * i, _whole_sums(others, POSTURES))
 
 
 def _fill_false_positives(
@@ -398,9 +395,7 @@ def _fill_false_positives(
         tables.ghosts[camera, count] = chance(min(total, 1.0))
         term *= float(mean) / (count + 1)
     shares = {str(i): rate / sum_in_order(rates) for i, rate in enumerate(rates)}
-    tables.source[camera, : len(rates)] = _whole(
-        cumulative(shares, list(shares)), shares, list(shares)
-    )
+    tables.source[camera, : len(rates)] = _whole_sums(shares, list(shares))
     for i, spot in enumerate(model.spots, 1):
         x, y = context.lattice.point_at(spot.at)
         noise = round(spot.spread * context.lattice.units_per_m * 65536 / BELL_STD)

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings, register
 from fleet2d.configuration.problems import problem
-from fleet2d.configuration.units import Days, Duration, TimeOfDay, weekdays_of
+from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, weekdays_of
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Behavior, Situation
 from fleet2d.entities.place import (
     Place,
@@ -128,7 +128,7 @@ class ScheduledVisit(Settings):
     at: TimeOfDay
     place: Place
     dwell: Duration = timedelta(minutes=10)
-    on: Days | Annotated[tuple[Days, ...], Field(min_length=1)] = "daily"
+    on: OnDays = "daily"
     look_around: bool = True
     task: str = ""
 

@@ -455,13 +455,13 @@ class Policy(BeliefBehavior):
 
     def _rest(self, now: Situation, plan: Plan) -> Plan:
         """Charge, if it has a battery; else stay where it is."""
-        charge = now.actor.charge
-        if charge is None or not plan.reaches(*charge.charger):
-            return self._wait(plan, timedelta(minutes=1) if self.task == "find" else self.period)
-        if (plan.x, plan.y) != charge.charger:
-            plan.go_to_point(*charge.charger).note("docks", charge.percent)
-        charging = timedelta(microseconds=charge.time_to_charge(1.0))
-        return self._wait(plan, max(charging, timedelta(minutes=1)))
+        charge, lasts = now.actor.charge, MINUTE if self.task == "find" else self.period
+        if charge is not None and plan.reaches(*charge.charger):
+            if (plan.x, plan.y) != charge.charger:
+                plan.go_to_point(*charge.charger).note("docks", charge.percent)
+            lasts = max(timedelta(microseconds=charge.time_to_charge(1.0)), MINUTE)
+        plan.stay(lasts)
+        return plan.interrupt_on("user_seen") if self.task == "find" else plan
 
     def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
         """Go to a room, and wait or look round there."""
@@ -481,10 +481,6 @@ class Policy(BeliefBehavior):
         overdue_s = (now.step - begun) * now.actor.clock.step_us / 1e6
         self._tally["overdue_h"] += min(overdue_s / HOUR_S, MAX_OVERDUE_H)
         return plan.turn_by(1.0).stay(self.dwell)
-
-    def _wait(self, plan: Plan, duration: timedelta) -> Plan:
-        plan.stay(duration)
-        return plan.interrupt_on("user_seen") if self.task == "find" else plan
 
 
 @lru_cache(maxsize=8)

@@ -93,7 +93,9 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
     heading = np.full(len(turns), -1, np.int64)
     heading[known] = np.floor(turns[known] * TURN + 0.5).astype(np.int64) % TURN
     columns = (np.delete(column, outside, axis=0) for column in (time_us, points, heading))
-    return Fixes(*columns, snapped=len(off) - len(outside), outside=len(outside))
+    time_us, points, heading = columns
+    snapped = len(off) - len(outside)
+    return Fixes(time_us, points, heading, snapped=snapped, outside=len(outside))
 
 
 class FixFollower:
@@ -228,16 +230,10 @@ class RoomFollower:
     """
 
     def __init__(
-        self,
-        actor: Actor,
-        visits: Sequence[LoggedVisit],
-        at_once: bool = False,
-        limit: float = float("inf"),
+        self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool, limit: float
     ) -> None:
-        self.actor = actor
-        self.limit = limit
-        self.visits = visits
-        self.at_once = at_once
+        self.actor, self.visits = actor, visits
+        self.at_once, self.limit = at_once, limit
         self.step_us = actor.clock.step_us
         self.walks = self.hurried = self.implausible = 0
         self.top_speed = 0.0  # of the walks [m/s]
@@ -377,7 +373,6 @@ def report_rooms(
     log: ActivityLog,
     mapped: Mapping[str, RoomChoice | None],
     logged: LoggedVisits,
-    rule: VisitRule,
     follower: RoomFollower,
 ) -> tuple[str, ...]:
     """Return lines about a log of rooms: which room each label means, omissions, gaps, haste."""
@@ -391,9 +386,8 @@ def report_rooms(
             f"{logged.overruled} readings yield to later ones of another room in their step"
         )
     gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
-    hours = sum_in_order(
-        (min(v.last + 1, rule.steps) - max(v.first, 0)) * rule.step_us / 3.6e9 for v in gaps
-    )
+    steps, step_us = follower.actor.clock.steps, follower.step_us
+    hours = sum_in_order((min(v.last + 1, steps) - max(v.first, 0)) * step_us / 3.6e9 for v in gaps)
     if gaps:
         lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
     if follower.hurried:
@@ -406,10 +400,10 @@ def report_rooms(
 
 
 def report_fixes(
-    log: PositionLog, fixes: Fixes, follower: FixFollower, thinned: int, frame: LogFrame
+    log: PositionLog, follower: FixFollower, thinned: int, frame: LogFrame
 ) -> tuple[str, ...]:
     """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
-    lines = [_head(log, len(log.time_us), "fixes"), *log.notes]
+    lines, fixes = [_head(log, len(log.time_us), "fixes"), *log.notes], follower.fixes
     if frame.matches:
         off = frame.errors()
         lines.append(f"the frame fits its {len(off)} matches to {float(off.max()):.2f} m")
@@ -549,8 +543,7 @@ class Replay(Behavior):
 
     def _start_rooms(self, actor: Actor, log: ActivityLog, begin_us: int) -> None:
         mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)
-        clock = actor.clock
-        gap_us = micros(self.gap or GAP_OF_ROOMS)
+        clock, gap_us = actor.clock, micros(self.gap or GAP_OF_ROOMS)
         rule = VisitRule(
             step_us=clock.step_us,
             begin_us=begin_us,
@@ -566,7 +559,7 @@ class Replay(Behavior):
         self.follower: RoomFollower | FixFollower = follower
         # Planned once before the run, for the report on its walks.
         follower.follow(Plan(actor, 0), 0, rejoin=False)
-        self.notes = report_rooms(log, mapped, logged, rule, follower)
+        self.notes = report_rooms(log, mapped, logged, follower)
 
     def _start_fixes(self, actor: Actor, log: PositionLog, begin_us: int) -> None:
         if self.rooms:
@@ -587,4 +580,4 @@ class Replay(Behavior):
         self.follower = FixFollower(actor, fixes, gap_us, self.gaps, self.fastest)
         self.follower.follow(Plan(actor, 0))
         thinned = int(np.count_nonzero(step[1:] == step[:-1]))
-        self.notes = report_fixes(log, fixes, self.follower, thinned, self.frame)
+        self.notes = report_fixes(log, self.follower, thinned, self.frame)

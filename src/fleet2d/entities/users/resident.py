@@ -112,29 +112,24 @@ class Spots:
         return self._of_room[room.index]
 
     def at_furniture(
-        self,
-        kinds: Sequence[str],
-        rooms: Sequence[Room],
-        posture: str,
-        share: tuple[int, int] | None = None,
+        self, activity: Activity, rooms: Sequence[Room], share: tuple[int, int] | None = None
     ) -> list[Seat]:
-        """Return the body's own places at the furniture in some rooms.
+        """Return the body's own places for an activity at the furniture in some rooms.
 
         Places of the first type that exists are used, and those of the next types as long as there
         are fewer places than bodies that share them.
 
         Args:
-            kinds: Types of furniture, to try in turn.
+            activity: The activity.
             rooms: The rooms to look in.
-            posture: If a piece has places for this posture, only those of its places are used.
             share: Rank of the body, and number of bodies that share; None: as in its household.
         """
         self._check_version()
-        key = (tuple(kinds), *[room.index for room in rooms], posture, share, self._actor.part)
+        indices, kinds = frozenset(room.index for room in rooms), activity.objects
+        key = kinds, indices, activity.posture, share, self._actor.part
         if key not in self._at_furniture:
-            indices = frozenset(room.index for room in rooms)
             rank, members = share or (self.rank, self.members)
-            seats = seats_at(self._actor.home, kinds, indices, posture, members, self._can_reach)
+            seats = seats_at(self._actor.home, activity, indices, members, self._can_reach)
             if self.apart and len(seats) <= rank % members and not FIXTURES.intersection(kinds):
                 seats = []
             self._at_furniture[key] = list(part_of(seats, rank, members)) if seats else []
@@ -172,29 +167,30 @@ class Spots:
 
 def seats_at(
     home: Home,
-    kinds: Sequence[str],
+    activity: Activity,
     indices: Set[int],
-    posture: str,
     bodies: int,
-    can_reach: Callable[[UsePlace], bool] | None = None,
+    can_reach: Callable[[UsePlace], bool] = lambda _: True,
 ) -> list[Seat]:
-    """Return the places at the furniture in some rooms.
+    """Return the places for an activity at the furniture in some rooms.
+
+    Its types of furniture are tried in turn until there are as many places as bodies. Of a piece
+    that has places for its posture, only those are used.
 
     Args:
         home: The home.
-        kinds: Types of furniture, to try in turn until there are `bodies` places.
+        activity: The activity.
         indices: The numbers of the rooms.
-        posture: If a piece has places for this posture, only those of its places are used.
         bodies: The number of bodies that share the places.
-        can_reach: Tells whether a place can be used; None: all can.
+        can_reach: Tells whether a place can be used.
     """
     seats: list[Seat] = []
-    for kind in kinds:
+    for kind in activity.objects:
         for thing in (thing for thing in home.objects if thing.type == kind):
             room = home.room_of(thing)
             if room is not None and room.index in indices:
-                usable = [i for i, use in enumerate(thing.uses) if not can_reach or can_reach(use)]
-                fit = [i for i in usable if thing.uses[i].posture == posture]
+                usable = [i for i, use in enumerate(thing.uses) if can_reach(use)]
+                fit = [i for i in usable if thing.uses[i].posture == activity.posture]
                 seats += [Seat(thing.name, i) for i in fit or usable]
         if len(seats) >= bodies:
             break
@@ -320,8 +316,8 @@ class KnownHome:
 
     def seats(self, venue: Venue, room: int) -> list[int]:
         """Return the numbers of the places for an activity at the furniture in a room."""
-        spots, activity, rooms = self._person.spots, venue.activity, (self._rooms[room],)
-        return self._numbers_of(spots.at_furniture(activity.objects, rooms, activity.posture))
+        seats = self._person.spots.at_furniture(venue.activity, (self._rooms[room],))
+        return self._numbers_of(seats)
 
     def seat(self, number: int) -> tuple[int, int, int, int, int, int]:
         """Return a place at furniture: x, y, heading, posture, and x, y from where one gets there.
@@ -580,9 +576,7 @@ class ResidentBehavior(Behavior):
 
     def _within(self, venue: Venue, rooms: list[Room]) -> Venue:
         """Return the venue of an activity, in some of its rooms only."""
-        activity = venue.activity
-        seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
-        return venue._replace(rooms=rooms, seats=seats)
+        return venue._replace(rooms=rooms, seats=self.spots.at_furniture(venue.activity, rooms))
 
     def _venue(self, actor: Actor, activity: Activity) -> Venue:
         if activity.away:
@@ -595,7 +589,7 @@ class ResidentBehavior(Behavior):
             rooms = list(dict.fromkeys(named)) or _match(actor, names, never_in)[1]
         means = {kind: getattr(activity, kind) for kind in MOVE_KINDS if self.small_moves}
         moves = ((kind, max(1, seconds(mean))) for kind, mean in means.items() if mean is not None)
-        seats = self.spots.at_furniture(activity.objects, rooms, activity.posture)
+        seats = self.spots.at_furniture(activity, rooms)
         if not activity.fetches:
             return Venue(activity, rooms, seats, [], tuple(moves), None)
         stores = self._own_rooms(actor, activity.fetches_from, never_in)
@@ -605,7 +599,7 @@ class ResidentBehavior(Behavior):
         """Return the venue of sleep for a member of a household, whose bed it may share."""
         rooms = _match(actor, sleep.rooms, sleep.never_in)[1]
         room = rooms[sleeps_in % len(rooms)]
-        seats = self.spots.at_furniture(sleep.objects, [room], sleep.posture, side)
+        seats = self.spots.at_furniture(sleep, [room], side)
         return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
     @staticmethod

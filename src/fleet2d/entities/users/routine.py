@@ -223,7 +223,7 @@ class Seating:
 
     def _seats(self, activity: Activity, rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
         """Return the places for an activity in some rooms, of those at one spot the first."""
-        seats = seats_at(self._home, activity.objects, rooms, activity.posture, wanted)
+        seats = seats_at(self._home, activity, rooms, wanted)
         return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
     def _rooms(self, rank: int, activity: Activity, bedroom: int | None) -> Sequence[Room]:

@@ -200,9 +200,7 @@ def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[Age
             )
         if over is not None and begins > over:
             entries.append(AgendaEntry(over, rest, "rest"))
-        entries.append(
-            AgendaEntry(begins, AWAY if item.away else item.place or AWAY, item.activity)
-        )
+        entries.append(AgendaEntry(begins, item.place or AWAY, item.activity))
         over = None if item.dwell is None else begins + item.dwell
     if over is not None and over < DAY:
         entries.append(AgendaEntry(over, rest, "rest"))
