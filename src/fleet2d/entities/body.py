@@ -23,7 +23,6 @@ from fleet2d.entities.place import (
     is_point,
     matching_rooms,
     parse_place,
-    room_of_furniture,
 )
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
@@ -498,7 +497,10 @@ class Body:
         Raises:
             PlacementError: No name is that of a room that can be reached.
         """
-        return room_of_furniture(self, names) or self._match(names)[1]
+        thing = furniture_of(self, names)
+        at = None if thing is None else self.place_at(thing, 0).approach  # from where it is used
+        room = None if at is None else self.home.plan.room_of_point(*at)
+        return self._match(names)[1] if room is None else [self.home.rooms[room.index]]
 
     def _match(self, names: RoomChoice) -> tuple[str, list[Room]]:
         try:

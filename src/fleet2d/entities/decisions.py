@@ -129,9 +129,10 @@ class Arbiter:
         """
         if fresh:
             self.own = plan.interrupts
-        active = len(self.behaviors) if self.active is None else self.active
-        times, events = [self._closes_at(active, now)], self.own
-        for number, behavior in enumerate(self.behaviors[:active]):
+        times, events = list[datetime | None](), self.own
+        if self.active is not None and not self.behaviors[self.active].busy():
+            times.append(holds(self.behaviors[self.active].when, now.time))  # when its hours end
+        for number, behavior in enumerate(self.behaviors[: self.active]):
             if not behavior.preempts or number in self.off:
                 continue
             opens = self._opens_at(number, now)
@@ -164,13 +165,6 @@ class Arbiter:
         if when and holds(when, time) is None:
             return min(span.next_begin(time) for span in when)
         return time if time > now.time else None
-
-    def _closes_at(self, number: int, now: Situation) -> datetime | None:
-        """Return when the hours of the active behavior are over; None if they don't end it."""
-        if number >= len(self.behaviors) or self.behaviors[number].busy():
-            return None
-        when = self.behaviors[number].when
-        return holds(when, now.time) if when else None
 
     def _activate(self, number: int | None, now: Situation, plan: Plan) -> None:
         """Make a behavior the active one; the plan of the one before may be resumed later."""
@@ -348,6 +342,7 @@ class DecidingActor(Actor):
     Attributes:
         arbiter: Asks its behaviors.
         order: The order that decides in place of its behaviors; None: there is none.
+        waiting: Its wait, if it has stopped in front of a person.
         is_stuck: Whether it can't move, whatever its behaviors or an order want.
         is_displaced: Whether it was ever put somewhere: it may be where no way leads out.
         passes_until: Before that step it goes round people, and may come near without touching.
@@ -360,24 +355,24 @@ class DecidingActor(Actor):
         self.is_stuck = self.is_displaced = False
         self.passes_until = 0
         self._chosen: Plan | None = None  # by `choose` or `keeps_plan`, for the next `decide`
-        self._waiting: WaitForPeople | None = None
+        self.waiting: WaitForPeople | None = None
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
         self._no_way_round: object = None  # where no way round people was found, and for what
         self._blocked = ("", -1)  # what was in its way, and up to which step it waits there
 
     def choose(self, plan: Plan) -> None:
         """Set the plan that its next decision, which is due now, results in."""
-        self._chosen, self._waiting, self.order = plan, None, None
+        self._chosen, self.waiting, self.order = plan, None, None
 
     def follow_order(self, order: Order | None, step: int) -> None:
         """Follow an order from a step on, in place of its behaviors; None: follow them again."""
-        self.order, self._waiting, self.arbiter.own = order, None, frozenset()
+        self.order, self.waiting, self.arbiter.own = order, None, frozenset()
         self._chosen = None
         self.decide_again(step)
 
     def put(self, pose: Pose, step: int) -> None:
         """Move to a pose at a step, and replan there: a plan from elsewhere is void."""
-        self.state, self._chosen, self._waiting = pose, None, None
+        self.state, self._chosen, self.waiting = pose, None, None
         self.is_displaced, self.part = True, self._present_part()
         self.decide_again(step)
 
@@ -468,8 +463,8 @@ class DecidingActor(Actor):
             return False
         if self._runs_down(now):
             return False
-        waits = self._waiting is not None and not now.events
-        if waits and self._waiting.continued(now) is not None:  # type: ignore[union-attr]
+        waits = self.waiting is not None and not now.events
+        if waits and self.waiting.continued(now) is not None:  # type: ignore[union-attr]
             return False
         return self.arbiter.asks_first(now, self.plan)
 
@@ -478,7 +473,7 @@ class DecidingActor(Actor):
         step, (plan, self._chosen) = now.step, (self._chosen, None)
         if self.is_stuck or (self.charge is not None and self.charge.is_empty):
             plan = now.plan().stay()
-        waiting, self._waiting = self._waiting, None
+        waiting, self.waiting = self.waiting, None
         if waiting is not None:
             self._waited = waiting.since, waiting.look_before(step) + self._just_waited
         if plan is None and waiting is not None and not now.events:
@@ -517,11 +512,6 @@ class DecidingActor(Actor):
         """The steps after a wait within which another one counts as its continuation."""
         return micros(REPEATED_WAIT) // self.clock.step_us + 1
 
-    @property
-    def waiting(self) -> WaitForPeople | None:
-        """Its wait, if it has stopped in front of a person; else None."""
-        return self._waiting
-
     def give_way(self, now: Situation, person: str, surroundings: Surroundings) -> None:
         """Stop in front of a person who is in the way; go round after a while, or give up.
 
@@ -549,7 +539,7 @@ class DecidingActor(Actor):
                 if self.order is None:
                     self.arbiter.give_up(now)
         if plan is None:
-            plan, self._waiting = wait.stand_still(now, person, gives_way), wait
+            plan, self.waiting = wait.stand_still(now, person, gives_way), wait
         self.follow_instead(plan, now)
 
     def follow_instead(self, plan: Plan, now: Situation) -> None:

@@ -194,15 +194,6 @@ def _owned(body: "Body", kind: str, person: str) -> PlacedObject | None:
     return owner.own_furniture(kind) or furniture_of(owner, (kind,))
 
 
-def room_of_furniture(body: "Body", place: RoomChoice | Point) -> list[Room]:
-    """Return the room from which the furniture of a place is used; empty if it names none."""
-    thing = furniture_of(body, place)
-    if thing is None:
-        return []
-    room = body.home.plan.room_of_point(*body.place_at(thing, 0).approach)
-    return [] if room is None else [body.home.rooms[room.index]]
-
-
 def seat_at(body: "Body", place: object) -> PlacedObject | None:
     """Return the furniture that a place names, if the body uses furniture; else None."""
     return furniture_of(body, parse_place(place)) if body.entity.uses_furniture else None

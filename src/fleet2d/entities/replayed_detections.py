@@ -130,7 +130,7 @@ class ReplayedDetections(EvidenceSource):
             if count := int((identity[used] == row).sum()):
                 notes.append(f"{count} detections of {name}")
         self.notes = tuple(notes)
-        rows = np.empty((int(used.sum()), SIGHTING), np.int64)
+        rows = np.zeros((int(used.sum()), SIGHTING), np.int64)  # by camera 0, standing
         units = actor.home.plan.lattice
         places = np.clip(xy[used], -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
         points = (
@@ -139,11 +139,10 @@ class ReplayedDetections(EvidenceSource):
             else units.to_lattice(places)
         )
         heading = np.floor(np.nan_to_num(turns[used]) * TURN + 0.5).astype(np.int64) % TURN
-        rows[:, Column.STEP], rows[:, Column.CAMERA] = step[used], 0
-        rows[:, Column.USER], rows[:, Column.IDENTITY] = UNKNOWN_TRUTH, identity[used]
+        rows[:, Column.STEP], rows[:, Column.IDENTITY] = step[used], identity[used]
+        rows[:, Column.USER] = UNKNOWN_TRUTH
         rows[:, [Column.X, Column.Y]] = rows[:, [Column.TRUE_X, Column.TRUE_Y]] = points
         rows[:, Column.HEADING] = rows[:, Column.TRUE_HEADING] = heading
-        rows[:, Column.POSTURE] = rows[:, Column.TRUE_POSTURE] = 0
         return rows
 
     def _inside(self, xy: F64, used: Bool, actor: Actor, notes: list[str]) -> Bool:

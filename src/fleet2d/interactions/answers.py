@@ -487,15 +487,10 @@ class Answers(Component):
             for name, value in data.items()
         }
 
-    @property
-    def parts(self) -> list[AnswerPart]:
-        """All parts of the three stages."""
-        return [getattr(self, name) for name in PARTS]
-
     def chance(self, stage: Stage, now: Circumstances, state: AttitudeState) -> float:
         """Return the probability of a stage."""
-        parts = (part for part in self.parts if part.stage == stage)
-        return logistic(sum_in_order(part.logit(now, state) for part in parts))
+        parts = (getattr(self, name) for name in PARTS)
+        return logistic(sum_in_order(p.logit(now, state) for p in parts if p.stage == stage))
 
     def reply(
         self, now: Circumstances, state: AttitudeState, seed: int, path: str, step: int

@@ -9,17 +9,10 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
+from fleet2d.configuration import units
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
-from fleet2d.configuration.units import (
-    Duration,
-    Length,
-    OnDays,
-    PositiveDuration,
-    Share,
-    TimeOfDay,
-    weekdays_of,
-)
+from fleet2d.configuration.units import Duration, Length, OnDays, PositiveDuration, Share, TimeOfDay
 from fleet2d.runtime.clock import midnights
 
 InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_report"]
@@ -124,7 +117,7 @@ class Interaction(Settings):
             for number in count(-(-passed // self.every)):
                 yield start + number * self.every
         for midnight in midnights(after):
-            if midnight.weekday() in weekdays_of(self.on):
+            if midnight.weekday() in units.weekdays_of(self.on):
                 yield from (midnight + at for at in sorted(self.at) if midnight + at >= after)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from datetime import timedelta
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
@@ -36,6 +36,8 @@ class SchemaForms:
         """Add the forms to the schema."""
         return {"anyOf": [handler(schema), *(FORMS[form] for form in self.forms)]}
 
+
+SettingsType = TypeVar("SettingsType", bound=Settings)
 
 FOLDER = Path(__file__).parent
 SECOND = timedelta(seconds=1)
@@ -175,6 +177,15 @@ class Activity(Settings):
     fetch_takes: AnyDurationDistribution = DurationDistribution(mean=timedelta(minutes=2))
 
 
+def bundled(
+    model: type[SettingsType], file: str, section: str | None = None
+) -> dict[str, SettingsType]:
+    """Return the settings by name in a file of this package, or in a section of it."""
+    data = read_document(FOLDER / file).data
+    entries = data if section is None else data[section]
+    return {name: model.model_validate(fields) for name, fields in entries.items()}
+
+
 @cache
 def catalogue() -> dict[str, Activity]:
     """Return the activities that come with Fleet2D, by name.
@@ -182,8 +193,7 @@ def catalogue() -> dict[str, Activity]:
     >>> catalogue()["cook"].rooms, catalogue()["work"].away
     (('kitchen', 'any'), True)
     """
-    data = read_document(FOLDER / "activities.yaml").data
-    return {name: Activity.model_validate(fields) for name, fields in data.items()}
+    return bundled(Activity, "activities.yaml")
 
 
 def find_activity(name: str, own: dict[str, Activity]) -> Activity:

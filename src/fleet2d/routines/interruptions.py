@@ -3,13 +3,11 @@
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings
-from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Share, TimeOfDay
 from fleet2d.kernels import CHANCE_BITS, QUANTILE_BITS, Interruptions
@@ -19,6 +17,7 @@ from fleet2d.routines.activity import (
     AnyDurationDistribution,
     DurationDistribution,
     SchemaForms,
+    bundled,
     seconds,
 )
 from fleet2d.routines.distributions import Distribution
@@ -34,7 +33,6 @@ from fleet2d.routines.planner import (
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
 
-FOLDER = Path(__file__).parent
 # The shortest mean time between two occurrences of a need.
 SHORTEST_INTERVAL = timedelta(minutes=5)
 
@@ -118,25 +116,19 @@ def usual_needs() -> dict[str, Need]:
     >>> sorted(usual_needs())
     ['call', 'drink', 'toilet']
     """
-    return _needs("needs")
+    return bundled(Need, "needs.yaml", "needs")
 
 
 @cache
 def population_needs() -> dict[str, Need]:
     """Return the needs of people of the survey: an adult's, and a meal that it doesn't record."""
-    return {**usual_needs(), **_needs("population")}
-
-
-def _needs(section: str) -> dict[str, Need]:
-    data = read_document(FOLDER / "needs.yaml").data[section]
-    return {name: Need.model_validate(fields) for name, fields in data.items()}
+    return {**usual_needs(), **bundled(Need, "needs.yaml", "population")}
 
 
 @cache
 def usual_errands() -> dict[str, Errand]:
     """Return the errands of an adult, which personas without errands of their own have."""
-    data = read_document(FOLDER / "needs.yaml").data["errands"]
-    return {name: Errand.model_validate(fields) for name, fields in data.items()}
+    return bundled(Errand, "needs.yaml", "errands")
 
 
 def activities_of(needs: Mapping[str, Need], errands: Mapping[str, Errand]) -> set[str]:

@@ -19,27 +19,18 @@ from pydantic import (
 )
 
 from fleet2d.bounds import EXTENDED_FILES, PERSONA_VALUES
+from fleet2d.configuration import units
 from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import check_known, problem, problem_at, shown, suggest
-from fleet2d.configuration.units import (
-    WEEKDAYS,
-    Duration,
-    Length,
-    OnDays,
-    PositiveDuration,
-    Share,
-    TimeOfDay,
-    folder_of,
-    format_time_of_day,
-    weekdays_of,
-)
+from fleet2d.configuration.units import Duration, Length, OnDays, PositiveDuration, Share, TimeOfDay
 from fleet2d.errors import errors_as, extra
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
     DurationDistribution,
     SchemaForms,
+    bundled,
     catalogue,
     find_activity,
 )
@@ -141,9 +132,9 @@ class Timing(Settings):
             at, last = self.at - first, last - first
             if at % DAY > last % DAY:
                 raise problem(
-                    f"'at' {format_time_of_day(self.at)} is not within 'between'"
-                    f" {format_time_of_day(self.between[0])} to"
-                    f" {format_time_of_day(self.between[1])}"
+                    f"'at' {units.format_time_of_day(self.at)} is not within 'between'"
+                    f" {units.format_time_of_day(self.between[0])} to"
+                    f" {units.format_time_of_day(self.between[1])}"
                 )
 
 
@@ -269,7 +260,7 @@ class DayTemplate(Settings):
     @property
     def weekdays(self) -> set[int]:
         """The days of the week it applies to, 0 = Monday."""
-        return weekdays_of(self.on)
+        return units.weekdays_of(self.on)
 
 
 def holds_on(dates: Dates, day: date) -> bool:
@@ -387,7 +378,7 @@ class Persona(Settings):
                 wrong = partial(problem_at, ("year", name, "days"))
                 check_known(event.days, "template", [*bundled_days(), *self.days], wrong)
         covered = {weekday for day in self.days.values() for weekday in day.weekdays}
-        if missing := [WEEKDAYS[i] for i in range(7) if i not in covered]:
+        if missing := [units.WEEKDAYS[i] for i in range(7) if i not in covered]:
             raise problem_at(
                 ("days",), f"no day is described for {', '.join(missing)}: add them to 'on'"
             )
@@ -454,8 +445,7 @@ def bundled_days() -> dict[str, DayTemplate]:
     >>> sorted(bundled_days())
     ['bad_day', 'day_off', 'hot', 'ill']
     """
-    data = read_document(FOLDER / "days.yaml").data
-    return {name: DayTemplate.model_validate(fields) for name, fields in data.items()}
+    return bundled(DayTemplate, "days.yaml")
 
 
 def public_holidays(place: str) -> list[date]:
@@ -590,7 +580,7 @@ def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
             f"{name!r} is a part of a persona: extend one with it, like"
             f" {{extends: [retired, {name}]}}"
         )
-    path = folder_of(value) / Path(value).expanduser()
+    path = units.folder_of(value) / Path(value).expanduser()
     if not path.is_file():
         known = [*bundled_names(), *(part_names() if is_extended else ())]
         raise problem(
@@ -612,7 +602,7 @@ def _validate_persona(
         return validate(data)
 
     if isinstance(value, str | Path) and str(value) not in bundled_names():
-        return once(info, (Persona, folder_of(value) / Path(value).expanduser()), read)
+        return once(info, (Persona, units.folder_of(value) / Path(value).expanduser()), read)
     return read()
 
 

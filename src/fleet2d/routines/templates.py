@@ -52,7 +52,10 @@ def day_plans(persona: "Persona", days: "Mapping[str, DayTemplate]") -> dict[str
 
 def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     if day.recorded:
-        return _recorded_plan(name, day)
+        wakes = [recorded.begins[0] for recorded in day.recorded]
+        beds = [recorded.begins[-1] for recorded in day.recorded]
+        wake, sleep = uniform(min(wakes), max(wakes)), uniform(min(beds), max(beds))
+        return DayPlan(name, wake, sleep, 0, (), (), to_recording(day.recorded))
     wake = starts(day.wake, 0)
     dawn = wake.shortest
     sleep = starts(day.sleep, dawn)
@@ -63,14 +66,6 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
         _pastime(persona, name, activity, pastime, dawn) for activity, pastime in leisure.items()
     )
     return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, pastimes)
-
-
-def _recorded_plan(name: str, day: "DayTemplate") -> DayPlan:
-    """Return the plan of a template that has recorded days."""
-    wakes = [recorded.begins[0] for recorded in day.recorded]
-    beds = [recorded.begins[-1] for recorded in day.recorded]
-    wake, sleep = uniform(min(wakes), max(wakes)), uniform(min(beds), max(beds))
-    return DayPlan(name, wake, sleep, 0, (), (), to_recording(day.recorded))
 
 
 def _in_order(tasks: dict[str, "Task"]) -> list[str]:

@@ -10,18 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d import kernels
+from fleet2d.configuration import units
 from fleet2d.configuration.components import OneOf, Settings
 from fleet2d.configuration.problems import check_known, problem, problem_at
-from fleet2d.configuration.units import (
-    AngleDeg,
-    Duration,
-    Length,
-    PositiveDuration,
-    Share,
-    format_duration,
-    micros,
-    whole_steps,
-)
+from fleet2d.configuration.units import AngleDeg, Duration, Length, PositiveDuration, Share
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.placed_objects import POSTURES
@@ -96,8 +88,8 @@ class Lens(NamedTuple):
         """Return the points of a body of `radius` [lattice units] to look at: its centre first."""
         steps = [round(i * TURN / self.points) for i in range(self.points)]
         along, half = round(radius), UNIT // 2
-        units = ((kernels.cosine(step), kernels.sine(step)) for step in steps)
-        circle = [(int(along * x + half) // UNIT, int(along * y + half) // UNIT) for x, y in units]
+        ways = ((kernels.cosine(step), kernels.sine(step)) for step in steps)
+        circle = [(int(along * x + half) // UNIT, int(along * y + half) // UNIT) for x, y in ways]
         return [(0, 0), *circle]
 
 
@@ -156,8 +148,8 @@ class Camera(Settings):
         if self.period is not None and self.period > patience:
             raise problem_at(
                 ("period",),
-                f"{format_duration(self.period)} is longer than lost_after,"
-                f" {format_duration(patience)}: each user would be lost between two looks",
+                f"{units.format_duration(self.period)} is longer than lost_after,"
+                f" {units.format_duration(patience)}: each user would be lost between two looks",
             )
 
     def lens(self, units_per_m: float, step_us: int) -> Lens:
@@ -166,17 +158,17 @@ class Camera(Settings):
         Raises:
             ValueError: The period, or a given `lost_after`, is not a multiple of the step.
         """
-        lost_us = micros(DEFAULT_PATIENCE if self.lost_after is None else self.lost_after)
+        lost_us = units.micros(DEFAULT_PATIENCE if self.lost_after is None else self.lost_after)
         if lost_us % step_us and self.lost_after is not None:
             raise ValueError(
-                f"lost_after is {format_duration(self.lost_after)}, which is not a multiple of"
-                f" simulation.step ({step_us / 1e6:g} s): it would act as"
+                f"lost_after is {units.format_duration(self.lost_after)}, which is not a multiple"
+                f" of simulation.step ({step_us / 1e6:g} s): it would act as"
                 f" {-(-lost_us // step_us) * step_us / 1e6:g} s; choose a multiple"
             )
         near, far = (round(distance * units_per_m) for distance in self.range)
         period = 1
         if self.period is not None:
-            period = whole_steps(self.period, step_us, "period", ValueError)
+            period = units.whole_steps(self.period, step_us, "period", ValueError)
         return Lens(
             near=near,
             far=far,
@@ -188,9 +180,9 @@ class Camera(Settings):
             left=round(self.offset[1] * units_per_m),
             heading=headings([self.heading_deg])[0],
             pans=headings(self.pan.headings_deg if self.pan else ()),
-            pan_us=micros(self.pan.dwell) if self.pan else 1,
+            pan_us=units.micros(self.pan.dwell) if self.pan else 1,
             period=period,
-            latency=-(-micros(self.latency) // step_us),
+            latency=-(-units.micros(self.latency) // step_us),
             points=self.body_points,
         )
 
@@ -309,7 +301,7 @@ def _put(table: I64, at: int, values: Sequence[int] | I64) -> None:
 def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableContext) -> None:
     _put(table, TablePart.DISTANCE, model.distance.chances(_distances(table, context)))
     angles = [360 * i / TURN for i in range(-HALF_TURN, HALF_TURN)]
-    if not model.bearing.reaches_below_zero:
+    if not any(angle < 0 for angle, _ in model.bearing.points):
         angles = [abs(angle) for angle in angles]
     _put(table, TablePart.BEARING, model.bearing.chances(angles))
     turns = [360 * i / TURN for i in range(HALF_TURN + 1)]
@@ -321,7 +313,7 @@ def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableCont
     hours = [(minute + 0.5) / 60 for minute in range(kernels.MINUTES)]
     _put(table, TablePart.LIGHT, model.light.around_the_clock().chances(hours))
     if model.memory:
-        steps = Decimal(context.step_us) / micros(model.memory)
+        steps = Decimal(context.step_us) / units.micros(model.memory)
         _put(table, TablePart.STAY, [chance(decay(steps * 2**i)) for i in range(kernels.DOUBLINGS)])
 
 

@@ -100,11 +100,6 @@ class Curve(Settings):
         short = [{"type": "number"}, {"type": "string"}, {"type": "array", "items": row}]
         return {"anyOf": [*short, super().__get_pydantic_json_schema__(schema, handler)]}
 
-    @property
-    def reaches_below_zero(self) -> bool:
-        """Whether its rows begin at a negative x."""
-        return bool(self.points) and self.points[0][0] < 0
-
     def at(self, x: float) -> float:
         """Return the probability at x."""
         return float(self._shares(np.array([x], np.float64))[0])
@@ -192,9 +187,16 @@ DARKEST = 0.2
 DARK_NIGHT = Curve(points=((6.0, DARKEST), (8.0, 1.0), (17.0, 1.0), (19.0, DARKEST)))
 
 
-def _check_sum(location: tuple[str, ...], total: float) -> None:
-    if total > 1 + SUM_ERROR:
-        raise problem_at(location, f"the shares add up to {total:g}, more than 1")
+def _check_shares(
+    location: tuple[str, ...], shares: Mapping[Any, float], own: object = None, *, whole: bool
+) -> None:
+    """Refuse shares that have one of `own`, or exceed 1 together; if `whole`, they must be 1."""
+    if own in shares:
+        raise problem_at(location, f"{own!r} can't be mistaken for itself: leave it out")
+    total = sum_in_order(shares.values())
+    if total > 1 + SUM_ERROR or (whole and total < 1 - SUM_ERROR):
+        limit = "not to 1" if whole else "more than 1"
+        raise problem_at(location, f"the shares add up to {total:g}, {limit}")
 
 
 class Detection(Settings):
@@ -231,9 +233,8 @@ class Detection(Settings):
         for key, curve in (("light", self.light), ("unlit", self.unlit)):
             for hour, _ in curve.points:
                 if not 0 <= hour <= 24:
-                    raise problem_at(
-                        (key,), f"expected an hour of the day from 0 to 24, got {hour:g}"
-                    )
+                    message = f"expected an hour of the day from 0 to 24, got {hour:g}"
+                    raise problem_at((key,), message)
 
 
 class MistakenSpot(Settings):
@@ -265,7 +266,7 @@ class FalsePositives(Settings):
 
     def model_post_init(self, _: object, /) -> None:
         """Require shares of identities that add up to at most 1."""
-        _check_sum(("looks_like",), sum_in_order(self.looks_like.values()))
+        _check_shares(("looks_like",), self.looks_like, whole=False)
 
 
 class Identity(Settings):
@@ -289,13 +290,7 @@ class Identity(Settings):
     def model_post_init(self, _: object, /) -> None:
         """Require distributions over other users."""
         for user, others in self.confusion.items():
-            if user in others:
-                raise problem_at(
-                    ("confusion", user), f"{user!r} can't be mistaken for itself: leave it out"
-                )
-            total = sum_in_order(others.values())
-            if abs(total - 1) > SUM_ERROR:
-                raise problem_at(("confusion", user), f"the shares add up to {total:g}, not to 1")
+            _check_shares(("confusion", user), others, user, whole=True)
 
 
 class Attributes(Settings):
@@ -328,11 +323,7 @@ class Attributes(Settings):
         }
         for key, confusion in confusions.items():
             for true, others in confusion.items():
-                if true in others:
-                    raise problem_at(
-                        (key, true), f"{true!r} can't be mistaken for itself: leave it out"
-                    )
-                _check_sum((key, true), sum_in_order(others.values()))
+                _check_shares((key, true), others, true, whole=False)
 
 
 class Perception(Settings):
@@ -392,9 +383,8 @@ class Confusable(Settings):
         """Require one way to state the rate, and shares that add up to 1."""
         if sum(value is not None for value in (self.rate, self.kind, self.height)) != 1:
             raise problem("give one of rate, kind and height")
-        total = sum_in_order(self.others.values())
-        if self.others and abs(total - 1) > SUM_ERROR:
-            raise problem_at(("others",), f"the shares add up to {total:g}, not to 1")
+        if self.others:
+            _check_shares(("others",), self.others, whole=True)
 
     @property
     def share(self) -> float:

@@ -126,17 +126,13 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
 
 
 def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
-    targets = spread(cells_of(actor.home.plan.room_of_cell == room.index), MAX_TARGET_CELLS)
-    points, seen = _cover(actor, room, centres(targets), enough, most)
-    return Viewpoints(points, seen) if points else Viewpoints((actor.middle(room),), 0.0)
+    views = _cover(actor, room, floor_of(actor, room), enough, most)
+    return views if views.points else Viewpoints((actor.middle(room),), 0.0)
 
 
-def _cover(
-    actor: Actor, room: Room, goals: I64, enough: float, most: int
-) -> tuple[tuple[tuple[int, int], ...], float]:
-    """Choose points in a room, greedily, from which goals (n, 2) are seen; return their share."""
-    stands = spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS)
-    places = np.concatenate([[actor.middle(room)], centres(stands)])
+def _cover(actor: Actor, room: Room, goals: I64, enough: float, most: int) -> Viewpoints:
+    """Choose points in a room, greedily, from which goals (n, 2) are seen, and their share."""
+    places = np.concatenate([[actor.middle(room)], stands_in(actor, room)])
     visible = np.array([visible_from(actor, place, goals) for place in places])
     points: list[tuple[int, int]] = []
     unseen = np.ones(len(goals), np.bool_)
@@ -147,7 +143,7 @@ def _cover(
             break
         points.append((int(places[best, 0]), int(places[best, 1])))
         unseen &= ~visible[best]
-    return tuple(points), 1 - float(unseen.sum()) / len(goals)
+    return Viewpoints(tuple(points), 1 - float(unseen.sum()) / len(goals))
 
 
 # The part of a room without furniture to be seen, and the maximum number of stops in a room.
@@ -170,8 +166,7 @@ def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
     ]
     if uses:
         return [name for name, _ in uses], plan.lattice.to_lattice([at for _, at in uses])
-    cells = spread(cells_of(plan.room_of_cell == room.index), MAX_TARGET_CELLS)
-    return [], centres(cells)
+    return [], floor_of(actor, room)
 
 
 def stops_with_view(actor: Actor, room: Room) -> tuple[tuple[int, int], ...]:
@@ -182,10 +177,10 @@ def stops_with_view(actor: Actor, room: Room) -> tuple[tuple[int, int], ...]:
     names, goals = places_to_see(actor, room)
     enough = 1.0 if names else FLOOR_TO_SEE
     key = "stops", actor.home.walls, actor.home.objects, actor.space, actor.part, sight_range(actor)
-    points, _ = actor.home.cached(
+    views = actor.home.cached(
         (*key, room.index), lambda: _cover(actor, room, goals, enough, MOST_STOPS)
     )
-    return points or (actor.middle(room),)
+    return views.points or (actor.middle(room),)
 
 
 def unwatched(actor: Actor, stops: Sequence[tuple[int, int]]) -> list[str]:
@@ -235,6 +230,16 @@ def spread(cells: I64, most: int) -> I64:
         pitch += 1
     on_grid = cells_of(is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]) * pitch + pitch // 2
     return on_grid if len(on_grid) else cells[:: max(1, len(cells) // most)]
+
+
+def stands_in(actor: Actor, room: Room) -> I64:
+    """Return points of a room [lattice] where a body can stand, evenly spread, int64 (n, 2)."""
+    return centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
+
+
+def floor_of(actor: Actor, room: Room) -> I64:
+    """Return points of the floor of a room [lattice], evenly spread, int64 (n, 2)."""
+    return centres(spread(cells_of(actor.home.plan.room_of_cell == room.index), MAX_TARGET_CELLS))
 
 
 def centres(cells: I64) -> I64:

@@ -14,11 +14,11 @@ from fleet2d.configuration.units import Duration, Length, PositiveDuration, Shar
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
 from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import BeliefBehavior, sight_range, viewpoints_of
+from fleet2d.entities.robots.approach import BeliefBehavior, centres, sight_range, viewpoints_of
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, points_in_sight
+from fleet2d.kernels import F64, I64, SUB, points_in_sight
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2
@@ -101,7 +101,7 @@ class HangoutPlaces:
         rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
         is_candidate = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
         cells, rooms = cells[is_candidate], rooms[is_candidate]
-        points = cells[:, ::-1] * SUB + CELL_CENTRE
+        points = centres(cells)
         if plan.doorways and off_doors > 0:
             lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
             gaps = shapely.distance(
@@ -124,8 +124,7 @@ class HangoutPlaces:
         if uses:
             return np.ascontiguousarray(plan.lattice.to_lattice(uses))
         cells = cells_of(plan.room_of_cell == room.index)
-        cells = cells[:: max(1, len(cells) // MAX_SEATS)]
-        return np.ascontiguousarray(cells[:, ::-1] * SUB + CELL_CENTRE)
+        return centres(cells[:: max(1, len(cells) // MAX_SEATS)])
 
     def _view(self, room: Room) -> F64:
         walls, reach = self._actor.home.walls, sight_range(self._actor)
@@ -142,7 +141,7 @@ class HangoutPlaces:
         cells = actor.space.cells(room.index, actor.part)
         if not len(cells):
             return np.zeros(len(self.points))
-        field = actor.space.distance_field(cells[:, ::-1] * SUB + CELL_CENTRE)
+        field = actor.space.distance_field(centres(cells))
         metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
         return decay(actor.seconds(metres) / tau)
 

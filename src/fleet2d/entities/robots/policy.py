@@ -22,19 +22,11 @@ from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.approach import (
-    ANYONE,
-    MAX_TARGET_CELLS,
-    MAX_VIEWPOINT_CELLS,
-    BeliefBehavior,
-    centres,
-    check_has_camera,
-    sight_range,
-    spread,
-)
+from fleet2d.entities.robots import approach
+from fleet2d.entities.robots.approach import ANYONE, BeliefBehavior
 from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, extra
-from fleet2d.floorplan.plan import FloorPlan, Room, cells_of, read_only
+from fleet2d.floorplan.plan import FloorPlan, Room, read_only
 from fleet2d.floorplan.space import PointDistances
 from fleet2d.kernels import (
     F32,
@@ -164,14 +156,10 @@ class WaitingPoses:
 
     def _best(self, room: Room) -> tuple[int, int, int]:
         """Return the place (x, y) and the heading at which most of a room is in view."""
-        actor, plan = self._actor, self._actor.home.plan
-        stands = centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
-        goals = centres(spread(cells_of(plan.room_of_cell == room.index), MAX_TARGET_CELLS))
-        limit = cosine(self._half_angle) / UNIT
-        reach = sight_range(actor)
-        best = kernels.best_view(
-            actor.home.walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit
-        )
+        actor, walls = self._actor, self._actor.home.walls
+        stands, goals = approach.stands_in(actor, room), approach.floor_of(actor, room)
+        limit, reach = cosine(self._half_angle) / UNIT, approach.sight_range(actor)
+        best = kernels.best_view(walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit)
         if best is None:
             return *actor.middle(room), 0
         place, facing = best
@@ -288,7 +276,7 @@ class Policy(BeliefBehavior):
             ScenarioError: The robot has no camera.
             PlacementError: The home has more rooms than an observation.
         """
-        check_has_camera(actor, "policy")
+        approach.check_has_camera(actor, "policy")
         count = len(actor.home.rooms)
         if count > self.rooms:
             raise PlacementError(

@@ -9,16 +9,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from fleet2d.configuration import units
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import counted
-from fleet2d.configuration.units import (
-    Duration,
-    InputFileOrFolder,
-    Length,
-    PositiveDuration,
-    Speed,
-    micros,
-)
+from fleet2d.configuration.units import Duration, InputFileOrFolder, Length, PositiveDuration, Speed
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
@@ -134,7 +128,7 @@ class FixFollower:
             if plan.away:
                 self._appear(plan, j)
             elif time[j] - time[j - 1] <= self.gap_us:
-                self._leg(plan, j - 1, j, plan.time_us)
+                self._leg(plan, j, plan.time_us)
             elif self.gaps == "unknown":
                 _vanish(plan, plan.time_us + 1)  # at the fix itself it is known
                 self.gap_count += 1
@@ -143,8 +137,10 @@ class FixFollower:
             else:
                 leave = plan.time_us
                 if self.gaps == "hold":
-                    leave = max(leave, int(time[j]) - self._takes(j - 1, j))
-                self._leg(plan, j - 1, j, leave)
+                    speeds, heading = (self.actor.speed, self.actor.turn_rate), self.heading[j - 1]
+                    takes = time_route(self._route(j), 0, int(heading), *speeds)[-1, 0]
+                    leave = max(leave, int(time[j] - takes))
+                self._leg(plan, j, leave)
         if len(time) and not plan.away and end_us - plan.time_us > self.gap_us:
             _vanish(plan, plan.time_us + 1)
         return plan.stay()
@@ -172,27 +168,18 @@ class FixFollower:
         at_us, heading = int(self.fixes.time_us[i]), int(self.heading[i])
         plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
 
-    def _route(self, i: int, j: int) -> I64:
-        """Return the route from a fix to another, straight if that is free; int64 (n, 2)."""
-        (ax, ay), (bx, by) = self.fixes.xy[i].tolist(), self.fixes.xy[j].tolist()
-        space = self.actor.space
-        straight = straight_way((ax, ay), (bx, by))
-        if (ax, ay) == (bx, by):
+    def _route(self, j: int) -> I64:
+        """Return the route to a fix from the one before, straight if that is free; int64 (n, 2)."""
+        start, goal = map(tuple, self.fixes.xy[j - 1 : j + 1].tolist())
+        mesh, straight = self.actor.space.mesh, straight_way(start, goal)
+        if start == goal or line_of_sight(mesh, *start, locate(mesh, *start), *goal):
             return straight
-        if line_of_sight(space.mesh, ax, ay, locate(space.mesh, ax, ay), bx, by):
-            return straight
-        route = space.route((ax, ay), (bx, by))
+        route = self.actor.space.route(start, goal)
         return straight if route is None else route
 
-    def _takes(self, i: int, j: int) -> int:
-        """Return how long the body takes from one fix to another [us]."""
-        route, heading = self._route(i, j), int(self.heading[i])
-        rows = time_route(route, 0, heading, self.actor.speed, self.actor.turn_rate)
-        return int(rows[-1, 0])
-
-    def _leg(self, plan: Plan, i: int, j: int, leave_us: int) -> None:
-        """Go from fix i, from a moment on, to fix j, at a constant speed."""
-        route = self._route(i, j)
+    def _leg(self, plan: Plan, j: int, leave_us: int) -> None:
+        """Go from the fix before fix j, from a moment on, to that one, at a constant speed."""
+        route = self._route(j)
         arrive_us = int(self.fixes.time_us[j])
         moves = np.diff(route, axis=0)
         lengths = np.sqrt((moves * moves).sum(axis=1).astype(np.float64))
@@ -543,13 +530,13 @@ class Replay(Behavior):
 
     def _start_rooms(self, actor: Actor, log: ActivityLog, begin_us: int) -> None:
         mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)
-        clock, gap_us = actor.clock, micros(self.gap or GAP_OF_ROOMS)
+        clock, gap_us = actor.clock, units.micros(self.gap or GAP_OF_ROOMS)
         rule = VisitRule(
             step_us=clock.step_us,
             begin_us=begin_us,
             steps=clock.steps,
             gap_us=gap_us,
-            still_us=micros(self.still),
+            still_us=units.micros(self.still),
             unknown=self.gaps == "unknown",
             door_us=gap_us,
         )
@@ -576,7 +563,7 @@ class Replay(Behavior):
             self.frame.turn_headings(log.heading[used] / (2 * np.pi)),
             self.reach,
         )
-        gap_us = micros(self.gap or GAP_OF_FIXES)
+        gap_us = units.micros(self.gap or GAP_OF_FIXES)
         self.follower = FixFollower(actor, fixes, gap_us, self.gaps, self.fastest)
         self.follower.follow(Plan(actor, 0))
         thinned = int(np.count_nonzero(step[1:] == step[:-1]))

@@ -260,12 +260,11 @@ class KnownHome:
         self._seats: dict[Seat, int] = {}  # `_last` refers to them
         self._names: dict[str, int] = {}
         self._core_venues: dict[str, tuple[Venue, CoreVenue]] = {}
-        self._rooms: dict[int, Room] = {}
         self._resident: tuple[object, Resident | None] = None, None
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out caches, which are made again."""
-        return {**self.__dict__, "_core_venues": {}, "_rooms": {}, "_resident": (None, None)}
+        return {**self.__dict__, "_core_venues": {}, "_resident": (None, None)}
 
     def live(self, plan: Plan, stints: Sequence[Stint], until_us: int, *, continues: bool) -> None:
         """Add activities to a plan, until the last one is over or shut doors block one.
@@ -297,7 +296,6 @@ class KnownHome:
             steps_off = [(*at, *off) for at, off in steps if off is not None]
             resident = Resident(self._person.key, *rates, routes, steps_off)
             self._resident = present, resident
-            self._rooms = {room.index: room for room in actor.home.rooms}
             self._core_venues.clear()
         return resident
 
@@ -312,12 +310,12 @@ class KnownHome:
 
     def spots(self, room: int) -> Sequence[Spot]:
         """Return the points of a room where the body stands."""
-        return self._person.spots.in_room(self._rooms[room])
+        return self._person.spots.in_room(self._actor.home.rooms[room])
 
     def seats(self, venue: Venue, room: int) -> list[int]:
         """Return the numbers of the places for an activity at the furniture in a room."""
-        seats = self._person.spots.at_furniture(venue.activity, (self._rooms[room],))
-        return self._numbers_of(seats)
+        rooms = (self._actor.home.rooms[room],)
+        return self._numbers_of(self._person.spots.at_furniture(venue.activity, rooms))
 
     def seat(self, number: int) -> tuple[int, int, int, int, int, int]:
         """Return a place at furniture: x, y, heading, posture, and x, y from where one gets there.

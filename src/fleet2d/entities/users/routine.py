@@ -11,16 +11,8 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
-from fleet2d.entities.users.resident import (
-    SECOND_US,
-    ResidentBehavior,
-    Seat,
-    Spots,
-    Venue,
-    part_of,
-    rooms_at,
-    seats_at,
-)
+from fleet2d.entities.users import resident
+from fleet2d.entities.users.resident import SECOND_US, ResidentBehavior, Seat, Spots, Venue
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
@@ -218,12 +210,13 @@ class Seating:
         share = household.side_of_bed(member) if name == SLEEP else (rank, self._count)
         indices = frozenset(room.index for room in rooms)
         seats = self._seats(activity, indices, self._count)
-        own = list(part_of(self._seats(activity, indices, share[1]), *share)) if seats else []
+        shared = self._seats(activity, indices, share[1])
+        own = list(resident.part_of(shared, *share)) if seats else []
         return (*own, *(seat for seat in seats if seat not in own)), len(own)
 
     def _seats(self, activity: Activity, rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
         """Return the places for an activity in some rooms, of those at one spot the first."""
-        seats = seats_at(self._home, activity, rooms, wanted)
+        seats = resident.seats_at(self._home, activity, rooms, wanted)
         return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
 
     def _rooms(self, rank: int, activity: Activity, bedroom: int | None) -> Sequence[Room]:
@@ -393,7 +386,8 @@ class Routine(ResidentBehavior):
         time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
         if time_s < likely_day(today)[0].begin:
             today, time_s = today - 1, time_s + DAY_S
-        return rooms_at(self._with_absences(likely_day(today), today), time_s, self._activities())
+        day = self._with_absences(likely_day(today), today)
+        return resident.rooms_at(day, time_s, self._activities())
 
     def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what is done on the day of a date's ordinal."""
