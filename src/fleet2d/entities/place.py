@@ -76,6 +76,20 @@ def _dump(place: RoomChoice | Point) -> str | list[str] | list[float]:
     return place[0] if len(place) == 1 else list(place)  # type: ignore[return-value]
 
 
+_NAME = {"type": "string"}
+_OWNED = {"type": "object", "properties": {"object": _NAME, "of": _NAME}}
+_FORMS = [
+    _NAME,
+    {"type": "array", "items": _NAME, "minItems": 1},
+    {**_OWNED, "required": ["object", "of"], "additionalProperties": False},
+    {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
+]
+_EXAMPLES = [
+    "kitchen",
+    ["dining_room", "kitchen", "any"],
+    [4.0, 2.5],
+    {"object": "bed", "of": "ana"},
+]
 Place = Annotated[
     RoomChoice | Point,
     BeforeValidator(parse_place),
@@ -85,23 +99,8 @@ Place = Annotated[
             "description": "a room, a kind of room, a piece or kind of furniture, a list of those"
             " to try in turn, or [x, y] in metres; 'any' is any room",
             "x-quantity": "place",
-            "anyOf": [
-                {"type": "string"},
-                {"type": "array", "items": {"type": "string"}, "minItems": 1},
-                {
-                    "type": "object",
-                    "properties": {"object": {"type": "string"}, "of": {"type": "string"}},
-                    "required": ["object", "of"],
-                    "additionalProperties": False,
-                },
-                {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
-            ],
-            "examples": [
-                "kitchen",
-                ["dining_room", "kitchen", "any"],
-                [4.0, 2.5],
-                {"object": "bed", "of": "ana"},
-            ],
+            "anyOf": _FORMS,
+            "examples": _EXAMPLES,
         }
     ),
 ]

@@ -248,25 +248,23 @@ class Plan:
 
     def turn_by(self, turns: float) -> Self:
         """Turn on the spot by a number of turns, counter-clockwise if positive."""
-        self._turn(round(turns * TURN))
-        return self
+        return self._turn(round(turns * TURN))
 
     def turn_to(self, heading: int) -> Self:
         """Turn on the spot to a heading [1/4096 turn], the shorter way."""
-        self._turn(kernels.turn_between(self.heading, heading))
-        return self
+        return self._turn(kernels.turn_between(self.heading, heading))
 
     def face(self, x: int, y: int) -> Self:
         """Turn on the spot towards a lattice point."""
         return self.turn_to(kernels.heading_of(x - self.x, y - self.y))
 
-    def _turn(self, headings: int) -> None:
+    def _turn(self, headings: int) -> Self:
         self._check_goes_on()
         if headings:
-            now = self.time_us, self.x, self.y, self.heading, self.away
-            self.time_us, _, _, self.heading, _ = self.legs.turn(
-                *now, headings, self._body.turn_rate
-            )
+            now, rate = (self.time_us, self.x, self.y, self.heading), self._body.turn_rate
+            turned = self.legs.turn(*now, self.away, headings, rate)
+            self.time_us, self.heading = turned[0], turned[3]
+        return self
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
         """Stay for a duration, or until a local time; without either, for good.
@@ -360,10 +358,8 @@ class Plan:
         body = self._body
         names = frozenset(event if isinstance(event, str) else event.type_name for event in events)
         for name in sorted(names - body.interrupts):
-            try:
+            with errors_as(ComponentError, body.path, of=ComponentError):
                 body.entity.check_interrupt(name)
-            except ComponentError as error:
-                raise ComponentError(f"{body.path}: {error}") from error
             body.interrupts |= {name}
         self.interrupts |= names
         return self

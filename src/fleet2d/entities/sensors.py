@@ -141,12 +141,11 @@ class MotionSensor(Sensor):
 
     def start(self, home: Home, step_us: int) -> None:
         """Compute its position on the lattice."""
-        x, y = home.plan.lattice.point_at(self.at)
         if home.plan.room_at(*self.at) is None:
             raise PlacementError(
                 f"({self.at[0]:g}, {self.at[1]:g}) m is outside the home: hang the sensor in a room"
             )
-        self.eye = (int(x), int(y))
+        self.eye = home.plan.lattice.point_at(self.at)
         self.reach = round(self.range * home.plan.lattice.units_per_m)
         self.version = -1
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -220,10 +221,8 @@ class Household(Settings):
                     f"no member has a template {event.days!r}{suggest(event.days, known)}",
                 )
         for name, joint in self.together.items():
-            try:
+            with errors_as(partial(problem_at, ("together", name)), of=ValueError):
                 find_activity(joint.activity or name, {})
-            except ValueError as error:
-                raise problem_at(("together", name), str(error)) from None
 
     def bedrooms(self) -> dict[str, int]:
         """Return the number of each member's bedroom, from 0; couples share one."""

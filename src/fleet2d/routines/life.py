@@ -480,10 +480,6 @@ class Lives:
 
 def _with_job(plan: DayPlan, job: Job) -> DayPlan:
     """Return a plan with a job, which replaces one of the same task."""
-    jobs = list(plan.jobs)
-    index = next((i for i, own in enumerate(jobs) if own.task == job.task), None)
-    if index is None:
-        jobs.append(job)
-    else:
-        jobs[index] = job._replace(after=jobs[index].after)
-    return replace(plan, jobs=tuple(jobs))
+    jobs = {own.task: own for own in plan.jobs}
+    jobs[job.task] = job._replace(after=jobs[job.task].after) if job.task in jobs else job
+    return replace(plan, jobs=tuple(jobs.values()))

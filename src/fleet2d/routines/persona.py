@@ -369,10 +369,8 @@ class Persona(Settings):
             named += [((*of_day, "leisure", pastime), pastime) for pastime in day.leisure or ()]
         named += [(("leisure", pastime), pastime) for pastime in self.leisure]
         for key, name in (*named, *named_activities(self.needs, self.errands)):
-            try:
+            with errors_as(partial(problem_at, key), of=ValueError):
                 self.activity(name)
-            except ValueError as error:
-                raise problem_at(key, str(error)) from None
         for name, event in self.year.items():
             if event.days is not None:
                 wrong = partial(problem_at, ("year", name, "days"))

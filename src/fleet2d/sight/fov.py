@@ -74,8 +74,7 @@ class VisibleRegion:
             PlacementError: The eye is outside free space or on a wall.
         """
         self._mesh, self._lattice = plan.sight_mesh, plan.lattice
-        eye = self._lattice.to_lattice((x, y))
-        self.eye = (int(eye[0]), int(eye[1]))
+        self.eye = self._lattice.point_at((x, y))
         self.right, self.wall = visible_region_fast(self._mesh, *self.eye)
         if len(self.right) == 0:
             raise PlacementError(

@@ -236,11 +236,8 @@ class Interact(BeliefBehavior):
 
     def _take_served(self, now: Situation) -> ServedRequest | None:
         """Return and forget what it is doing; None if another behavior has interrupted that."""
-        served = self.served
-        if served is None:
-            return None
-        self.served = None
-        if now.actor.plan.root is self.plan:
+        served, self.served = self.served, None
+        if served is None or now.actor.plan.root is self.plan:
             return served
         if served.step == "ask":  # maybe it was sent away
             self.left_alone[served.request.to] = now.time + self.again
@@ -269,9 +266,7 @@ class Interact(BeliefBehavior):
 
     def _ready(self, now: Situation) -> list[Request]:
         """Return the open requests of its users that may be tried now, the most valuable first."""
-        if now.requests is None or not now.requests.open:
-            return []
-        ready = now.requests.ready(now.time)
+        ready = [] if now.requests is None else now.requests.ready(now.time)
         return [each for each in ready if self.user in (ANYONE, each.to)]
 
     def _waits_for(self, now: Situation, request: Request) -> bool:

@@ -25,7 +25,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots import approach
 from fleet2d.entities.robots.approach import ANYONE, BeliefBehavior
 from fleet2d.entities.robots.find import Sites
-from fleet2d.errors import ComponentError, InputError, PlacementError, extra
+from fleet2d.errors import ComponentError, InputError, PlacementError, errors_as, extra
 from fleet2d.floorplan.plan import FloorPlan, Room, read_only
 from fleet2d.floorplan.space import PointDistances
 from fleet2d.kernels import (
@@ -478,12 +478,10 @@ def _model(path: str, _: int) -> Callable[[F32, Bool], F32]:
         import onnxruntime as ort
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    try:
+    with errors_as(ComponentError, f"{path} can't be read as an ONNX file", of=Exception):
         session = ort.InferenceSession(
             Path(path).read_bytes(), options, providers=["CPUExecutionProvider"]
         )
-    except Exception as error:
-        raise ComponentError(f"{path} can't be read as an ONNX file: {error}") from error
     names = [item.name for item in session.get_inputs()]
 
     def scores(observation: F32, mask: Bool) -> Any:

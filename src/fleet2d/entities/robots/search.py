@@ -229,12 +229,9 @@ def receding(problem: SearchProblem, horizon: int = HORIZON) -> list[int]:
     """
     rough = greedy(problem)
     sites = sorted(rough[:horizon])
+    prior, reach, travel, look, detect = problem
     part = SearchProblem(
-        problem.prior[sites],
-        problem.reach[sites],
-        problem.travel[np.ix_(sites, sites)],
-        problem.look[sites],
-        problem.detect[sites],
+        prior[sites], reach[sites], travel[np.ix_(sites, sites)], look[sites], detect[sites]
     )
     return [sites[number] for number in exact(part)] + rough[horizon:]
 

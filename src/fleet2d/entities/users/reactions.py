@@ -144,8 +144,7 @@ class Reactions(Behavior):
 
 
 def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
-    x, y = now.home.plan.lattice.point_at((event.x, event.y))
-    return x, y
+    return now.home.plan.lattice.point_at((event.x, event.y))
 
 
 def _squared(dx: int, dy: int) -> int:

@@ -18,7 +18,7 @@ from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
 from fleet2d.floorplan.space import straight_way
-from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, locate, time_route
+from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
 from fleet2d.logs.layout import Layout, read_log
 from fleet2d.logs.log import AWAY, ActivityLog, Day, LogError, PositionLog, begin_of_run, files_of
 from fleet2d.logs.placement import (
@@ -170,11 +170,11 @@ class FixFollower:
 
     def _route(self, j: int) -> I64:
         """Return the route to a fix from the one before, straight if that is free; int64 (n, 2)."""
-        start, goal = map(tuple, self.fixes.xy[j - 1 : j + 1].tolist())
-        mesh, straight = self.actor.space.mesh, straight_way(start, goal)
-        if start == goal or line_of_sight(mesh, *start, locate(mesh, *start), *goal):
+        (ax, ay), (bx, by) = self.fixes.xy[j - 1 : j + 1].tolist()
+        space, straight = self.actor.space, straight_way((ax, ay), (bx, by))
+        if (ax, ay) == (bx, by) or line_of_sight(space.mesh, ax, ay, bx, by):
             return straight
-        route = self.actor.space.route(start, goal)
+        route = space.route((ax, ay), (bx, by))
         return straight if route is None else route
 
     def _leg(self, plan: Plan, j: int, leave_us: int) -> None:
@@ -426,22 +426,13 @@ def _rooms(value: object) -> object:
     return value
 
 
+_NAMES = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+_ROOM = {"anyOf": [{"type": "string"}, _NAMES, {"type": "null"}]}
+_MAPPING = {"type": "object", "additionalProperties": _ROOM}
 RoomMap = Annotated[
     dict[str, tuple[str, ...] | None],
     BeforeValidator(_rooms),
-    WithJsonSchema(
-        {
-            "type": "object",
-            "additionalProperties": {
-                "anyOf": [
-                    {"type": "string"},
-                    {"type": "array", "items": {"type": "string"}, "minItems": 1},
-                    {"type": "null"},
-                ]
-            },
-            "x-quantity": "mapping of labels to rooms",
-        }
-    ),
+    WithJsonSchema({**_MAPPING, "x-quantity": "mapping of labels to rooms"}),
 ]
 
 

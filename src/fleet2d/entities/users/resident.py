@@ -346,7 +346,7 @@ class KnownHome:
     # What is prepared for it, and taken from it.
 
     def _make_core_venue(self, name: str, venue: Venue) -> CoreVenue:
-        activity = venue.activity
+        activity, waits = venue.activity, exponential_waits
         return CoreVenue(
             venue,
             self._names.setdefault(name, len(self._names)),
@@ -356,10 +356,7 @@ class KnownHome:
             [room.index for room in venue.rooms],
             self._numbers_of(venue.seats),
             [room.index for room in venue.stores],
-            [
-                (MOVE_KINDS.index(kind), exponential_waits(mean_s))
-                for kind, mean_s in venue.small_moves
-            ],
+            [(MOVE_KINDS.index(kind), waits(mean_s)) for kind, mean_s in venue.small_moves],
             venue.fetch_takes,
         )
 
