@@ -30,18 +30,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import (
-    F64,
-    I8,
-    I64,
-    TURN,
-    Breakpoints,
-    Mesh,
-    PoseBlock,
-    Poses,
-    Timelines,
-    Window,
-)
+from fleet2d.kernels import F64, I8, I64, TURN, Breakpoints, PoseBlock, Poses, Timelines, Window
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
@@ -79,8 +68,8 @@ class Track:
 class RandomWalk:
     """A random walk, drawn step by step."""
 
-    walls: Mesh
-    space: Mesh
+    walls: kernels.Mesh
+    space: kernels.Mesh
     rule: kernels.WalkRule
 
 

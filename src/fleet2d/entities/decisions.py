@@ -17,6 +17,7 @@ from datetime import datetime, timedelta
 from typing import Protocol
 
 from fleet2d.configuration.units import micros
+from fleet2d.entities import giving_way
 from fleet2d.entities.behavior import (
     DOOR_WAIT,
     Actor,
@@ -27,13 +28,7 @@ from fleet2d.entities.behavior import (
     holds,
 )
 from fleet2d.entities.body import Pose
-from fleet2d.entities.giving_way import (
-    REPEATED_WAIT,
-    GivesWay,
-    Surroundings,
-    WaitForPeople,
-    resumed,
-)
+from fleet2d.entities.giving_way import GivesWay, Surroundings, WaitForPeople
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
@@ -77,11 +72,9 @@ class Arbiter:
             True if the plan goes on, the plan of a behavior that takes over, or False if all
             behaviors have to be asked.
         """
-        only_preempting = bool(now.events) and all(
-            event.event in self._preempting_events for event in now.events
-        )
-        is_time = self.wake_step == now.step and not now.events
-        if self.active is None or plan.is_over(now.step) or not (is_time or only_preempting):
+        events = {event.event for event in now.events}
+        is_due = events <= self._preempting_events if events else self.wake_step == now.step
+        if self.active is None or plan.is_over(now.step) or not is_due:
             return False
         active = self.behaviors[self.active]
         if active.when and not active.busy() and holds(active.when, now.time) is None:
@@ -113,11 +106,6 @@ class Arbiter:
                 return chosen
         self._activate(None, now, plan)
         return None
-
-    def give_up(self, now: Situation) -> None:
-        """Let the active behavior give up its plan, which can't be continued."""
-        if self.active is not None:
-            self.behaviors[self.active].give_up(now)
 
     def watch(self, now: Situation, plan: Plan, *, fresh: bool) -> None:
         """Set when, and at which events, behaviors before the active one are asked.
@@ -190,7 +178,7 @@ class Arbiter:
         interrupted, step, interrupts, kept_out = self._interrupted.pop(number)
         if kept_out != now.actor.kept_out:
             return None  # its way may lead through a room that the body keeps out of now
-        plan = resumed(now.actor, now.plan(), interrupted, step)
+        plan = giving_way.resumed(now.actor, now.plan(), interrupted, step)
         if plan is not None:
             plan.interrupts = interrupts
         return plan
@@ -510,7 +498,7 @@ class DecidingActor(Actor):
     @property
     def _just_waited(self) -> int:
         """The steps after a wait within which another one counts as its continuation."""
-        return micros(REPEATED_WAIT) // self.clock.step_us + 1
+        return micros(giving_way.REPEATED_WAIT) // self.clock.step_us + 1
 
     def give_way(self, now: Situation, person: str, surroundings: Surroundings) -> None:
         """Stop in front of a person who is in the way; go round after a while, or give up.
@@ -536,8 +524,8 @@ class DecidingActor(Actor):
             plan, self._waited = wait.skip_stop(now, person), (0, -1)
             if plan is None:
                 plan = wait.give_up(now, person)
-                if self.order is None:
-                    self.arbiter.give_up(now)
+                if self.order is None and self.arbiter.active is not None:
+                    self.behaviors[self.arbiter.active].give_up(now)
         if plan is None:
             plan, self.waiting = wait.stand_still(now, person, gives_way), wait
         self.follow_instead(plan, now)

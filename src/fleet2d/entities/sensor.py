@@ -79,7 +79,7 @@ class Sensor(HomeObject):
 
     def hold_us(self) -> int:
         """Return how long it stays on after the last step that triggers it [us]."""
-        return 0
+        return micros(getattr(self, "hold", timedelta(0)))
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps that trigger it, ascending, and the user of each; int64 (n,) each."""
@@ -167,7 +167,3 @@ class FurnitureSensor(Sensor):
         middle = home.object(self.of).footprint.centroid
         room = home.plan.room_at(middle.x, middle.y)
         return room.name if room else ""
-
-    def hold_us(self) -> int:
-        """Return how long it stays on [us]."""
-        return micros(self.hold)

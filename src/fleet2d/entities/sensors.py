@@ -16,7 +16,6 @@ from fleet2d.configuration.units import (
     Length,
     PeerAddress,
     PositiveLength,
-    micros,
 )
 from fleet2d.entities.place import Point
 from fleet2d.entities.sensor import FurnitureSensor, Sensor, SensorView, first_cause
@@ -153,10 +152,6 @@ class MotionSensor(Sensor):
         """Return the room that it hangs in."""
         room = home.plan.room_at(*self.at)
         return room.name if room else ""
-
-    def hold_us(self) -> int:
-        """Return how long it stays on [us]."""
-        return micros(self.hold)
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which somebody moved in view."""

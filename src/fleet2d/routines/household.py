@@ -18,14 +18,7 @@ from pydantic import (
 from fleet2d.bounds import MEMBERS, PERSONA_VALUES
 from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
-from fleet2d.configuration.problems import (
-    Location,
-    did_you_mean,
-    problem,
-    problem_at,
-    shown,
-    suggest,
-)
+from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
 from fleet2d.configuration.units import OnDays, PositiveDuration, Share, folder_of
 from fleet2d.errors import errors_as
 from fleet2d.routines.activity import (
@@ -202,7 +195,7 @@ class Household(Settings):
 
     def model_post_init(self, _: object, /) -> None:
         """Refuse names of people who are no members, and events of the year without effect."""
-        named: list[tuple[Location, str]] = []
+        named: list[tuple[tuple[str | int, ...], str]] = []
         named += [(("couples", i), n) for i, pair in enumerate(self.couples) for n in pair]
         named += [(("together", k, "who"), n) for k, t in self.together.items() for n in t.who]
         named += [(("trips", n), n) for n in self.trips]

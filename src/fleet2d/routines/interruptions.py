@@ -21,15 +21,7 @@ from fleet2d.routines.activity import (
     seconds,
 )
 from fleet2d.routines.distributions import Distribution
-from fleet2d.routines.planner import (
-    FINISHES,
-    INTERRUPTS,
-    PLANNED,
-    RESUMES,
-    SLEEP,
-    Episode,
-    PrivateRooms,
-)
+from fleet2d.routines.planner import PLANNED, RESUMES, SLEEP, Episode, PrivateRooms
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws
 
@@ -292,10 +284,10 @@ def without_interruptions(day: Sequence[Episode]) -> list[Episode]:
     planned: list[Episode] = []
     begin = day[0].begin
     for episode in day:
-        if episode.role == INTERRUPTS:
+        if episode.role == planner.INTERRUPTS:
             continue
         resumes = episode.role == RESUMES and planned and planned[-1].activity == episode.activity
-        if episode.role == FINISHES or resumes:
+        if episode.role == planner.FINISHES or resumes:
             planned[-1] = planned[-1]._replace(end=episode.end)
         else:
             planned.append(episode._replace(begin=begin))

@@ -17,16 +17,7 @@ from fleet2d.routines.distributions import exponential, uniform
 from fleet2d.routines.household import SECOND, Household, Period, RandomVisits, with_absences
 from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.persona import Persona, YearEvent, holds_on
-from fleet2d.routines.planner import (
-    INTERRUPTS,
-    PLANNED,
-    RESUMES,
-    SLEEP,
-    DayPlan,
-    Episode,
-    Job,
-    PrivateRooms,
-)
+from fleet2d.routines.planner import PLANNED, SLEEP, DayPlan, Episode, Job, PrivateRooms
 from fleet2d.routines.templates import starts
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -453,8 +444,9 @@ class Lives:
                 if is_busy or episode.end - end < NO_GAP_S:
                     return day
                 before = [episode._replace(end=at)] if episode.begin < at else []
-                welcome = Episode(WELCOME, at, end, role=INTERRUPTS)
-                role = RESUMES if episode.begin < at and episode.role == PLANNED else episode.role
+                welcome = Episode(WELCOME, at, end, role=planner.INTERRUPTS)
+                is_begun = episode.begin < at and episode.role == PLANNED
+                role = planner.RESUMES if is_begun else episode.role
                 after = episode._replace(begin=end, role=role)
                 return [*day[:i], *before, welcome, after, *day[i + 1 :]]
         return day

@@ -17,31 +17,12 @@ from fleet2d.configuration.units import AngleDeg, Duration, Length, PositiveDura
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import (
-    BELL_STD,
-    HALF_TURN,
-    I64,
-    ONE,
-    TURN,
-    UNIT,
-    ErrorTables,
-    Lenses,
-    TablePart,
-)
+from fleet2d.kernels import BELL_STD, I64, ONE, TURN, UNIT, ErrorTables, Lenses, TablePart
 from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.sight import perception
 from fleet2d.sight.fov import FieldOfView, LineOfSight
-from fleet2d.sight.perception import (
-    SUM_ERROR,
-    Attributes,
-    Detection,
-    FalsePositives,
-    Identity,
-    Perception,
-    chance,
-    cumulative,
-    decay,
-)
+from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Identity, Perception
 
 # Squares of distances in lattice units stay far inside 64 bits.
 MAX_DISTANCE_M = 10_000
@@ -260,10 +241,10 @@ def error_tables(
             one false positive per look.
     """
     cameras, users = len(lenses), len(context.users)
-    models = [perception or Perception() for perception in perceptions]
+    models = [errors or Perception() for errors in perceptions]
     sources = 1 + max(len(model.false_positives.spots) for model in models)
     # If no camera errs, no table is ever read.
-    errs = any(perception is not None for perception in perceptions)
+    errs = any(errors is not None for errors in perceptions)
     tables = ErrorTables(
         table=np.zeros((cameras, kernels.TABLE if errs else 1), np.int64),
         confusion=np.zeros((cameras, users, users), np.int64),
@@ -275,15 +256,15 @@ def error_tables(
         keys=np.zeros((cameras, users, len(kernels.UserDraw)), np.uint64),
         ghost_keys=np.zeros((cameras, len(kernels.GhostDraw)), np.uint64),
     )
-    for c, (lens, perception) in enumerate(zip(lenses, perceptions, strict=True)):
-        if perception is not None:
+    for c, (lens, errors) in enumerate(zip(lenses, perceptions, strict=True)):
+        if errors is not None:
             reach = lens.far + max((round(radius) + 2 for radius in context.radii), default=0)
             table = tables.table[c]
             table[TablePart.SHIFT] = max(0, reach.bit_length() - (kernels.BINS - 1).bit_length())
-            _fill_detection(table, lens, perception.detection, context)
-            _fill_identity(table, tables.confusion[c], perception.identity, context)
-            _fill_attributes(table, perception.attributes, context)
-            _fill_false_positives(tables, c, lens, perception.false_positives, context)
+            _fill_detection(table, lens, errors.detection, context)
+            _fill_identity(table, tables.confusion[c], errors.identity, context)
+            _fill_attributes(table, errors.attributes, context)
+            _fill_false_positives(tables, c, lens, errors.false_positives, context)
     return tables
 
 
@@ -300,13 +281,17 @@ def _put(table: I64, at: int, values: Sequence[int] | I64) -> None:
 
 def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableContext) -> None:
     _put(table, TablePart.DISTANCE, model.distance.chances(_distances(table, context)))
-    angles = [360 * i / TURN for i in range(-HALF_TURN, HALF_TURN)]
+    angles = [360 * i / TURN for i in range(-kernels.HALF_TURN, kernels.HALF_TURN)]
     if not any(angle < 0 for angle, _ in model.bearing.points):
         angles = [abs(angle) for angle in angles]
     _put(table, TablePart.BEARING, model.bearing.chances(angles))
-    turns = [360 * i / TURN for i in range(HALF_TURN + 1)]
+    turns = [360 * i / TURN for i in range(kernels.HALF_TURN + 1)]
     _put(table, TablePart.FACING, model.orientation.chances(turns))
-    _put(table, TablePart.POSTURE, [chance(model.posture.get(name, 1.0)) for name in POSTURES])
+    _put(
+        table,
+        TablePart.POSTURE,
+        [perception.chance(model.posture.get(name, 1.0)) for name in POSTURES],
+    )
     count = lens.points + 1
     shares = [i / count for i in range(count + 1)]
     _put(table, TablePart.SHOWN, model.visible_share.chances(shares))
@@ -314,14 +299,15 @@ def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableCont
     _put(table, TablePart.LIGHT, model.light.around_the_clock().chances(hours))
     if model.memory:
         steps = Decimal(context.step_us) / units.micros(model.memory)
-        _put(table, TablePart.STAY, [chance(decay(steps * 2**i)) for i in range(kernels.DOUBLINGS)])
+        stay = (perception.decay(steps * 2**i) for i in range(kernels.DOUBLINGS))
+        _put(table, TablePart.STAY, [perception.chance(share) for share in stay])
 
 
 def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableContext) -> None:
     distances = _distances(table, context)
     mistaken = model.mistaken.chances(distances)
     right = ONE - mistaken if model.right is None else model.right.chances(distances)
-    excess = np.flatnonzero(right + mistaken > ONE + chance(SUM_ERROR))
+    excess = np.flatnonzero(right + mistaken > ONE + perception.chance(perception.SUM_ERROR))
     if len(excess):
         i = int(excess[0])
         raise ScenarioError(
@@ -343,7 +329,7 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
 def _whole_sums(shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
     """Return cumulative probabilities, 1 from the last possible outcome on, despite rounding."""
     last = max((i for i, name in enumerate(order) if shares.get(name)), default=len(order))
-    return [*cumulative(shares, order)[:last], *[ONE] * (len(order) - last)]
+    return [*perception.cumulative(shares, order)[:last], *[ONE] * (len(order) - last)]
 
 
 def _check_users(names: Mapping[str, object], key: str, context: TableContext) -> None:
@@ -367,7 +353,7 @@ def _fill_false_positives(
     tables: ErrorTables, camera: int, lens: Lens, model: FalsePositives, context: TableContext
 ) -> None:
     _check_users(model.looks_like, "looks_like", context)
-    tables.looks_like[camera] = cumulative(model.looks_like, [*context.users, None])
+    tables.looks_like[camera] = perception.cumulative(model.looks_like, [*context.users, None])
     tables.looks_like[camera, -1] = ONE
     rates = [model.per_hour, *(spot.per_hour for spot in model.spots)]
     if not any(rates):
@@ -381,10 +367,10 @@ def _fill_false_positives(
             f" the limit of one per look ({float(1 / hours):g} per hour at this period)"
         )
     # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
-    term, total = decay(mean), 0.0
+    term, total = perception.decay(mean), 0.0
     for count in range(kernels.MAX_GHOSTS):
         total += term
-        tables.ghosts[camera, count] = chance(min(total, 1.0))
+        tables.ghosts[camera, count] = perception.chance(min(total, 1.0))
         term *= float(mean) / (count + 1)
     shares = {str(i): rate / sum_in_order(rates) for i, rate in enumerate(rates)}
     tables.source[camera, : len(rates)] = _whole_sums(shares, list(shares))
@@ -394,12 +380,12 @@ def _fill_false_positives(
         tables.spot[camera, i] = x, y, noise
 
 
-def is_perfect(perception: Perception | None) -> bool:
+def is_perfect(errors: Perception | None) -> bool:
     """Return whether a look has no errors, so that it needs no tables; `errors` come after it."""
-    if perception is None:
+    if errors is None:
         return True
-    lit = perception.detection.model_copy(update={"unlit": Detection().unlit})
-    return perception.model_copy(update={"errors": {}, "detection": lit}) == Perception()
+    lit = errors.detection.model_copy(update={"unlit": Detection().unlit})
+    return errors.model_copy(update={"errors": {}, "detection": lit}) == Perception()
 
 
 class FalseSighting(NamedTuple):

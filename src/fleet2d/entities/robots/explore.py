@@ -122,8 +122,9 @@ class Explore(Behavior):
 
     def _near_frontier(self, now: Situation, explored: Bool) -> Bool:
         """Return which places are within reach of a frontier, bool (places,)."""
-        frontier = self.floor & ~explored & _beside(explored & self.floor)
-        away = squared_distance(np.pad(~frontier, 1, constant_values=True))[1:-1, 1:-1]
+        is_beside = squared_distance(~(explored & self.floor)) <= 2  # across a side or a corner
+        frontier = self.floor & ~explored & is_beside
+        away = squared_distance(~frontier)
         cells = self.reach / now.home.plan.lattice.cell
         near: Bool = away[self.stands[:, 0], self.stands[:, 1]] <= cells * cells
         near[sorted(self.blocked_stands)] = False
@@ -137,11 +138,3 @@ class Explore(Behavior):
             place = centres(self.stands[stand : stand + 1])[0]
             self.visible[1][stand] = visible_from(actor, place, centres(self.targets))
         return self.visible[1][stand]
-
-
-def _beside(mask: Bool) -> Bool:
-    """Return the cells with a neighbor in a mask, across a side or a corner."""
-    padded = np.pad(mask, 1)
-    rows, columns = mask.shape
-    shifted = [padded[r : r + rows, c : c + columns] for r in range(3) for c in range(3)]
-    return np.logical_or.reduce(shifted)

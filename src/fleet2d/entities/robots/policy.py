@@ -28,19 +28,7 @@ from fleet2d.entities.robots.find import Sites
 from fleet2d.errors import ComponentError, InputError, PlacementError, errors_as, extra
 from fleet2d.floorplan.plan import FloorPlan, Room, read_only
 from fleet2d.floorplan.space import PointDistances
-from fleet2d.kernels import (
-    F32,
-    F64,
-    I32,
-    I64,
-    TURN,
-    UNIT,
-    Bool,
-    RoomMemory,
-    ShownMemory,
-    cosine,
-    sine,
-)
+from fleet2d.kernels import F32, F64, I32, I64, TURN, UNIT, Bool, RoomMemory, ShownMemory
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import DAY_MINUTES, HOUR_S, MICROSECOND, Clock, midnight_of
 
@@ -89,9 +77,8 @@ SATURDAY = 5
 
 # Number of headings in which a robot may wait, and unit vectors of the first half of them, (n, 2).
 DIRECTIONS = 16
-HALF_DIRECTIONS = (
-    np.array([(cosine(h), sine(h)) for h in range(0, TURN // 2, TURN // DIRECTIONS)]) / UNIT
-)
+_HALF_TURN = range(0, TURN // 2, TURN // DIRECTIONS)
+HALF_DIRECTIONS = np.array([(kernels.cosine(h), kernels.sine(h)) for h in _HALF_TURN]) / UNIT
 
 # A time t ago counts 1 / (1 + t / scale) [s].
 SHORT_S, SEEN_S, LONG_S = 20 * 60, 30 * 60, 6 * HOUR_S
@@ -158,7 +145,7 @@ class WaitingPoses:
         """Return the place (x, y) and the heading at which most of a room is in view."""
         actor, walls = self._actor, self._actor.home.walls
         stands, goals = approach.stands_in(actor, room), approach.floor_of(actor, room)
-        limit, reach = cosine(self._half_angle) / UNIT, approach.sight_range(actor)
+        limit, reach = kernels.cosine(self._half_angle) / UNIT, approach.sight_range(actor)
         best = kernels.best_view(walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit)
         if best is None:
             return *actor.middle(room), 0
@@ -322,8 +309,8 @@ class Policy(BeliefBehavior):
         minute = (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
         charge, since = actor.charge, self.since
         common = [
-            sine(minute) / UNIT,
-            cosine(minute) / UNIT,
+            kernels.sine(minute) / UNIT,
+            kernels.cosine(minute) / UNIT,
             float(time.weekday() >= SATURDAY),
             away,
             1.0 if charge is None else charge.level,

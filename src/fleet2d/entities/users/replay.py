@@ -19,19 +19,10 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
+from fleet2d.logs import placement
 from fleet2d.logs.layout import Layout, read_log
 from fleet2d.logs.log import AWAY, ActivityLog, Day, LogError, PositionLog, begin_of_run, files_of
-from fleet2d.logs.placement import (
-    DOOR,
-    UNKNOWN,
-    LogFrame,
-    LoggedVisit,
-    LoggedVisits,
-    RoomChoice,
-    VisitRule,
-    map_rooms,
-    visits_of,
-)
+from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
 from fleet2d.runtime.determinism import sum_in_order
 
 # Coordinates are clipped to this, far outside of any home [m].
@@ -520,9 +511,9 @@ class Replay(Behavior):
         return self.follower.follow(plan, current, rejoin=now.step > 0)
 
     def _start_rooms(self, actor: Actor, log: ActivityLog, begin_us: int) -> None:
-        mapped = map_rooms(log.rooms, self.rooms, actor.home.rooms)
+        mapped = placement.map_rooms(log.rooms, self.rooms, actor.home.rooms)
         clock, gap_us = actor.clock, units.micros(self.gap or GAP_OF_ROOMS)
-        rule = VisitRule(
+        rule = placement.VisitRule(
             step_us=clock.step_us,
             begin_us=begin_us,
             steps=clock.steps,
@@ -531,7 +522,7 @@ class Replay(Behavior):
             unknown=self.gaps == "unknown",
             door_us=gap_us,
         )
-        logged = visits_of(log, mapped, rule)
+        logged = placement.visits_of(log, mapped, rule)
         self.visits = logged.visits
         follower = RoomFollower(actor, self.visits, self.gaps == "walk", self.fastest)
         self.follower: RoomFollower | FixFollower = follower
