@@ -45,7 +45,7 @@ from fleet2d.routines.interruptions import (
     usual_needs,
 )
 from fleet2d.routines.planner import REST, SLEEP, AnyRecordedDay, DayPlan
-from fleet2d.routines.templates import check, day_plans
+from fleet2d.routines.templates import check, day_plans, in_order
 from fleet2d.runtime.clock import DAY
 
 
@@ -249,13 +249,7 @@ class DayTemplate(Settings):
         for name, task in self.do.items():
             for other in task.after:
                 check_known(other, "task", self.do, partial(problem_at, ("do", name, "after")))
-        done: set[str] = set()
-        while len(done) < len(self.do):
-            ready = [n for n, t in self.do.items() if n not in done and done.issuperset(t.after)]
-            if not ready:
-                waiting = ", ".join(n for n in self.do if n not in done)
-                raise problem_at(("do",), f"these tasks wait for each other: {waiting}")
-            done.update(ready)
+        in_order(self.do)
 
     @property
     def weekdays(self) -> set[int]:

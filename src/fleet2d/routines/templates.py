@@ -59,7 +59,7 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     wake = starts(day.wake, 0)
     dawn = wake.shortest
     sleep = starts(day.sleep, dawn)
-    order = _in_order(day.do)
+    order = in_order(day.do)
     jobs = tuple(_job(persona, task, day.do[task], order, dawn) for task in order)
     leisure = persona.leisure if day.leisure is None else day.leisure
     pastimes = tuple(
@@ -68,11 +68,19 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     return DayPlan(name, wake, sleep, seconds(day.sleep.at_least), jobs, pastimes)
 
 
-def _in_order(tasks: dict[str, "Task"]) -> list[str]:
-    """Return the names of the tasks, each after those that come before it."""
+def in_order(tasks: dict[str, "Task"]) -> list[str]:
+    """Return the names of the tasks of a day, each after those that come before it.
+
+    Raises:
+        ValidationError: Some wait for each other.
+    """
     order: list[str] = []
     while len(order) < len(tasks):
-        order += [n for n, t in tasks.items() if n not in order and set(t.after) <= set(order)]
+        ready = [n for n, t in tasks.items() if n not in order and set(t.after) <= set(order)]
+        if not ready:
+            waiting = ", ".join(name for name in tasks if name not in order)
+            raise problem_at(("do",), f"these tasks wait for each other: {waiting}")
+        order += ready
     return order
 
 
@@ -100,9 +108,7 @@ def _job(persona: "Persona", name: str, task: "Task", order: list[str], dawn: in
 def _pastime(
     persona: "Persona", day: str, activity: str, pastime: "Pastime", dawn: int
 ) -> PastimeOption:
-    first, last = 0, NEVER
-    if pastime.between is not None:
-        first, last = window(pastime.between, dawn)
+    first, last = (0, NEVER) if pastime.between is None else window(pastime.between, dawn)
     takes = persona.activity(activity).takes.table()
     if takes.shortest < 1 and takes.longest < 2:  # time would stand still
         own = day in persona.days and persona.days[day].leisure is not None
@@ -116,16 +122,11 @@ def starts(timing: "Timing", dawn: int) -> Distribution:
 
     The day begins at `dawn` or later.
     """
+    first, last = (dawn, dawn + DAY_S) if timing.between is None else window(timing.between, dawn)
     if timing.at is None:
-        if timing.between is None:
-            return uniform(dawn, dawn + DAY_S)
-        return uniform(*window(timing.between, dawn))
-    spread = seconds(timing.spread)
-    if timing.between is not None:
-        first, last = window(timing.between, dawn)
-        at = seconds_of_day(timing.at, first)
-    else:
-        at = seconds_of_day(timing.at, dawn)
+        return uniform(first, last)
+    spread, at = seconds(timing.spread), seconds_of_day(timing.at, first)
+    if timing.between is None:
         reach = int(REACH * spread)
         first, last = max(at - reach, 0), at + reach
     begin = normal(at, spread) if spread else uniform(at, at)

@@ -1,6 +1,5 @@
 """Schedule: a fixed daily or weekly agenda of places."""
 
-from collections.abc import Iterator
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -120,8 +119,10 @@ class Schedule(Behavior):
             if now.step or now.actor.entity.start or seat is not None:
                 _add(plan, entry)
         self.until = midnight_of(now.time) + DAY
-        for begins, entry in self._between(since, self.until):
-            _add(plan.stay(until=begins), entry)
+        for midnight in midnights(since, self.until):
+            for entry in self.week[midnight.weekday()]:
+                if midnight + entry.begins >= since:
+                    _add(plan.stay(until=midnight + entry.begins), entry)
         self.plan = plan.stay(until=self.until)
         return self.plan
 
@@ -137,13 +138,6 @@ class Schedule(Behavior):
             plan.come_home().go_to(place)
         else:
             plan.leave_home()
-
-    def _between(self, since: datetime, until: datetime) -> Iterator[tuple[datetime, AgendaEntry]]:
-        """Yield the entries that begin from `since` on and before the midnight `until`."""
-        for midnight in midnights(since, until):
-            for entry in self.week[midnight.weekday()]:
-                if midnight + entry.begins >= since:
-                    yield midnight + entry.begins, entry
 
     def _week(self) -> list[list[AgendaEntry]]:
         week: list[list[AgendaEntry]] = [[] for _ in range(7)]
