@@ -203,14 +203,10 @@ def unwatched(actor: Actor, stops: Sequence[tuple[int, int]]) -> list[str]:
     return lines
 
 
-def visible_from(actor: Actor, place: I64, goals: I64, reach: float | None = None) -> Bool:
-    """Return which goals (n, 2) are in range and in sight of a place, at any heading, bool (n,).
-
-    The range is that of `sight_range`; who asks for many places passes it as `reach`.
-    """
+def visible_from(actor: Actor, place: I64, goals: I64) -> Bool:
+    """Return which goals (n, 2) are in range and in sight of a place, at any heading, bool (n,)."""
     x, y = int(place[0]), int(place[1])
-    reach = sight_range(actor) if reach is None else reach
-    near = (goals[:, 0] - x) ** 2 + (goals[:, 1] - y) ** 2 <= reach**2
+    near = (goals[:, 0] - x) ** 2 + (goals[:, 1] - y) ** 2 <= sight_range(actor) ** 2
     visible = np.zeros(len(goals), np.bool_)
     visible[near] = points_in_sight(actor.home.walls, x, y, goals[near])
     return visible
