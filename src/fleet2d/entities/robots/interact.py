@@ -91,9 +91,7 @@ class RoundMemory:
 
     def _count(self, person: str, time: datetime) -> RoundCount:
         """Return the rounds for a person in an hour of such days, as they count now."""
-        last = self._counts.get(_hour_of(person, time))
-        if last is None:
-            return RoundCount(0.0, 0.0, time)
+        last = self._counts.get(_hour_of(person, time), RoundCount(0.0, 0.0, time))
         kept = exp2(-((time - last.at) / self.HALF_LIFE))
         return RoundCount(kept * last.found, kept * last.rounds, time)
 
@@ -185,7 +183,7 @@ class Interact(BeliefBehavior):
         check_has_camera(actor, "interact")
         self.served: ServedRequest | None = None
         self.plan: Plan | None = None  # the last one that addresses somebody
-        self.looked: dict[str, datetime] = {}  # when each request was considered last
+        self.set_aside: dict[str, datetime] = {}  # until when each request isn't considered
         self.unanswered: dict[str, Point] = {}  # where a person gave no answer
         self.best_so_far: dict[str, tuple[datetime, float]] = {}  # best chance of each request
         self.left_alone: dict[str, datetime] = {}  # until when each person isn't addressed
@@ -204,10 +202,8 @@ class Interact(BeliefBehavior):
             return None
         times = [queue.next_ready(now.time)]
         for request in queue.open:
-            name, to = request.text, request.to
-            times += [self.left_alone.get(to), self.not_sought.get(to)]
-            if (last := self.looked.get(name)) is not None:
-                times.append(last + self.look)
+            times += [self.left_alone.get(request.to), self.not_sought.get(request.to)]
+            times.append(self.set_aside.get(request.text))
         return min((time for time in times if time is not None and time > now.time), default=None)
 
     def busy(self) -> bool:
@@ -271,10 +267,8 @@ class Interact(BeliefBehavior):
 
     def _waits_for(self, now: Situation, request: Request) -> bool:
         """Return whether it would address the person of a request now, if in view."""
-        last = self.looked.get(request.text)
-        if last is not None and now.time - last < self.look:
-            return False
-        return self.left_alone.get(request.to, now.time) <= now.time
+        rests = self.set_aside.get(request.text), self.left_alone.get(request.to)
+        return all(until is None or until <= now.time for until in rests)
 
     def _look_for_somebody(self, now: Situation, ready: list[Request]) -> Plan | None:
         """Look for the person of one of some requests, if likely at home; None: of none."""
@@ -319,11 +313,10 @@ class Interact(BeliefBehavior):
         """Draw whether to serve a request now, with the probability that `timing` names."""
         if self.timing is None:
             return True
-        last = self.looked.get(request.text)
-        if last is not None and now.time - last < self.look:
+        if self.set_aside.get(request.text, now.time) > now.time:
             return False
         assert now.requests is not None
-        self.looked[request.text] = now.time
+        self.set_aside[request.text] = now.time + self.look
         output, chance, to = now.outputs.get(self.timing), 1.0, request.to
         if output is not None and not callable(getattr(output, "chance", None)):
             raise ComponentError(
