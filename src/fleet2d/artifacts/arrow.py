@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -69,14 +70,9 @@ def spec_of(schema: pa.Schema) -> TableSpec:
 
 
 def _metadata(column: Column) -> dict[str, str]:
-    metadata: dict[str, str] = {"kind": column.kind}
-    if column.unit:
-        metadata["unit"] = column.unit
-    if column.description:
-        metadata["description"] = column.description
-    if column.categories:
-        metadata["categories"] = json.dumps(column.categories)
-    return metadata
+    categories = json.dumps(column.categories) if column.categories else ""
+    values = {"unit": column.unit, "description": column.description, "categories": categories}
+    return {"kind": column.kind, **{key: value for key, value in values.items() if value}}
 
 
 def _column_of(field: pa.Field) -> Column:
@@ -313,10 +309,7 @@ def read_parquet(path: Path, kinds: Mapping[str, Kind] | None = None) -> pa.Tabl
         if kinds is not None:
             _check_columns(path, file.schema_arrow, kinds)
         TABLE_BYTES.check(unpacked_bytes(file), path, ArtifactError, prefix="about ")
-        try:
-            table = file.read()
-        except (OSError, pa.ArrowException) as error:
-            raise _damaged(path, error) from error
+        table = file.read()
     return with_categories(table)
 
 
@@ -341,11 +334,7 @@ def read_row_groups(path: Path) -> Iterator[pa.Table]:
         yield file.schema_arrow.empty_table()
         for group in range(file.num_row_groups):
             TABLE_BYTES.check(unpacked_bytes(file, group), path, ArtifactError, prefix="about ")
-            try:
-                part = file.read_row_group(group)
-            except (OSError, pa.ArrowException) as error:
-                raise _damaged(path, error) from error
-            yield part
+            yield file.read_row_group(group)
 
 
 def count_rows(path: Path) -> int:
@@ -358,23 +347,22 @@ def count_rows(path: Path) -> int:
         return int(file.metadata.num_rows)
 
 
-def _opened(path: Path) -> pq.ParquetFile:
+@contextmanager
+def _opened(path: Path) -> Iterator[pq.ParquetFile]:
+    """Open a file, and say which one it is if it can't be opened or read."""
     try:
-        return pq.ParquetFile(path)
+        with pq.ParquetFile(path) as file:
+            yield file
     except FileNotFoundError as error:
         raise ArtifactError(
             f"{path} is missing: the run directory was changed; run the scenario again"
         ) from error
     except (OSError, pa.ArrowException) as error:
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception) -> ArtifactError:
-    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return ArtifactError(
-        f"{path} is damaged or cut off ({reason}): copy the run again from where it was whole, "
-        "or run the scenario again"
-    )
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ArtifactError(
+            f"{path} is damaged or cut off ({reason}): copy the run again from where it was whole, "
+            "or run the scenario again"
+        ) from error
 
 
 def with_categories(table: pa.Table) -> pa.Table:

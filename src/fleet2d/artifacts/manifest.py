@@ -124,14 +124,12 @@ def versions() -> dict[str, str]:
     return {**packages, "python": python, "platform": f"{sys.platform} {machine}"}
 
 
+@cache
 def _version(package: str) -> str:
     # Searching the installed packages takes longer than simulating a day.
     version = getattr(sys.modules.get(package), "__version__", None)
-    return version if isinstance(version, str) else _installed_version(package)
-
-
-@cache
-def _installed_version(package: str) -> str:
+    if isinstance(version, str):
+        return version
     from importlib import metadata
 
     try:

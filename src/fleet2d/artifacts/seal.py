@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import (
     FILE_NAME,
@@ -25,14 +24,7 @@ from fleet2d.artifacts.manifest import (
     json_of,
     table_record,
 )
-from fleet2d.artifacts.table import (
-    Chunk,
-    Column,
-    ColumnChunk,
-    Dictionary,
-    TableSpec,
-    new_dictionaries,
-)
+from fleet2d.artifacts.table import Chunk, Dictionary, TableSpec, new_dictionaries
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import ArtifactError, RunDirectoryError, os_errors_as, printable
@@ -53,50 +45,30 @@ class TableDigest:
         """Start with no rows."""
         self.spec = spec
         self.rows = 0
-        self._columns = [_ColumnDigest(column) for column in spec.columns]
+        self._hashes = {name: [hashlib.sha256() for _ in range(3)] for name in spec.names}
 
     def update(self, chunk: Chunk, rows: int) -> None:
         """Add the next `rows` rows."""
-        for column in self._columns:
-            column.update(chunk[column.name])
+        for name, hashes in self._hashes.items():
+            for hasher, values in zip(hashes, chunk[name], strict=True):
+                if values is not None and len(values):
+                    values = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
+                    hasher.update(values.view(np.uint8).data)
         self.rows += rows
 
-    def hexdigest(self, words: Mapping[str, Dictionary] | None = None) -> str:
+    def hexdigest(self, words: Mapping[str, Dictionary]) -> str:
         """Return the digest of all rows so far.
 
         Args:
             words: The dictionaries of the columns whose dictionary grows.
         """
-        columns = [
-            (
-                column.name,
-                column.kind,
-                column.nullable,
-                digest.hexdigest(
-                    words[column.name].in_order()
-                    if words and column.is_growing
-                    else column.categories
-                ),
-            )
-            for column, digest in zip(self.spec.columns, self._columns, strict=True)
-        ]
+        columns = []
+        for column in self.spec.columns:
+            names = words[column.name].in_order() if column.is_growing else column.categories
+            hashes = [hasher.hexdigest() for hasher in self._hashes[column.name]]
+            digest = sha256_of([hashes, list(names)])
+            columns.append((column.name, column.kind, column.nullable, digest))
         return sha256_of([self.spec.name, self.rows, columns])
-
-
-class _ColumnDigest:
-    """The hashes of one column: its values, their validity, and the lengths of strings."""
-
-    def __init__(self, column: Column) -> None:
-        self.name = column.name
-        self._hashes = [hashlib.sha256() for _ in range(3)]
-
-    def update(self, chunk: ColumnChunk) -> None:
-        for hasher, values in zip(self._hashes, chunk, strict=True):
-            if values is not None and len(values):
-                hasher.update(_little_endian(values))
-
-    def hexdigest(self, categories: Sequence[str]) -> str:
-        return sha256_of([[hasher.hexdigest() for hasher in self._hashes], list(categories)])
 
 
 def run_digest(tables: Mapping[str, str]) -> str:
@@ -119,39 +91,20 @@ def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
     Raises:
         ArtifactError: The table's columns are not those of the spec.
     """
-    return digest_tables([table], spec)
+    from fleet2d.artifacts.arrow import spec_of
+
+    return _digest_parts([table], spec or spec_of(table.schema))[1]
 
 
-def digest_tables(parts: Iterable[pa.Table], spec: TableSpec | None = None) -> str:
-    """Return the digest of a table that comes in parts, in the order of its rows."""
-    return _digest_parts(parts, spec)[1]
+def _digest_parts(parts: Iterable[pa.Table], spec: TableSpec) -> tuple[int, str]:
+    """Return the number of rows and the digest of a table that comes in parts."""
+    from fleet2d.artifacts.arrow import chunks_of
 
-
-def _digest_parts(
-    parts: Iterable[pa.Table], spec: TableSpec | None = None
-) -> tuple[TableDigest, str]:
-    from fleet2d.artifacts.arrow import chunks_of, spec_of
-
-    digest: TableDigest | None = None
-    words: dict[str, Dictionary] = {}
+    digest, words = TableDigest(spec), new_dictionaries(spec)
     for part in parts:
-        if digest is None:
-            spec = spec or spec_of(part.schema)
-            digest = TableDigest(spec)
-            words = new_dictionaries(spec)
-        for chunk, rows in chunks_of(part, digest.spec, words):
+        for chunk, rows in chunks_of(part, spec, words):
             digest.update(chunk, rows)
-    if digest is None:
-        raise ValueError("a table needs at least one part, even if it has no rows")
-    return digest, digest.hexdigest(words)
-
-
-def digest_of_file(path: Path) -> str | None:
-    """Return the digest of a stored table, None if it can't be read."""
-    try:
-        return record_of_file(path).digest
-    except ArtifactError:
-        return None
+    return digest.rows, digest.hexdigest(words)
 
 
 def record_of_file(path: Path) -> TableRecord:
@@ -160,25 +113,11 @@ def record_of_file(path: Path) -> TableRecord:
     Raises:
         ArtifactError: The file can't be read.
     """
-    from fleet2d.artifacts.arrow import read_row_groups
+    from fleet2d.artifacts.arrow import read_row_groups, spec_of
 
-    digest, text = _digest_parts(read_row_groups(path))
-    return table_record(digest.spec, digest.rows, text)
-
-
-def changed_tables(digests: Mapping[str, str], digest_of: Callable[[str], str | None]) -> list[str]:
-    """Return the names of the tables whose digest is not the stored one.
-
-    Args:
-        digests: The stored digests by name.
-        digest_of: Returns the present digest of a table.
-    """
-    return [name for name, digest in digests.items() if digest_of(name) != digest]
-
-
-def _little_endian(values: NDArray[Any]) -> memoryview:
-    values = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
-    return values.view(np.uint8).data
+    parts = read_row_groups(path)
+    spec = spec_of(next(parts).schema)
+    return table_record(spec, *_digest_parts(parts, spec))
 
 
 def sha256_of(content: Any, *, ordered: bool = False) -> str:
@@ -219,15 +158,10 @@ def make_seal(manifest: Manifest, directory: Path) -> Seal:
     Raises:
         OSError: A file can't be read.
     """
-    paths = {path.name: path for path in directory.iterdir() if path.suffix == ".parquet"}
-    paths = {name: path for name, path in paths.items() if path.stem in manifest.tables}
-    learned = directory / LEARNED_NAME
-    if learned.is_dir():
-        paths |= {f"{LEARNED_NAME}/{path.name}": path for path in learned.glob("*.npz")}
-    plan = directory / FLOORPLAN_NAME
-    if plan.exists():
-        paths[plan.name] = plan
-    files = {name: _file_record(path) for name, path in sorted(paths.items())}
+    names = {FLOORPLAN_NAME, *(f"{name}.parquet" for name in manifest.tables)}
+    names |= {f"{LEARNED_NAME}/{path.name}" for path in (directory / LEARNED_NAME).glob("*.npz")}
+    paths = {name: directory / name for name in sorted(names)}
+    files = {name: _file_record(path) for name, path in paths.items() if path.exists()}
     fields = digest_fields(manifest.content())
     return Seal(digest=_digest_of(fields, files), fields=fields, files=files)
 

@@ -76,63 +76,6 @@ class ArtifactSettings(Settings):
     ] = "auto"
 
 
-def check_run_directory(directory: Path) -> None:
-    """Check, without writing, that a run can be stored in a directory.
-
-    Raises:
-        RunDirectoryError: It exists and isn't empty, is a file, or can't be created.
-    """
-    try:
-        if directory.is_dir():
-            if any(directory.iterdir()):
-                raise RunDirectoryError(
-                    f"{directory} exists and is not empty: choose another --out or remove it"
-                )
-            _check_writable(directory, directory)
-            return
-        nearest = directory
-        while not os.path.lexists(nearest) and nearest != nearest.parent:
-            nearest = nearest.parent
-        if not nearest.is_dir():
-            raise RunDirectoryError(
-                f"{directory} can't be a run directory, because {nearest} is not a directory: "
-                "choose another --out or remove it"
-            )
-        _check_writable(directory, nearest)
-    except OSError as error:
-        raise cannot_write(directory, error) from error
-
-
-def _check_writable(directory: Path, nearest: Path) -> None:
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise RunDirectoryError(
-            f"{directory} can't be written: you may not write in {nearest}; choose another --out"
-        )
-
-
-def make_directories(directory: Path) -> list[Path]:
-    """Create a directory and its parents; return those that were missing, outermost first.
-
-    Raises:
-        OSError: One can't be created; those created before it are removed again.
-    """
-    missing = [path for path in (directory, *directory.parents) if not path.is_dir()][::-1]
-    try:
-        for path in missing:
-            path.mkdir(exist_ok=True)
-    except OSError:
-        remove_directories(missing)
-        raise
-    return missing
-
-
-def remove_directories(directories: list[Path]) -> None:
-    """Remove those of some directories, outermost first, that exist and are empty."""
-    for path in reversed(directories):
-        with suppress(OSError):
-            path.rmdir()
-
-
 def cannot_write(directory: Path, error: OSError) -> Fleet2DError:
     """Return the error to raise when a run directory can't be created."""
     if is_disk_full(error):
@@ -249,8 +192,29 @@ class RunStore:
         Raises:
             RunDirectoryError: It exists and isn't empty, is a file, or can't be written.
         """
-        if self.directory is not None:
-            check_run_directory(self.directory)
+        directory = self.directory
+        if directory is None:
+            return
+        try:
+            nearest = directory
+            while not os.path.lexists(nearest) and nearest != nearest.parent:
+                nearest = nearest.parent
+            if not nearest.is_dir():
+                raise RunDirectoryError(
+                    f"{directory} can't be a run directory, because {nearest} is not a directory: "
+                    "choose another --out or remove it"
+                )
+            if nearest == directory and any(directory.iterdir()):
+                raise RunDirectoryError(
+                    f"{directory} exists and is not empty: choose another --out or remove it"
+                )
+        except OSError as error:
+            raise cannot_write(directory, error) from error
+        if not os.access(nearest, os.W_OK | os.X_OK):
+            raise RunDirectoryError(
+                f"{directory} can't be written: you may not write in {nearest}; choose another"
+                " --out"
+            )
 
     def open(self) -> None:
         """Create the directory and its manifest, with the status `running`.
@@ -262,11 +226,16 @@ class RunStore:
         if self._is_open or self.directory is None or self.root is None:
             return
         self.check()
+        paths, unfinished = (self.root, *self.root.parents), self._unfinished_run()
+        self._new_directories = [path for path in paths if not path.is_dir()]
         try:
-            self._new_directories = make_directories(self.root)
-            self._lock_directory(self.root)
+            self.root.mkdir(parents=True, exist_ok=True)
+            unfinished.lock()
+            if any(path.name != LOCK_NAME for path in self.root.iterdir()):
+                unfinished.release()
+                raise RunDirectoryError(f"another run was stored in {self.directory} just now")
             self._is_open = True
-            self._unfinished_run().begin()
+            unfinished.begin()
             self.manifest.status = "running"
             size = self.manifest.write(self.root)
             FILE_BYTES.check(size, self.directory / FILE_NAME, RunDirectoryError)
@@ -276,14 +245,6 @@ class RunStore:
         except RunDirectoryError:  # a run that nobody could open
             self.discard()
             raise
-
-    def _lock_directory(self, root: Path) -> None:
-        """Lock the directory, and check that no other run has begun there in the meantime."""
-        unfinished = self._unfinished_run()
-        unfinished.lock()
-        if any(path.name != LOCK_NAME for path in root.iterdir()):
-            unfinished.release()
-            raise RunDirectoryError(f"another run was stored in {self.directory} just now")
 
     def reopen(self, unfinished: UnfinishedRun, commit: Commit | None) -> None:
         """Continue in the directory of an unfinished run, after a commit of its journal.
@@ -358,8 +319,7 @@ class RunStore:
         self._check_usable()
         entry = self._tables.get(spec.name)
         if entry is None:
-            buffer = TableBuffer(spec, self._flush_rows)
-            self._tables[spec.name] = TableWriter(buffer)
+            self._tables[spec.name] = TableWriter(TableBuffer(spec, self._flush_rows))
         elif entry.buffer.spec != spec:
             raise ArtifactError(
                 f"there is a table {spec.name!r} with other columns already: choose another name"
@@ -433,8 +393,15 @@ class RunStore:
             return self._digests
         for entry in self._tables.values():
             self._flush(entry)
-        if self.root is not None:
-            self._finish_files(self.root)
+        if self.root is not None:  # every file is complete before any is renamed
+            for name, entry in self._tables.items():
+                with self._writing(f"{name}.parquet", entry):
+                    entry.file_in(self.root).finish()
+            for name, entry in self._tables.items():
+                with self._writing(f"{name}.parquet"):
+                    entry.file_in(self.root).publish()
+            with self._writing("the directory"):
+                sync_directory(self.root)
         digests, tables = dict[str, str](), dict[str, TableRecord]()
         for name, entry in self._tables.items():
             digest, spec = entry.hashed(), entry.buffer.spec
@@ -478,7 +445,9 @@ class RunStore:
                 for path in (self.root / name, self.root / f"{name}{PARTIAL}"):
                     with suppress(OSError):
                         path.unlink()
-            remove_directories(self._new_directories)
+        for path in self._new_directories:  # if they are empty, the innermost first
+            with suppress(OSError):
+                path.rmdir()
         self._is_open = False
 
     @property
@@ -507,17 +476,6 @@ class RunStore:
     def _unfinished_run(self) -> UnfinishedRun:
         assert self._unfinished is not None, "a run in memory has no journal"
         return self._unfinished
-
-    def _finish_files(self, root: Path) -> None:
-        """Complete every file before any is renamed."""
-        for name, entry in self._tables.items():
-            with self._writing(f"{name}.parquet", entry):
-                entry.file_in(root).finish()
-        for name, entry in self._tables.items():
-            with self._writing(f"{name}.parquet"):
-                entry.file_in(root).publish()
-        with self._writing("the directory"):
-            sync_directory(root)
 
     def _check_usable(self) -> None:
         self._check_failure()

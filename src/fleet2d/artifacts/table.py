@@ -179,14 +179,6 @@ def encode_strings(strings: Sequence[str | None], nullable: bool) -> ColumnChunk
     return ColumnChunk(values, _valid(strings) if nullable else None, lengths)
 
 
-def encode_words(strings: Sequence[str | None], words: Dictionary, nullable: bool) -> ColumnChunk:
-    """Turn strings into codes, entering new ones into `words`."""
-    if nullable:
-        words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
-    codes = np.fromiter(map(words.__getitem__, strings), np.int32, len(strings))
-    return ColumnChunk(codes, _valid(strings) if nullable else None)
-
-
 def _valid(strings: Sequence[str | None]) -> Bool:
     return np.fromiter((string is not None for string in strings), np.bool_, len(strings))
 
@@ -244,25 +236,11 @@ class TableBuffer:
         """Whether no further row fits."""
         return self.rows >= self.limit
 
-    def append(self, **columns: Any) -> None:
-        """Add rows, as many as fit under `limit`.
+    def check(self, columns: Mapping[str, Any]) -> Batch:
+        """Convert columns to the table's types; the buffer is not changed yet.
 
         Args:
             columns: One array per column, all of one length; a scalar stands for all rows.
-
-        Raises:
-            ArtifactError: The columns don't fit the table, or the rows don't fit the limit.
-        """
-        batch = self.check(columns)
-        if self.rows + batch.rows > self.limit:
-            raise ArtifactError(
-                f"table {self.spec.name!r}: {batch.rows} rows are more than the "
-                f"{self.limit - self.rows} that still fit: append less at a time"
-            )
-        self.fill(batch, 0)
-
-    def check(self, columns: Mapping[str, Any]) -> Batch:
-        """Convert columns to the table's types; the buffer is not changed yet.
 
         Raises:
             ArtifactError: A column is missing, unknown, of another length or type, out of range,
@@ -320,7 +298,11 @@ class TableBuffer:
             reuse: Whether the next rows may overwrite the arrays that are returned: the caller no
                 longer needs them by then.
         """
-        chunk = self.peek()
+        self.code_words()
+        chunk = {
+            column.name: self._rows_of(column, 0) if self.rows else empty_chunk(column)
+            for column in self.spec.columns
+        }
         self.rows = self._coded = 0
         if not reuse:
             # The next rows are likely to be as many.
@@ -330,13 +312,6 @@ class TableBuffer:
             strings.clear()
         return chunk
 
-    def peek(self) -> Chunk:
-        """Return the rows without removing them; arrays are not copied."""
-        if not self.rows:
-            return {column.name: empty_chunk(column) for column in self.spec.columns}
-        self.code_words()
-        return {column.name: self._rows_of(column, 0) for column in self.spec.columns}
-
     def arrays(self, start: int) -> list[NDArray[Any]]:
         """Return the rows from `start` on, at least one, as the journal takes them.
 
@@ -345,16 +320,10 @@ class TableBuffer:
             the lengths, which of them are not missing, and their bytes.
         """
         self.code_words()
-        rows = slice(start, self.rows)
         arrays: list[NDArray[Any]] = []
         for column in self.spec.columns:
-            if column.kind == "string":
-                text, valid, lengths = self._rows_of(column, start)
-                arrays += [a for a in (lengths, valid, text) if a is not None]
-                continue
-            if column.nullable:
-                arrays.append(self._valid[column.name][rows])
-            arrays.append(self._values[column.name][rows])
+            values, valid, lengths = self._rows_of(column, start)
+            arrays += [array for array in (lengths, valid, values) if array is not None]
         return arrays
 
     def _rows_of(self, column: Column, start: int) -> ColumnChunk:
@@ -373,10 +342,12 @@ class TableBuffer:
         for column in self.spec.columns:
             name = column.name
             if column.is_growing:
-                words = encode_words(self._strings[name][rows], self.words[name], column.nullable)
-                self._values[name][rows] = words.values
+                strings, words = self._strings[name][rows], self.words[name]
                 if column.nullable:
-                    self._valid[name][rows] = words.valid
+                    words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
+                    self._valid[name][rows] = _valid(strings)
+                codes = map(words.__getitem__, strings)
+                self._values[name][rows] = np.fromiter(codes, np.int32, len(strings))
         self._coded = self.rows
 
     def _make_room(self, rows: int) -> None:

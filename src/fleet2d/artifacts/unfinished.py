@@ -13,7 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,7 +36,6 @@ from fleet2d.storage.files import (
     FolderLock,
     FrameWriter,
     JournalFormat,
-    path_in,
     read_frames,
     replacing,
     sync_directory,
@@ -101,9 +100,7 @@ class RowJournal:
 
     def replay(self, entry: LoggedRows) -> None:
         """Count rows that are in the file already."""
-        table = self._tables.setdefault(
-            entry.spec.name, _LoggedTable(len(self._tables), entry.spec, 0, {})
-        )
+        table = self._tables.setdefault(entry.spec.name, _LoggedTable(len(self._tables)))
         table.rows += entry.rows
         table.words = {name: len(words) for name, words in entry.words.items()}
 
@@ -127,7 +124,7 @@ class RowJournal:
         """
         table = self._tables.get(spec.name)
         if table is None:
-            table = self._tables[spec.name] = _LoggedTable(len(self._tables), spec, 0, {})
+            table = self._tables[spec.name] = _LoggedTable(len(self._tables))
             self.frames.add("table", _to_json(asdict(spec)))
         added_words = {}
         for name, dictionary in words.items():
@@ -160,9 +157,8 @@ class _LoggedTable:
     """A table in the journal: its number, its rows, and the size of its dictionaries so far."""
 
     number: int
-    spec: TableSpec
-    rows: int
-    words: dict[str, int]
+    rows: int = 0
+    words: dict[str, int] = field(default_factory=dict)
 
 
 class LoggedRows(NamedTuple):
@@ -528,40 +524,21 @@ def columns_of(entry: LoggedRows) -> dict[str, object]:
     return columns
 
 
-class Prefix:
-    """The rows of an unfinished run that can be read.
+def read_committed(path: Path, end: int, name: str) -> pa.Table:
+    """Return a table of a journal up to a commit.
 
-    Attributes:
-        commit: The last commit.
-        names: Names of the tables, sorted.
+    Args:
+        path: The journal.
+        end: Position where the commit ends [bytes].
+        name: The name of the table.
+
+    Raises:
+        ArtifactError: The journal is damaged.
     """
+    from fleet2d.artifacts.arrow import table_of
 
-    def __init__(self, path: Path, commit: Commit) -> None:
-        """Read nothing yet; `find` creates prefixes."""
-        self._path, self.commit = path, commit
-        self.names = tuple(sorted(commit.rows))
-
-    @classmethod
-    def find(cls, directory: Path) -> Prefix | None:
-        """Return what a run directory holds up to the last commit; None if there is no commit.
-
-        Raises:
-            ArtifactError: The journal can't be read.
-        """
-        path = path_in(directory, f"{FOLDER}/{JOURNAL_NAME}")
-        commit = last_commit(path)
-        return None if commit is None else cls(path, commit)
-
-    def read(self, name: str) -> pa.Table:
-        """Return a table up to the last commit.
-
-        Raises:
-            ArtifactError: The journal is damaged.
-        """
-        from fleet2d.artifacts.arrow import table_of
-
-        rows = [e for e in read_rows(self._path, self.commit.end) if e.spec.name == name]
-        if not rows:
-            raise ArtifactError(f"{self._path} names the table {name!r}, but has no rows of it")
-        last: LoggedRows = rows[-1]  # its dictionaries hold the words of all
-        return table_of([(entry.chunk, entry.rows) for entry in rows], last.spec, last.words)
+    rows = [entry for entry in read_rows(path, end) if entry.spec.name == name]
+    if not rows:
+        raise ArtifactError(f"{path} names the table {name!r}, but has no rows of it")
+    last: LoggedRows = rows[-1]  # its dictionaries hold the words of all
+    return table_of([(entry.chunk, entry.rows) for entry in rows], last.spec, last.words)

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.errors import extra
 from fleet2d.kernels import F64, I64, U8
 from fleet2d.runs.exporters import Chunk, Records
-from fleet2d.storage.bags import VISION_TYPES
+from fleet2d.storage.bags import ros_types
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -86,12 +85,7 @@ class RosMessages:
         Raises:
             InputError: rosbags isn't installed.
         """
-        with extra("ros", "ROS messages need rosbags"):
-            from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-        self.types = get_typestore(Stores.ROS2_HUMBLE)
-        for name, definition in VISION_TYPES.items():
-            self.types.register(get_types_from_msg(definition, name))
+        self.types = ros_types("ROS messages need rosbags")
         self._records, self._margin = records, margin
         self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
@@ -103,17 +97,12 @@ class RosMessages:
             Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage"),
             Topic(STATIC, "tf2_msgs/msg/TFMessage", latched=True),
             *(Topic(f"/{robot}/odom", "nav_msgs/msg/Odometry") for robot in records.robots),
-            *(
-                Topic(f"/{robot}/detections", "vision_msgs/msg/Detection3DArray")
-                for robot in records.robots
-                if "observations" in records.tables
-            ),
-            *(
-                Topic(f"/{name}", self._encoder(name)[0])
-                for name in records.tables
-                if name != "observations"
-            ),
         ]
+        if "observations" in records.tables:
+            kind = "vision_msgs/msg/Detection3DArray"
+            topics += [Topic(f"/{robot}/detections", kind) for robot in records.robots]
+        tables = [name for name in records.tables if name != "observations"]
+        topics += [Topic(f"/{name}", self._encoder(name)[0]) for name in tables]
         self.topics = {topic.name: topic for topic in topics}
 
     def definition(self, topic: Topic) -> str:
@@ -205,12 +194,8 @@ class RosMessages:
         x, y, z, w = xyzw
         vector = self._new("geometry_msgs/msg/Vector3", x, y, 0.0)
         transform = self._new("geometry_msgs/msg/Transform", vector, self._turn(z, w))
-        return self._new(
-            "geometry_msgs/msg/TransformStamped",
-            self._header(time, frames[0]),
-            frames[1],
-            transform,
-        )
+        header = self._header(time, frames[0])
+        return self._new("geometry_msgs/msg/TransformStamped", header, frames[1], transform)
 
     def _static_transforms(self, time: int) -> bytes:
         """Odometry in Fleet2D doesn't drift from the map: errors of localization are in beliefs."""
@@ -363,15 +348,8 @@ class RosMessages:
         """Return an event as an entry of a log: who, what, details."""
         detail = " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
         stamp = self._header(self._time(row["step"]), "").stamp
-        fields = (
-            stamp,
-            _LEVELS,
-            row["entity"],
-            f"{row['event']} {detail}".strip(),
-            "",
-            row["event"],
-            0,
-        )
+        text = f"{row['event']} {detail}".strip()
+        fields = (stamp, _LEVELS, row["entity"], text, "", row["event"], 0)
         return self._data(self._new("rcl_interfaces/msg/Log", *fields))
 
     def json_text(self, row: dict[str, Any]) -> bytes:

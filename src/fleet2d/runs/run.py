@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
-from fleet2d.artifacts.seal import changed_tables, digest_of_file, digest_table, run_digest
-from fleet2d.artifacts.table import Column, Kind, TableSpec
-from fleet2d.artifacts.unfinished import Prefix
+from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
+from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
+from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
 from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
@@ -271,14 +271,14 @@ class Run:
                 " there is nothing to compare with"
             )
         digests = {name: table["digest"] for name, table in self.manifest["tables"].items()}
-        changes = changed_tables(digests, self._digest_of)
+        changes = [name for name, digest in digests.items() if self._digest_of(name) != digest]
         return changes if run_digest(digests) == self.digest else [*changes, FILE_NAME]
 
     def _digest_of(self, name: str) -> str | None:
         """Return the present digest of a table, None if it can't be read."""
-        if self.directory is not None:
-            return digest_of_file(path_in(self.directory, f"{name}.parquet"))
         try:
+            if self.directory is not None:
+                return record_of_file(path_in(self.directory, f"{name}.parquet")).digest
             return digest_table(self.tables[name])
         except (ArtifactError, KeyError):
             return None
@@ -303,9 +303,12 @@ def open_run(directory: Path | str) -> Run:
         )
     manifest = Manifest.read(root)
     if manifest.digest is None:
-        prefix = Prefix.find(root)
-        if prefix is not None:
-            return _open_prefix(root, manifest, prefix)
+        journal = path_in(root, f"{FOLDER}/{JOURNAL_NAME}")
+        commit = last_commit(journal)
+        if commit is not None:
+            read = partial(read_committed, journal, commit.end)
+            notes = _end_at_commit(root, manifest, commit.step)
+            return Run(root, manifest, sorted(commit.rows), read, notes)
     notes = _state_notes(root, manifest)
     on_disk = {path.name.removesuffix(".parquet") for path in root.glob("*.parquet")}
     if manifest.digest is not None:
@@ -357,34 +360,30 @@ def _is_at(path: Path, root: Path) -> bool:
         return False
 
 
-def _open_prefix(root: Path, manifest: Manifest, prefix: Prefix) -> Run:
-    """Return an unfinished run up to its last commit."""
-    manifest.steps = prefix.commit.step
-    manifest.simulated_s = manifest.steps * manifest.step_us / 1e6
+def _end_at_commit(root: Path, manifest: Manifest, step: int) -> list[str]:
+    """Let the manifest of an unfinished run end at its last commit; return a note about it."""
+    manifest.steps, manifest.simulated_s = step, step * manifest.step_us / 1e6
     states = {
         "running": "is unfinished: it crashed, or is still going on",
         "failed": "failed",
         "interrupted": "was interrupted",
     }
-    note = (
-        f"{root} {states.get(manifest.status, 'is unfinished')}; everything before step"
-        f" {prefix.commit.step} can be read, and `fleet2d resume {root}` continues the run"
-    )
-    return Run(root, manifest, prefix.names, prefix.read, [note])
+    state = states.get(manifest.status, "is unfinished")
+    return [
+        f"{root} {state}; everything before step {step} can be read, and `fleet2d resume {root}`"
+        " continues the run"
+    ]
 
 
 def _state_notes(root: Path, manifest: Manifest) -> list[str]:
     """Return notes on what is missing in a run that isn't complete."""
-    notes = []
-    if manifest.status == "running":
-        notes.append(
-            f"{root} was not closed: the run crashed, or is still going on; only tables that "
-            "are whole can be read"
-        )
-    if manifest.status == "interrupted":
-        notes.append(f"{root} was interrupted: it holds what was stored until then")
-    if manifest.status == "failed":
-        notes.append(f"{root} failed: it holds what was stored until then")
+    states = {
+        "running": "was not closed: the run crashed, or is still going on; only tables that are"
+        " whole can be read",
+        "failed": "failed: it holds what was stored until then",
+        "interrupted": "was interrupted: it holds what was stored until then",
+    }
+    notes = [f"{root} {states[manifest.status]}"] if manifest.status in states else []
     names = sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}"))
     if names:
         notes.append(f"cut off and not readable: {printable(', '.join(names))}")
@@ -412,9 +411,7 @@ def layer_rows(layer: Layer) -> dict[str, NDArray[Any]]:
     values, fill = layer.values, np.array(layer.fill)
     differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
     row, column = np.nonzero(differs)
-    kind = {"bool": np.bool_, "int64": np.int64, "float64": np.float64}[
-        LAYER_KINDS[layer.dtype.kind]
-    ]
+    kind = DTYPES[LAYER_KINDS[layer.dtype.kind]]
     return {
         "row": np.concatenate([[ALL_CELLS], row]).astype(np.int32),
         "column": np.concatenate([[ALL_CELLS], column]).astype(np.int32),

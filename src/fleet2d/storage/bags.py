@@ -39,6 +39,24 @@ def is_bag(path: Path) -> bool:
     return path.suffix.lower() in _BAGS
 
 
+def ros_types(need: str) -> Any:
+    """Return the types of messages of ROS 2, with those of vision_msgs.
+
+    Args:
+        need: What rosbags is needed for, for the message.
+
+    Raises:
+        InputError: rosbags isn't installed.
+    """
+    with extra("ros", need):
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    for name, definition in VISION_TYPES.items():
+        types.register(get_types_from_msg(definition, name))
+    return types
+
+
 @contextmanager
 def open_bag(path: Path, failure: type[InputError] = InputError) -> Iterator[Any]:
     """Open a ROS 1 or ROS 2 bag for reading.
@@ -52,13 +70,9 @@ def open_bag(path: Path, failure: type[InputError] = InputError) -> Iterator[Any
     """
     for file in path.iterdir() if path.is_dir() else (path,):
         check_file(file, LOG_BYTES, failure)
-    with extra("ros", "bags need rosbags"):
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    types = ros_types("bags need rosbags")  # of bags without definitions of their own
+    from rosbags.highlevel import AnyReader
 
-    types = get_typestore(Stores.ROS2_HUMBLE)  # of bags without definitions of their own
-    for name, definition in VISION_TYPES.items():
-        types.register(get_types_from_msg(definition, name))
     try:
         with AnyReader([path], default_typestore=types) as reader:
             yield reader

@@ -83,14 +83,10 @@ class Chunk:
     """A stretch of a run.
 
     Attributes:
-        first: The first step.
-        end: The step after the last one.
         poses: The poses of each user and robot, by name.
         tables: The rows of each table, by name, by step.
     """
 
-    first: int
-    end: int
     poses: dict[str, Trajectory]
     tables: "dict[str, pa.Table]"
 
@@ -153,15 +149,8 @@ class Records:
         steps = stride * max(MAX_POSES // max(len(names), 1), 1)
         for first in range(self.part.first, self.part.end, steps):
             end = min(first + steps, self.part.end)
-            yield Chunk(
-                first,
-                end,
-                {
-                    name: reader.read(first, end, self.part.every)
-                    for name, reader in readers.items()
-                },
-                {name: _between(*table, first, end) for name, table in rows.items()},
-            )
+            paths = {n: reader.read(first, end, self.part.every) for n, reader in readers.items()}
+            yield Chunk(paths, {n: _between(*table, first, end) for n, table in rows.items()})
 
 
 def _by_step(table: "pa.Table") -> "tuple[pa.Table, I64]":
@@ -202,10 +191,7 @@ _FORMATS = {
         "bags",
         "ROS 2 messages in an MCAP file, for Foxglove, PlotJuggler and ROS: needs the extra `ros`.",
     ),
-    "rerun": (
-        "rerun",
-        "A recording for the viewer of Rerun: needs the extra `rerun`.",
-    ),
+    "rerun": ("rerun", "A recording for the viewer of Rerun: needs the extra `rerun`."),
     "rosbag2": (
         "bags",
         "ROS 2 messages as a bag in SQLite, which any ROS 2 can play: needs the extra `ros`.",
@@ -303,9 +289,8 @@ def exporter(name: str) -> Exporter:
         module = importlib.import_module(f"{__name__}.{_FORMATS[name][0]}")
         return cast("Exporter", getattr(module, f"export_{name}"))
     if name not in _plugins().names:
-        from fleet2d.configuration.problems import (
-            suggest,  # with pydantic, which the help needn't import
-        )
+        # It imports pydantic, which the help needn't.
+        from fleet2d.configuration.problems import suggest
 
         raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")
     return cast("Exporter", _plugins()[name].load())

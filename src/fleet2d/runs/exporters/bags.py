@@ -31,6 +31,7 @@ MESSAGE_HEAD = np.dtype(
     ]
 )
 """What stands before the content of a message."""
+QOS = "offered_qos_profiles"
 COMPRESSION = "zstd"
 # Covariances are zeros: higher levels save little.
 COMPRESSION_LEVEL = 1
@@ -139,17 +140,13 @@ class McapWriter:
         for topic, channel in self._channels.items():
             own = [i for i, block in enumerate(blocks) if block.topic == topic]
             if own:
-                index = np.concatenate(
-                    [np.stack([blocks[i].times, places[i]], axis=-1) for i in own]
-                )
+                pairs = [np.stack([blocks[i].times, places[i]], axis=-1) for i in own]
+                index = np.concatenate(pairs)
                 index = index[np.argsort(index[:, 1])].astype("<u8")
                 head = struct.pack("<HI", channel, index.nbytes)
                 indices[channel] = self._put(_record(MESSAGE_INDEX, head, index.tobytes()))
-        self._chunks.append(
-            _WrittenChunk(
-                begins, ends, at, length, indices, self._at - at - length, len(data), len(records)
-            )
-        )
+        sizes = self._at - at - length, len(data), len(records)
+        self._chunks.append(_WrittenChunk(begins, ends, at, length, indices, *sizes))
 
     def _fill_heads(self, blocks: Sequence[Block]) -> None:
         """Write what stands before the messages of a topic."""
@@ -213,12 +210,8 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
     piece = np.flatnonzero(np.diff(number[order], prepend=-1))
     last = order[np.append(piece[1:], len(order)) - 1]
     data = [_side_by_side([blocks[i] for i in row]).data for row in rows]
-    pieces = zip(
-        number[order[piece]].tolist(),
-        own[order[piece]].tolist(),
-        (own[last] + sizes[last]).tolist(),
-        strict=True,
-    )
+    begins, ends = own[order[piece]].tolist(), (own[last] + sizes[last]).tolist()
+    pieces = zip(number[order[piece]].tolist(), begins, ends, strict=True)
     records = b"".join([data[row][begin:end] for row, begin, end in pieces])
     of_block = [np.empty(0, np.int64)] * len(blocks)
     for row, first in zip(rows, firsts.tolist(), strict=True):
@@ -232,16 +225,15 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
 def _alike(blocks: Sequence[Block]) -> list[list[int]]:
     """Return which blocks can be side by side: of equal times, and each of one size."""
     rows: list[list[int]] = []
-    is_alone: list[bool] = []
+    has_one_size = [bool((block.sizes == block.sizes[0]).all()) for block in blocks]
     for i, block in enumerate(blocks):
-        alone = bool((block.sizes != block.sizes[0]).any())
-        for row, other_alone in zip(rows, is_alone, strict=True):
-            if not alone and not other_alone and np.array_equal(blocks[row[0]].times, block.times):
+        for row in rows:
+            alike = has_one_size[i] and has_one_size[row[0]]
+            if alike and np.array_equal(blocks[row[0]].times, block.times):
                 row.append(i)
                 break
         else:
             rows.append([i])
-            is_alone.append(alone)
     return rows
 
 
@@ -313,7 +305,7 @@ def _metadata(topic: Topic) -> dict[str, str]:
         "liveliness_lease_duration": no_limit,
         "avoid_ros_namespace_conventions": False,
     }
-    return {"offered_qos_profiles": json.dumps([latched])}  # JSON is YAML
+    return {QOS: json.dumps([latched])}  # JSON is YAML
 
 
 def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
@@ -332,28 +324,9 @@ def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
         RunDirectoryError: The folder exists, or can't be written.
     """
     with extra("ros", "bags need rosbags"):
-        from rosbags.interfaces import (
-            Qos,
-            QosDurability,
-            QosHistory,
-            QosLiveliness,
-            QosReliability,
-            QosTime,
-        )
         from rosbags.rosbag2 import Writer, WriterError
+        from rosbags.rosbag2.metadata import parse_qos
     messages = RosMessages(Records(run, part))
-    no_limit = QosTime(0, 0)
-    latched = Qos(
-        QosHistory.KEEP_LAST,
-        1,
-        QosReliability.RELIABLE,
-        QosDurability.TRANSIENT_LOCAL,
-        no_limit,
-        no_limit,
-        QosLiveliness.AUTOMATIC,
-        no_limit,
-        avoid_ros_namespace_conventions=False,
-    )
     count = 0
     try:
         with Writer(path, version=8) as writer:
@@ -362,7 +335,7 @@ def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
                     topic.name,
                     topic.type,
                     typestore=messages.types,
-                    offered_qos_profiles=[latched] if topic.latched else [],
+                    offered_qos_profiles=parse_qos(_metadata(topic).get(QOS, "")),
                 )
                 for topic in messages.topics.values()
             }

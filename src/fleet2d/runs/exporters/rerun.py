@@ -125,8 +125,7 @@ class _Writer:
     def _rows(self, chunk: Chunk) -> None:
         for table, rows in chunk.rows.items():
             if table == "observations":
-                groups = _grouped(rows, "robot")
-                for robot, seen in groups.items():
+                for robot, seen in _grouped(rows, "robot").items():
                     self._sightings(f"bodies/{robot}/sees", seen)
             elif table == "events":
                 for entity, events in _grouped(rows, "entity").items():

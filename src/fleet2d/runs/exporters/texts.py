@@ -207,10 +207,8 @@ def _event(row: dict[str, Any], poses: dict[str, Trajectory]) -> dict[str, Any]:
     if way is not None and len(way.step):
         at = min(max(int(np.searchsorted(way.step, row["step"])), 0), len(way.step) - 1)
         if not way.away[at]:
-            place = {
-                "type": "Point",
-                "coordinates": [round(float(way.x[at]), 4), round(float(way.y[at]), 4)],
-            }
+            xy = [round(float(way.x[at]), 4), round(float(way.y[at]), 4)]
+            place = {"type": "Point", "coordinates": xy}
     present = {key: value for key, value in row.items() if value is not None}
     return _feature(place, kind="event", **(present | {"time": row["time"].isoformat()}))
 
