@@ -28,8 +28,6 @@ from fleet2d.kernels import (
     MAX_GHOSTS,
     SUB,
     U64,
-    USER_LOST,
-    USER_SEEN,
     About,
     DetectionRule,
     GhostDraw,
@@ -45,9 +43,7 @@ from fleet2d.kernels import (
     new_memory,
     view_queries,
 )
-from fleet2d.kernels import (
-    ViewQueryColumn as Query,
-)
+from fleet2d.kernels import ViewQueryColumn as Query
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event, new_event
@@ -56,7 +52,6 @@ from fleet2d.sight.camera import (
     TableContext,
     error_tables,
     is_perfect,
-    of_camera,
     stack_lenses,
 )
 from fleet2d.sight.fov import FieldOfView
@@ -68,6 +63,8 @@ if TYPE_CHECKING:
 
 # Squared distance beyond which a dark camera sees nobody.
 NO_RANGE = -1
+# The chance of a lens that notices all bodies in view.
+CERTAIN = 2**53
 # Methods may round points to cells, so points this far outside the field of view are checked, too.
 SLACK = 2 * SUB
 # The name of the random stream of each draw.
@@ -139,6 +136,7 @@ class Cameras(Watcher):
 
     knows_truth = True
     notes: tuple[str, ...] = ()
+    _levels: Heights  # of its cameras and what they look at, if heights matter
 
     def __init__(self, row: int, shared: SightSetup) -> None:
         """Set up the cameras of the body in a row.
@@ -170,36 +168,44 @@ class Cameras(Watcher):
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances, from the step on at which they look next."""
         old, self.disturbances = self.disturbances, list(disturbances)
-        injects = _without_injections(old) == _without_injections(self.disturbances)
-        memory = self._inject() if injects else self._set_up()
-        people = [other.name for other in self.others]
-        forced = forced_of(self.disturbances, self.names, people)
-        self.memory = carry_over(memory, self.memory, forced)
+        others = [[d for d in each if d.injected is None] for each in (old, disturbances)]
+        memory = self._inject() if others[0] == others[1] else self._set_up()
+        self.memory = carry_over(memory, self.memory, self._forced())
+
+    def _disturbed(self) -> Iterator[tuple[int, Disturbance]]:
+        """Yield the number of each camera with each of its disturbances, in order."""
+        for c, name in enumerate(self.names):
+            yield from ((c, each) for each in self.disturbances if each.is_of(name))
+
+    def _forced(self) -> I64:
+        """Return what each body in view is perceived as, (cameras, bodies); see About.FORCED."""
+        index = {other.name: u for u, other in enumerate(self.others)} | {"": -1}
+        forced = np.zeros((len(self.names), len(self.others)), np.int64)
+        for c, disturbance in self._disturbed():
+            if disturbance.missed is not None:
+                forced[c, index[disturbance.missed]] = FORCED_MISS
+            if disturbance.mistaken is not None:
+                user, other = disturbance.mistaken
+                forced[c, index[user]] = FORCED_IDENTITY + index[other]
+        return forced
 
     def _set_up(self) -> SightMemory:
         owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
+        units = lattice.units_per_m
         with errors_as(ScenarioError, owner.path, of=ValueError):
-            lenses = [
-                camera.lens(lattice.units_per_m, clock.step_us) for camera in cameras.values()
-            ]
+            lenses = [camera.lens(units, clock.step_us) for camera in cameras.values()]
         common = getattr(owner.entity, "perception", None)  # users have no errors
-        perceptions = [
-            present_errors(self.disturbances, name) or camera.perception or common
-            for name, camera in cameras.items()
-        ]
+        perceptions = [camera.perception or common for camera in cameras.values()]
+        for c, disturbance in self._disturbed():
+            perceptions[c] = disturbance.errs or perceptions[c]
         has_errors = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
-        self._context = context = TableContext(
-            [other.name for other in self.others],
-            [other.entity.radius * lattice.units_per_m for other in self.others],
-            lattice,
-            clock.step_us,
-            owner.path,
-        )
+        people = [other.name for other in self.others]
+        radii = [other.entity.radius * units for other in self.others]
+        context = TableContext(people, radii, lattice, clock.step_us, owner.path)
         self.lenses = stack_lenses(lenses, has_errors, context)
-        self._levels = None
         if self.heights is not None:
             others = slice(self._first, self._first + len(self.others))
             points = self.lenses.bodies.shape[2]
@@ -208,9 +214,12 @@ class Cameras(Watcher):
         self._patience = max(lens.patience for lens in lenses)
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
         self.errors = error_tables(lenses, errors, context)
-        self._dark = dark_cameras(self.disturbances, self.names)
-        degrade(self.lenses, self.disturbances, self.names)
+        self._dark = [c for c, disturbance in self._disturbed() if disturbance.dark]
+        self.lenses.widest[self._dark] = NO_RANGE
         self.errors.has_ghosts[self._dark] = 0
+        for c, disturbance in self._disturbed():
+            chance = Fraction(int(self.lenses.chance[c])) * Fraction(disturbance.detection)
+            self.lenses.chance[c] = round(chance)
         self.sighting_errors = None
         if self.drift is not None or any(p and p.errors for p in perceptions):
             from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
@@ -224,8 +233,15 @@ class Cameras(Watcher):
 
     def _inject(self) -> SightMemory:
         """Set the false sightings of interventions; return an empty memory with room for them."""
-        injected = injected_by(self.disturbances, self.names, self._context)
-        self.errors = self.errors._replace(injected=injected)
+        index = {other.name: u for u, other in enumerate(self.others)} | {"": -1}
+        to_lattice = self.owner.home.plan.lattice.to_lattice
+        injected = [
+            (c, index[sighting.user], *to_lattice((sighting.x, sighting.y)), sighting.heading)
+            for c, disturbance in self._disturbed()
+            if (sighting := disturbance.injected) is not None and c not in self._dark
+        ]
+        rows = np.array(injected, np.int64).reshape(-1, 5)
+        self.errors = self.errors._replace(injected=rows)
         clock, count = self.owner.clock, len(self.others)
         bursts = count + MAX_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
         self.rule = DetectionRule(
@@ -254,34 +270,25 @@ class Cameras(Watcher):
 
     def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
         """Set how each camera perceives activities."""
-        for c, (name, perception) in enumerate(zip(self.names, perceptions, strict=True)):
-            keys = [
-                stream_key(self.owner.seed, self.owner.path, f"{name}: activity {other.name}")
-                for other in self.others
-            ]
+        latencies = self.lenses.latency.tolist()
+        for name, perception, latency in zip(self.names, perceptions, latencies, strict=True):
+            purposes = (f"{name}: activity {other.name}" for other in self.others)
+            keys = [stream_key(self.owner.seed, self.owner.path, each) for each in purposes]
             confusion = perception.attributes.activity if perception else None
-            latency = int(self.lenses.latency[c])
             sense = ActivitySense(latency, np.array(keys, np.uint64), confusion)
             self.activity_senses.append(sense)
 
     @property
-    def stops(self) -> tuple[bool, bool]:
-        """Whether its owner's plan ends when a body is lost, and when a body is seen."""
-        interrupts, names = self.owner.plan.interrupts, self.event_names
-        return names[USER_LOST] in interrupts, names[USER_SEEN] in interrupts
-
-    @property
     def ends(self) -> tuple[bool, bool]:
         """Whether a span ends at USER_LOST, when a body is lost, and at USER_SEEN."""
-        lost, seen = self.stops
-        names = self.event_names
-        return lost or names[USER_LOST] in self.awaited, seen or names[USER_SEEN] in self.awaited
+        plan, awaited = self.owner.plan.interrupts, self.awaited
+        lost, seen = (name in plan or name in awaited for name in self.event_names)
+        return lost, seen
 
     @property
     def waits(self) -> bool:
         """Whether an event of it may end the present span."""
-        names = self.event_names
-        return not (self.awaited.isdisjoint(names) and self.owner.plan.interrupts.isdisjoint(names))
+        return any(self.ends)
 
     @property
     def counts(self) -> I64:
@@ -304,6 +311,12 @@ class Cameras(Watcher):
     def name_of(self, identity: int) -> str:
         """Return the name of an identity; empty for somebody unknown."""
         return self.others[identity].name if identity < len(self.others) else ""
+
+    def perfect(self, first: int) -> "PerfectCameras":
+        """Return cameras that notice all bodies in view at each step, from `first` on."""
+        perfect = PerfectCameras(self.row, self.shared)
+        perfect.next_step = first
+        return perfect
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first event that ends the span, `end` if there is none."""
@@ -344,8 +357,7 @@ class Cameras(Watcher):
         """Yield the events of the last step that end its owner's plan."""
         if not events:
             return
-        stops = {name for name, stop in zip(self.event_names, self.stops, strict=True) if stop}
-        lattice = self.owner.home.plan.lattice
+        stops, lattice = self.owner.plan.interrupts, self.owner.home.plan.lattice
         index = {other.name: i for i, other in enumerate(self.others)}
         for event in events:
             if event.step == self.next_step - 1 and event.event in stops:
@@ -358,10 +370,9 @@ class Cameras(Watcher):
         blocks, self._sightings = self._sightings, []
         if not blocks:
             return NOTHING
-        all_blocks = SightingTable.joined(blocks)
-        columns = all_blocks.distinct.T
-        robot = np.full((1, columns.shape[1]), self.index)
-        return replace(all_blocks, distinct=np.concatenate([columns, robot]).T)
+        seen = SightingTable.joined(blocks)
+        robot = np.full((1, len(seen.distinct)), self.index)
+        return replace(seen, distinct=np.concatenate([seen.distinct.T, robot]).T)
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "Look":
         if self.owner.home.unlit and self.sighting_errors is None and self._first == 0:
@@ -377,13 +388,11 @@ class Cameras(Watcher):
             others = slice(self._first, self._first + len(self.others))
             crowd = PoseBlock._make(column[others] for column in block)
             poses = poses_of(block, self.row)
-            step_us = self.owner.clock.step_us
-            with blame("sight.method", self.next_step):
-                lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
-                points = points_seen(
-                    self.method, home, lenses, poses, crowd, self.next_step, step_us
-                )
-                points[self._dark] = 0
+            first, step_us = self.next_step, self.owner.clock.step_us
+            lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
+            with blame("sight.method", first):
+                points = points_seen(self.method, home, lenses, poses, crowd, first, step_us)
+            points[self._dark] = 0
         count, seen_at, index, distinct, newest, events = detect(
             home.walls,
             self.lenses,
@@ -395,7 +404,7 @@ class Cameras(Watcher):
             self.memory,
             points,
             self.radii,
-            self._heights_in(home),
+            None if self.heights is None else self.heights.with_furniture(self._levels, home),
         )
         sightings = SightingTable(seen_at, index, distinct.T) if len(seen_at) else UNSEEN
         end = looked = self.next_step + count
@@ -411,22 +420,36 @@ class Cameras(Watcher):
                 end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
         return Look(looked, end, sightings, newest, events, old_memory)
 
-    def _heights_in(self, home: Home) -> Heights | None:
-        """Return the heights that matter at present; None if none does."""
-        if self.heights is None or self._levels is None:
-            return None
-        return self.heights.with_furniture(self._levels, home)
-
 
 def _drift_of(owner: Actor) -> Drift | None:
     """Return the error of a body's belief about its own pose; None: it has none."""
     settings: Localization | None = getattr(owner.entity, "localization", None)
     if settings is None:
         return None
-    lattice, clock = owner.home.plan.lattice, owner.clock
-    return Drift(
-        settings, lattice.units_per_m, clock.step_us, owner.seed, owner.path, owner.displacements
-    )
+    units_per_m, step_us = owner.home.plan.lattice.units_per_m, owner.clock.step_us
+    return Drift(settings, units_per_m, step_us, owner.seed, owner.path, owner.displacements)
+
+
+class PerfectCameras(Cameras):
+    """Cameras that look at every step, and notice all bodies in view at once."""
+
+    def _set_up(self) -> SightMemory:
+        memory = super()._set_up()
+        lenses = self.lenses
+        self.lenses = lenses._replace(
+            chance=np.full_like(lenses.chance, CERTAIN),
+            period=np.ones_like(lenses.period),
+            latency=np.zeros_like(lenses.latency),
+            errs=np.zeros_like(lenses.errs),
+        )
+        self.rule, self.sighting_errors = self.rule._replace(patience=1), None
+        return memory
+
+    def look(self, bodies: Bodies, end: int) -> Sequence[Event]:
+        """Look in the steps up to `end` - 1; return the events of seeing and losing."""
+        events = self.take(bodies, end)
+        self.collect()
+        return events
 
 
 class Look(NamedTuple):
@@ -452,74 +475,6 @@ def newest_of(rows: I64, identities: int) -> list[int]:
 
 
 # Interventions
-
-
-def present_errors(disturbances: Sequence[Disturbance], camera: str) -> Perception | None:
-    """Return the present errors of a camera, by the latest intervention; None: as configured."""
-    errs = [
-        disturbance.errs
-        for disturbance in of_camera(disturbances, camera)
-        if disturbance.errs is not None
-    ]
-    return errs[-1] if errs else None
-
-
-def dark_cameras(disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> list[int]:
-    """Return the cameras that see nothing, by number."""
-    return [
-        c
-        for c, camera in enumerate(cameras)
-        if any(disturbance.dark for disturbance in of_camera(disturbances, camera))
-    ]
-
-
-def _without_injections(disturbances: Sequence[Disturbance]) -> list[Disturbance]:
-    return [disturbance for disturbance in disturbances if disturbance.injected is None]
-
-
-def degrade(lenses: Lenses, disturbances: Sequence[Disturbance], cameras: Sequence[str]) -> None:
-    """Change lenses in place: dark cameras see nobody, others notice people less often."""
-    lenses.widest[dark_cameras(disturbances, cameras)] = NO_RANGE
-    for c, camera in enumerate(cameras):
-        for disturbance in of_camera(disturbances, camera):
-            chance = Fraction(int(lenses.chance[c])) * Fraction(disturbance.detection)
-            lenses.chance[c] = round(chance)
-
-
-def forced_of(
-    disturbances: Sequence[Disturbance], cameras: Sequence[str], people: Sequence[str]
-) -> I64:
-    """Return what each person in view is perceived as, (cameras, people); see About.FORCED."""
-    index = {name: u for u, name in enumerate(people)} | {"": -1}
-    forced = np.zeros((len(cameras), len(people)), np.int64)
-    for c, camera in enumerate(cameras):
-        for disturbance in of_camera(disturbances, camera):
-            if disturbance.missed is not None:
-                forced[c, index[disturbance.missed]] = FORCED_MISS
-            if disturbance.mistaken is not None:
-                user, other = disturbance.mistaken
-                forced[c, index[user]] = FORCED_IDENTITY + index[other]
-    return forced
-
-
-def injected_by(
-    disturbances: Sequence[Disturbance], cameras: Sequence[str], context: TableContext
-) -> I64:
-    """Return the false sightings of cameras that aren't dark, (n, 5); see ErrorTables."""
-    dark = dark_cameras(disturbances, cameras)
-    index = {name: u for u, name in enumerate(context.users)} | {"": -1}
-    rows = [
-        (
-            c,
-            index[sighting.user],
-            *context.lattice.to_lattice((sighting.x, sighting.y)),
-            sighting.heading,
-        )
-        for c, camera in enumerate(cameras)
-        for disturbance in of_camera(disturbances, camera)
-        if (sighting := disturbance.injected) is not None and c not in dark
-    ]
-    return np.array(rows, np.int64).reshape(-1, 5)
 
 
 def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemory:
@@ -589,11 +544,8 @@ def points_seen(
 def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
     """Return which points of each body are in view, for one pose of one camera."""
     camera, _, x, y, heading = queries[0, : Query.EYE_HEADING + 1].tolist()
-    reach = Reach(
-        int(lenses.near_squared[camera]),
-        int(lenses.far_squared[camera]),
-        int(lenses.half_angle[camera]),
-    )
+    ends = lenses.near_squared[camera], lenses.far_squared[camera], lenses.half_angle[camera]
+    reach = Reach(*map(int, ends))
     bodies = lenses.bodies[camera, queries[:, Query.BODY], : int(lenses.points[camera]) + 1]
     points = (bodies + queries[:, None, [Query.BODY_X, Query.BODY_Y]]).reshape(-1, 2)
     flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong

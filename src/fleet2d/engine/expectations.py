@@ -1,7 +1,7 @@
 """Expectations of a run: measured during the run, judged at any time and at its end."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,15 +30,11 @@ from fleet2d.expectations.verdict import (
     is_decided,
     verdict_of,
 )
-from fleet2d.kernels import SightMemory
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 
 TABLE = "violations"
-
-# The chance of a lens that notices all bodies in view.
-CERTAIN = 2**53
 
 
 class ActiveExpectation(NamedTuple):
@@ -76,17 +72,10 @@ class RunExpectations:
         interventions: InterventionQueue,
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
-        self._run = MeasuredRun(
-            actors,
-            bodies,
-            changes.home,
-            changes.clock,
-            changes.names,
-            sensors.on,
-            {c.owner.name: ExpectedCameras(c, self) for c in cameras},
-            activities,
-        )
-        self.actors, self.bodies, self.clock = actors, bodies, changes.clock
+        home, clock, doors = changes.home, changes.clock, changes.names
+        groups = {group.owner.name: group for group in cameras}
+        self._run = MeasuredRun(actors, bodies, home, clock, doors, sensors.on, groups, activities)
+        self.actors, self.bodies, self.clock = actors, bodies, clock
         self._scenario, self._sensors, self._queue = scenario, sensors, interventions
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []
@@ -140,7 +129,7 @@ class RunExpectations:
         }
         return Scene(
             names,
-            {name: c.names for name, c in self._run.cameras.items()},
+            {name: [o.name for o in c.others] for name, c in self._run.cameras.items()},
             possible_events(users, robots, home, self._run.doors, self._sensors.names),
             possible_details(users, robots, self._queue.acts),
             home.plan.bounds,
@@ -178,16 +167,10 @@ class RunExpectations:
             readings: The readings of sensors.
         """
         names, rest = self._sensors.names, [e for e in self._events if e.step >= end]
-        events = [event for event in self._events if event.step < end]
-        block = SignalBlock(
-            self.first,
-            end,
-            self.bodies,
-            self._run.home,
-            observations,
-            [(row.step, names[row.sensor], row.on) for row in readings],
-            sorted(events, key=lambda event: (event.step, event.rank)),
-        )
+        states = [(row.step, names[row.sensor], row.on) for row in readings]
+        events = sorted((e for e in self._events if e.step < end), key=lambda e: (e.step, e.rank))
+        home, bodies = self._run.home, self.bodies
+        block = SignalBlock(self.first, end, bodies, home, observations, states, events)
         for gauge in self._gauges.values():
             gauge.take(block)
         self._run.first, self._events = end, rest
@@ -200,11 +183,13 @@ class RunExpectations:
         Args:
             ended: Whether the run is over.
         """
-        return {
-            name: self._verdict(name, entry, ended)
-            for name, entry in self.entries.items()
-            if self.first > entry.since
-        }
+        verdicts = {}
+        for name, entry in self.entries.items():
+            if self.first > entry.since:
+                signals = self._signals(entry, ended)
+                verdict = verdict_of(name, entry.expectation, signals, entry.text)
+                verdicts[name] = replace(verdict, notes=entry.notes)
+        return verdicts
 
     @property
     def are_decided(self) -> bool:
@@ -220,20 +205,11 @@ class RunExpectations:
         entry = self.entries[name]
         return evidence_of(entry.expectation, self._signals(entry, ended=True))
 
-    def _verdict(self, name: str, entry: ActiveExpectation, ended: bool) -> Verdict:
-        verdict = verdict_of(name, entry.expectation, self._signals(entry, ended), entry.text)
-        return replace(verdict, notes=entry.notes)
-
     def _signals(self, entry: ActiveExpectation, ended: bool) -> RunSignals:
         gauges = {str(s): self._gauges[str(s)] for s in entry.expectation.measures()}
-        return RunSignals(
-            {key: gauge.trace() for key, gauge in gauges.items()},
-            {key: gauge.words for key, gauge in gauges.items()},
-            entry.since,
-            self.first,
-            ended,
-            self.clock,
-        )
+        traces = {key: gauge.trace() for key, gauge in gauges.items()}
+        words = {key: gauge.words for key, gauge in gauges.items()}
+        return RunSignals(traces, words, entry.since, self.first, ended, self.clock)
 
     def finish(self, results: Mapping[str, Any], store: RunStore, *, ended: bool) -> dict[str, Any]:
         """Store the table of violations; return the content of all verdicts for the manifest.
@@ -277,60 +253,3 @@ class RunExpectations:
             worst_step=np.array(worst, np.int64),
             robustness=np.where(np.isfinite(value), value, np.nan),
         )
-
-
-@dataclass(frozen=True)
-class ExpectedCameras:
-    """The cameras of a body as `fleet2d.expectations.signals.MeasuredCameras` describes them."""
-
-    cameras: Cameras
-    run: RunExpectations
-
-    @property
-    def names(self) -> list[str]:
-        """The bodies that they look at, by their numbers."""
-        return [other.name for other in self.cameras.others]
-
-    @property
-    def index(self) -> int:
-        """The number of the owner among the robots, or among the users."""
-        return self.cameras.index
-
-    @property
-    def in_view(self) -> Mapping[str, object]:
-        """The bodies that count as seen at present, by name."""
-        return self.cameras.in_view
-
-    def perfect(self) -> "PerfectCameras":
-        """Return cameras that notice all bodies in view at each step, from the present one on."""
-        run, perfect = self.run, PerfectCameras(self.cameras.row, self.cameras.shared)
-        perfect.bodies, perfect.next_step = run.bodies, run.first
-        return perfect
-
-
-class PerfectCameras(Cameras):
-    """Cameras that look at every step, and notice all bodies in view at once.
-
-    Attributes:
-        bodies: The bodies of the run.
-    """
-
-    bodies: Bodies
-
-    def _set_up(self) -> SightMemory:
-        memory = super()._set_up()
-        lenses = self.lenses
-        self.lenses = lenses._replace(
-            chance=np.full_like(lenses.chance, CERTAIN),
-            period=np.ones_like(lenses.period),
-            latency=np.zeros_like(lenses.latency),
-            errs=np.zeros_like(lenses.errs),
-        )
-        self.rule, self.sighting_errors = self.rule._replace(patience=1), None
-        return memory
-
-    def look(self, end: int) -> Sequence[Event]:
-        """Look in the steps up to `end` - 1; return the events of seeing and losing."""
-        events = self.take(self.bodies, end)
-        self.collect()
-        return events

@@ -15,8 +15,6 @@ from fleet2d.kernels import (
     NOBODY,
     TURN,
     UNKNOWN_TRUTH,
-    USER_LOST,
-    USER_SEEN,
     SightMemory,
     turned,
 )
@@ -76,8 +74,8 @@ class RealSight(Cameras):
             rows = rows[np.argsort(rows[:, Column.STEP], kind="stable")]
         patience = self.rule.patience
         events = sight_events(rows, SightMemory(*self.memory), patience, first, looked)
-        ends = dict(zip((USER_LOST, USER_SEEN), self.ends, strict=True)) if stop else {}
-        ends_at = next((step + 1 for step, _, kind in events if ends.get(kind)), looked)
+        stops = self.ends if stop else (False, False)
+        ends_at = next((step + 1 for step, _, kind in events if stops[kind]), looked)
         newest = newest_of(rows, len(self.memory.seen))
         return Look(looked, ends_at, SightingTable.of_rows(rows), newest, events, old_memory)
 

@@ -185,10 +185,8 @@ class SightingErrors:
             np.subtract.at(memory.about, (c, missed, About.NOTICED.value), 1)
             rows[~new.noticed, Column.USER] = RETRACTED
         if self._drift is not None:
-            x, y, _ = body
-            rows[:, Column.X], rows[:, Column.Y] = self._drift.misplace(
-                rows[:, Column.X], rows[:, Column.Y], x, y, looks
-            )
+            xy = rows[:, Column.X], rows[:, Column.Y]
+            rows[:, Column.X], rows[:, Column.Y] = self._drift.misplace(*xy, *body[:2], looks)
             rows[:, Column.HEADING] = (rows[:, Column.HEADING] + self._drift.at(looks).turn) % TURN
         return rows
 
@@ -213,14 +211,9 @@ class SightingErrors:
         """Return the sightings of some looks of a camera, which is at a place in each."""
         owner = self._owner
         lattice = owner.home.plan.lattice
-        seen, true, at = (
-            lattice.to_metres(np.stack(xy, axis=1))
-            for xy in (
-                (rows[:, Column.X], rows[:, Column.Y]),
-                (rows[:, Column.TRUE_X], rows[:, Column.TRUE_Y]),
-                eye[:2],
-            )
-        )
+        seen = lattice.to_metres(rows[:, [Column.X, Column.Y]])
+        true = lattice.to_metres(rows[:, [Column.TRUE_X, Column.TRUE_Y]])
+        at = lattice.to_metres(np.stack(eye[:2], axis=1))
         return CameraSightings(
             camera=camera,
             users=self._users,
@@ -250,7 +243,6 @@ def _write(rows: I64, old: CameraSightings, new: CameraSightings, lattice: Latti
     if new.x is not old.x or new.y is not old.y:
         rows[:, [Column.X, Column.Y]] = lattice.to_lattice(np.stack([new.x, new.y], axis=1))
     if new.heading is not old.heading:
-        rows[:, Column.HEADING] = (
-            np.rint(new.heading * (TURN / (2 * math.pi))).astype(np.int64) % TURN
-        )
+        heading = np.rint(new.heading * (TURN / (2 * math.pi)))
+        rows[:, Column.HEADING] = heading.astype(np.int64) % TURN
     rows[:, Column.POSTURE], rows[:, Column.IDENTITY] = new.posture, new.user

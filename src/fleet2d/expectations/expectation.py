@@ -7,7 +7,7 @@ holds there or not. Robustness and signals are traces: stretches of steps with e
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, dataclass_transform
@@ -133,6 +133,23 @@ def shortest(start: I64, value: F64, end: int) -> Trace:
     missing = np.isnan(value)
     differs = np.append(True, (value[1:] != value[:-1]) & ~(missing[1:] & missing[:-1]))
     return Trace(start, value, end) if differs.all() else Trace(start[differs], value[differs], end)
+
+
+def stepwise(first: int, value: float, changes: Iterable[tuple[int, float]], end: int) -> Trace:
+    """Return the trace of a value at the first step that only changes at some steps, in order.
+
+    Example:
+        >>> stepwise(0, 1.0, [(3, 2.0), (3, 4.0)], 9).value.tolist()
+        [1.0, 4.0]
+    """
+    starts, values = [first], [value]
+    for step, now in changes:
+        if step > starts[-1]:
+            starts.append(step)
+            values.append(now)
+        else:
+            values[-1] = now
+    return shortest(np.array(starts, np.int64), np.array(values, np.float64), end)
 
 
 def combine(function: Callable[..., F64], *traces: Trace) -> Trace:

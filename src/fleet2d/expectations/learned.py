@@ -1,6 +1,6 @@
 """Words for what a run has learned: numbers of the outputs of algorithms, and of metrics."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from fleet2d.expectations.signals import (
     Gauge,
     MeasuredRun,
     NumberSignal,
+    Outputs,
+    Results,
     Scene,
     SignalBlock,
     WordSignal,
@@ -59,9 +61,7 @@ class output(_Value):
                 f'{self}: select a number of the output, such as output("{self.path}.kitchen")'
             )
 
-    def learn(
-        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
-    ) -> None:
+    def learn(self, outputs: Outputs, results: Results, gauge: Gauge) -> None:
         """Read the number from a new output of the algorithm."""
         if self.name in outputs:
             gauge.now = self._read(outputs[self.name], gauge.memory)
@@ -82,19 +82,17 @@ class output(_Value):
             if part in columns and part not in words:
                 number = part
                 continue
-            matches = [
-                np.isin(column.astype(str), [part, names.get(part, part)])
-                for column in words.values()
-            ]
+            meant = [part, names.get(part, part)]
+            matches = [np.isin(column.astype(str), meant) for column in words.values()]
             rows = np.any(matches, axis=0) if matches else np.zeros_like(keep)
             if not rows.any():
                 known = [*columns, *dict.fromkeys(w for c in words.values() for w in c.tolist())]
                 raise ScenarioError(f"{self}: there is no {part!r} in it{suggest(part, known)}")
             keep &= rows
         if keep.sum() != 1 or number is None:
-            how = (
-                f"select one by: {', '.join(words)}" if words else "they have no names to select by"
-            )
+            how = "they have no names to select by"
+            if words:
+                how = f"select one by: {', '.join(words)}"
             raise ScenarioError(f"{self} matches {keep.sum()} rows; {how}")
         return float(columns[number][keep][0])
 
@@ -118,9 +116,7 @@ class metric(_Value):
         """Refuse an unknown metric."""
         scene.check_name("metric", self.name, scene.names["metrics"], self)
 
-    def learn(
-        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
-    ) -> None:
+    def learn(self, outputs: Outputs, results: Results, gauge: Gauge) -> None:
         """Read the number from a new result of the metric."""
         if self.name in results:
             gauge.now = self._read(results[self.name]())
@@ -183,9 +179,7 @@ class likeliest(WordSignal):
         """Return the number of the room."""
         return constant(gauge.now, block.first, block.end)
 
-    def learn(
-        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
-    ) -> None:
+    def learn(self, outputs: Outputs, results: Results, gauge: Gauge) -> None:
         """Take the room from a new output of the algorithm, the first of equals.
 
         Raises:

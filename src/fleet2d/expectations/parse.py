@@ -250,7 +250,7 @@ def _read_mapping(value: Mapping[str, Any]) -> Expectation:
     return temporal.may_be_untested(expectation) if may_be_untested else expectation
 
 
-def _read_operator(value: Mapping[str, Any]) -> Expectation:
+def _read_operator(value: Mapping[str, Any]) -> temporal.Temporal:
     name = _operator(value)
     if name == "at_most" and "of" not in value:
         raise InputError("at_most needs the key 'of', such as of: events(find_begins, astro)")
@@ -267,7 +267,7 @@ def _read_operator(value: Mapping[str, Any]) -> Expectation:
     if name == "at_most":
         return temporal.at_most(value[name], part, per=value.get("per"))
     if "until" in value:
-        whole: Expectation = temporal.until(part, _part(value, "until"), **within)
+        whole: temporal.Temporal = temporal.until(part, _part(value, "until"), **within)
     else:
         whole = getattr(temporal, name)(part, **({} if name == "at_end" else within))
     return temporal.after(_part(value, "after"), whole) if "after" in value else whole

@@ -36,7 +36,7 @@ from fleet2d.expectations.expectation import (
     constant,
     joined,
     number_text,
-    shortest,
+    stepwise,
     truth,
 )
 from fleet2d.floorplan.home import Home
@@ -152,7 +152,8 @@ class Scene:
             self.check_name("body or object", entity, filter(None, self.events), of)
         names = [name for name, kinds in self.events.items() if kind in kinds]
         if not names or entity not in (None, *names):
-            behaviors = _behaviors_with(kind)
+            types = components("behavior").items()
+            behaviors = [n for n, c in types if issubclass(c, Behavior) and kind in c.records]
             to = f"robots with the behavior {' or '.join(behaviors)} " if behaviors else ""
             here = ", ".join(names) or "none"
             raise ScenarioError(
@@ -166,42 +167,27 @@ class Scene:
             self.check_name(f"{kind} with the detail", detail, known, of)
 
 
-def _behaviors_with(kind: str) -> list[str]:
-    """Return the types of behaviors that record a kind of event."""
-    return [
-        name
-        for name, cls in components("behavior").items()
-        if issubclass(cls, Behavior) and kind in cls.records
-    ]
-
-
 # Measuring
 
 
 class MeasuredCameras(Protocol):
     """The cameras of a body, as signals are measured by them."""
 
-    @property
-    def index(self) -> int:
-        """The number of the owner among the robots, or among the users."""
+    index: int
+    """The number of the owner among the robots, or among the users."""
+    others: Sequence[Actor]
+    """The bodies that they look at, by their numbers."""
 
     @property
     def in_view(self) -> Mapping[str, object]:
         """The bodies that count as seen at present, by name."""
 
-    @property
-    def names(self) -> list[str]:
-        """The bodies that they look at, by their numbers."""
+    def perfect(self, first: int) -> Any:
+        """Return cameras that notice all bodies in view at each step, from `first` on.
 
-    def perfect(self) -> "ErrorFreeCameras":
-        """Return cameras that notice all bodies in view at each step, from the present one on."""
-
-
-class ErrorFreeCameras(Protocol):
-    """Cameras that make no errors."""
-
-    def look(self, end: int) -> Iterable[Event]:
-        """Look in the steps up to `end` - 1; return the events of seeing and losing."""
+        Their method `look` takes the bodies of the run and the step up to which they look, and
+        returns the events of seeing and losing.
+        """
 
 
 @dataclass
@@ -258,6 +244,12 @@ class SignalBlock:
     events: Sequence[Event] = ()
 
 
+Outputs = Mapping[str, Any]
+"""New outputs of algorithms, by name."""
+Results = Mapping[str, Callable[[], Any]]
+"""What returns the new result of a metric, by name."""
+
+
 class Gauge:
     """The measurement of a signal during a run, block by block.
 
@@ -292,15 +284,9 @@ class Gauge:
 
     def switched(self, block: SignalBlock, changes: Iterable[tuple[int, float]]) -> Trace:
         """Return a value that only changes at some steps, in order; `now` is the last one."""
-        start, value = [block.first], [self.now]
-        for step, now in changes:
-            if step > start[-1]:
-                start.append(step)
-                value.append(now)
-            else:
-                value[-1] = now
-        self.now = value[-1]
-        return shortest(np.array(start, np.int64), np.array(value, np.float64), block.end)
+        trace = stepwise(block.first, self.now, changes, block.end)
+        self.now = float(trace.value[-1])
+        return trace
 
 
 class Measurement(Word, Term):
@@ -346,9 +332,7 @@ class Measurement(Word, Term):
     def begin_plan(self, actor: Actor, gauge: Gauge) -> None:
         """Note that a body begins a plan."""
 
-    def learn(
-        self, outputs: Mapping[str, Any], results: Mapping[str, Callable[[], Any]], gauge: Gauge
-    ) -> None:
+    def learn(self, outputs: Outputs, results: Results, gauge: Gauge) -> None:
         """Note new outputs of algorithms and results of metrics, by name, before the next block."""
 
     def finish(self, results: Mapping[str, Any], gauge: Gauge) -> None:
@@ -431,9 +415,8 @@ class Arithmetic(Signal):
     def unit(self) -> str:  # type: ignore[override]
         """The unit of the result: that of the operands if it is clear, else `MIXED`."""
         units = [each.unit for each in (self.one, self.other) if isinstance(each, Signal)]
-        if len(units) == 1 and (self.sign != "/" or isinstance(self.one, Signal)):
-            return units[0]
-        if self.sign in "+-":
+        is_scaled = len(units) == 1 and (self.sign != "/" or isinstance(self.one, Signal))
+        if is_scaled or self.sign in "+-":
             return units[0]
         return "" if self.sign == "/" and len(set(units)) == 1 and len(units) == 2 else MIXED
 

@@ -29,7 +29,7 @@ from fleet2d.expectations.expectation import (
 from fleet2d.expectations.signals import Scene, Signal
 from fleet2d.expectations.vocabulary import during, events
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.kernels import I64
+from fleet2d.kernels import I64, Bool
 
 ANSWERS = (*map(str, Outcome), "delivered")
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
@@ -255,12 +255,8 @@ def _until(hold: Trace, goal: Trace, reach: tuple[int, int] | None, after: float
     if low == 0:
         return combine(np.minimum, whole, in_time)
     before = hold.sliding_min(0, low - 1, INFINITE, INFINITE)
-    return combine(
-        lambda *values: np.minimum.reduce(values),
-        before,
-        whole.sliding_max(low, low, -INFINITE, after),
-        in_time,
-    )
+    later = whole.sliding_max(low, low, -INFINITE, after)
+    return combine(np.minimum, before, combine(np.minimum, later, in_time))
 
 
 class since(Windowed):
@@ -502,11 +498,9 @@ class share(Total):
         part = self.part if self.of is None else self.part & self.of
         steps = np.arange(run.first, run.end, dtype=np.int64)
         holds = part.robustness(run, False).values(steps) > 0
-        counts = (
-            np.ones(len(steps))
-            if self.of is None
-            else self.of.robustness(run, True).values(steps) > 0
-        )
+        counts: Bool = np.ones(len(steps), np.bool_)
+        if self.of is not None:
+            counts = self.of.robustness(run, True).values(steps) > 0
 
         def share_in(first: int, end: int) -> Trace:
             inside = slice(first - run.first, end - run.first)
@@ -520,18 +514,12 @@ class share(Total):
 class may_be_untested(Word, Temporal):
     """An expectation that may end without a test, such as `after` without its trigger."""
 
-    part: Expectation
+    part: Temporal
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.part, Temporal):
             raise InputError(f"{self.word}: expected an operator like after(…), got {self.part}")
-
-    @property
-    def operator(self) -> Temporal:
-        """The expectation itself."""
-        assert isinstance(self.part, Temporal)
-        return self.part
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the robustness of the expectation."""
@@ -539,11 +527,11 @@ class may_be_untested(Word, Temporal):
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the violations of the expectation."""
-        return self.operator.violations(run)
+        return self.part.violations(run)
 
     def slack(self, run: RunSignals) -> int | None:
         """Return the slack of the expectation."""
-        return self.operator.slack(run)
+        return self.part.slack(run)
 
     def untested(self, run: RunSignals) -> str:
         """Return why the expectation was not tested."""

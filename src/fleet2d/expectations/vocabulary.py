@@ -17,7 +17,15 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor
 from fleet2d.errors import InputError, ScenarioError, errors_as
-from fleet2d.expectations.expectation import RunSignals, Trace, combine, constant, pulses, shortest
+from fleet2d.expectations.expectation import (
+    RunSignals,
+    Trace,
+    combine,
+    constant,
+    pulses,
+    shortest,
+    stepwise,
+)
 from fleet2d.expectations.signals import (
     ANY_KIND,
     Condition,
@@ -43,7 +51,7 @@ from fleet2d.kernels import (
     speeds,
 )
 from fleet2d.runtime.clock import DAY, midnights
-from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.events import SIGHTS, EventKind
 
 Target = str | tuple[float, float] | WordSignal
 """A body, also as `nearest(…)`, a room, an object, or a point (x, y) [m]."""
@@ -86,7 +94,12 @@ class distance(NumberSignal):
             )
         super().check(scene)
         if isinstance(self.other, tuple):
-            _check_point(self.other, scene, self)
+            (x, y), (x0, y0, x1, y1) = self.other, scene.bounds
+            if not (x0 <= x <= x1 and y0 <= y <= y1):
+                raise ScenarioError(
+                    f"{self}: ({x:g}, {y:g}) m is outside the home, which reaches from"
+                    f" ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
+                )
         else:
             scene.check_room(str(self.other), self, [*bodies, *places])
         if self.other == self.body:
@@ -132,15 +145,6 @@ class distance(NumberSignal):
         return np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.int64)
 
 
-def _check_point(point: tuple[float, float], scene: Scene, of: object) -> None:
-    (x, y), (x0, y0, x1, y1) = point, scene.bounds
-    if not (x0 <= x <= x1 and y0 <= y <= y1):
-        raise ScenarioError(
-            f"{of}: ({x:g}, {y:g}) m is outside the home, which reaches from ({x0:g}, {y0:g}) to"
-            f" ({x1:g}, {y1:g}) m"
-        )
-
-
 def outline(mask: Bool, side: int) -> I64:
     """Return the edges around some cells: int64 (n, 4), from (x, y) to (x, y) [lattice].
 
@@ -173,10 +177,9 @@ class _Motion(Measurement):
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return its row, its pose at the step before, and the steps in a second."""
-        row, pose = run.row(self.body), np.zeros(0, np.int64)
-        if run.first > 0:
-            # The present pose stands for the one before, which may be forgotten.
-            pose = _pose(run.bodies.pose_at(row, run.first))
+        row, before = run.row(self.body), np.zeros(0, np.int64)
+        # The present pose stands for the one before, which may be forgotten.
+        pose = _pose(run.bodies.pose_at(row, run.first)) if run.first > 0 else before
         return row, pose, 1e6 / run.clock.step_us
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
@@ -289,14 +292,8 @@ class activity(WordSignal):
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the code of the activity at each step."""
-        return gauge.switched(
-            block,
-            [
-                (event.step, _code(event.detail, gauge))
-                for event in block.events
-                if event.event == EventKind.ACTIVITY and event.entity == self.user
-            ],
-        )
+        begun = [e for e in block.events if e[1:3] == (self.user, EventKind.ACTIVITY)]
+        return gauge.switched(block, [(e.step, _code(e.detail, gauge)) for e in begun])
 
 
 def _code(word: str, gauge: Gauge) -> float:
@@ -401,7 +398,6 @@ class _CameraCondition(Condition):
 
 
 SEEN_EVENTS = (EventKind.USER_SEEN, EventKind.ROBOT_SEEN)
-LOST = (EventKind.USER_LOST, EventKind.ROBOT_LOST)
 
 
 class seen(_CameraCondition):
@@ -416,9 +412,7 @@ class seen(_CameraCondition):
         changes = (
             (event.step, float(event.event in SEEN_EVENTS))
             for event in block.events
-            if event.entity == self.by
-            and event.detail == self.body
-            and event.event in (*SEEN_EVENTS, *LOST)
+            if event.entity == self.by and event.detail == self.body and event.event in SIGHTS
         )
         return gauge.switched(block, changes)
 
@@ -429,11 +423,11 @@ class in_view(_CameraCondition):
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return cameras that make no errors; so far they have seen nobody."""
         gauge.now = 0.0
-        return run.cameras[self.by].perfect()
+        return run.cameras[self.by].perfect(run.first)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it is in view."""
-        looks = gauge.memory.look(block.end)
+        looks = gauge.memory.look(block.bodies, block.end)
         changes = ((e.step, float(e.event in SEEN_EVENTS)) for e in looks if e.detail == self.body)
         return gauge.switched(block, changes)
 
@@ -449,7 +443,7 @@ class perceived(_CameraCondition):
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the numbers of the robot and the user in observations."""
         cameras = run.cameras[self.by]
-        return cameras.index, cameras.names.index(self.body)
+        return cameras.index, [other.name for other in cameras.others].index(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the number of observations at each step at which there is one."""
@@ -582,14 +576,10 @@ class during(Condition):
         """Return 1 where the time is within these hours, 0 elsewhere."""
         clock = run.clock
         begin, length, weekdays = (vars(self)[n] for n in ("_begin", "_length", "_weekdays"))
-        starts, values = [run.first], [0.0]
-        for midnight in midnights(clock.time(run.first) - DAY, clock.time(run.end)):
-            if midnight.weekday() in weekdays:
-                for offset, is_within in ((begin, 1.0), (begin + length, 0.0)):
-                    step = clock.step_at_or_after(clock.elapsed(midnight + offset))
-                    if step <= starts[-1]:
-                        values[-1] = is_within
-                    elif step < run.end:
-                        starts.append(step)
-                        values.append(is_within)
-        return Trace(np.array(starts, np.int64), np.array(values), run.end)
+        changes = [
+            (clock.step_at_or_after(clock.elapsed(midnight + offset)), is_within)
+            for midnight in midnights(clock.time(run.first) - DAY, clock.time(run.end))
+            if midnight.weekday() in weekdays
+            for offset, is_within in ((begin, 1.0), (begin + length, 0.0))
+        ]
+        return stepwise(run.first, 0.0, (c for c in changes if c[0] < run.end), run.end)

@@ -431,11 +431,6 @@ class Disturbance:
         return self.camera in (None, camera)
 
 
-def of_camera(disturbances: Sequence[Disturbance], camera: str) -> list[Disturbance]:
-    """Return the disturbances of a camera, in the order in which they began."""
-    return [disturbance for disturbance in disturbances if disturbance.is_of(camera)]
-
-
 class SightSettings(Settings):
     """How a run computes what is in view.
 
