@@ -56,7 +56,7 @@ def begin_run(directory: Path, commits: int = 5, **options: Any) -> RunStore:
 def kill(store: RunStore) -> Path:
     """End a run as the end of its process would: nothing more is written, the lock goes."""
     assert store._unfinished is not None
-    store._unfinished.journal.frames.close()
+    store._unfinished.journal.close()
     store._unfinished.release()
     assert store.directory is not None
     return store.directory
@@ -349,7 +349,7 @@ def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(
         raise OSError(5, "Input/output error")
 
     assert store._unfinished is not None
-    handle = store._unfinished.journal.frames._handle
+    handle = store._unfinished.journal._handle
     monkeypatch.setattr("fleet2d.storage.files.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
     store.close(status)
     assert status == open_run(tmp_path / "run").status

@@ -47,7 +47,7 @@ def cut_off(simulation: fleet2d.Simulation) -> Path:
     """Leave a run as the end of its process would."""
     unfinished = simulation._store._unfinished
     assert unfinished is not None
-    unfinished.journal.frames.close()
+    unfinished.journal.close()
     assert unfinished._lock is not None
     os.close(unfinished._lock._handle)
     assert simulation.directory is not None

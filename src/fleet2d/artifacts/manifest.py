@@ -309,10 +309,7 @@ class TableRecord(_Record):
 
 def table_record(spec: TableSpec, rows: int, digest: str) -> TableRecord:
     """Return the record of a table with the columns of its spec."""
-    columns = [
-        ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
-        for column in spec.columns
-    ]
+    columns = [ColumnRecord(name=c.name, kind=c.kind, unit=c.unit) for c in spec.columns]
     return TableRecord(rows=rows, digest=digest, columns=columns)
 
 

@@ -124,7 +124,7 @@ class TableWriter:
         first, buffer = self.logged, self.buffer
         if unfinished is None or first == buffer.rows:
             return
-        unfinished.journal.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
+        unfinished.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
         self.logged = buffer.rows
 
     def file_in(self, root: Path) -> ParquetTable:

@@ -179,6 +179,14 @@ def encode_strings(strings: Sequence[str | None], nullable: bool) -> ColumnChunk
     return ColumnChunk(values, _valid(strings) if nullable else None, lengths)
 
 
+def encode_words(strings: Sequence[str | None], words: Dictionary, nullable: bool) -> ColumnChunk:
+    """Turn strings into codes, entering new ones into `words`."""
+    if nullable:
+        words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
+    codes = np.fromiter(map(words.__getitem__, strings), np.int32, len(strings))
+    return ColumnChunk(codes, _valid(strings) if nullable else None)
+
+
 def _valid(strings: Sequence[str | None]) -> Bool:
     return np.fromiter((string is not None for string in strings), np.bool_, len(strings))
 
@@ -219,9 +227,8 @@ class TableBuffer:
         self._first_capacity = _FIRST_CAPACITY
         self._values: dict[str, NDArray[Any]] = {}
         self._strings: dict[str, list[str | None]] = {
-            column.name: [] for column in spec.columns if column.takes_strings
+            column.name: [] for column in spec.columns if column.kind == "string"
         }
-        self._coded = 0  # rows whose words have codes in `_values`
         self._valid: dict[str, Bool] = {}
         self._names = frozenset(spec.names)
 
@@ -273,18 +280,18 @@ class TableBuffer:
         a, b = self.rows, self.rows + stop - start
         self._make_room(b)
         for column in self.spec.columns:
-            name, values = column.name, batch.values[column.name]
+            name, values, valid = column.name, batch.values[column.name], batch.valid[column.name]
             if column.takes_strings:
-                strings = self._strings[name]
-                # An interrupted call may have added some.
-                del strings[a:]
-                is_list = isinstance(values, list)
-                strings.extend(values[start:stop] if is_list else [values] * (b - a))
-                continue
-            self._values[name][a:b] = values if np.ndim(values) == 0 else values[start:stop]
+                values = values[start:stop] if isinstance(values, list) else [values] * (b - a)
+                if column.kind == "string":
+                    self._strings[name][a:] = values  # an interrupted call may have added some
+                    continue
+                values, valid, _ = encode_words(values, self.words[name], column.nullable)
+            else:
+                values = values[start:stop] if np.ndim(values) else values
+                valid = valid[start:stop] if np.ndim(valid) else valid
+            self._values[name][a:b] = values
             if column.nullable:
-                valid = batch.valid[name]
-                valid = valid if np.ndim(valid) == 0 else valid[start:stop]
                 self._valid[name][a:b] = valid
                 if valid is not True:
                     np.copyto(self._values[name][a:b], 0, where=~valid)
@@ -298,12 +305,11 @@ class TableBuffer:
             reuse: Whether the next rows may overwrite the arrays that are returned: the caller no
                 longer needs them by then.
         """
-        self.code_words()
         chunk = {
             column.name: self._rows_of(column, 0) if self.rows else empty_chunk(column)
             for column in self.spec.columns
         }
-        self.rows = self._coded = 0
+        self.rows = 0
         if not reuse:
             # The next rows are likely to be as many.
             self._first_capacity = max(self._first_capacity, self._capacity)
@@ -319,7 +325,6 @@ class TableBuffer:
             Of each column which values are not missing, if it is nullable, and its values; of texts
             the lengths, which of them are not missing, and their bytes.
         """
-        self.code_words()
         arrays: list[NDArray[Any]] = []
         for column in self.spec.columns:
             values, valid, lengths = self._rows_of(column, start)
@@ -333,22 +338,6 @@ class TableBuffer:
             return encode_strings(self._strings[name][rows], column.nullable)
         valid = self._valid[name][rows] if column.nullable else None
         return ColumnChunk(self._values[name][rows], valid)
-
-    def code_words(self) -> None:
-        """Turn the words of columns whose dictionary grows into codes."""
-        if self._coded == self.rows:
-            return
-        rows = slice(self._coded, self.rows)
-        for column in self.spec.columns:
-            name = column.name
-            if column.is_growing:
-                strings, words = self._strings[name][rows], self.words[name]
-                if column.nullable:
-                    words[None] = 0  # a missing value is stored as code 0 and marked by `valid`
-                    self._valid[name][rows] = _valid(strings)
-                codes = map(words.__getitem__, strings)
-                self._values[name][rows] = np.fromiter(codes, np.int32, len(strings))
-        self._coded = self.rows
 
     def _make_room(self, rows: int) -> None:
         """Allocate memory for `rows` rows or more; it doubles, so that small appends are cheap."""

@@ -78,83 +78,9 @@ class Commit(NamedTuple):
     end: int
 
 
-class RowJournal:
-    """Appends the rows of a run to its journal.
-
-    Attributes:
-        frames: The frames of the journal.
-    """
-
-    def __init__(self, path: Path, start: int = 0) -> None:
-        """Create the file, or continue after a commit, whose rows are then passed to `replay`.
-
-        Args:
-            path: The file.
-            start: Where the commit ends [bytes]; 0: create the file.
-
-        Raises:
-            OSError: The file can't be written.
-        """
-        self.frames = FrameWriter(path, JOURNAL, start)
-        self._tables: dict[str, _LoggedTable] = {}
-
-    def replay(self, entry: LoggedRows) -> None:
-        """Count rows that are in the file already."""
-        table = self._tables.setdefault(entry.spec.name, _LoggedTable(len(self._tables)))
-        table.rows += entry.rows
-        table.words = {name: len(words) for name, words in entry.words.items()}
-
-    def add(
-        self,
-        spec: TableSpec,
-        arrays: list[NDArray[Any]],
-        rows: int,
-        words: Mapping[str, Dictionary],
-    ) -> None:
-        """Append rows; readers see them after the next commit.
-
-        Args:
-            spec: The table.
-            arrays: The rows; see `TableBuffer.arrays`.
-            rows: Their number.
-            words: The dictionaries of columns whose dictionary grows, up to these rows.
-
-        Raises:
-            OSError: They can't be written.
-        """
-        table = self._tables.get(spec.name)
-        if table is None:
-            table = self._tables[spec.name] = _LoggedTable(len(self._tables))
-            self.frames.add("table", _to_json(asdict(spec)))
-        added_words = {}
-        for name, dictionary in words.items():
-            known, count = table.words.get(name, 0), len(dictionary) - (None in dictionary)
-            if count > known:
-                added_words[name] = dictionary.in_order()[known:]
-                table.words[name] = count
-        table.rows += rows
-        # Most parts of a table have no new words, and no need of an encoder.
-        added = _to_json(added_words) if added_words else "{}"
-        self.frames.add("rows", f"[{table.number},{rows},{added}]", encode_arrays(arrays))
-
-    def commit(self, step: int) -> Commit:
-        """Commit all rows so far, and write them to the file.
-
-        Args:
-            step: The first step of which rows may be missing.
-
-        Raises:
-            OSError: It can't be written; the commit before it is still the last one.
-        """
-        rows = {name: table.rows for name, table in self._tables.items()}
-        self.frames.add("commit", f"[{step},[{','.join(map(str, rows.values()))}]]")
-        self.frames.commit()
-        return Commit(step, rows, self.frames.end)
-
-
 @dataclass
 class _LoggedTable:
-    """A table in the journal: its number, its rows, and the size of its dictionaries so far."""
+    """A table in a journal: its number, its rows, and the size of its dictionaries so far."""
 
     number: int
     rows: int = 0
@@ -398,12 +324,13 @@ class UnfinishedRun:
         """Create no file yet: `begin` and `resume` do."""
         self.directory, self.folder = directory, directory / FOLDER
         self._lock: FolderLock | None = None
-        self._journal: RowJournal | None = None
+        self._journal: FrameWriter | None = None
+        self._tables: dict[str, _LoggedTable] = {}  # in the journal
         self._synced = time.monotonic()
 
     @property
-    def journal(self) -> RowJournal:
-        """All rows so far; there is none before `begin` or `resume`."""
+    def journal(self) -> FrameWriter:
+        """The frames of the journal; there is none before `begin` or `resume`."""
         assert self._journal is not None, "the journal was not begun"
         return self._journal
 
@@ -431,7 +358,7 @@ class UnfinishedRun:
         self.lock()
         self.folder.mkdir(exist_ok=True)
         self.checkpoint.unlink(missing_ok=True)
-        self._journal = RowJournal(self.folder / JOURNAL_NAME)
+        self._journal = FrameWriter(self.folder / JOURNAL_NAME, JOURNAL)
 
     def resume(self, commit: Commit | None) -> Iterator[LoggedRows]:
         """Truncate the journal after a commit, and yield the rows before it.
@@ -444,27 +371,64 @@ class UnfinishedRun:
             self.begin()
             return
         path = self.folder / JOURNAL_NAME
-        self._journal = RowJournal(path, commit.end)
+        self._journal = FrameWriter(path, JOURNAL, commit.end)
         for entry in read_rows(path, commit.end):
-            self.journal.replay(entry)
+            table = self._tables.setdefault(entry.spec.name, _LoggedTable(len(self._tables)))
+            table.rows += entry.rows
+            table.words = {name: len(words) for name, words in entry.words.items()}
             yield entry
 
-    def commit(self, step: int, *, sync: bool = False) -> Commit:
-        """Commit all rows so far.
+    def add(
+        self,
+        spec: TableSpec,
+        arrays: list[NDArray[Any]],
+        rows: int,
+        words: Mapping[str, Dictionary],
+    ) -> None:
+        """Append rows to the journal; readers see them after the next commit.
 
         Args:
-            step: The step before which they are.
-            sync: Whether to flush the journal to the disk now.
+            spec: The table.
+            arrays: The rows; see `TableBuffer.arrays`.
+            rows: Their number.
+            words: The dictionaries of columns whose dictionary grows, up to these rows.
 
         Raises:
             OSError: They can't be written.
         """
-        commit = self.journal.commit(step)
+        table = self._tables.get(spec.name)
+        if table is None:
+            table = self._tables[spec.name] = _LoggedTable(len(self._tables))
+            self.journal.add("table", _to_json(asdict(spec)))
+        added_words = {}
+        for name, dictionary in words.items():
+            known, count = table.words.get(name, 0), len(dictionary) - (None in dictionary)
+            if count > known:
+                added_words[name] = dictionary.in_order()[known:]
+                table.words[name] = count
+        table.rows += rows
+        # Most parts of a table have no new words, and no need of an encoder.
+        added = _to_json(added_words) if added_words else "{}"
+        self.journal.add("rows", f"[{table.number},{rows},{added}]", encode_arrays(arrays))
+
+    def commit(self, step: int, *, sync: bool = False) -> Commit:
+        """Commit all rows so far, and write them to the journal.
+
+        Args:
+            step: The first step of which rows may be missing.
+            sync: Whether to flush the journal to the disk now.
+
+        Raises:
+            OSError: They can't be written; the commit before is still the last one.
+        """
+        rows = {name: table.rows for name, table in self._tables.items()}
+        self.journal.add("commit", f"[{step},[{','.join(map(str, rows.values()))}]]")
+        self.journal.commit()
         now = time.monotonic()
         if sync or now - self._synced > SYNC_S:
-            self.journal.frames.sync()
+            self.journal.sync()
             self._synced = now
-        return commit
+        return Commit(step, rows, self.journal.end)
 
     def keep_checkpoint(self, write: Callable[[int], None]) -> None:
         """Replace the checkpoint atomically; the rows that it refers to must be synced before.
@@ -487,7 +451,7 @@ class UnfinishedRun:
             undo: Whether to remove what was written since the last commit, as after a failed write.
         """
         if self._journal is not None:
-            self._journal.frames.close(undo=undo)
+            self._journal.close(undo=undo)
         if not keep and self._lock is not None:
             remove_leftovers(self.directory)
         self.release()

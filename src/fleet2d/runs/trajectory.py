@@ -148,10 +148,9 @@ class PathReader:
                 f"key_frames.parquet has poses of {self._entity} outside of the floor plan: it is"
                 " damaged; `fleet2d verify` says which files have changed"
             )
-        x, y = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1)).T
-        heading, away = in_radians(out.heading), out.away.astype(bool)
-        room = np.where(out.away, -1, plan.room_of_place[cells])
-        return Trajectory(steps, clock.times(steps), x, y, heading, away, room)
+        xs, ys = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1)).T
+        is_away, room = out.away.astype(bool), np.where(out.away, -1, plan.room_of_place[cells])
+        return Trajectory(steps, clock.times(steps), xs, ys, in_radians(out.heading), is_away, room)
 
     def _trace(self, begin: int, end: int, stop: int, steps: I64, out: Poses) -> None:
         """Fill in poses of the segment of some key frames, which ends before the step `stop`."""
