@@ -78,16 +78,8 @@ class ExternalProgram:
             state = self.ask({"type": "save"}, expected="state").blocks.get("state")
             if state is None:
                 raise self._failure('answered "save" without a block named "state"')
-        return {
-            "_program": self._program,
-            "_arguments": self._arguments,
-            "_timeout_s": self._timeout_s,
-            "_start": self._start,
-            "_state": state,
-            "_process": None,
-            "wall_s": self.wall_s,
-            "asked": self.asked,
-        }
+        kept = ("_program", "_arguments", "_timeout_s", "_start", "wall_s", "asked")
+        return {name: vars(self)[name] for name in kept} | {"_state": state, "_process": None}
 
     def ask(
         self,
@@ -109,14 +101,9 @@ class ExternalProgram:
         if self._process is None:
             self._begin()
         began = time.perf_counter()
-        answer = self._exchange(content, blocks or {})
+        answer = self._exchange(content, blocks or {}, expected)
         self.wall_s += time.perf_counter() - began
         self.asked += 1
-        kind = answer.content.get("type")
-        if kind == "error":
-            raise self._failure(f"reports: {answer.content.get('text', '')}")
-        if expected and kind != expected:
-            raise self._failure(f"answered {kind!r} to {content['type']!r}, not {expected!r}")
         return answer
 
     def _begin(self) -> None:
@@ -143,17 +130,13 @@ class ExternalProgram:
         for end in self._ends:
             os.set_blocking(end, False)
         self._finalizer = weakref.finalize(self, _end, process, self._stderr)
-        self._exchange_checked({"type": "start", "version": VERSION, **self._start}, {})
+        self._exchange({"type": "start", "version": VERSION, **self._start}, {}, "ready")
         if self._state is not None:
-            self._exchange_checked({"type": "load"}, {"state": self._state})
+            self._exchange({"type": "load"}, {"state": self._state}, "ready")
 
-    def _exchange_checked(self, content: Mapping[str, Any], blocks: Mapping[str, bytes]) -> None:
-        answer = self._exchange(content, blocks)
-        if answer.content.get("type") != "ready":
-            text = answer.content.get("text", answer.content)
-            raise self._failure(f"answered {text} to {content['type']!r}, not 'ready'")
-
-    def _exchange(self, content: Mapping[str, Any], blocks: Mapping[str, bytes]) -> Answer:
+    def _exchange(
+        self, content: Mapping[str, Any], blocks: Mapping[str, bytes], expected: str
+    ) -> Answer:
         if blocks:
             content = {**content, "blocks": [[name, len(data)] for name, data in blocks.items()]}
         if self._unread:
@@ -178,6 +161,12 @@ class ExternalProgram:
             raise self._failure(
                 f"ended with code {process.poll()} instead of answering {content['type']!r}"
             )
+        kind, text = answer.content.get("type"), answer.content.get("text", "")
+        if kind == "error":
+            raise self._failure(f"reports: {text}")
+        if expected and kind != expected:
+            said = f" ({text})" if text else ""
+            raise self._failure(f"answered {kind!r}{said} to {content['type']!r}, not {expected!r}")
         return answer
 
     def _transfer(self, message: memoryview) -> Answer | None:

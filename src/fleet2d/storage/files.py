@@ -353,11 +353,10 @@ class FrameWriter:
         self._buffer: list[bytes] = []
         self._size = 0  # bytes in the buffer
         self._written = start
-        if start:
-            self._handle = os.open(path, os.O_WRONLY)
-        else:
+        if not start:
             path.unlink(missing_ok=True)
-            self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        flags = os.O_WRONLY | (0 if start else os.O_CREAT | os.O_EXCL)
+        self._handle = os.open(path, flags, 0o666)
         try:
             if start:
                 os.ftruncate(self._handle, start)
