@@ -133,7 +133,7 @@ def hostile() -> dict[str, bytes]:
         "a forged shape": pickle.dumps(
             Call(snapshot.plain_array, "<f8", (10**9,), bytes(8), "C", True)
         ),
-        "a function of ours": pickle.dumps(snapshot._reducers),
+        "a function of ours": pickle.dumps(snapshot._reduce_type),
         "no pickle": b"hello",
     }
 

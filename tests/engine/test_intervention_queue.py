@@ -230,9 +230,8 @@ def test_a_lasting_intervention_lasts_its_time_after_each_event() -> None:
     interventions = InterventionQueue(Clock(datetime(2026, 1, 5), 1_000_000, 3600))
     dark = parse_intervention({"fault": "astro", "dark": True, "duration": "1 min"})
     trigger = Trigger(event="user_seen")
-    interventions.waiting.append(
-        PendingIntervention(trigger, True, 0, 0, dark, SCRIPT, 0, "script.0")
-    )
+    due = DueIntervention(0, SCRIPT, 0, dark, "script.0")
+    interventions.waiting.append(PendingIntervention(trigger, True, 0, due))
     for step in (9, 49):
         interventions.take_events([Event(step, "astro", "user_seen", "ana")])
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence, ValuesView
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 from pydantic import BaseModel
 
@@ -19,7 +19,6 @@ from fleet2d.floorplan.home import Home
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
-from fleet2d.sight.perception import Perception
 
 T = TypeVar("T")
 
@@ -29,6 +28,26 @@ class ImmutableRows(list[T]):
 
     def __copy__(self) -> Self:
         return self.__class__(self)
+
+
+class PlannedNote(NamedTuple):
+    """What a plan has at a step: a question or a call, by its text.
+
+    Attributes:
+        step: The step.
+        row: The row of the body.
+        text: The detail of the note.
+    """
+
+    step: int
+    row: int
+    text: str
+
+
+def notes_of(actor: DecidingActor, kind: str) -> list[PlannedNote]:
+    """Return the notes of a kind in the plan of a body."""
+    step_of, notes = actor.clock.step_at_or_after, actor.plan.notes
+    return [PlannedNote(step_of(n.time_us), actor.row, n.detail) for n in notes if n.event == kind]
 
 
 class Watcher:
@@ -153,8 +172,12 @@ def changed_inputs(manifest: Manifest) -> list[str]:
 
 def components_of(scenario: Scenario) -> Iterator[Component]:
     """Yield all components of a scenario, also those within others."""
-    entities = (*scenario.users.values(), *scenario.robots.values())
-    holders = [scenario, scenario.sight, *entities, *scenario.script, *_perceptions_of(scenario)]
+    robots, script = scenario.robots.values(), scenario.script
+    errors = [robot.perception for robot in robots]
+    errors += [camera.perception for robot in robots for camera in robot.eyes.values()]
+    errors += [getattr(entry.act, "errs", None) for entry in script]  # of faults
+    entities = (*scenario.users.values(), *robots)
+    holders = [scenario, scenario.sight, *entities, *script, *(each for each in errors if each)]
     queue = [component for holder in holders for component in _components_in(holder)]
     while queue:
         component = queue.pop()
@@ -168,13 +191,3 @@ def _components_in(holder: BaseModel) -> Iterator[Component]:
         values = value.values() if isinstance(value, Mapping) else value
         several = values if isinstance(values, list | tuple | ValuesView) else (values,)
         yield from (item for item in several if isinstance(item, Component))
-
-
-def _perceptions_of(scenario: Scenario) -> Iterator[Perception]:
-    """Yield the perceptions of all robots, their cameras, and the faults of a script."""
-    for robot in scenario.robots.values():
-        cameras = [camera.perception for camera in robot.eyes.values()]
-        yield from (p for p in (robot.perception, *cameras) if p is not None)
-    for entry in scenario.script:
-        if (errs := getattr(entry.act, "errs", None)) is not None:
-            yield errs

@@ -148,11 +148,10 @@ RETRY_US = 1_000_000
 
 
 class DueChange(NamedTuple):
-    """A change that waits for its step; those of one step happen in the order of their numbers.
+    """A change that waits for its step.
 
     Attributes:
         step: The step.
-        number: The number of changes that were put into the queue before.
         change: The change; None: the door opens for a body, or closes by itself; or without a
             door, the body may switch a light.
         by: The body or thing that causes it, for the table of events.
@@ -163,7 +162,6 @@ class DueChange(NamedTuple):
     """
 
     step: int
-    number: int
     change: HomeChange | None
     by: str = ""
     door: int = -1
@@ -188,13 +186,14 @@ class ChangeQueue:
         self._switches = PeopleSwitches(basis)
         self._floor = basis.scenario.floorplan.slows
         self.slow((), 0, ())
-        self._queue: list[DueChange] = []
+        # By step; those of one step happen in the order in which they were put into the queue.
+        self._queue: list[tuple[int, int, DueChange]] = []
         self._count = 0
         for number, door in enumerate(self.doors.values()):
             if door.locked:
-                self._put(0, HomeChange(lock=self.names[number]), "at first")
+                self._put(DueChange(0, HomeChange(lock=self.names[number]), "at first"))
             if not door.open:
-                self._put(0, HomeChange(shut=self.names[number]), "at first")
+                self._put(DueChange(0, HomeChange(shut=self.names[number]), "at first"))
             self._schedule(number, door)
 
     def slow(self, areas: Sequence[SlowArea], step: int, actors: Sequence[Actor]) -> None:
@@ -207,7 +206,7 @@ class ChangeQueue:
 
     def next_due(self) -> int | None:
         """Return the step of the next change; None if there is none."""
-        return self._queue[0].step if self._queue else None
+        return self._queue[0][0] if self._queue else None
 
     def declare(self, index: int, change: HomeChange) -> None:
         """Schedule a change of the scenario.
@@ -221,7 +220,7 @@ class ChangeQueue:
             )
         with errors_as(ScenarioError, f"changes.{index}", of=ScenarioError):
             self.check_names(change)
-        self._put(self._step_of(change.at), change, "scenario")
+        self._put(DueChange(self._step_of(change.at), change, "scenario"))
 
     def ask(self, change: HomeChange, step: int, by: str) -> None:
         """Schedule a change that an algorithm or a script requests.
@@ -229,24 +228,16 @@ class ChangeQueue:
         Raises:
             ComponentError: It names something unknown.
         """
-        self.check(change, by)
-        if change.at is not None:
-            step = max(step, self._step_of(change.at))
-        self._put(step, change, by)
-
-    def check(self, change: HomeChange, by: str) -> None:
-        """Refuse an impossible request of an algorithm or a script.
-
-        Raises:
-            ComponentError: It names something unknown.
-        """
         with errors_as(ComponentError, f"{by} requests an impossible change", of=ScenarioError):
             self.check_names(change)
+        if change.at is not None:
+            step = max(step, self._step_of(change.at))
+        self._put(DueChange(step, change, by))
 
     def expect(self, row: int, actor: Actor) -> None:
         """Schedule what a body does on its way to doors and lights, after it has a new plan."""
         for step in self._switches.steps(row, actor):
-            self._put(step, None, actor.name, opens_for=(row, actor.planned_at))
+            self._put(DueChange(step, None, actor.name, opens_for=(row, actor.planned_at)))
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
             return
         for door in range(len(self.names)):
@@ -254,7 +245,7 @@ class ChangeQueue:
             for moment in crossings(actor.motion.breakpoints, line, jumps=jumps):
                 step = max(actor.planned_at, (moment - OPENS_AHEAD_US) // self.clock.step_us)
                 plan = (row, actor.planned_at)
-                self._put(step, None, actor.name, door, plan, moment)
+                self._put(DueChange(step, None, actor.name, door, plan, moment))
 
     def make(self, step: int, actors: Sequence[Actor]) -> list[Event]:
         """Make all changes that are due at a step; bodies whose way they block replan.
@@ -263,8 +254,8 @@ class ChangeQueue:
             ComponentError: A request of an algorithm or a script is impossible.
         """
         events: list[Event] = []
-        while self._queue and self._queue[0].step <= step:
-            due = heapq.heappop(self._queue)
+        while self._queue and self._queue[0][0] <= step:
+            due = heapq.heappop(self._queue)[2]
             if due.change is not None:
                 events += self._make_change(due, due.change, step, actors)
             elif due.door < 0 and due.opens_for is not None:
@@ -289,7 +280,8 @@ class ChangeQueue:
         if verb == "move":
             return self._move(due, change, step, actors)
         if verb == "lights":
-            return switch(self.home, self._lit_by(target), step, is_on=change.turn == "on")
+            lit = [r.index for r in self.home.rooms if target in (r.name, r.type, ALL_ROOMS)]
+            return switch(self.home, lit, step, is_on=change.turn == "on")
         door = self.names.index(target)
         if verb in ("lock", "unlock"):
             self.home.set_lock(door, locked=verb == "lock")
@@ -300,11 +292,6 @@ class ChangeQueue:
             return []
         return self._turn(door, is_open, due, step, actors)
 
-    def _lit_by(self, name: str) -> list[int]:
-        """Return the indices of the rooms that the name of lights stands for."""
-        rooms = self.home.rooms
-        return [room.index for room in rooms if name in (room.name, room.type, ALL_ROOMS)]
-
     def _open_for(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
         row, planned_at = due.opens_for or (0, 0)
         if actors[row].planned_at != planned_at:
@@ -314,19 +301,17 @@ class ChangeQueue:
         after = self.doors[self.names[door]].closes_after
         if after is not None:
             shuts = self.clock.step_at_or_after(due.passed_us + micros(after))
-            self._put(max(shuts, step + 1), None, "", door)
+            self._put(DueChange(max(shuts, step + 1), None, door=door))
         if door not in self.home.shut or door in self.home.locked:
             return []
         return self._turn(door, True, due, step, actors)
 
     def _close_unused(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
         """Shut a door that has not been used for its `closes_after`."""
-        after = self.doors[self.names[due.door]].closes_after
-        if after is None or due.door in self.home.shut:
+        door, after = due.door, self.doors[self.names[due.door]].closes_after
+        if after is None or step * self.clock.step_us < self._used_us[door] + micros(after):
             return []
-        if step * self.clock.step_us < self._used_us[due.door] + micros(after):
-            return []
-        return self._turn(due.door, False, due, step, actors)
+        return [] if door in self.home.shut else self._turn(door, False, due, step, actors)
 
     def _turn(
         self, door: int, is_open: bool, due: DueChange, step: int, actors: Sequence[Actor]
@@ -341,19 +326,18 @@ class ChangeQueue:
         if is_open and due.opens_for is None and after is not None:
             now = step * self.clock.step_us
             self._used_us[door] = max(self._used_us[door], now)
-            self._put(self.clock.step_at_or_after(now + micros(after)), None, "", door)
-        return [
-            Event(step, self.names[door], EventKind.OPENED if is_open else EventKind.SHUT, due.by)
-        ]
+            shuts = self.clock.step_at_or_after(now + micros(after))
+            self._put(DueChange(shuts, None, door=door))
+        kind = EventKind.OPENED if is_open else EventKind.SHUT
+        return [Event(step, self.names[door], kind, due.by)]
 
     def _move(
         self, due: DueChange, change: HomeChange, step: int, actors: Sequence[Actor]
     ) -> list[Event]:
         plan = self.home.plan
-        old = next(item for item in self.home.objects if item.name == change.target)
         assert change.to is not None
-        new = move_object(old, plan.lattice, change.to, change.turn_deg)
-        shape = _corners(lattice_footprint(plan, new))
+        new = move_object(self.home.object(change.target), plan.lattice, change.to, change.turn_deg)
+        shape = np.asarray(lattice_footprint(plan, new).exterior.coords)
         is_solid = new.blocks != "nothing"
         if is_solid and self._is_blocked(shape, actors):
             self._retry(due, step)
@@ -361,7 +345,7 @@ class ChangeQueue:
         self.home.put(new)
         self._stop(step, actors, shape if is_solid else None)
         x, y = change.to
-        return [Event(step, HOME, EventKind.MOVED, f"{old.name} to ({x:g}, {y:g})")]
+        return [Event(step, HOME, EventKind.MOVED, f"{new.name} to ({x:g}, {y:g})")]
 
     # Bodies in the way
 
@@ -399,22 +383,13 @@ class ChangeQueue:
 
     # The queue
 
-    def _put(
-        self,
-        step: int,
-        change: HomeChange | None,
-        by: str,
-        door: int = -1,
-        opens_for: tuple[int, int] | None = None,
-        passed_us: int = 0,
-    ) -> None:
-        due = DueChange(step, self._count, change, by, door, opens_for, passed_us)
-        heapq.heappush(self._queue, due)
+    def _put(self, due: DueChange) -> None:
+        heapq.heappush(self._queue, (due.step, self._count, due))
         self._count += 1
 
     def _retry(self, due: DueChange, step: int) -> None:
         wait = max(1, self.clock.step_at_or_after(RETRY_US))
-        self._put(step + wait, due.change, due.by, due.door, due.opens_for, due.passed_us)
+        self._put(due._replace(step=step + wait))
 
     def _schedule(self, number: int, door: Door) -> None:
         """Put the schedule of a door into the queue, for all days of the run."""
@@ -423,13 +398,11 @@ class ChangeQueue:
             for turn in door.schedule:
                 if midnight + turn.at < begin:
                     continue
-                for value, verbs in (
-                    (turn.open, ("shut", "open")),
-                    (turn.locked, ("unlock", "lock")),
-                ):
-                    if value is not None:
-                        change = HomeChange.model_validate({verbs[value]: self.names[number]})
-                        self._put(self._step_of(midnight + turn.at), change, "schedule")
+                opens = {True: "open", False: "shut", None: ""}[turn.open]
+                locks = {True: "lock", False: "unlock", None: ""}[turn.locked]
+                for verb in filter(None, (opens, locks)):
+                    change = HomeChange.model_validate({verb: self.names[number]})
+                    self._put(DueChange(self._step_of(midnight + turn.at), change, "schedule"))
 
     def _step_of(self, time: datetime | timedelta) -> int:
         elapsed = micros(time) if isinstance(time, timedelta) else self.clock.elapsed(time)
@@ -457,30 +430,20 @@ class ChangeQueue:
             )
         if change.verb == "move":
             self._check_move(change)
-        if change.type is not None:
-            self._check_type(change.type)
-
-    def _check_type(self, word: str) -> None:
-        """Refuse a room type that is neither in the vocabulary nor that of any room."""
-        types = dict.fromkeys([*PRIORITY, *(room.type for room in self.home.rooms)])
-        if usual_type(word) not in types:
-            raise ScenarioError(f"there is no room type {word!r}{suggest(word, types)}")
+        types = dict.fromkeys([*PRIORITY, *(room.type for room in rooms)])
+        if change.type is not None and usual_type(change.type) not in types:
+            raise ScenarioError(
+                f"there is no room type {change.type!r}{suggest(change.type, types)}"
+            )
 
     def _check_move(self, change: HomeChange) -> None:
-        plan = self.home.plan
-        old = next(item for item in self.home.objects if item.name == change.target)
+        plan, old = self.home.plan, self.home.object(change.target)
         assert change.to is not None
         with errors_as(ScenarioError, of=(PlacementError, OverflowError)):
             new = move_object(old, plan.lattice, change.to, change.turn_deg)
-        inside = shapely.intersection(
-            shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, new)
-        )
-        if inside.area == 0:
+        free, footprint = shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, new)
+        if shapely.intersection(free, footprint).area == 0:
             x, y = change.to
             raise ScenarioError(
                 f"({x:g}, {y:g}) m is not in the home: {old.name} can't stand there"
             )
-
-
-def _corners(shape: shapely.Polygon) -> F64:
-    return np.asarray(shape.exterior.coords)

@@ -20,6 +20,7 @@ from fleet2d.engine.snapshot import (
     write_snapshot,
 )
 from fleet2d.engine.state import State
+from fleet2d.entities.body import NEVER
 from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as
 from fleet2d.runtime.clock import DAY_US, Clock
 from fleet2d.runtime.memory import release_memory
@@ -124,8 +125,7 @@ class CheckpointWriter:
         self._next_day = (step // self._day + 1) * self._day
         self._next_commit = now + COMMIT_S
         self._next_checkpoint = (time.process_time() + COMPUTING_S, now + WAITING_S)
-        self._next_step = (step // self._every + 1) * self._every if self._every else 0
-        self._check_at = min(self._next_day, self._next_step) if self._every else self._next_day
+        self._next_step = (step // self._every + 1) * self._every if self._every else NEVER
 
     def after_span(self, state: State) -> None:
         """Write a commit or a checkpoint if one is due.
@@ -134,7 +134,7 @@ class CheckpointWriter:
             ArtifactError: The disk is full or failed; the run is marked as failed.
         """
         step = state.bodies.step
-        if step < self._check_at and time.monotonic() < self._next_commit:
+        if step < min(self._next_day, self._next_step) and time.monotonic() < self._next_commit:
             return
         is_due = step >= self._next_step
         if not self._every:
@@ -159,9 +159,7 @@ class CheckpointWriter:
         commit = self._store.commit(step, sync=sync)
         state.recorder.wall_s += time.perf_counter() - began
         self._next_commit = time.monotonic() + COMMIT_S
-        while self._next_day <= step:
-            self._next_day += self._day
-        self._check_at = min(self._next_day, self._next_step) if self._every else self._next_day
+        self._next_day = (step // self._day + 1) * self._day
         return None if commit is None else commit._asdict()
 
     def checkpoint(self, state: State) -> None:

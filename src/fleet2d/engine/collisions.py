@@ -115,9 +115,8 @@ class BlockedWays(Watcher):
         step, step_us, wait = now.step, actor.clock.step_us, self._waits[row]
         since = wait.since if wait.until == step else step
         # Of two who wait for each other, the later one in the scenario waits twice as long.
-        patience_us = self._patience_us * (
-            2 if other < row and self._avoids(other, row, step) else 1
-        )
+        is_later = other < row and self._avoids(other, row, step)
+        patience_us = self._patience_us * (2 if is_later else 1)
         if (step - since) * step_us < patience_us:
             first = since == step
             notes = [Note(step * step_us, "gives_way", self._actors[other].name)] if first else []
@@ -296,9 +295,8 @@ class Clearance(Watcher):
         units = robot.home.plan.lattice.units_per_m
         first_meeting: tuple[int, int] | None = None
         now_x, now_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
-        gap = np.where(
-            first + moves < robot.passes_until, TOUCHING_GAP_M, robot.entity.gives_way.distance
-        )
+        passes, distance = first + moves < robot.passes_until, robot.entity.gives_way.distance
+        gap = np.where(passes, TOUCHING_GAP_M, distance)
         for number, user in enumerate(self._users):
             clearance = user.entity.radius + robot.entity.radius + gap
             user_x, user_y = xs[number, moves], ys[number, moves]

@@ -5,14 +5,13 @@ span ends with each question and answer, and where the robot's plan waits for re
 """
 
 from collections.abc import Iterable, Sequence, Set
-from dataclasses import dataclass, field
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import NamedTuple
 
 import numpy as np
 
 from fleet2d.configuration.units import micros
-from fleet2d.engine.basis import Basis, Watcher
+from fleet2d.engine.basis import Basis, PlannedNote, Watcher, notes_of
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.entities.behavior import Command, SightEvent
 from fleet2d.entities.body import NEVER, Bodies
@@ -42,14 +41,6 @@ EARSHOT_M = 8.0
 FRONT = TURN * 100 // 360
 
 
-class Question(NamedTuple):
-    """A robot addresses a person: at the end of a step."""
-
-    step: int
-    robot: int
-    text: str
-
-
 class PendingReply(NamedTuple):
     """An answer that is given at the end of a step."""
 
@@ -59,7 +50,6 @@ class PendingReply(NamedTuple):
     reply: Reply
 
 
-@dataclass
 class Conversations(Watcher):
     """All questions and answers of a run; it does nothing if nobody wants anything.
 
@@ -71,24 +61,26 @@ class Conversations(Watcher):
         attitudes: The attitude of each user to each robot: truth, by their rows.
         log: How people answered: truth, for metrics.
         wanted: The requests that came up, for metrics.
-        interventions: Where cameras of robots that are switched off are switched off, too.
         awaited: Kinds of events that end a span, whatever plans wait for.
     """
 
-    actors: Sequence[DecidingActor]
-    users: int
-    queues: dict[int, RequestQueue] = field(default_factory=dict)
-    answers: dict[int, Answers] = field(default_factory=dict)
-    attitudes: dict[tuple[int, int], AttitudeState] = field(default_factory=dict)
-    log: list[AnswerRecord] = field(default_factory=list)
-    wanted: list[Wanted] = field(default_factory=list)
-    interventions: InterventionQueue | None = None
-    awaited: Set[str] = frozenset()
-    next_step: int = 0
+    def __init__(self, basis: Basis, interventions: InterventionQueue) -> None:
+        """Set up those of a scenario, and give each robot its queue.
 
-    def __post_init__(self) -> None:
+        Args:
+            basis: The basis of the run.
+            interventions: Where cameras of robots that are switched off are switched off, too.
+        """
+        self.actors, self.users, self._clock = basis.actors, basis.bodies.users, basis.clock
+        self.queues: dict[int, RequestQueue] = {}
+        self.answers: dict[int, Answers] = {}
+        self.attitudes: dict[tuple[int, int], AttitudeState] = {}
+        self.log: list[AnswerRecord] = []
+        self.wanted: list[Wanted] = []
+        self.awaited: Set[str] = frozenset()
+        self._interventions = interventions
         self._activity: dict[int, str] = {}  # of each user before the present plan
-        self._questions: list[Question] = []  # at the ends of plans that were replaced
+        self._questions: list[PlannedNote] = []  # at the ends of plans that were replaced
         self._replies: list[PendingReply] = []
         self._last: list[tuple[int, SightEvent]] = []
         self._next: int | None = None  # the next step that ends a span; None: unknown
@@ -99,12 +91,9 @@ class Conversations(Watcher):
         self._begun_days = 0
         self._off_until: dict[int, int] = {}  # by robot: the first step at which it is on again
         self._bans: list[tuple[int, int, int]] = []  # first step without, robot, room
+        self._open(basis)
 
-    @classmethod
-    def of(cls, basis: Basis) -> "Conversations":
-        """Return those of a scenario, and give each robot its queue."""
-        users, clock = basis.bodies.users, basis.clock
-        conversations = cls(basis.actors, users)
+    def _open(self, basis: Basis) -> None:
         rows = {actor.name: row for row, actor in enumerate(basis.actors)}
         wanted: dict[int, dict[str, Interaction]] = {}
         for name, interaction in basis.scenario.interactions.items():
@@ -112,18 +101,17 @@ class Conversations(Watcher):
             wanted.setdefault(rows[by], {})[name] = interaction
         declared = [basis.scenario.users[actor.name].answers for actor in basis.users]
         if any(answers and answers.initiative != Initiative() for answers in declared):
-            wanted |= {row: wanted.get(row, {}) for row in range(users, len(basis.actors))}
+            wanted |= {row: wanted.get(row, {}) for row in range(self.users, len(basis.actors))}
         people = [answers or Answers() for answers in declared] if wanted else []
         for row, interactions in wanted.items():
-            queue = RequestQueue(interactions, clock.start)
-            conversations.queues[row] = basis.actors[row].requests = queue
+            queue = RequestQueue(interactions, basis.clock.start)
+            self.queues[row] = basis.actors[row].requests = queue
             for user, answers in enumerate(people):
-                conversations.answers[user] = answers
-                conversations.attitudes[user, row] = answers.months.begin(clock.start)
+                self.answers[user] = answers
+                self.attitudes[user, row] = answers.months.begin(basis.clock.start)
                 if answers.initiative != Initiative():
                     _check_answers_calls(basis.actors[user], basis.actors[row], answers)
-                    conversations._initiators.append((user, row))
-        return conversations
+                    self._initiators.append((user, row))
 
     @property
     def waits(self) -> bool:
@@ -138,7 +126,7 @@ class Conversations(Watcher):
             self._activity[row] = self._activity_at(row, step)
         elif row in self.queues:
             self._next = None
-            self._questions += [q for q in _questions(row, actor) if q.step == step]
+            self._questions += [q for q in notes_of(actor, EventKind.ASKS) if q.step == step]
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first question or answer, or request that a robot hears of."""
@@ -154,7 +142,7 @@ class Conversations(Watcher):
             heard = self.awaited | robot.plan.interrupts
             steps += [at for kind, at in changes.items() if kind in heard]
             if robot.plan.notes:
-                steps += [question.step for question in _questions(row, robot)]
+                steps += [question.step for question in notes_of(robot, EventKind.ASKS)]
         return min(step for step in steps if step >= self.next_step)
 
     def _look_ahead(self) -> None:
@@ -165,11 +153,14 @@ class Conversations(Watcher):
             steps.append(self._day_begin(self._begun_days))
         self._agenda, self._next = max(min(steps), self.next_step), None
         for row, queue in self.queues.items():
-            clock = self.actors[row].clock
-            self._changes[row] = {
-                kind: max(clock.step_at_or_after(clock.elapsed(time)), self.next_step)
-                for kind, time in queue.next_changes().items()
-            }
+            changes = queue.next_changes().items()
+            self._changes[row] = {k: max(self._step_of(t), self.next_step) for k, t in changes}
+
+    def _step_of(self, time: datetime) -> int:
+        return self._clock.step_at_or_after(self._clock.elapsed(time))
+
+    def _steps_in(self, duration: timedelta) -> int:
+        return max(1, micros(duration) // self._clock.step_us)
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take in the steps up to `end` - 1: only requests change before the last of them."""
@@ -188,16 +179,15 @@ class Conversations(Watcher):
             return events
         for row, queue in self.queues.items():
             robot = self.actors[row]
-            for change in queue.advance(robot.clock.time(step)):
-                at = robot.clock.step_at_or_after(robot.clock.elapsed(change.time))
-                interaction = change.request.interaction
+            for change in queue.advance(self._clock.time(step)):
+                at, interaction = max(self._step_of(change.time), first), change.request.interaction
                 text = f"{change.request.name} {interaction.to}"
-                events.append(Event(max(at, first), robot.name, change.event, text))
+                events.append(Event(at, robot.name, change.event, text))
                 if change.event == "due":
-                    self.wanted.append(Wanted(max(at, first), robot.name, text, interaction))
+                    self.wanted.append(Wanted(at, robot.name, text, interaction))
                 self._tell(row, change.event, text)
-            asked = [q for q in _questions(row, robot) if q.step == step]
-            asked += [q for q in self._questions if q.step == step and q.robot == row]
+            asked = [q for q in notes_of(robot, EventKind.ASKS) if q.step == step]
+            asked += [q for q in self._questions if q.step == step and q.row == row]
             for question in dict.fromkeys(asked):
                 block = block or bodies.block(step, end + 1)
                 self._ask(question, block)
@@ -220,43 +210,39 @@ class Conversations(Watcher):
         x, y = actor.home.plan.lattice.xy_of(actor.state.x, actor.state.y)
         self._last.append((row, SightEvent(event, text, x, y)))
 
-    def _ask(self, question: Question, block: PoseBlock) -> None:
+    def _ask(self, question: PlannedNote, block: PoseBlock) -> None:
         """Let the person who is addressed notice the robot, and draw the answer."""
         name, _, meant = question.text.rpartition(" ")
-        interaction = self.queues[question.robot].interactions.get(name)
-        user = self._addressed(question.robot, meant, block)
-        clock = self.actors[question.robot].clock
+        interaction = self.queues[question.row].interactions.get(name)
+        user = self._addressed(question.row, meant, block)
         if interaction is None or user is None:
             self._note(question, "", "", None, None)
             return
-        person, state = self.actors[user], self.attitudes[user, question.robot]
+        person, state = self.actors[user], self.attitudes[user, question.row]
         answers = self.answers[user]
-        now = self._circumstances(user, question, name, interaction, block)
+        now = self._circumstances(user, question, interaction, block)
         answers.months.pass_time(state, now.time)
         reply = answers.reply(now, state, person.seed, person.path, question.step)
         if reply is not None and person.name != meant:
             reply = reply._replace(outcome=Outcome.MISTAKEN)
         if reply is not None:
             answers.months.addressed(state, name, reply.outcome, reply.willingness)
-            waits = max(1, micros(reply.delay) // clock.step_us)
-            step = question.step + waits
-            self._replies.append(PendingReply(step, question.robot, question.text, reply))
+            step = question.step + self._steps_in(reply.delay)
+            self._replies.append(PendingReply(step, question.row, question.text, reply))
         self._note(question, person.name, now.activity, reply, state)
 
     def _note(
         self,
-        question: Question,
+        question: PlannedNote,
         person: str,
         activity: str,
         reply: Reply | None,
         state: AttitudeState | None,
     ) -> None:
         """Record how a person has answered, for metrics."""
-        state = state or AttitudeState(self.actors[0].clock.start, 0.0, trust=0.0)
-        robot, request = (
-            self.actors[question.robot],
-            self.queues[question.robot].find(question.text),
-        )
+        state = state or AttitudeState(self._clock.start, 0.0, trust=0.0)
+        robot = self.actors[question.row]
+        request = self.queues[question.row].find(question.text)
         is_last = request is not None and request.is_last_stage
         value = request.value_at(robot.clock.time(question.step)) if request and is_last else 0.0
         self.log.append(
@@ -284,14 +270,14 @@ class Conversations(Watcher):
         away2 = (x[: self.users] - x[row]) ** 2 + (y[: self.users] - y[row]) ** 2
         reach = round(EARSHOT_M * self.actors[row].home.plan.lattice.units_per_m)
         near = [u for u in range(self.users) if not block.away[u, 0] and away2[u] <= reach**2]
-        key = lambda u: (int(away2[u]), self.actors[u].name != meant)  # noqa: E731
-        return min(near, key=key, default=None)
+        ranked = [(int(away2[u]), self.actors[u].name != meant, u) for u in near]
+        return min(ranked)[-1] if ranked else None
 
     def _circumstances(
-        self, user: int, question: Question, name: str, interaction: Interaction, block: PoseBlock
+        self, user: int, question: PlannedNote, interaction: Interaction, block: PoseBlock
     ) -> Circumstances:
-        person, row = self.actors[user], question.robot
-        home, lattice = person.home, person.home.plan.lattice
+        person, row = self.actors[user], question.row
+        home, walls, lattice = person.home, person.home.walls, person.home.plan.lattice
         x, y = int(block.x[user, 0]), int(block.y[user, 0])
         robot_x, robot_y = int(block.x[row, 0]), int(block.y[row, 0])
         gap = np.array([robot_x - x, robot_y - y], np.int64)
@@ -301,7 +287,7 @@ class Conversations(Watcher):
         room = rooms[user]
         return Circumstances(
             time=person.clock.time(question.step),
-            name=name,
+            name=question.text.rpartition(" ")[0],
             interaction=interaction,
             activity=self._activity_at(user, question.step),
             room="" if room is None else home.rooms[room].type,
@@ -309,9 +295,7 @@ class Conversations(Watcher):
             is_moving=bool((block.x[user, 1], block.y[user, 1]) != (x, y)),
             is_lying=bool(block.posture[user, 0] == LYING),
             distance=float(np.sqrt(np.float64((gap * gap).sum()))) / lattice.units_per_m,
-            in_sight=bool(
-                line_of_sight(home.walls, x, y, locate(home.walls, x, y), robot_x, robot_y)
-            ),
+            in_sight=bool(line_of_sight(walls, x, y, locate(walls, x, y), robot_x, robot_y)),
             from_behind=min(off, TURN - off) > FRONT,
         )
 
@@ -326,14 +310,10 @@ class Conversations(Watcher):
     def _activity_at(self, row: int, step: int) -> str:
         """Return what a user does at a step of the present plan; empty if that is unknown."""
         actor, time_us = self.actors[row], step * self.actors[row].clock.step_us
-        return next(
-            (
-                note.detail
-                for note in reversed(actor.plan.notes)
-                if note.event == EventKind.ACTIVITY and note.time_us <= time_us
-            ),
-            self._activity.get(row, ""),
-        )
+        for note in reversed(actor.plan.notes):
+            if note.event == EventKind.ACTIVITY and note.time_us <= time_us:
+                return note.detail
+        return self._activity.get(row, "")
 
     def _give(self, pending: PendingReply, step: int, bodies: Bodies) -> list[Event]:
         """Give an answer: tell the robot, and let it keep to it."""
@@ -371,7 +351,7 @@ class Conversations(Watcher):
         room = self._room(row, bodies.block(step, step + 1))
         lasts = {Outcome.SENT_AWAY: answers.away_for, Outcome.BANNED: answers.bans_for}.get(outcome)
         if lasts is not None and room is not None:
-            until = step + max(1, micros(lasts) // robot.clock.step_us)
+            until = step + self._steps_in(lasts)
             robot.keep_out(room, step + 1, until, text)
             self._bans.append((until, row, room))
             text = f"{text} {robot.home.rooms[room].name}"
@@ -382,12 +362,12 @@ class Conversations(Watcher):
     def _switch_off(self, robot: DecidingActor, lasts: timedelta, step: int, by: str) -> None:
         """Let a robot stand still from a step on, and neither see nor hear."""
         robot.follow_order(StandStill(lasts), step)
-        self._off_until[robot.row] = step + max(1, micros(lasts) // robot.clock.step_us)
-        if robot.entity.eyes and self.interventions is not None:
+        self._off_until[robot.row] = step + self._steps_in(lasts)
+        if robot.entity.eyes:
             from fleet2d.interventions.robots import SwitchOff  # few robots are switched off
 
             off = SwitchOff(entity=robot.name, camera=True, duration=lasts)
-            self.interventions.follow(off, step, by)
+            self._interventions.follow(off, step, by)
 
     def _end_bans(self, step: int) -> list[Event]:
         """Let robots into the rooms whose bans are over at a step."""
@@ -403,19 +383,17 @@ class Conversations(Watcher):
 
     def _day_begin(self, day: int) -> int:
         """Return the step at which a day of the run begins."""
-        clock = self.actors[0].clock
-        return clock.step_at_or_after(clock.elapsed(midnight_of(clock.start) + day * DAY))
+        return self._step_of(midnight_of(self._clock.start) + day * DAY)
 
     def _start(self, step: int, bodies: Bodies) -> list[Event]:
         """Let people turn to robots by themselves."""
-        clock = self.actors[0].clock
         while self._initiators and self._day_begin(self._begun_days) <= step:
-            midnight = midnight_of(clock.start) + self._begun_days * DAY
+            midnight = midnight_of(self._clock.start) + self._begun_days * DAY
             for user, row in self._initiators:
                 person, robot = self.actors[user], self.actors[row]
                 key = stream_key(person.seed, person.path, f"initiative {robot.name}")
                 for start in self.answers[user].initiative.starts(Draws(key, self._begun_days)):
-                    at = clock.step_at_or_after(clock.elapsed(midnight + start.day_share * DAY))
+                    at = self._step_of(midnight + start.day_share * DAY)
                     if at > step:
                         self._starts.append((at, user, row, start.kind))
             self._begun_days += 1
@@ -428,9 +406,8 @@ class Conversations(Watcher):
     def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> Event | None:
         """Let a person call a robot, ask it something, or complain; None: it doesn't happen."""
         person, robot, block = self.actors[user], self.actors[row], bodies.block(step, step + 1)
-        if block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
-            return None
-        if step < self._off_until.get(row, 0):
+        is_off = step < self._off_until.get(row, 0)
+        if is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
             return None
         lattice, point = robot.home.plan.lattice, (int(block.x[user, 0]), int(block.y[user, 0]))
         if kind == "call":
@@ -442,14 +419,13 @@ class Conversations(Watcher):
             away2 = (int(block.x[row, 0]) - point[0]) ** 2 + (int(block.y[row, 0]) - point[1]) ** 2
             if away2 > reach**2:
                 return None
-            self._last.append(
-                (row, SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(*point)))
-            )
+            asked = SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(*point))
+            self._last.append((row, asked))
             return Event(step, robot.name, EventKind.QUESTION, person.name)
         room, state = self._room(user, block), self.attitudes[user, row]
         if room is None or room != self._room(row, block):
             return None
-        self.answers[user].months.pass_time(state, person.clock.time(step))
+        self.answers[user].months.pass_time(state, self._clock.time(step))
         outcome = self.answers[user].complaint(state, person.home.rooms[room].type)
         if outcome is None:
             return None
@@ -468,12 +444,3 @@ def _check_answers_calls(person: DecidingActor, robot: DecidingActor, answers: A
             f"{person.path}.answers.initiative.calls: none of the behaviors of {robot.name} answers"
             " calls: give it one, like behaviors: [{type: come}, …]"
         )
-
-
-def _questions(row: int, robot: DecidingActor) -> list[Question]:
-    """Return the questions of a robot's plan."""
-    return [
-        Question(robot.clock.step_at_or_after(note.time_us), row, note.detail)
-        for note in robot.plan.notes
-        if note.event == EventKind.ASKS
-    ]

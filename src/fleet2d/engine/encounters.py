@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.engine.basis import Watcher
+from fleet2d.engine.basis import PlannedNote, Watcher, notes_of
 from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
@@ -42,9 +42,7 @@ class Pair:
 
     Attributes:
         user: The person.
-        user_row: The person's row among the bodies.
         robot: The robot.
-        robot_row: Its row among the bodies.
         attention: What the person notices.
         near: Whether the person would notice the robot nearby: not if it has stayed there.
         coming: Whether the person would notice the robot driving up: not if it has just done so.
@@ -54,9 +52,7 @@ class Pair:
     """
 
     user: DecidingActor
-    user_row: int
     robot: DecidingActor
-    robot_row: int
     attention: Attention
     near: bool = True
     coming: bool = True
@@ -70,7 +66,7 @@ class Pair:
         kinds = {
             "robot_near": self._first_near(block),
             "robot_coming": self._first_coming(block),
-            "robot_close": self._first_close(),
+            "robot_close": _first(self._close_run() == self.attention.patience),
         }
         return [
             Encounter(column, event, self.robot, self)
@@ -85,37 +81,29 @@ class Pair:
     def advance(self, block: PoseBlock, count: int, events: Sequence[str]) -> None:
         """Update the state after `count` steps, with encounters in the last one."""
         distances = self.distances[:count]
-        self.near = "robot_near" not in events and bool(self._armed_near()[count - 1])
-        self.coming = "robot_coming" not in events and bool(self._armed_coming()[count - 1])
+        near = self._armed(self.attention.notices, AGAIN_NEAR, self.near)[count - 1]
+        coming = self._armed(self.attention.in_way, AGAIN_COMING, self.coming)[count - 1]
+        self.near = "robot_near" not in events and bool(near)
+        self.coming = "robot_coming" not in events and bool(coming)
         self.close_steps = int(self._close_run()[count - 1])
         self.distance = int(distances[-1])
-        row = self.robot_row
+        row = self.robot.row
         self.at = int(block.x[row, count - 1]), int(block.y[row, count - 1])
 
     def _measure(self, block: PoseBlock, count: int) -> I64:
         """Return the squared distances; FAR if one is away or the person lies."""
-        u, r = self.user_row, self.robot_row
+        u, r = self.user.row, self.robot.row
         dx = block.x[u, :count] - block.x[r, :count]
         dy = block.y[u, :count] - block.y[r, :count]
         away = block.away[u, :count] | block.away[r, :count]
         is_unreachable = (away != 0) | (block.posture[u, :count] == LYING)
         return np.where(is_unreachable, FAR, dx * dx + dy * dy)
 
-    def _is_beyond(self, limit: int, factor: tuple[int, int]) -> Bool:
+    def _armed(self, limit: int, factor: tuple[int, int], before: bool) -> Bool:
+        """Return where the person would notice the robot again, as it has been farther away."""
         far = limit * factor[0] // factor[1]
-        return self.distances > far * far
-
-    def _armed_near(self) -> Bool:
-        has_left: Bool = np.logical_or.accumulate(
-            self._is_beyond(self.attention.notices, AGAIN_NEAR)
-        )
-        return has_left | self.near
-
-    def _armed_coming(self) -> Bool:
-        has_left: Bool = np.logical_or.accumulate(
-            self._is_beyond(self.attention.in_way, AGAIN_COMING)
-        )
-        return has_left | self.coming
+        has_left: Bool = np.logical_or.accumulate(self.distances > far * far)
+        return has_left | before
 
     def _close_run(self) -> I64:
         """Return the number of steps for which the robot has been too close, at each step."""
@@ -128,8 +116,9 @@ class Pair:
     def _first_near(self, block: PoseBlock) -> int | None:
         """Return the first column in which the robot is noticed: near, and in line of sight."""
         limit = self.attention.notices
-        candidates = np.flatnonzero((self.distances <= limit * limit) & self._armed_near())
-        u, r = self.user_row, self.robot_row
+        is_armed = self._armed(limit, AGAIN_NEAR, self.near)
+        candidates = np.flatnonzero((self.distances <= limit * limit) & is_armed)
+        u, r = self.user.row, self.robot.row
         walls, checked = self.user.home.walls, None
         rows = (block.x[u], block.y[u], block.x[r], block.y[r])
         for column, *places in zip(
@@ -145,19 +134,17 @@ class Pair:
 
     def _first_coming(self, block: PoseBlock) -> int | None:
         """Return the first column in which the robot drives up to the person, who stands."""
-        limit, count, row = self.attention.in_way, len(self.distances), self.robot_row
-        is_inside = (self.distances <= limit * limit) & self._armed_coming()
+        limit, count, row = self.attention.in_way, len(self.distances), self.robot.row
+        is_armed = self._armed(limit, AGAIN_COMING, self.coming)
+        is_inside = (self.distances <= limit * limit) & is_armed
         if not is_inside.any():
             return None
         x, y = block.x[row, :count], block.y[row, :count]
         last = self.at if self.at[0] >= 0 else (int(x[0]), int(y[0]))
         moves = (np.diff(x, prepend=last[0]) != 0) | (np.diff(y, prepend=last[1]) != 0)
         approaches = np.diff(self.distances, prepend=self.distance) < 0
-        stands = block.posture[self.user_row, :count] == STANDING
+        stands = block.posture[self.user.row, :count] == STANDING
         return _first(is_inside & moves & approaches & stands)
-
-    def _first_close(self) -> int | None:
-        return _first(self._close_run() == self.attention.patience)
 
 
 class Encounters(Watcher):
@@ -169,14 +156,14 @@ class Encounters(Watcher):
     """
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
-        self._robots = [(len(users) + i, robot) for i, robot in enumerate(robots)]
+        self._robots = robots
         self.pairs = [
-            Pair(user, row, robot, robot_row, user.attention)
-            for row, user in enumerate(users)
+            Pair(user, robot, user.attention)
+            for user in users
             if user.attention is not None
-            for robot_row, robot in self._robots
+            for robot in robots
         ]
-        self._calls: list[tuple[int, int, str]] = []  # at the ends of plans: step, row, user
+        self._calls: list[PlannedNote] = []  # of users, at the ends of plans
         self._ahead: list[Encounter] = []
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []
 
@@ -188,20 +175,22 @@ class Encounters(Watcher):
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Record the calls at `step` of a robot's plan that is replaced."""
         if self.pairs:
-            self._calls += [call for call in _calls(row, actor) if call[0] == step]
+            self._calls += [call for call in notes_of(actor, EventKind.CALLS) if call.step == step]
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first encounter, `end` if there is none."""
         first, block = self.next_step, bodies.block(self.next_step, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
-        calls = self._calls + [call for row, robot in self._robots for call in _calls(row, robot)]
+        calls = self._calls + [
+            c for robot in self._robots for c in notes_of(robot, EventKind.CALLS)
+        ]
         self._calls = []
         self._ahead += [
             Encounter(step - first, "robot_calls", pair.robot, pair)
             for step, row, user in calls
             if first <= step < end
             for pair in self.pairs
-            if pair.robot_row == row and user in ("", pair.user.name) and pair.hears(step - first)
+            if pair.robot.row == row and user in ("", pair.user.name) and pair.hears(step - first)
         ]
         return min((event.column + first + 1 for event in self._ahead), default=end)
 
@@ -217,7 +206,7 @@ class Encounters(Watcher):
             pair.advance(block, count, [e.event for e in last])
             x, y = pair.user.home.plan.lattice.to_metres(pair.at).tolist()
             self._last += [
-                (pair.user_row, pair.user, SightEvent(e.event, e.robot.name, x, y)) for e in last
+                (pair.user.row, pair.user, SightEvent(e.event, e.robot.name, x, y)) for e in last
             ]
         return ()
 
@@ -226,15 +215,6 @@ class Encounters(Watcher):
         for row, user, event in self._last:
             if user.reacts_to(event, self.next_step - 1):
                 yield row, event
-
-
-def _calls(row: int, robot: DecidingActor) -> list[tuple[int, int, str]]:
-    """Return the calls of a robot's plan: step, the robot's row, and the user it calls."""
-    return [
-        (robot.clock.step_at_or_after(note.time_us), row, note.detail)
-        for note in robot.plan.notes
-        if note.event == EventKind.CALLS
-    ]
 
 
 def _first(flags: Bool) -> int | None:

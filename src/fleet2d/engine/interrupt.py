@@ -65,7 +65,11 @@ WATCHED_EVENTS = frozenset({*User.sight_events, *Robot.sight_events, *Robot.requ
 
 
 class Interruptions(Watcher):
-    """The plans that wait for interrupts; it does nothing while there are none."""
+    """The plans that wait for interrupts; it does nothing while there are none.
+
+    Attributes:
+        files: The files of the user's own interrupts for which plans waited.
+    """
 
     def __init__(self, basis: Basis) -> None:
         self._actors, self._users = basis.actors, basis.bodies.users
@@ -74,19 +78,11 @@ class Interruptions(Watcher):
         self._ahead: dict[Wait, Bool] = {}  # whether it holds in the present span
         self._last: list[Wait] = []
         self._interrupts: dict[str, Interrupt] = {}
-        self._files: dict[type[Interrupt], list[Path]] = {}  # of each class of the user's own
+        self.files: list[Path] = []
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the interrupts, which follow from their names."""
-        return {**self.__dict__, "_interrupts": {}, "_files": {}}
-
-    @property
-    def files(self) -> list[Path]:
-        """The files of the user's own interrupts for which plans waited."""
-        for cls in {type(interrupt) for interrupt in self._interrupts.values()}:
-            if cls not in self._files and not cls.__module__.startswith("fleet2d."):
-                self._files[cls] = source_files(cls)  # it reads them: once, not at every commit
-        return [path for files in self._files.values() for path in files]
+        return {**self.__dict__, "_interrupts": {}, "files": []}
 
     @property
     def waits(self) -> bool:
@@ -98,9 +94,8 @@ class Interruptions(Watcher):
         names = self._actors[row].plan.interrupts - WATCHED_EVENTS
         if not names and not self._held:
             return
-        named = {(row, name) for name in names}
         others = {wait: held for wait, held in self._held.items() if wait[0] != row}
-        new = {wait: self._held.get(wait) for wait in named}
+        new = {(row, name): self._held.get((row, name)) for name in names}
         self._held = dict(sorted((others | new).items(), key=lambda item: item[0]))
 
     def limit(self, bodies: Bodies, end: int) -> int:
@@ -135,7 +130,9 @@ class Interruptions(Watcher):
 
     def _interrupt(self, name: str) -> Interrupt:
         if name not in self._interrupts:
-            self._interrupts[name] = cast("Interrupt", lookup("interrupt", name)())
+            interrupt = self._interrupts[name] = cast("Interrupt", lookup("interrupt", name)())
+            if not type(interrupt).__module__.startswith("fleet2d."):
+                self.files += source_files(type(interrupt))
         return self._interrupts[name]
 
     def _begins(self, wait: Wait) -> Bool:

@@ -105,20 +105,15 @@ class PendingIntervention:
         trigger: The event.
         repeats: Whether it is applied at every such event, not only at the first.
         delay_us: Time from the event to the intervention [us].
-        since: The first step whose events count: earlier ones may become known later.
-        act: The intervention.
-        rank, number, by: See `DueIntervention`.
+        due: The intervention, at the first step whose events count: earlier ones may become known
+            later.
         last: The last step for which it was put into the queue; -1: none.
     """
 
     trigger: Trigger
     repeats: bool
     delay_us: int
-    since: int
-    act: Intervention
-    rank: int
-    number: int
-    by: str
+    due: DueIntervention
     last: int = -1
 
     @property
@@ -146,7 +141,7 @@ class InterventionQueue:
         self._clock = clock
         self._queue: list[DueIntervention] = []
         self._ends = 0
-        self._origins: list[str] = []  # of `done`: empty for what was requested to happen at once
+        self._followed: list[dict[str, Any]] = []  # of `done`, without what was requested at once
 
     def request(self, act: Intervention, step: int) -> None:
         """Schedule an intervention from outside at a step, after all earlier requests."""
@@ -179,7 +174,7 @@ class InterventionQueue:
             due = self._queue.pop(0)
             if isinstance(due.act, Lasting):
                 if due.ends:
-                    self._forget(due.act)
+                    self.forget(due.act)
                 else:
                     # A copy: what happens at each event begins again before it has ended.
                     act = due.act.model_copy()
@@ -200,34 +195,28 @@ class InterventionQueue:
         request = self.requests[due.number] if due.rank == OUTSIDE else None
         if request is not None and ENTRY_KEYS.isdisjoint(request):
             self.done.append(request)
-            self._origins.append("")
-        else:
-            self.done.append(due.record)
-            self._origins.append(due.by if request is None else f"request.{due.number}")
+            return
+        self.done.append(due.record)
+        origin = due.by if request is None else f"request.{due.number}"
+        self._followed.append({**due.record, "by": origin})
 
     def undo(self, applies: Callable[[Lasting], bool]) -> list[Lasting]:
         """Remove the active interventions to which a condition applies, and return them."""
         removed = [act for act in self.lasting if applies(act)]
         for act in removed:
-            self._forget(act)
+            self.forget(act)
             self._queue = [due for due in self._queue if not (due.ends and due.act is act)]
         return removed
 
-    def leave_out(self, act: Intervention) -> None:
-        """Note that an intervention, the last that `take` yielded, could not be applied."""
-        if isinstance(act, Lasting):
-            self._forget(act)
-
-    def _forget(self, act: Lasting) -> None:
-        """Remove an active intervention, by identity: another may be equal to it."""
+    def forget(self, act: Intervention) -> None:
+        """Remove an intervention if it is active, by identity: another may be equal to it."""
         self.lasting = [active for active in self.lasting if active is not act]
 
     @property
     def acts(self) -> list[Mapping[str, Any]]:
         """All interventions, done and scheduled, as `dump_intervention` writes them."""
-        scheduled = [due.act for due in self._queue if not due.ends]
-        waiting = [waiting.act for waiting in self.waiting]
-        return [*self.done, *map(dump_intervention, [*scheduled, *waiting])]
+        queue = [*self._queue, *(waiting.due for waiting in self.waiting)]
+        return [*self.done, *(dump_intervention(due.act) for due in queue if not due.ends)]
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -241,14 +230,13 @@ class InterventionQueue:
         """
         for event in events:
             for waiting in self.waiting:
-                is_early = event.step < waiting.since
+                is_early = event.step < waiting.due.step
                 if is_early or waiting.is_over or not waiting.trigger.fits(event):
                     continue
                 after = event.step * self._clock.step_us + waiting.delay_us
                 step = max(self._clock.step_at_or_after(after), event.step + 1)
                 if step != waiting.last:
-                    rank, number, by = waiting.rank, waiting.number, waiting.by
-                    self.add(DueIntervention(step, rank, number, waiting.act, by))
+                    self.add(waiting.due._replace(step=step))
                     waiting.last = step
 
     @property
@@ -257,12 +245,7 @@ class InterventionQueue:
 
         An intervention that was requested to happen at once is its request.
         """
-        followed = [
-            {**record, "by": origin}
-            for record, origin in zip(self.done, self._origins, strict=True)
-            if origin
-        ]
-        return [*followed, *self.requests]
+        return [*self._followed, *self.requests]
 
 
 def read_record(content: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:

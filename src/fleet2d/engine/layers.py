@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.history import Log
-from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, Watcher
@@ -113,14 +111,9 @@ class SeenArea(Watcher):
 
     def _set_walls(self, walls: Mesh) -> None:
         """Use other walls, and clear the cache of poses."""
-        self._setup = CoverageSetup(
-            walls,
-            self._lenses,
-            self._patches.of_cell,
-            self.robot.clock.step_us,
-            self.every,
-            max(self._bin_steps, 1),
-        )
+        step_us, of_cell = self.robot.clock.step_us, self._patches.of_cell
+        bin_steps = max(self._bin_steps, 1)
+        self._setup = CoverageSetup(walls, self._lenses, of_cell, step_us, self.every, bin_steps)
         self._cache.last[:] = self._cache.settled[:] = NEVER
         self._cache.used[0] = 0
 
@@ -145,24 +138,19 @@ class SeenArea(Watcher):
             first, until = self.next_step, min(end, self.next_step + MAX_BATCH_STEPS)
             self.next_step = until
             runs = bodies.runs(self.row, first, until)
-            record, bins = self._record, self._new_bins(first, until)
+            record, bins = self._record, None
             if self._bin_steps:
+                count = (until - 1) // self._bin_steps - first // self._bin_steps + 1
+                bins = np.empty((count, *self._bins.shape[1:]), np.int64)
                 record = record._replace(binned=bins[:, 0], peak=bins[:, 1])
             record_coverage(self._setup, runs, 0, first, until, self._cache, record)
-            if self._bin_steps:
+            if bins is not None:
                 self._collect_bins(first, bins)
         return ()
 
     def catch_up(self) -> None:
         """Look up to the present step."""
         self.take(self._bodies, self._bodies.step)
-
-    def _new_bins(self, begin: int, end: int) -> I64:
-        """Return the bins that steps reach, not set yet: int64 (bins, 2, patches)."""
-        if not self._bin_steps:
-            return self._bins
-        count = (end - 1) // self._bin_steps - begin // self._bin_steps + 1
-        return np.empty((count, *self._bins.shape[1:]), np.int64)
 
     def _collect_bins(self, begin: int, bins: I64) -> None:
         """Collect the bins of the steps from `begin` to the present one."""
@@ -255,11 +243,15 @@ class LayerBook:
         scenario = basis.scenario
         self._stored_at: dict[str, int] = {}
         self._robots, self._first_robot = len(scenario.robots), len(scenario.users)
-        learners = {
+        learners: dict[str, Algorithm | Metric] = {
             **{f"algorithms.{name}": learner for name, learner in scenario.algorithms.items()},
             **{f"metrics.{name}": learner for name, learner in scenario.metrics.items()},
         }
-        needs = {need for path, learner in learners.items() for need in _needs_of(path, learner)}
+        for path, learner in learners.items():
+            if unknown := [need for need in learner.needs if need not in NEEDS]:
+                hint = suggest(unknown[0], NEEDS)
+                raise ComponentError(f"{path}: {type(learner).__name__} needs {unknown[0]!r}{hint}")
+        needs = {need for learner in learners.values() for need in learner.needs}
         behaviors = [behavior for actor in basis.actors for behavior in actor.behaviors]
         needs |= {need for behavior in behaviors for need in behavior.needs}
         names = {*needs, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
@@ -313,14 +305,15 @@ class LayerBook:
 
     def _open_areas(self, basis: Basis, names: Set[str]) -> list[SeenArea]:
         """Return the area that each robot with a camera has seen, before the first step."""
-        every = self._multiple(basis.scenario.sight.seen_every, "sight.seen_every") or 1
+        every, step_us = basis.scenario.sight.seen_every, self._clock.step_us
+        steps = 1 if every is None else whole_steps(every, step_us, "sight.seen_every")
         return [
             SeenArea(
                 actor,
                 row,
                 self._patches,
                 basis.bodies,
-                every=every,
+                every=steps,
                 keeps_first=not names.isdisjoint({"explored", "first_seen"}),
                 keeps_last=not names.isdisjoint({"last_seen", "time_since_seen"}),
                 bin_steps=self._bin_steps,
@@ -343,16 +336,10 @@ class LayerBook:
 
     def _period(self, layer: Layer) -> int:
         """Return the steps between two times at which a layer is stored; 0 for never."""
-        if not layer.store:
+        if not layer.store or layer.every is None:
             return 0
-        name = layer.name.partition(".")[0]
-        return self._multiple(layer.every, f"floorplan.layers.{name}.every")
-
-    def _multiple(self, duration: timedelta | None, key: str) -> int:
-        """Return a duration in steps, 0 for none."""
-        if duration is None:
-            return 0
-        return whole_steps(duration, self._clock.step_us, key)
+        key = f"floorplan.layers.{layer.name.partition('.')[0]}.every"
+        return whole_steps(layer.every, self._clock.step_us, key)
 
     def _put(self, layer: Layer, step: int) -> None:
         spec = layer_table(layer)
@@ -406,18 +393,3 @@ _SEEN = {
     ),
 }
 _COSTS = _cell_settings("int32", 0, "what a way costs besides its length, -1 where none leads", "%")
-
-
-def _needs_of(path: str, learner: Component) -> Set[str]:
-    """Return what an algorithm or a metric needs.
-
-    Raises:
-        ComponentError: A need is unknown.
-    """
-    assert isinstance(learner, Algorithm | Metric)
-    for need in learner.needs:
-        if need not in NEEDS:
-            raise ComponentError(
-                f"{path}: {type(learner).__name__} needs {need!r}{suggest(need, NEEDS)}"
-            )
-    return set(learner.needs)

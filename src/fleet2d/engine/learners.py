@@ -157,10 +157,6 @@ class Learners:
         dues = (learner.due for learner in self.all)
         return min((due for due in dues if due is not None), default=None)
 
-    def earliest_needed(self) -> int:
-        """Return the first step that a next history still contains."""
-        return min(learner.oldest for learner in self.all)
-
     def update(self, end: int, log: Log, events: Sequence[Event] = ()) -> None:
         """Update all whose period ends before step `end`, or that wait for one of these events."""
         fresh: dict[str, Any] = {}

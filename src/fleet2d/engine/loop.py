@@ -71,7 +71,7 @@ def intervene(state: State, span: Span) -> None:
             item.act.check(world)
             item.act.begin(world)
         except InputError as error:
-            state.interventions.leave_out(item.act)
+            state.interventions.forget(item.act)
             source = item.by or f"the intervention {item.act.type_name}"
             state.store.manifest.notes.append(f"step {span.first}: {source} was left out: {error}")
     if state.interventions.waiting:  # maybe for fewer events now
@@ -161,13 +161,8 @@ def move(state: State, span: Span) -> None:
     end = min(span.end, state.bodies.next_decision(), state.settled + state.capacity)
     if state.max_span is not None:
         end = min(end, span.first + state.max_span)
-    dues = (
-        state.learners.next_due(),
-        state.changes.next_due(),
-        state.layers.next_due(span.first),
-        state.interventions.next_due(),
-    )
-    for due in dues:
+    queues = state.learners, state.changes, state.interventions
+    for due in (state.layers.next_due(span.first), *(queue.next_due() for queue in queues)):
         if due is not None:
             end = min(end, max(due, span.first + 1))
     awaited = state.learners.awaited | state.awaited
@@ -224,7 +219,7 @@ def _update(state: State, log: Log, end: int) -> None:
             if isinstance(output, HomeChanges) and name not in learners.replaced:
                 for change in output.changes:
                     state.changes.ask(change, end, f"algorithms.{name}")
-        state.forget(learners.earliest_needed())
+        state.forget(min(learner.oldest for learner in learners.all))
 
 
 Phase = Callable[[State, Span], None]
@@ -280,7 +275,6 @@ class Loop:
         Raises:
             KeyboardInterrupt: Ctrl-C, after the present span.
         """
-        stored_s, self._began = state.recorder.wall_s, perf_counter()
         if self.pace is not None:
             self.pace.resume(self._simulated_s(state))
         with ExitStack() as stack:
@@ -288,16 +282,8 @@ class Loop:
             if end - state.bodies.step >= SHORT:
                 stack.enter_context(rare_collections())
                 stack.enter_context(deferred_interrupt(self._stop))
-            try:
-                self._simulate(state, end, on_progress, spans)
-            except BaseException:
-                self.has_failed = True
-                raise
-            finally:
-                stored_s = state.recorder.wall_s - stored_s
-                self.simulate_s += self.running_s - stored_s
-                self.save_s += stored_s
-                self._began = None
+            stack.enter_context(self._timed(state))
+            self._simulate(state, end, on_progress, spans)
         if self._is_stopping:
             self._is_stopping = False
             raise KeyboardInterrupt
@@ -314,25 +300,32 @@ class Loop:
             Whether the condition holds. The present step has begun then: its interventions and
             changes of the home are made, and the next call continues with its decisions.
         """
-        began, stored_s = perf_counter(), state.recorder.wall_s
+        trusted = nullcontext() if current_trust() is self._trust else restrict(self._trust)
+        with self._timed(state), trusted:
+            while state.bodies.step < end:
+                span = Span(state.bodies.step, end)
+                intervene(state, span)
+                change_home(state, span)
+                if asks(state, span.first):
+                    return True
+                for phase in PHASES[AT_DECISIONS:]:
+                    phase(state, span)
+        return False
+
+    @contextmanager
+    def _timed(self, state: State) -> Iterator[None]:
+        """Measure the time of simulating and storing, and note a failure in between."""
+        stored_s, self._began = state.recorder.wall_s, perf_counter()
         try:
-            with nullcontext() if current_trust() is self._trust else restrict(self._trust):
-                while state.bodies.step < end:
-                    span = Span(state.bodies.step, end)
-                    intervene(state, span)
-                    change_home(state, span)
-                    if asks(state, span.first):
-                        return True
-                    for phase in PHASES[AT_DECISIONS:]:
-                        phase(state, span)
-            return False
+            yield
         except BaseException:
             self.has_failed = True
             raise
         finally:
             stored_s = state.recorder.wall_s - stored_s
-            self.simulate_s += perf_counter() - began - stored_s
+            self.simulate_s += self.running_s - stored_s
             self.save_s += stored_s
+            self._began = None
 
     def _simulate(
         self, state: State, end: int, on_progress: Callable[[], None] | None, spans: int | None

@@ -24,17 +24,7 @@ from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.trajectories import (
-    HEADING,
-    STEP,
-    TIME,
-    KeyFrames,
-    Samples,
-    X,
-    Y,
-    away_column,
-    trajectory_table,
-)
+from fleet2d.engine.trajectories import HEADING, STEP, TIME, KeyFrames, Samples, X, Y
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I8, I32, I64, NOBODY, UNKNOWN_TRUTH
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
@@ -58,20 +48,12 @@ def table_specs(
     room = Column("room", "category", nullable=True, categories=rooms)
     specs = []
     if settings.trajectories != "off":
-        specs.append(trajectory_table(entity, room))
+        away = Column("away", "bool", description="not at home: x, y and room are missing")
+        specs.append(TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away)))
     if settings.key_frames:
         kind = Column("kind", "category", categories=KEY_KINDS)
-        columns = (
-            STEP,
-            TIME,
-            entity,
-            kind,
-            X,
-            Y,
-            HEADING,
-            away_column("x and y are where it left"),
-        )
-        specs.append(TableSpec("key_frames", columns))
+        away = Column("away", "bool", description="not at home: x and y are where it left")
+        specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
     if settings.observations and users and robots:
         specs.append(_observation_table(users, robots, room, cameras, activities))
     if settings.events:
@@ -88,8 +70,11 @@ def table_specs(
         specs.append(TableSpec("events", (STEP, TIME, entities, event, *user_columns, detail)))
     if settings.decisions:
         specs.append(TableSpec("decisions", (STEP, TIME, entity, *DECISION)))
-    if sensors.names:
-        specs.append(_sensor_table(sensors))
+    if sensors.names:  # in the layout of the CASAS smart homes
+        where, state = Column("room", "category"), Column("state", "category")
+        sensor = Column("sensor", "category", categories=tuple(sensors.names))
+        activity = Column("activity", "string", description="what the person does, if known")
+        specs.append(TableSpec("sensors", (STEP, TIME, where, sensor, state, activity)))
     return specs
 
 
@@ -133,14 +118,6 @@ def _observation_table(
     return TableSpec("observations", tuple(columns))
 
 
-def _sensor_table(sensors: Sensors) -> TableSpec:
-    """Return the table of the readings of sensors, in the layout of the CASAS smart homes."""
-    sensor = Column("sensor", "category", categories=tuple(sensors.names))
-    room, state = Column("room", "category"), Column("state", "category")
-    activity = Column("activity", "string", description="what the person does, if known")
-    return TableSpec("sensors", (STEP, TIME, room, sensor, state, activity))
-
-
 DECISION = (
     Column("behavior", "category", nullable=True, description="the one whose plan it follows"),
     Column("reason", "string", description="the last note of the plan"),
@@ -165,16 +142,6 @@ UNSTORED = (
 ROWS_PER_BODY = 128
 
 
-def activities_of(cameras: Sequence[Cameras], users: int) -> Activities:
-    """Return the activities of users, and how each camera perceives them, before the first one."""
-    senses = {
-        (group.index, c): sense
-        for group in cameras
-        for c, sense in enumerate(group.activity_senses)
-    }
-    return Activities(users, senses)
-
-
 class Recorder:
     """Collects the rows of a run.
 
@@ -185,7 +152,7 @@ class Recorder:
     """
 
     def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
-        """Prepare to record.
+        """Add the tables of the run to its store.
 
         Args:
             basis: The basis of the run.
@@ -194,9 +161,13 @@ class Recorder:
         """
         self.store, self.clock = basis.store, basis.clock
         self.home, self.bodies = basis.home, basis.bodies
-        self._tables = set(basis.store.names)
         self._samples, self._keys = Samples(basis), KeyFrames(basis)
-        self.activities = activities_of(cameras, basis.bodies.users)
+        senses = {(g.index, c): s for g in cameras for c, s in enumerate(g.activity_senses)}
+        self.activities = Activities(basis.bodies.users, senses)
+        perceived = self.activities.are_perceived
+        for spec in table_specs(basis, cameras, sensors, activities=perceived):
+            self.store.add_table(spec)
+        self._tables = set(self.store.names)
         self._users = {actor.name: row for row, actor in enumerate(basis.users)}
         entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
         self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
@@ -207,7 +178,8 @@ class Recorder:
         self._observations: ImmutableRows[SightingTable] = ImmutableRows()
         self._sensors, self._readings = sensors, list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
-        self._camera_codes = _codes_of(cameras)
+        names = camera_names(cameras)
+        self._camera_codes = {g.index: [names.index(n) for n in g.names] for g in cameras if names}
         self._has_unknown_truth = not all(group.knows_truth for group in cameras)
         self._count = 0  # observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
@@ -326,9 +298,8 @@ class Recorder:
 
     def _cameras(self, robot: I32, camera: I8) -> I32:
         """Return the codes of cameras from their indices among the cameras of their robot."""
-        codes = np.zeros(
-            (len(self.bodies), 1 + max(map(len, self._camera_codes.values()))), np.int32
-        )
+        most = 1 + max(map(len, self._camera_codes.values()))
+        codes = np.zeros((len(self.bodies), most), np.int32)
         for index, names in self._camera_codes.items():
             codes[index, : len(names)] = names
         return codes[robot, camera]
@@ -356,13 +327,8 @@ class Recorder:
             columns["user"] = user
         for i in of_users:
             details[i] = ""
-        self.store.append(
-            "events",
-            **columns,
-            entity=rows[order],
-            event=list(map(str, kinds)),
-            detail=details,
-        )
+        words = {"event": list(map(str, kinds)), "detail": details}
+        self.store.append("events", **columns, entity=rows[order], **words)
 
     def _store_decisions(self) -> None:
         if not self._decisions:
@@ -400,11 +366,3 @@ class Recorder:
 
     def _times(self, step: I64) -> dict[str, Any]:
         return {"step": step, "time": self.clock.times(step)}
-
-
-def _codes_of(cameras: Sequence[Cameras]) -> dict[int, list[int]]:
-    """Return the code of each camera of each robot; none if observations don't name cameras."""
-    names = camera_names(cameras)
-    if not names:
-        return {}
-    return {group.index: [names.index(name) for name in group.names] for group in cameras}

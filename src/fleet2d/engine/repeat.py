@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
@@ -99,9 +100,8 @@ def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
     refuse_untrusted(root, content["scenario"], content["interventions"], trust)
     refuse_links(path_in(root, LEARNED_NAME))
     seal = verify_run(root)
-    causes += [
-        f"{name} in {directory} {change} after the run" for name, change in seal.differing.items()
-    ]
+    changes = seal.differing.items()
+    causes += [f"{name} in {directory} {change} after the run" for name, change in changes]
     causes += seal.notes
     causes += [f"{name} in {directory} is not part of the run" for name in seal.foreign]
     with tempfile.TemporaryDirectory() as folder:
@@ -226,20 +226,17 @@ def _simulation(
     content: Mapping[str, Any], out: Path | None, artifacts: Mapping[str, Any] | None = None
 ) -> Simulation:
     # Without its speedup and checkpoints, which would only cost time.
-    scenario = content["scenario"]
-    if not isinstance(scenario.get("simulation"), dict):
+    stored = content["scenario"]
+    if not isinstance(stored.get("simulation"), dict):
         raise RunDirectoryError(f"{FILE_NAME}: scenario.simulation is missing: it can't be run")
     fast = {
-        **scenario,
-        "simulation": {**scenario["simulation"], "speedup": None},
-        "artifacts": {**scenario.get("artifacts", {}), **(artifacts or {})},
+        **stored,
+        "simulation": {**stored["simulation"], "speedup": None},
+        "artifacts": {**stored.get("artifacts", {}), **(artifacts or {})},
     }
     try:
-        simulation = Simulation(
-            load_scenario(fast, "artifacts.checkpoint=off"),
-            out=out,
-            interventions=content["interventions"],
-        )
+        scenario = load_scenario(fast, "artifacts.checkpoint=off")
+        simulation = Simulation(scenario, out=out, interventions=content["interventions"])
         simulation._expect_again(content["expectations"])
         return simulation
     except RecursionError as error:
@@ -286,13 +283,12 @@ def _files(old: Path, new: Path) -> list[str]:
     names = {FLOORPLAN_NAME}
     for root in (old, new):
         names |= {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}
-    return [name for name in sorted(names) if not _are_equal(path_in(old, name), new / name)]
-
-
-def _are_equal(old: Path, new: Path) -> bool:
-    if not (old.is_file() and new.is_file()):
-        return False
-    return old.stat().st_size == new.stat().st_size and old.read_bytes() == new.read_bytes()
+    pairs = {name: (path_in(old, name), new / name) for name in sorted(names)}
+    return [
+        name
+        for name, (before, after) in pairs.items()
+        if not (before.is_file() and after.is_file() and filecmp.cmp(before, after, shallow=False))
+    ]
 
 
 def _other_versions(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
@@ -367,7 +363,10 @@ def _reopen(root: Path, unfinished: UnfinishedRun, trust: Trust) -> tuple[Simula
     with restrict(trust):
         scenario = load_scenario(manifest.scenario)
         try:
-            checkpoint = _checkpoint(unfinished, manifest)
+            checkpoint = Checkpoint.open(unfinished.checkpoint, manifest)
+            last = last_commit(unfinished.folder / JOURNAL_NAME)
+            if last is None or last.end < checkpoint.commit.end:
+                raise UnusableCheckpointError("the journal is shorter than the checkpoint says")
             run = Simulation.reopened(scenario, RunStore(root), unfinished, checkpoint)
         except UnusableCheckpointError as error:
             remark = f"starting again from the first step: {error}"
@@ -376,16 +375,3 @@ def _reopen(root: Path, unfinished: UnfinishedRun, trust: Trust) -> tuple[Simula
             remark = f"continuing from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
     run.catch_up(manifest.interventions)
     return run, remark
-
-
-def _checkpoint(unfinished: UnfinishedRun, manifest: Manifest) -> Checkpoint:
-    """Return the last checkpoint, after checking that the journal has all of its rows.
-
-    Raises:
-        UnusableCheckpointError: There is none, or it can't be used.
-    """
-    checkpoint = Checkpoint.open(unfinished.checkpoint, manifest)
-    last = last_commit(unfinished.folder / JOURNAL_NAME)
-    if last is None or last.end < checkpoint.commit.end:
-        raise UnusableCheckpointError("the journal is shorter than the checkpoint says")
-    return checkpoint

@@ -109,10 +109,8 @@ class Sensors(Watcher):
             return ()
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
-            readings = []
-            for number, state in enumerate(self._states):
-                new = self._read(number, state, view, end)
-                readings += [(number, reading) for reading in new]
+            of_each = [self._read(i, state, view, end) for i, state in enumerate(self._states)]
+        readings = [(i, reading) for i, of_one in enumerate(of_each) for reading in of_one]
         # By step, then by sensor.
         self._readings += sorted(readings, key=lambda item: (item[1].step, item[0]))
         return ()
@@ -136,11 +134,8 @@ class Sensors(Watcher):
 
         The events up to their steps must be known by then: activities are among them.
         """
-        readings, self._readings = self._readings, []
-        return [
-            SensorRow(r.step, number, r.on, self._activity(r.user, r.step))
-            for number, r in readings
-        ]
+        rows, self._readings = self._readings, []
+        return [SensorRow(r.step, i, r.on, self._activity(r.user, r.step)) for i, r in rows]
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
         """Return readings as events, with the sensor and its state in the words of the table."""
@@ -162,9 +157,8 @@ class Sensors(Watcher):
         arrays = (block.x, block.y, block.away == 0)
         last_poses = self._last_poses or tuple(array[:, :1] for array in arrays)
         self._last_poses = tuple(array[:, -1:].copy() for array in arrays)
-        x, y, present = (
-            np.concatenate(pair, axis=1) for pair in zip(last_poses, arrays, strict=True)
-        )
+        pairs = zip(last_poses, arrays, strict=True)
+        x, y, present = (np.concatenate(pair, axis=1) for pair in pairs)
         return SensorView(first, x, y, present, self.users)
 
     def _activity(self, user: int, step: int) -> str:

@@ -18,7 +18,7 @@ from fleet2d.engine.interrupt import WATCHED_EVENTS, Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.recorder import Recorder, activities_of, table_specs
+from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import EventStream, InView, Recall, State
 from fleet2d.engine.world import schedule_script
@@ -52,34 +52,22 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
             changes.declare(index, change)
     with _locate_errors(scenario, "objects"):
         sensors = Sensors(basis, changes.names)
-    activities = activities_of(cameras, basis.bodies.users)
-    for spec in table_specs(basis, cameras, sensors, activities=activities.are_perceived):
-        store.add_table(spec)
     recorder = Recorder(basis, cameras, sensors)
     layers, learners = LayerBook(basis), Learners(basis)
-    for group in [*user_cameras, *cameras]:
-        group.awaited = learners.awaited
-    sensors.awaited = EventKind.SENSOR in learners.awaited
-    conversations = Conversations.of(basis)
-    conversations.awaited = learners.awaited
-    log = _log(basis, cameras, recorder) if learners.all else None
-    if log is not None:
-        log.answers, log.wanted = conversations.log, conversations.wanted
-        log.answer_models = {
-            basis.users[row].name: answers for row, answers in conversations.answers.items()
-        }
-    clearance, blocking = Clearance(basis.users, basis.robots), BlockedWays(basis)
-    encounters, interruptions = Encounters(basis.users, basis.robots), Interruptions(basis)
+    interventions = InterventionQueue(clock)
+    conversations = Conversations(basis, interventions)
+    log = _log(basis, cameras, recorder, conversations) if learners.all else None
+    names = [*(actor.name for actor in basis.actors), *scenario.objects]
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,
         home=basis.home,
         changes=changes,
-        clearance=clearance,
-        blocking=blocking,
-        encounters=encounters,
+        clearance=Clearance(basis.users, basis.robots),
+        blocking=BlockedWays(basis),
+        encounters=Encounters(basis.users, basis.robots),
         conversations=conversations,
-        interruptions=interruptions,
+        interruptions=Interruptions(basis),
         sensors=sensors,
         user_cameras=user_cameras,
         cameras=cameras,
@@ -88,28 +76,14 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         log=log,
         recorder=recorder,
         store=store,
-        events=EventStream(
-            [recorder, sensors, *([] if log is None else [log])],
-            [*(actor.name for actor in basis.actors), *scenario.objects],
-        ),
-        interventions=InterventionQueue(clock),
+        events=EventStream([recorder, sensors, *([] if log is None else [log])], names),
+        interventions=interventions,
         max_span=scenario.simulation.max_span,
-        watchers=[
-            clearance,
-            blocking,
-            *user_cameras,
-            *cameras,
-            encounters,
-            conversations,
-            interruptions,
-            sensors,
-            *layers.areas,
-        ],
     )
     for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)
-    conversations.interventions = state.interventions
     _remember(state, basis)
+    state.wait_for(state.requested)
     # What waits for an event comes last: the event may be one that another entry causes.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
@@ -238,14 +212,15 @@ def _remember(state: State, basis: Basis) -> None:
             cameras.remembered = memory
 
 
-def _log(basis: Basis, cameras: list[Cameras], recorder: Recorder) -> Log:
+def _log(
+    basis: Basis, cameras: list[Cameras], recorder: Recorder, conversations: Conversations
+) -> Log:
     names = [actor.name for actor in basis.actors]
     log = Log(basis.home, basis.clock, names, basis.bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]
-    log.untracked = frozenset(
-        actor.name
-        for actor in basis.users
-        if any(EventKind.UNKNOWN in behavior.records for behavior in actor.behaviors)
-    )
+    behaviors = [(user.name, behavior) for user in basis.users for behavior in user.behaviors]
+    log.untracked = frozenset(name for name, b in behaviors if EventKind.UNKNOWN in b.records)
+    log.answers, log.wanted = conversations.log, conversations.wanted
+    log.answer_models = {basis.users[u].name: each for u, each in conversations.answers.items()}
     log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
     return log

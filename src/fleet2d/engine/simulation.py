@@ -36,13 +36,7 @@ from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import (
-    Constants,
-    copy_state,
-    open_snapshot,
-    read_state,
-    save_snapshot,
-)
+from fleet2d.engine.snapshot import Constants, copy_state, open_snapshot, read_state, save_snapshot
 from fleet2d.engine.state import Listener, State
 from fleet2d.engine.world import repeat, request
 from fleet2d.entities.behavior import Situation
@@ -152,9 +146,9 @@ class Simulation(InterventionMethods):
         except ArtifactError as error:
             store.discard()
             reason = error.__cause__
-            raise (
-                cannot_write(store.directory, reason) if isinstance(reason, OSError) else error
-            ) from reason
+            if isinstance(reason, OSError):
+                raise cannot_write(store.directory, reason) from reason
+            raise
 
     def _store_plan(self) -> None:
         plan = self.home.plan
@@ -479,8 +473,11 @@ class Simulation(InterventionMethods):
         if isinstance(when, int | str | datetime | timedelta):
             step = self._step_of(when)
             if not self.step <= step <= self.clock.steps:
+                how = "after the run"
+                if step < self.step:
+                    how = "past: keep a copy of an earlier step to go back"
                 raise InputError(
-                    f"run_until({when!r}) is {self._describe(step)}; now it is step {self.step},"
+                    f"run_until({when!r}) is {how}; now it is step {self.step},"
                     f" {self.time}, and the run ends at {self.clock.time(self.clock.steps)}"
                 )
             self._run_to(step)
@@ -491,10 +488,6 @@ class Simulation(InterventionMethods):
         while not (holds := when(self)) and self.step < end:
             self._run_to(self.step + 1)
         return holds
-
-    def _describe(self, step: int) -> str:
-        is_past = step < self.step
-        return "past: keep a copy of an earlier step to go back" if is_past else "after the run"
 
     def _end_of_wait(self, timeout: str | timedelta | None) -> int:
         if timeout is None:
@@ -702,10 +695,10 @@ class Simulation(InterventionMethods):
                 return
 
     def _body(self, name: str) -> DecidingActor:
-        for actor in self._state.actors:
-            if actor.name == name:
-                return actor
-        raise ScenarioError(f"there is nobody named {name!r}{suggest(name, self.actors)}")
+        actors = self.actors
+        if name not in actors:
+            raise ScenarioError(f"there is nobody named {name!r}{suggest(name, actors)}")
+        return actors[name]
 
     # Expectations
 
@@ -918,7 +911,9 @@ class Simulation(InterventionMethods):
         state.recorder.end(self.step, len(state.actors))
         if status != "failed":
             self._state.layers.finish(self.step)
-            self._store_learned()
+            if self._store.root is not None and self.scenario.artifacts.learned:
+                notes = self._state.learners.remember(self._store.root / LEARNED_NAME)
+                self._store.manifest.notes += notes
         self._store.close_tables()
         self._loop.save_s += time.perf_counter() - began
         self._describe_end(results)
@@ -957,18 +952,10 @@ class Simulation(InterventionMethods):
                 " because computing took longer"
             )
 
-    def _store_learned(self) -> None:
-        """Store what algorithms have learned; failures are noted in the manifest."""
-        root = self._store.root
-        if root is not None and self.scenario.artifacts.learned:
-            notes = self._state.learners.remember(root / LEARNED_NAME)
-            self._store.manifest.notes += notes
-
     def _store_verdicts(self, results: Mapping[str, Any], status: Status) -> None:
         """Store the verdicts on all expectations."""
-        expectations = self._state.expectations
+        expectations, store = self._state.expectations, self._state.store
         if expectations is not None and status != "failed":
-            store = self._state.store
             ended = status == "complete"
             store.manifest.expectations = expectations.finish(results, store, ended=ended)
 

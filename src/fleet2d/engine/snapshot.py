@@ -32,12 +32,7 @@ from fleet2d import __version__
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import Column, ColumnChunk, TableSpec
-from fleet2d.configuration.trust import (
-    current_trust,
-    is_listed,
-    is_scenario_module,
-    public_name,
-)
+from fleet2d.configuration.trust import current_trust, is_listed, is_scenario_module, public_name
 from fleet2d.engine.basis import ImmutableRows, components_of
 from fleet2d.engine.state import RecentEvents, State
 from fleet2d.engine.trajectories import KeySegment
@@ -103,9 +98,8 @@ def _reduce_array(array: NDArray[Any]) -> tuple[Any, ...]:
     if array.dtype == object:
         return object_array, (array.shape, list(array.ravel()))
     text = plain_type(array.dtype.str).str
-    order: Literal["C", "F"] = (
-        "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
-    )
+    is_fortran = array.flags.f_contiguous and not array.flags.c_contiguous
+    order: Literal["C", "F"] = "F" if is_fortran else "C"
     return plain_array, (text, array.shape, _content(array, order), order, array.flags.writeable)
 
 
@@ -126,20 +120,15 @@ def _reduce_type(kind: np.dtype[Any]) -> tuple[Any, ...]:
     return plain_type, (plain_type(kind.str).str,)
 
 
-_DTYPES = {type(np.dtype(scalar)) for scalar in set(np.sctypeDict.values()) - {np.void, np.object_}}
+_SCALARS = set(np.sctypeDict.values()) - {np.void, np.object_}
+_DTYPES = {type(np.dtype(scalar)) for scalar in _SCALARS}
 
-
-def _reducers() -> dict[type, Any]:
-    scalars = set(np.sctypeDict.values())
-    return {
-        **copyreg.dispatch_table,
-        np.ndarray: _reduce_array,
-        **dict.fromkeys(scalars - {np.void, np.object_}, _reduce_scalar),
-        **dict.fromkeys(_DTYPES, _reduce_type),
-    }
-
-
-REDUCERS = _reducers()
+REDUCERS: dict[type, Any] = {
+    **copyreg.dispatch_table,
+    np.ndarray: _reduce_array,
+    **dict.fromkeys(_SCALARS, _reduce_scalar),
+    **dict.fromkeys(_DTYPES, _reduce_type),
+}
 """The `dispatch_table` of a pickler for arrays, their values and their types."""
 
 
@@ -167,22 +156,8 @@ _SHARED_NAMES = frozenset(
 
 # Names that a file may refer to besides classes of Fleet2D and of the scenario's own modules.
 _ALLOWED = {
-    "builtins": {
-        "bool",
-        "bytearray",
-        "complex",
-        "dict",
-        "float",
-        "frozenset",
-        "int",
-        "list",
-        "object",
-        "range",
-        "set",
-        "slice",
-        "str",
-        "tuple",
-    },
+    "builtins": {"bool", "complex", "float", "int", "object", "range", "slice", "str"}
+    | {"bytearray", "dict", "frozenset", "list", "set", "tuple"},
     "collections": {"Counter", "OrderedDict", "defaultdict", "deque"},
     "copyreg": {"_reconstructor"},
     "datetime": {"date", "datetime", "time", "timedelta"},
@@ -215,14 +190,10 @@ _NO_STATE = (
     "fleet2d.scenario",
     "fleet2d.studies",
     "fleet2d.testing",
-    "fleet2d.configuration.trust",
     "fleet2d.options",
     "fleet2d.pictures",
     "fleet2d.viewer",
 )
-
-# Packages of tables that are written: the state of a run in a directory names its store only.
-_STORES = frozenset({"fleet2d.artifacts.store"})
 
 # Objects that are written as a module and a name.
 _REFERENCES = (type, FunctionType, BuiltinFunctionType)
@@ -255,11 +226,14 @@ def read_state(file: BinaryIO, constants: Constants) -> State:
         ArtifactError: The file contains something else, or is damaged.
     """
     try:
-        return _StateReader(file, constants).state()
+        state = _StateReader(file, constants).load()
     except ArtifactError:
         raise
     except Exception as error:  # a damaged pickle may raise anything
         raise ArtifactError(f"the file holds no state of a run: {error}") from error
+    if not isinstance(state, State):
+        raise ArtifactError("the file holds no state of a run")
+    return state
 
 
 def write_snapshot(
@@ -439,19 +413,14 @@ class _StateWriter(pickle.Pickler):
         name = self._names.get(id(obj))
         if name is not None:
             return name
-        kind = type(obj)
         if isinstance(obj, _REFERENCES) and id(obj) not in self._checked:
-            self._check_reference(obj)
+            module, name = obj.__module__ or "builtins", obj.__qualname__
+            if not may_refer(module, name, self._code) and obj is not type(None):
+                raise ArtifactError(
+                    f"the state of the run can't be written: it refers to {module}.{name}"
+                )
             self._checked.add(id(obj))
-        return ("space", obj.key) if kind is Space else None
-
-    def _check_reference(self, obj: Any) -> None:
-        """Refuse a name that the reader would refuse."""
-        module, name = obj.__module__ or "builtins", obj.__qualname__
-        if not may_refer(module, name, self._code) and obj is not type(None):
-            raise ArtifactError(
-                f"the state of the run can't be written: it refers to {module}.{name}"
-            )
+        return ("space", obj.key) if type(obj) is Space else None
 
 
 class _StateReader(pickle.Unpickler):
@@ -460,13 +429,6 @@ class _StateReader(pickle.Unpickler):
     def __init__(self, file: BinaryIO, constants: Constants) -> None:
         super().__init__(file)
         self._constants, self._code = constants, _OwnCode.of(constants)
-
-    def state(self) -> State:
-        """Return the state."""
-        state = self.load()
-        if not isinstance(state, State):
-            raise ArtifactError("the file holds no state of a run")
-        return state
 
     def persistent_load(self, pid: Any) -> object:
         if isinstance(pid, tuple) and pid[0] == "space":
@@ -477,26 +439,19 @@ class _StateReader(pickle.Unpickler):
         if not is_scenario_module(module):  # it may be one under another name in this process
             top, dot, rest = public_name(module).partition(".")
             module = self._code.packages.get(top, top) + dot + rest
-        is_other_store = module in _STORES and "store" in self._constants
+        # The state of a run in a directory names its store only.
+        is_other_store = module == "fleet2d.artifacts.store" and "store" in self._constants
         # A file imports nothing of the user's: the scenario has imported what was listed.
         is_ours = module.partition(".")[0] == "fleet2d" or name in _ALLOWED.get(module, ())
         is_missing = not is_ours and module not in sys.modules
-        if is_other_store or is_missing or not may_refer(module, name, self._code):
-            raise ArtifactError(
-                f"the file refers to {module}.{name}, which can't be part of a state"
-            )
-        value = super().find_class(module, name)
-        is_allowed = name in _ALLOWED.get(module, ()) or module == __name__
-        # Only a class that the module defines: a class that it imports could be any.
-        is_own = isinstance(value, type) and (value.__module__, value.__qualname__) == (
-            module,
-            name,
-        )
-        if not is_allowed and not is_own:
-            raise ArtifactError(
-                f"the file refers to {module}.{name}, which can't be part of a state"
-            )
-        return value
+        if not is_other_store and not is_missing and may_refer(module, name, self._code):
+            value = super().find_class(module, name)
+            if name in _ALLOWED.get(module, ()) or module == __name__:
+                return value
+            # Only a class that the module defines: a class that it imports could be any.
+            if isinstance(value, type) and (value.__module__, value.__qualname__) == (module, name):
+                return value
+        raise ArtifactError(f"the file refers to {module}.{name}, which can't be part of a state")
 
 
 @dataclass(frozen=True)

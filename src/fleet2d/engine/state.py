@@ -4,8 +4,7 @@ from array import array
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field
-from itertools import chain, islice
-from operator import itemgetter
+from itertools import chain, islice, takewhile
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -42,9 +41,6 @@ if TYPE_CHECKING:
 MAX_STEPS = 1 << 16
 MIN_STEPS = 1 << 12
 MAX_POSES = 1 << 21
-
-
-STEP = itemgetter(0)
 
 
 class EventSink(Protocol):
@@ -126,14 +122,9 @@ class EventStream:
         """Pass events on to all sinks."""
         if not events:
             return
-        self._keep(events)
+        self.keep(events)
         for sink in self.sinks:
             sink.take_events(events)
-
-    def emit_readings(self, events: Sequence[Event]) -> None:
-        """Pass readings of sensors on to listeners, as events."""
-        if events:
-            self._keep(events)
 
     def next_awaited(self, step: int) -> int | None:
         """Return the first step from `step` on with an awaited event that was emitted already."""
@@ -150,11 +141,12 @@ class EventStream:
             if events := [event for event in due if event.event in kinds]:
                 function(events)
 
-    def _keep(self, events: Sequence[Event]) -> None:
+    def keep(self, events: Sequence[Event]) -> None:
+        """Pass events on to listeners only: readings of sensors."""
         excess = len(self._recent) + len(events) - self.CAPACITY
         if excess > 0:
             oldest = islice(chain(self._recent, events), excess)
-            self._first_step = max(self._first_step, max(map(STEP, oldest)) + 1)
+            self._first_step = max(self._first_step, max(event.step for event in oldest) + 1)
         self._recent.extend(events)
         if self.listeners:
             self._unheard += events
@@ -233,7 +225,6 @@ class State:
     events: EventStream
     interventions: InterventionQueue
     max_span: int | None
-    watchers: list[Watcher]
     settled: int = 0
     pending: dict[int, list[SightEvent]] = field(default_factory=dict)
     driven: set[int] = field(default_factory=set)
@@ -242,6 +233,7 @@ class State:
     expectations: "RunExpectations | None" = None
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
+    watchers: list[Watcher] = field(init=False)
     _situation: Situation | None = None  # the newest one
 
     def __getstate__(self) -> dict[str, object]:
@@ -252,6 +244,9 @@ class State:
         """Begin without notes."""
         self.notes_emitted = [0] * len(self.actors)
         self.capacity = capacity_of(len(self.actors))
+        cameras = [*self.user_cameras, *self.cameras]
+        others = self.encounters, self.conversations, self.interruptions, self.sensors
+        self.watchers = [self.clearance, self.blocking, *cameras, *others, *self.layers.areas]
 
     # Decisions of scripts
 
@@ -291,12 +286,8 @@ class State:
         """Return what a body knows at a step; the same object, as long as it knows the same."""
         actor, events = self.actors[row], tuple(self.pending.get(row, ()))
         now, outputs = self._situation, self.learners.readable_outputs
-        if (
-            now is None
-            or now.step != step
-            or now.actor is not actor
-            or (now.events != events or now.outputs is not outputs)
-        ):
+        is_same = now is not None and now.actor is actor and now.outputs is outputs
+        if now is None or not is_same or (now.step, now.events) != (step, events):
             now = self._situation = Situation(actor, step, events, outputs)
         return now
 
@@ -318,21 +309,16 @@ class State:
 
     def emit_notes(self, row: int, step: int) -> None:
         """Emit the notes of a body's plan up to a step as events."""
-        if self.notes_emitted[row] < len(self.actors[row].plan.notes):
-            self.events.emit(self._due_notes(row, step))
+        self.events.emit(self._due_notes(row, step))
 
     def _due_notes(self, row: int, step: int) -> Sequence[Event]:
         """Return the notes of a body's plan up to a step, once, as events."""
-        actor = self.actors[row]
-        notes, begin = actor.plan.notes, self.notes_emitted[row]
-        step_us, name = actor.clock.step_us, actor.name
+        actor, begin = self.actors[row], self.notes_emitted[row]
+        notes, step_us, name = actor.plan.notes, actor.clock.step_us, actor.name
         if begin == len(notes) or notes[begin].time_us > step * step_us:
             return ()
-        last_us, events = step * step_us, []
-        for time_us, event, detail in islice(notes, begin, None):
-            if time_us > last_us:
-                break
-            events.append(new_event((-(-time_us // step_us), name, event, detail)))
+        due = takewhile(lambda note: note.time_us <= step * step_us, islice(notes, begin, None))
+        events = [new_event((-(-time // step_us), name, kind, text)) for time, kind, text in due]
         self.notes_emitted[row] = begin + len(events)
         return events
 
@@ -378,7 +364,7 @@ class State:
         observations, readings = self._observations(), self.sensors.collect()
         if readings:
             events = self.sensors.events_of(readings)
-            self.events.emit_readings(events)
+            self.events.keep(events)
             if EventKind.SENSOR in self.awaited:
                 self.interventions.take_events(events)
         self.recorder.take(first, end, observations, readings)

@@ -7,45 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.artifacts.store import ArtifactSettings
-from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column, TableSpec
+from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.kernels import I64, SUB, Breakpoints, in_radians
-from fleet2d.runtime.clock import HOUR_US, Clock
+from fleet2d.runtime.clock import HOUR_US
 
 STEP = Column("step", "step", description="step at which the row takes effect")
 TIME = Column("time", "time", description="local time")
 X = Column("x", "float64", "m", nullable=True)
 Y = Column("y", "float64", "m", nullable=True)
 HEADING = Column("heading", "float64", "rad", description="counter-clockwise from +x")
-
-
-def away_column(meaning: str) -> Column:
-    """Return the column that is true while a body isn't at home, and what other columns mean then.
-
-    >>> away_column("x and y are missing").description
-    'not at home: x and y are missing'
-    """
-    return Column("away", "bool", description=f"not at home: {meaning}")
-
-
-def in_order(blocks: list[I64]) -> I64:
-    """Join blocks of rows (step, entity, …) and sort them; equal rows keep their order.
-
-    Example:
-        >>> in_order([np.array([[1, 1, 5]]), np.array([[1, 0, 6], [0, 1, 7]])]).tolist()
-        [[0, 1, 7], [1, 0, 6], [1, 1, 5]]
-    """
-    rows = np.concatenate(blocks)
-    return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-
-
-def trajectory_table(entity: Column, room: Column) -> TableSpec:
-    """Return the table of trajectories; `Samples.store` fills its columns."""
-    away = away_column("x, y and room are missing")
-    return TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away))
 
 
 class Samples:
@@ -62,7 +35,12 @@ class Samples:
             ScenarioError: The interval between samples is not a multiple of the step.
         """
         self._store, self._clock, self._home = basis.store, basis.clock, basis.home
-        self._every = _steps_between(basis.scenario.artifacts, basis.clock)
+        every, named = basis.scenario.artifacts.trajectories, {"off": 0, "every step": 1}
+        self._every = (
+            named[every]
+            if isinstance(every, str)
+            else whole_steps(every, self._clock.step_us, "artifacts.trajectories")
+        )
         self._blocks: list[I64] = []
         self.count = 0
 
@@ -88,7 +66,8 @@ class Samples:
         """Append all collected rows to the store."""
         if not self._blocks:
             return
-        rows = in_order(self._blocks)
+        rows = np.concatenate(self._blocks)
+        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
         self._blocks, self.count = [], 0
         step, entity, x, y, heading, away = rows.T
         plan = self._home.plan
@@ -107,19 +86,6 @@ class Samples:
             room=np.where(is_away, np.int32(-1), room),
             away=is_away,
         )
-
-
-def _steps_between(settings: ArtifactSettings, clock: Clock) -> int:
-    """Return the steps between two samples, 0 for no samples.
-
-    Raises:
-        ScenarioError: The interval is not a multiple of the step.
-    """
-    if settings.trajectories == "off":
-        return 0
-    if settings.trajectories == "every step":
-        return 1
-    return whole_steps(settings.trajectories, clock.step_us, "artifacts.trajectories")
 
 
 # Time between the key frames of a random walk [us].
@@ -161,9 +127,7 @@ class KeyFrames:
         # Collected breakpoints of the present plan; the plan before the first has none.
         count = len(basis.actors)
         self._emitted = [2] * count
-        self._complete_until = [-1] * len(
-            basis.actors
-        )  # the end of the last plan, if it was reached
+        self._complete_until = [-1] * count  # the end of the last plan, if it was reached
         self._walkers: set[int] = set()  # bodies whose present plan is a random walk
         self._walked = [1] * count  # the step before which it is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
@@ -228,12 +192,10 @@ class KeyFrames:
 
     def break_off(self, row: int, step: int) -> None:
         """Collect the planned end of the present segment."""
-        motion = self._actors[row].motion
-        if isinstance(motion, Track):
-            begin = self._emitted[row]
-            if begin < len(motion.breakpoints.time):
-                track = motion.breakpoints
-                self._segments.append(KeySegment(track, begin, begin + 1, row, PLANNED, step))
+        motion, begin = self._actors[row].motion, self._emitted[row]
+        if isinstance(motion, Track) and begin < len(motion.breakpoints.time):
+            end = KeySegment(motion.breakpoints, begin, begin + 1, row, PLANNED, step)
+            self._segments.append(end)
 
     def take(self, end: int) -> None:
         """Collect random walks up to step `end` - 1; `collect` the other key frames later.

@@ -85,15 +85,11 @@ class EngineWorld:
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances of the cameras of a robot from the present step on."""
         self._state.settle(self.step)
-        row = self.robots[robot].row
+        row, eyes = self.robots[robot].row, self.robots[robot].entity.eyes
         for cameras in self._state.cameras:
             if cameras.row == row:
                 cameras.disturb(disturbances)
-        dark = {
-            name
-            for name in self.robots[robot].entity.eyes
-            if any(disturbance.dark and disturbance.is_of(name) for disturbance in disturbances)
-        }
+        dark = {name for name in eyes if any(d.dark and d.is_of(name) for d in disturbances)}
         for area in self._state.layers.areas:
             if area.row == row:
                 area.darken(dark)
@@ -231,14 +227,13 @@ def _schedule(state: State, entry: Entry, world: EngineWorld, index: int | None 
         rank, number, by = OUTSIDE, len(interventions.requests), ""
         content = entry.model_dump(mode="json", exclude_defaults=True)
         interventions.requests.append({"do": content.pop("do"), "step": first, **content})
+    due = DueIntervention(first, rank, number, entry.act, by)
     for step in steps:
-        interventions.add(DueIntervention(step, rank, number, entry.act, by))
+        interventions.add(due._replace(step=step))
     if entry.on is None:
         return
-    delay_us = micros(entry.delay)
-    interventions.waiting.append(
-        PendingIntervention(entry.on, entry.each, delay_us, first, entry.act, rank, number, by)
-    )
+    pending = PendingIntervention(entry.on, entry.each, micros(entry.delay), due)
+    interventions.waiting.append(pending)
     if interventions not in state.events.sinks:
         state.events.sinks.append(interventions)
     state.wait_for(state.requested)
