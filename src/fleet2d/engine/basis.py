@@ -137,8 +137,7 @@ def input_files(scenario: Scenario) -> list[Path]:
     """
     files: set[Path] = set()
     for component in components_of(scenario):
-        files_of = getattr(component, "files", None)
-        if files_of:
+        if files_of := getattr(component, "files", None):
             with blame(component.type_name, None):
                 files |= set(files_of())
         files |= {value for _, value in component if isinstance(value, Path) and value.is_file()}

@@ -31,7 +31,6 @@ from fleet2d.kernels import (
     About,
     DetectionRule,
     GhostDraw,
-    Heights,
     Lenses,
     PoseBlock,
     Poses,
@@ -136,7 +135,7 @@ class Cameras(Watcher):
 
     knows_truth = True
     notes: tuple[str, ...] = ()
-    _levels: Heights  # of its cameras and what they look at, if heights matter
+    _levels: tuple[I64, I64, I64]  # of cameras and what they look at, if heights matter
 
     def __init__(self, row: int, shared: SightSetup) -> None:
         """Set up the cameras of the body in a row.

@@ -190,7 +190,7 @@ def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -
     ends = (away_x - vx) ** 2 + (away_y - vy) ** 2 < near
     beside = (away_x * vy - away_y * vx).astype(np.float64)
     passes = beside * beside < near.astype(np.float64) * way.astype(np.float64)
-    nearer: Bool = (towards > 0) & (away_x * dx + away_y * dy > 0)
+    nearer = (towards > 0) & (away_x * dx + away_y * dy > 0)
     return nearer & np.where(towards < way, passes, ends)
 
 

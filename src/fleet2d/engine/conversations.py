@@ -319,8 +319,7 @@ class Conversations(Watcher):
         """Give an answer: tell the robot, and let it keep to it."""
         row, text, reply = pending.robot, pending.text, pending.reply
         queue, time = self.queues[row], self.actors[row].clock.time(step)
-        request = queue.find(text)
-        if request is not None:
+        if (request := queue.find(text)) is not None:
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
         user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])

@@ -102,8 +102,7 @@ class Pair:
     def _armed(self, limit: int, factor: tuple[int, int], before: bool) -> Bool:
         """Return where the person would notice the robot again, as it has been farther away."""
         far = limit * factor[0] // factor[1]
-        has_left: Bool = np.logical_or.accumulate(self.distances > far * far)
-        return has_left | before
+        return np.logical_or.accumulate(self.distances > far * far) | before
 
     def _close_run(self) -> I64:
         """Return the number of steps for which the robot has been too close, at each step."""

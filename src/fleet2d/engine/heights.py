@@ -1,6 +1,7 @@
 """Heights of cameras, bodies and furniture: who stands behind a sofa is seen by the head."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -38,10 +39,12 @@ class BodyHeights:
         tall = np.array([actor.entity.tall for actor in actors])
         postures = [tall, SEAT_M + SITTING * tall, np.minimum(LYING_M, tall)]
         self.tops = _millimetres(np.stack(postures, axis=1))
-        self._furniture: tuple[object, tuple[I64, ...]] = (None, ())
+        self._furniture: tuple[object, Any] = (None, ())
 
-    def levels(self, row: int, cameras: Iterable[Camera], others: slice, points: int) -> Heights:
-        """Return the heights of the cameras of a body, and of the points that they look at.
+    def levels(
+        self, row: int, cameras: Iterable[Camera], others: slice, points: int
+    ) -> tuple[I64, I64, I64]:
+        """Return the heights of the cameras of a body, of the points that they look at, and `tops`.
 
         Args:
             row: The row of the body.
@@ -53,22 +56,14 @@ class BodyHeights:
         mounted = [HEAD * own[0] if c.height is None else 1000 * c.height for c in cameras]
         shares = np.array([HEAD, *(AROUND[i % len(AROUND)] for i in range(points - 1))])
         looked_at = np.rint(self.tops[others, :, None] * shares).astype(np.int64)
-        return Heights(
-            eyes=np.rint(np.outer(mounted, own / own[0])).astype(np.int64),
-            points=np.repeat(looked_at[None], len(mounted), axis=0),
-            tops=self.tops,
-            corners=np.zeros((0, 2), np.int64),
-            start=np.zeros(1, np.int64),
-            boxes=np.zeros((0, 4), np.int64),
-            top=np.zeros(0, np.int64),
-        )
+        eyes = np.rint(np.outer(mounted, own / own[0])).astype(np.int64)
+        return eyes, np.repeat(looked_at[None], len(mounted), axis=0), self.tops
 
-    def with_furniture(self, levels: Heights, home: Home) -> Heights:
-        """Return levels with the furniture that is in the home at present."""
+    def with_furniture(self, levels: tuple[I64, I64, I64], home: Home) -> Heights:
+        """Return levels with those of the furniture that is in the home at present."""
         if self._furniture[0] is not home.objects:
             self._furniture = home.objects, _stacked(home)
-        corners, start, boxes, top = self._furniture[1]
-        return levels._replace(corners=corners, start=start, boxes=boxes, top=top)
+        return Heights(*levels, *self._furniture[1])
 
 
 def _stacked(home: Home) -> tuple[I64, I64, I64, I64]:

@@ -163,8 +163,7 @@ class HomeEmpty(Interrupt):
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps all people are away."""
-        away: Bool = (span.poses.away[: span.users] != 0).all(axis=0)
-        return away
+        return (span.poses.away[: span.users] != 0).all(axis=0)
 
 
 @register("interrupt", "home_occupied")
@@ -173,5 +172,4 @@ class HomeOccupied(Interrupt):
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps somebody is at home."""
-        home: Bool = (span.poses.away[: span.users] == 0).any(axis=0)
-        return home
+        return (span.poses.away[: span.users] == 0).any(axis=0)

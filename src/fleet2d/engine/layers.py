@@ -293,8 +293,7 @@ class LayerBook:
     def keep(self, end: int) -> None:
         """Store the layers that are due after the step before `end`."""
         for layer in self._home.layers.values():
-            every = self._period(layer)
-            if every and end % every == 0:
+            if (every := self._period(layer)) and end % every == 0:
                 self._put(layer, end - 1)
 
     def finish(self, end: int) -> None:
@@ -372,24 +371,15 @@ def _with_storage(cells: LayerSettings, storage: LayerSettings) -> LayerSettings
     return cells.model_copy(update={"store": storage.store, "every": storage.every})
 
 
-def _cell_settings(
-    dtype: LayerType, fill: float, description: str, unit: str = ""
-) -> LayerSettings:
-    return LayerSettings.model_construct(
-        dtype=dtype, fill=fill, unit=unit, description=description, store=False, every=None
-    )
+def _cells(dtype: LayerType, fill: float, description: str, unit: str = "") -> LayerSettings:
+    settings = {"dtype": dtype, "fill": fill, "unit": unit, "description": description}
+    return LayerSettings.model_construct(**settings, store=False, every=None)
 
 
 _SEEN = {
-    "explored": _cell_settings("bool", 0, "whether the robot has had the cell in view"),
-    "first_seen": _cell_settings(
-        "int64", -1, "first step with the cell in view of the robot, -1 for none"
-    ),
-    "last_seen": _cell_settings(
-        "int64", -1, "last step with the cell in view of the robot, -1 for none"
-    ),
-    "time_since_seen": _cell_settings(
-        "float64", np.nan, "since the robot had the cell in view", "s"
-    ),
+    "explored": _cells("bool", 0, "whether the robot has had the cell in view"),
+    "first_seen": _cells("int64", -1, "first step with the cell in view of the robot, -1 for none"),
+    "last_seen": _cells("int64", -1, "last step with the cell in view of the robot, -1 for none"),
+    "time_since_seen": _cells("float64", np.nan, "since the robot had the cell in view", "s"),
 }
-_COSTS = _cell_settings("int32", 0, "what a way costs besides its length, -1 where none leads", "%")
+_COSTS = _cells("int32", 0, "what a way costs besides its length, -1 where none leads", "%")

@@ -142,12 +142,10 @@ def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool
         begins: Whether it begins a new plan at this step.
     """
     actor, blocking = state.actors[row], state.blocking
-    other = blocking.in_way(state.bodies, row)
-    if other is None:
+    if (other := blocking.in_way(state.bodies, row)) is None:
         return False
     situation = Situation(actor, step, (), state.learners.readable_outputs)
-    plan = blocking.plan(situation, other)
-    if plan is None:
+    if (plan := blocking.plan(situation, other)) is None:
         return False
     if not begins:
         state.end_plan(row, step)

@@ -47,7 +47,8 @@ class Sensors(Watcher):
     """All sensors of a scenario.
 
     Attributes:
-        names: Their names, in the order of the scenario.
+        sensors: The sensors by name, in the order of the scenario.
+        names: Their names.
         next_step: The first step at which the sensors have not been read.
         rooms: The room in the readings of each sensor.
         words: The words of each sensor for its two states, on and off.
@@ -61,8 +62,7 @@ class Sensors(Watcher):
         self.stuck: dict[str, SensorFault] = {}
         self.awaited = False
         self._readings: list[tuple[int, SensorReading]] = []  # not collected yet
-        self.sensors: list[Sensor] = []
-        self.names: list[str] = []
+        self.sensors: dict[str, Sensor] = {}
         for name, item in basis.scenario.objects.items():
             if isinstance(item, Sensor):
                 sensor = item.model_copy(deep=True)
@@ -73,18 +73,18 @@ class Sensors(Watcher):
                     check_known(sensor.of, "door", doors, where=f"objects.{name}.of: ")
                     sensor.watch(list(doors).index(sensor.of))
                 sensor.start(home, step_us)
-                self.names.append(name)
-                self.sensors.append(sensor)
-        self.rooms = [sensor.room or sensor.place(home) for sensor in self.sensors]
-        self.words = [sensor.words for sensor in self.sensors]
-        self._states = [SensorState(sensor.hold_us() // step_us) for sensor in self.sensors]
+                self.sensors[name] = sensor
+        self.names, sensors = list(self.sensors), self.sensors.values()
+        self.rooms = [sensor.room or sensor.place(home) for sensor in sensors]
+        self.words = [sensor.words for sensor in sensors]
+        self._states = {n: SensorState(s.hold_us() // step_us) for n, s in self.sensors.items()}
         self._last_poses: tuple[np.ndarray, ...] | None = None
         self._activities: dict[str, list[tuple[int, str]]] = {user.name: [] for user in basis.users}
 
     @property
     def on(self) -> dict[str, bool]:
         """Whether each sensor is on at present."""
-        return {name: state.on for name, state in zip(self.names, self._states, strict=True)}
+        return {name: state.on for name, state in self._states.items()}
 
     @property
     def waits(self) -> bool:
@@ -97,8 +97,8 @@ class Sensors(Watcher):
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
             self._last_poses = last_poses
-            for number, state in enumerate(self._states):
-                readings = self._read(number, copy(state), view, end)
+            for name, state in self._states.items():
+                readings = self._read(name, copy(state), view, end)
                 end = min([end, *(reading.step + 1 for reading in readings)])
         return end
 
@@ -109,18 +109,18 @@ class Sensors(Watcher):
             return ()
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
-            of_each = [self._read(i, state, view, end) for i, state in enumerate(self._states)]
+            of_each = [self._read(name, each, view, end) for name, each in self._states.items()]
         readings = [(i, reading) for i, of_one in enumerate(of_each) for reading in of_one]
         # By step, then by sensor.
         self._readings += sorted(readings, key=lambda item: (item[1].step, item[0]))
         return ()
 
     def _read(
-        self, number: int, state: SensorState, view: SensorView, end: int
+        self, name: str, state: SensorState, view: SensorView, end: int
     ) -> list[SensorReading]:
         """Return the readings of a sensor before step `end`, and update its state."""
-        steps, users = self.sensors[number].sense(view, self.home)
-        fault = self.stuck.get(self.names[number])
+        steps, users = self.sensors[name].sense(view, self.home)
+        fault = self.stuck.get(name)
         if fault == "on":
             steps = np.arange(view.first, end)
             users = np.full(len(steps), -1)

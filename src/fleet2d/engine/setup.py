@@ -126,8 +126,7 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
 
 def _cameras_of(row: int, shared: SightSetup) -> Cameras:
     """Return the cameras of one body, or what it perceives in place of their view."""
-    source = getattr(shared.actors[row].entity, "perceives", None)
-    if source is None:
+    if (source := getattr(shared.actors[row].entity, "perceives", None)) is None:
         return Cameras(row, shared)
     from fleet2d.engine.real_sight import RealSight  # few runs need it
 

@@ -891,21 +891,12 @@ class Simulation(InterventionMethods):
         began = time.perf_counter()
         if status == "interrupted" and self._keeper is not None:
             self._keeper.checkpoint(self._state)
-        # After a failure the metrics are not computed: they could fail, too, and lose the tables.
-        results: dict[str, Any] = {}
         state = self._state
         with suppress(Exception) if status == "failed" else nullcontext():
             state.settle(self.step)
             state.events.deliver(self.step)
-        if state.log and status != "failed":
-            state.count_looks()
-            try:
-                results = state.learners.finish(self.step, state.log)
-                self._store.manifest.notes += self._state.learners.idle_notes()
-            except BaseException as error:
-                self._fail(error)
-                raise
-        self._store_verdicts(results, status)
+        # After a failure the metrics are not computed: they could fail, too, and lose the tables.
+        results = {} if status == "failed" else self._measure(ended=status == "complete")
         self._loop.simulate_s += time.perf_counter() - began
         began = time.perf_counter()
         state.recorder.end(self.step, len(state.actors))
@@ -952,12 +943,21 @@ class Simulation(InterventionMethods):
                 " because computing took longer"
             )
 
-    def _store_verdicts(self, results: Mapping[str, Any], status: Status) -> None:
-        """Store the verdicts on all expectations."""
-        expectations, store = self._state.expectations, self._state.store
-        if expectations is not None and status != "failed":
-            ended = status == "complete"
-            store.manifest.expectations = expectations.finish(results, store, ended=ended)
+    def _measure(self, *, ended: bool) -> dict[str, Any]:
+        """Return the results of the metrics, and store the verdicts on all expectations."""
+        results: dict[str, Any] = {}
+        state, manifest = self._state, self._store.manifest
+        if state.log:
+            state.count_looks()
+            try:
+                results = state.learners.finish(self.step, state.log)
+            except BaseException as error:
+                self._fail(error)
+                raise
+            manifest.notes += state.learners.idle_notes()
+        if state.expectations is not None:
+            manifest.expectations = state.expectations.finish(results, self._store, ended=ended)
+        return results
 
     def _fail(self, error: BaseException) -> None:
         """Close the run as failed, so that it can be read up to the failure."""

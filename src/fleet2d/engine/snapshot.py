@@ -172,27 +172,10 @@ _CONSTRUCTORS = frozenset({"object_array", "plain_array", "plain_scalar", "plain
 
 # Packages without classes of states: their objects could read, write or run something.
 _NO_STATE = (
-    "fleet2d.artifacts.arrow",
-    "fleet2d.artifacts.unfinished",
-    "fleet2d.storage",
-    "fleet2d.runs",
-    "fleet2d.cli",
-    "fleet2d.configuration.components",
-    "fleet2d.configuration.documents",
-    "fleet2d.engine.checkpoint",
-    "fleet2d.engine.repeat",
-    "fleet2d.engine.simulation",
-    "fleet2d.engine.snapshot",
-    "fleet2d.fit",
-    "fleet2d.configuration.trust",
-    "fleet2d.paper",
-    "fleet2d.published",
-    "fleet2d.scenario",
-    "fleet2d.studies",
-    "fleet2d.testing",
-    "fleet2d.options",
-    "fleet2d.pictures",
-    "fleet2d.viewer",
+    *("artifacts.arrow", "artifacts.unfinished", "storage", "runs", "scenario", "options"),
+    *("configuration.components", "configuration.documents", "configuration.trust"),
+    *("engine.checkpoint", "engine.repeat", "engine.simulation", "engine.snapshot"),
+    *("cli", "fit", "paper", "pictures", "published", "studies", "testing", "viewer"),
 )
 
 # Objects that are written as a module and a name.
@@ -503,7 +486,7 @@ def may_refer(module: str, name: str, code: _OwnCode | None = None) -> bool:
     """
     if name in _ALLOWED.get(module, ()) or (module == __name__ and name in _CONSTRUCTORS):
         return True
-    if f"{module}.".startswith(tuple(f"{package}." for package in _NO_STATE)):
+    if f"{module}.".startswith(tuple(f"fleet2d.{package}." for package in _NO_STATE)):
         return False
     if module.partition(".")[0] == "fleet2d":
         return True

@@ -331,8 +331,7 @@ class State:
                 if note.event in kinds and at >= step:
                     steps.append(at)
                     break
-        logged = None if self.log is None else self.log.next_event(step, kinds)
-        if logged is not None:
+        if self.log is not None and (logged := self.log.next_event(step, kinds)) is not None:
             steps.append(logged)
         return min(steps, default=None)
 

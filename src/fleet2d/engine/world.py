@@ -48,9 +48,8 @@ class EngineWorld:
     def __init__(self, state: State, step: int) -> None:
         self._state, self.step = state, step
         self.home, self.clock = state.home, state.changes.clock
-        self.doors = state.changes.names
-        sensors = zip(state.sensors.names, state.sensors.sensors, strict=True)
-        self.sensors: Mapping[str, Sensor] = dict(sensors)
+        self.doors: Sequence[str] = state.changes.names
+        self.sensors: Mapping[str, Sensor] = state.sensors.sensors
         self.algorithms: Sequence[str] = state.learners.known
 
     @cached_property

@@ -384,8 +384,7 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
         "interrupted": "was interrupted: it holds what was stored until then",
     }
     notes = [f"{root} {states[manifest.status]}"] if manifest.status in states else []
-    names = sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}"))
-    if names:
+    if names := sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}")):
         notes.append(f"cut off and not readable: {printable(', '.join(names))}")
     return notes
 

@@ -132,8 +132,7 @@ class Sun:
         twilight = np.timedelta64(TWILIGHT)
         risen = (times - rise[which] + twilight) / (2 * twilight)
         left = (fall[which] - times + twilight) / (2 * twilight)
-        share: F64 = np.clip(np.minimum(risen, left), 0, 1)
-        return share
+        return np.clip(np.minimum(risen, left), 0, 1)
 
     def end_at(self, time: datetime) -> datetime | None:
         """Return the end of the night that a moment lies in; None by day."""

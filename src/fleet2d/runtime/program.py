@@ -196,8 +196,7 @@ class ExternalProgram:
                 raise TimeoutError
             if all(end != from_program for end, _ in ready):
                 continue
-            part = os.read(from_program, READ_SIZE)
-            if not part:
+            if not (part := os.read(from_program, READ_SIZE)):
                 return None
             self._unread += part
             if answer is None and len(self._unread) >= needed:

@@ -138,8 +138,7 @@ class McapWriter:
         at = self._put(_record(CHUNK, times, _text(COMPRESSION), size, data))
         length, indices = self._at - at, {}
         for topic, channel in self._channels.items():
-            own = [i for i, block in enumerate(blocks) if block.topic == topic]
-            if own:
+            if own := [i for i, block in enumerate(blocks) if block.topic == topic]:
                 pairs = [np.stack([blocks[i].times, places[i]], axis=-1) for i in own]
                 index = np.concatenate(pairs)
                 index = index[np.argsort(index[:, 1])].astype("<u8")
