@@ -267,11 +267,8 @@ class ParquetTable:
         if self._is_published:
             return
         self._writer.close()
-        handle = os.open(self.partial, os.O_RDWR)
-        try:
-            files.sync(handle)
-        finally:
-            os.close(handle)
+        with self.partial.open("rb+") as file:
+            files.sync(file.fileno())
 
     def publish(self) -> None:
         """Rename the finished temporary file to its final name."""

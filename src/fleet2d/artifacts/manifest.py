@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
@@ -240,7 +239,7 @@ def time_problem(start: str, step_us: int, steps: int) -> str:
     if not start:
         return "start is empty"
     try:
-        _ = datetime.fromisoformat(start) + timedelta(microseconds=steps * step_us)
+        _ = dt.datetime.fromisoformat(start) + dt.timedelta(microseconds=steps * step_us)
     except OverflowError:
         return f"{steps} steps from {start} end after the year 9999"
     return ""

@@ -163,13 +163,12 @@ class RunStore:
         self,
         directory: Path | str | None,
         specs: Iterable[TableSpec] = (),
-        manifest: Manifest | None = None,
         *,
         flush_rows: int = FLUSH_ROWS,
     ) -> None:
         """Write nothing yet: `open` does."""
         self.directory = None if directory is None else Path(directory)
-        self.manifest = manifest or Manifest()
+        self.manifest = Manifest()
         self.root = None if self.directory is None else self.directory.absolute()
         self._flush_rows = flush_rows
         self._tables: dict[str, TableWriter] = {}

@@ -300,12 +300,8 @@ class Cameras(Watcher):
         seen = self.memory.seen.tolist()
         if 1 not in seen:  # a quick answer, as policies ask for it again and again
             return {}
-        xy_of = self.owner.home.plan.lattice.xy_of
-        return {
-            self.name_of(identity): xy_of(*self.perceived[identity].tolist())
-            for identity, is_seen in enumerate(seen)
-            if is_seen
-        }
+        xy_of, places = self.owner.home.plan.lattice.xy_of, self.perceived.tolist()
+        return {self.name_of(i): xy_of(*places[i]) for i, is_seen in enumerate(seen) if is_seen}
 
     def name_of(self, identity: int) -> str:
         """Return the name of an identity; empty for somebody unknown."""

@@ -54,12 +54,8 @@ class Pass(NamedTuple):
     blocker: int = -1
 
 
-class PoseColumns(NamedTuple):
-    """Places of bodies at consecutive steps, (bodies, steps) each."""
-
-    x: I64
-    y: I64
-    away: I64 | U8
+Places = tuple[I64, I64, I64 | U8]
+"""x and y of bodies at consecutive steps, and whether they are away: (bodies, steps) each."""
 
 
 class BlockedWays(Watcher):
@@ -88,9 +84,9 @@ class BlockedWays(Watcher):
         """Return the step at which a body has to decide: not the first of the span."""
         first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
-        poses = PoseColumns(block.x, block.y, block.away)
+        places = block.x, block.y, block.away
         for row in self.rows:
-            meeting = self._first_meeting(poses, row, first, np.arange(1, end - first))
+            meeting = self._first_meeting(places, row, first, np.arange(1, end - first))
             end = end if meeting is None else first + meeting[0]
         return end
 
@@ -100,8 +96,7 @@ class BlockedWays(Watcher):
         if bodies.pose_at(row, step)[:2] == bodies.pose_at(row, step + 1)[:2]:
             return None  # mostly it rests
         x, y, _, away = bodies.poses(np.array([step, step + 1])).T
-        poses = PoseColumns(x, y, away)
-        meeting = self._first_meeting(poses, row, step, np.array([0]))
+        meeting = self._first_meeting((x, y, away), row, step, np.array([0]))
         return None if meeting is None else meeting[1]
 
     def plan(self, now: Situation, other: int) -> Plan | None:
@@ -137,10 +132,10 @@ class BlockedWays(Watcher):
         return any(pair.blocker == other and pair.until > step for pair in pairs)
 
     def _first_meeting(
-        self, poses: PoseColumns, row: int, first: int, columns: I64
+        self, places: Places, row: int, first: int, columns: I64
     ) -> tuple[int, int] | None:
         """Return the first of some columns at which another body blocks one, and its row."""
-        x, y, away = poses
+        x, y, away = places
         moved = (x[row, columns + 1] != x[row, columns]) | (y[row, columns + 1] != y[row, columns])
         moves = columns[moved & ((away[row, columns] | away[row, columns + 1]) == 0)]
         # A robot with `gives_way` keeps clear of people by that option.
@@ -203,11 +198,8 @@ class Clearance(Watcher):
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
         self._users = users
-        self.robots = {
-            len(users) + i: robot
-            for i, robot in enumerate(robots)
-            if isinstance(robot.entity, Robot) and robot.entity.gives_way is not None and users
-        }
+        polite = [r for r in robots if getattr(r.entity, "gives_way", None) is not None]
+        self.robots = {robot.row: robot for robot in polite if users}
 
     @property
     def waits(self) -> bool:

@@ -68,11 +68,7 @@ class Pair:
             "robot_coming": self._first_coming(block),
             "robot_close": _first(self._close_run() == self.attention.patience),
         }
-        return [
-            Encounter(column, event, self.robot, self)
-            for event, column in kinds.items()
-            if column is not None
-        ]
+        return [Encounter(c, kind, self.robot, self) for kind, c in kinds.items() if c is not None]
 
     def hears(self, column: int) -> bool:
         """Whether the person hears a call of the robot at a step: a column of the scanned span."""
@@ -156,12 +152,8 @@ class Encounters(Watcher):
 
     def __init__(self, users: Sequence[DecidingActor], robots: Sequence[DecidingActor]) -> None:
         self._robots = robots
-        self.pairs = [
-            Pair(user, robot, user.attention)
-            for user in users
-            if user.attention is not None
-            for robot in robots
-        ]
+        pairs = ((user, robot) for user in users for robot in robots)
+        self.pairs = [Pair(u, r, u.attention) for u, r in pairs if u.attention is not None]
         self._calls: list[PlannedNote] = []  # of users, at the ends of plans
         self._ahead: list[Encounter] = []
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []
@@ -180,10 +172,8 @@ class Encounters(Watcher):
         """Return the step after the first encounter, `end` if there is none."""
         first, block = self.next_step, bodies.block(self.next_step, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
-        calls = self._calls + [
-            c for robot in self._robots for c in notes_of(robot, EventKind.CALLS)
-        ]
-        self._calls = []
+        planned = [c for robot in self._robots for c in notes_of(robot, EventKind.CALLS)]
+        calls, self._calls = [*self._calls, *planned], []
         self._ahead += [
             Encounter(step - first, "robot_calls", pair.robot, pair)
             for step, row, user in calls

@@ -7,17 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fleet2d.algorithms.history import SensorRow
-from fleet2d.algorithms.observations import Activities, SightingTable
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.configuration.units import MICROSECOND
-from fleet2d.engine.cameras import Cameras
-from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.intervention_queue import InterventionQueue, possible_details, possible_events
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import STEP, TIME
-from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals
@@ -63,19 +60,12 @@ class RunExpectations:
     def __init__(
         self,
         scenario: Scenario,
-        actors: Sequence[DecidingActor],
-        bodies: Bodies,
-        changes: ChangeQueue,
+        run: MeasuredRun,
         sensors: Sensors,
-        cameras: Sequence[Cameras],
-        activities: Activities,
         interventions: InterventionQueue,
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
-        home, clock, doors = changes.home, changes.clock, changes.names
-        groups = {group.owner.name: group for group in cameras}
-        self._run = MeasuredRun(actors, bodies, home, clock, doors, sensors.on, groups, activities)
-        self.actors, self.bodies, self.clock = actors, bodies, clock
+        self._run, self.actors, self.bodies, self.clock = run, run.actors, run.bodies, run.clock
         self._scenario, self._sensors, self._queue = scenario, sensors, interventions
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,8 @@ from fleet2d.algorithms.history import Log
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, Watcher
-from fleet2d.entities.behavior import Actor
 from fleet2d.entities.body import Bodies
-from fleet2d.entities.entity import Robot
+from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.costmap import CostmapSettings, costs_of
 from fleet2d.floorplan.home import Home
@@ -60,31 +59,25 @@ class SeenArea(Watcher):
 
     def __init__(
         self,
-        robot: Actor,
-        row: int,
+        robot: DecidingActor,
         patches: Patches,
         bodies: Bodies,
-        *,
-        every: int = 1,
-        keeps_first: bool = True,
-        keeps_last: bool = True,
-        bin_steps: int = 0,
+        layers: Set[str],
+        every: int,
+        bin_steps: int,
     ) -> None:
         """Start with no cell seen.
 
         Args:
             robot: The robot.
-            row: Its row among the bodies.
             patches: The parts of rooms that bins distinguish.
             bodies: All bodies of the run.
+            layers: The names of the layers that are needed.
             every: Number of steps between two looks; each look counts for this many steps.
-            keeps_first: Whether `explored` and `first_seen` are available.
-            keeps_last: Whether `last_seen` and `time_since_seen` are available.
             bin_steps: Steps in a bin of exposure, for `take_bins`; 0: no bins.
         """
-        assert isinstance(robot.entity, Robot)
-        self.robot, self.row, self.every, self._patches = robot, row, every, patches
-        self._bodies = bodies
+        self.robot, self.row, self.every, self._patches = robot, robot.row, every, patches
+        self._bodies, self._bin_steps = bodies, bin_steps
         plan = robot.home.plan
         lattice, step_us = plan.lattice, robot.clock.step_us
         lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
@@ -93,6 +86,8 @@ class SeenArea(Watcher):
         self._lenses = stack_lenses(lenses, [False] * len(lenses), context)
         self._open_lenses = self._lenses
         grid, none = (lattice.rows, lattice.columns), (0, 0)
+        keeps_first = not layers.isdisjoint({"explored", "first_seen"})
+        keeps_last = not layers.isdisjoint({"last_seen", "time_since_seen"})
         self._record = CoverageRecord(
             first=np.full(grid if keeps_first else none, NEVER, np.int64),
             last=np.full(grid if keeps_last else none, NEVER, np.int64),
@@ -101,7 +96,6 @@ class SeenArea(Watcher):
             binned=np.zeros(none, np.int64),
             peak=np.zeros(none, np.int64),
         )
-        self._bin_steps = bin_steps
         # Cells in view, summed and at most, from bin _first_bin on.
         self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
         self._first_bin = 0
@@ -215,9 +209,8 @@ def add_layers(home: Home, source: FloorPlanSource) -> None:
     layers = dict(source.layers)
     costs = layers.pop(COSTMAP, None)
     if source.costmap is not None or costs is not None:
-        layer = home.layers.add_layer(
-            COSTMAP, _with_storage(_COSTS, costs or LayerSettings(store=False))
-        )
+        settings = _with_storage(_COSTS, costs or LayerSettings(store=False))
+        layer = home.layers.add_layer(COSTMAP, settings)
         footprints = [item.footprint for item in home.objects if item.blocks != "nothing"]
         layer.values = costs_of(home.plan, source.costmap or CostmapSettings(), footprints)
     for name, settings in layers.items():
@@ -258,7 +251,8 @@ class LayerBook:
         self._exposes = "exposure" in needs
         self._bin_steps = steps_of_bin(self._clock.step_us) if "evidence" in needs else 0
         self._logged_bins = 0
-        self._patches = _patches(basis.home, "patches" if self._bin_steps else "rooms")
+        cut, key = (patches_of, "patches") if self._bin_steps else (whole_rooms, "rooms")
+        self._patches: Patches = basis.home.cached((key,), lambda: cut(basis.home.plan))
         self.areas = self._open_areas(basis, names) if names else []
         self._add_seen_layers(scenario, needs)
         self.next_due(0)
@@ -307,18 +301,9 @@ class LayerBook:
         every, step_us = basis.scenario.sight.seen_every, self._clock.step_us
         steps = 1 if every is None else whole_steps(every, step_us, "sight.seen_every")
         return [
-            SeenArea(
-                actor,
-                row,
-                self._patches,
-                basis.bodies,
-                every=steps,
-                keeps_first=not names.isdisjoint({"explored", "first_seen"}),
-                keeps_last=not names.isdisjoint({"last_seen", "time_since_seen"}),
-                bin_steps=self._bin_steps,
-            )
-            for row, actor in enumerate(basis.actors)
-            if isinstance(actor.entity, Robot) and actor.entity.eyes
+            SeenArea(robot, self._patches, basis.bodies, names, steps, self._bin_steps)
+            for robot in basis.robots
+            if robot.entity.eyes
         ]
 
     def _add_seen_layers(self, scenario: Scenario, needs: Set[str]) -> None:
@@ -329,9 +314,8 @@ class LayerBook:
                 continue
             settings = _with_storage(cells, storage or LayerSettings(store=False))
             for area in self.areas:
-                self._home.layers.add_layer(
-                    f"{name}.{area.robot.name}", settings, _Cells(area, name)
-                )
+                layer = f"{name}.{area.robot.name}"
+                self._home.layers.add_layer(layer, settings, _Cells(area, name))
 
     def _period(self, layer: Layer) -> int:
         """Return the steps between two times at which a layer is stored; 0 for never."""
@@ -347,12 +331,6 @@ class LayerBook:
         steps = np.full(len(columns["row"]), step, np.int64)
         self._store.append(spec.name, step=steps, time=self._clock.times(steps), **columns)
         self._stored_at[layer.name] = step
-
-
-def _patches(home: Home, cut_by: Literal["patches", "rooms"]) -> Patches:
-    """Return the parts of rooms to distinguish, computed once for a home."""
-    of = patches_of if cut_by == "patches" else whole_rooms
-    return home.cached((cut_by,), lambda: of(home.plan))
 
 
 @dataclass(frozen=True)
@@ -372,8 +350,8 @@ def _with_storage(cells: LayerSettings, storage: LayerSettings) -> LayerSettings
 
 
 def _cells(dtype: LayerType, fill: float, description: str, unit: str = "") -> LayerSettings:
-    settings = {"dtype": dtype, "fill": fill, "unit": unit, "description": description}
-    return LayerSettings.model_construct(**settings, store=False, every=None)
+    texts: dict[str, Any] = {"unit": unit, "description": description}
+    return LayerSettings.model_construct(dtype=dtype, fill=fill, store=False, every=None, **texts)
 
 
 _SEEN = {

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fleet2d.algorithms.observations import SightingTable
-from fleet2d.engine.cameras import Cameras, Look, newest_of
+from fleet2d.engine.cameras import Cameras, Look, SightSetup, newest_of
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import SIGHTING, EvidenceSource, LiveDetections
@@ -31,8 +31,13 @@ class RealSight(Cameras):
     The cameras say what it watched; whom it perceived is the source's, or also the source's.
     """
 
-    def prepare(self, source: EvidenceSource) -> None:
-        """Set the source, a component of the scenario, and start it."""
+    def __init__(self, row: int, shared: SightSetup, source: EvidenceSource) -> None:
+        """Set up the cameras of the body in a row, and start its source.
+
+        Raises:
+            ScenarioError: See `Cameras`.
+        """
+        super().__init__(row, shared)
         self.source = source.model_copy()
         self.knows_truth = source.besides_cameras
         self.expect_disturbances()

@@ -130,9 +130,7 @@ def _cameras_of(row: int, shared: SightSetup) -> Cameras:
         return Cameras(row, shared)
     from fleet2d.engine.real_sight import RealSight  # few runs need it
 
-    sight = RealSight(row, shared)
-    sight.prepare(source)
-    return sight
+    return RealSight(row, shared, source)
 
 
 def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basis:

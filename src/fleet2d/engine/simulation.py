@@ -280,11 +280,8 @@ class Simulation(InterventionMethods):
     @property
     def algorithms(self) -> dict[str, Algorithm]:
         """The algorithms in the run, by name: configuration, and what they have learned."""
-        return {
-            learner.name: learner.component
-            for learner in self._state.learners.all
-            if isinstance(learner.component, Algorithm)
-        }
+        pairs = ((each.name, each.component) for each in self._state.learners.all)
+        return {name: component for name, component in pairs if isinstance(component, Algorithm)}
 
     def events(self, since: int = 0) -> list[Event]:
         """Return the events from a step on, up to the present one, in order.

@@ -16,7 +16,6 @@ import json
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from functools import cache
@@ -47,6 +46,7 @@ from fleet2d.kernels import Mesh, Timelines
 from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
+from fleet2d.storage.files import partial_file
 
 # Booleans, numbers, times and text of a fixed length.
 _PLAIN = frozenset("biufcmMSU")
@@ -260,16 +260,12 @@ def save_snapshot(
     if not isinstance(path, str | Path):
         write_snapshot(path.write, state, constants, header)
         return
-    partial = Path(f"{path}.partial")
-    try:
-        with partial.open("wb") as file:
-            write_snapshot(file.write, state, constants, header)
-        partial.replace(path)
-    except OSError as error:
-        raise ArtifactError(f"{path} can't be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):
-            partial.unlink()  # if it was not renamed
+    with (
+        os_errors_as(ArtifactError, f"{path} can't be written"),
+        partial_file(Path(path)) as partial,
+        partial.open("wb") as file,
+    ):
+        write_snapshot(file.write, state, constants, header)
 
 
 class _SnapshotParts:

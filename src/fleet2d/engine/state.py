@@ -263,20 +263,16 @@ class State:
 
     def expect(self, scenario: Scenario, name: str, expectation: "Expectation", since: int) -> None:
         """Add an expectation that is judged from a step on; see `RunExpectations.add`."""
-        # It imports much that other runs don't need.
+        # They import much that other runs don't need.
         from fleet2d.engine.expectations import RunExpectations
+        from fleet2d.expectations.signals import MeasuredRun
 
         if self.expectations is None:
-            self.expectations = RunExpectations(
-                scenario,
-                self.actors,
-                self.bodies,
-                self.changes,
-                self.sensors,
-                [*self.user_cameras, *self.cameras],
-                self.recorder.activities,
-                self.interventions,
-            )
+            cameras = {c.owner.name: c for c in [*self.user_cameras, *self.cameras]}
+            changes, now = self.changes, self.recorder.activities
+            home, clock, doors, on = self.home, changes.clock, changes.names, self.sensors.on
+            run = MeasuredRun(self.actors, self.bodies, home, clock, doors, on, cameras, now)
+            self.expectations = RunExpectations(scenario, run, self.sensors, self.interventions)
             self.events.sinks.append(self.expectations)
         self.expectations.add(name, expectation, since, self.settled)
 
@@ -293,7 +289,7 @@ class State:
 
     def end_plan(self, row: int, step: int) -> None:
         """Record the plan of a body up to the step at which it is replaced."""
-        self.emit_notes(row, step)
+        self.events.emit(self._due_notes(row, step))
         self.recorder.before_plan(row, step)
         self.encounters.before_plan(row, self.actors[row], step)
         self.conversations.before_plan(row, self.actors[row], step)
@@ -301,15 +297,11 @@ class State:
     def begin_plan(self, row: int, step: int) -> None:
         """Record the beginning of a body's new plan."""
         self.notes_emitted[row] = 0
-        self.emit_notes(row, step)
+        self.events.emit(self._due_notes(row, step))
         self.recorder.after_plan(row, step)
         self.interruptions.expect(row)
         if self.expectations is not None:
             self.expectations.begin_plan(self.actors[row])
-
-    def emit_notes(self, row: int, step: int) -> None:
-        """Emit the notes of a body's plan up to a step as events."""
-        self.events.emit(self._due_notes(row, step))
 
     def _due_notes(self, row: int, step: int) -> Sequence[Event]:
         """Return the notes of a body's plan up to a step, once, as events."""

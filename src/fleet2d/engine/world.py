@@ -270,9 +270,8 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
     Raises:
         ScenarioError: It can't happen; the message lists the events that can.
     """
-    possible = possible_events(
-        world.users.values(), world.robots.values(), world.home, world.doors, world.sensors
-    )
+    users, robots = world.users.values(), world.robots.values()
+    possible = possible_events(users, robots, world.home, world.doors, world.sensors)
     if trigger.entity is not None and (not trigger.entity or trigger.entity not in possible):
         names = [name for name in possible if name]
         raise ScenarioError(
@@ -291,7 +290,7 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
         raise ScenarioError(
             f"{trigger.event!r} can never happen {place}{suggest(trigger.event, kinds, 'What can')}"
         )
-    details = possible_details(world.users.values(), world.robots.values(), world.acts)
+    details = possible_details(users, robots, world.acts)
     own = f"{trigger.event} {trigger.entity}"  # such as the activities of one user
     known = details.get(own if own in details else trigger.event)
     # An empty detail is somebody who isn't recognized.

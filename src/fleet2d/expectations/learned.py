@@ -32,11 +32,6 @@ class _Value(NumberSignal):
         """The name of the algorithm or metric."""
         return self.path.partition(".")[0]
 
-    @property
-    def parts_of_path(self) -> list[str]:
-        """The names after it, which select the number."""
-        return self.path.split(".")[1:]
-
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the home; there is no value before the first update."""
         return run.home
@@ -78,7 +73,7 @@ class output(_Value):
         keep = np.ones(len(next(iter(columns.values()))), np.bool_)
         words = {n: c for n, c in columns.items() if c.dtype.kind == "O"}
         number = next((n for n, c in columns.items() if c.dtype.kind in "fiub"), None)
-        for part in self.parts_of_path:
+        for part in self.path.split(".")[1:]:
             if part in columns and part not in words:
                 number = part
                 continue
@@ -132,7 +127,7 @@ class metric(_Value):
         Raises:
             ScenarioError: The path leads to no number.
         """
-        for part in self.parts_of_path:
+        for part in self.path.split(".")[1:]:
             if not isinstance(result, Mapping) or part not in result:
                 if isinstance(result, Mapping) and not result:
                     return float("nan")

@@ -1,7 +1,7 @@
 """The operators of expectations: when something must hold, for how long, and how often."""
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from datetime import timedelta
 from functools import reduce
@@ -174,32 +174,31 @@ class eventually(Limited):
 
     def slack(self, run: RunSignals) -> int | None:
         """Return how many steps before the time limit it was fulfilled."""
-        if self.within is None:
-            return None
-        return self.slack_at(run.first, self.spans(run), run)
+        return self.least_slack([run.first], run)
 
-    def spans(self, run: RunSignals) -> I64:
-        """Return the stretches in which the operand holds: int64 (n, 2), first and last step."""
-        return self.part.robustness(run, False).spells
-
-    def slack_at(self, first: int, spans: I64, run: RunSignals) -> int | None:
-        """Return how many steps before the deadline the first of some spans begins.
+    def least_slack(self, steps: Sequence[int], run: RunSignals) -> int | None:
+        """Return how many steps before the time limit it was fulfilled, on the worst occasion.
 
         Args:
-            first: The step from which the time counts.
-            spans: What `spans` returns.
+            steps: The steps from which the time counts.
             run: The measured signals.
 
         Returns:
-            The steps; None while a span may still begin in time.
+            The steps; None without a limit, or while all may still be fulfilled in time.
         """
-        low, high_end = run.reach(self.within)
-        first, deadline = first + low, first + high_end
-        index = int(np.searchsorted(spans[:, 1], first))
-        if index == len(spans) and deadline >= run.end:
+        if self.within is None:
             return None
-        begin = max(int(spans[index, 0]), first) if index < len(spans) else run.end
-        return deadline - begin
+        slacks: list[int] = []
+        low, high_end = run.reach(self.within)
+        spans = self.part.robustness(run, False).spells  # first and last steps
+        for step in steps:
+            first, deadline = step + low, step + high_end
+            index = int(np.searchsorted(spans[:, 1], first))
+            if index < len(spans):
+                slacks.append(deadline - max(int(spans[index, 0]), first))
+            elif deadline < run.end:
+                slacks.append(deadline - run.end)
+        return min(slacks, default=None)
 
 
 class at_end(Word, Temporal):
@@ -325,9 +324,7 @@ class after(Limited):
         """The expectation that must hold at each step at which the trigger begins."""
         return self.part if self.within is None else eventually(self.part, within=self.within)
 
-    def last(self, run: RunSignals) -> int:
-        """Return the last step that has been simulated: the trigger may begin at any."""
-        return run.end - 1
+    last = Temporal.last  # the trigger may begin at any step
 
     def triggered(self, run: RunSignals) -> I64:
         """Return the steps at which the trigger begins: int64 (n,), ascending."""
@@ -336,10 +333,8 @@ class after(Limited):
     def judged(self, run: RunSignals) -> I64:
         """Return those at which the rest of the run can't change whether the condition holds."""
         steps = self.triggered(run)
-        best, worst = (
-            self.consequence.robustness(run, high).values(steps) for high in (True, False)
-        )
-        return steps[(best < 0) | (worst > 0)]
+        best, worst = (self.consequence.robustness(run, high) for high in (True, False))
+        return steps[(best.values(steps) < 0) | (worst.values(steps) > 0)]
 
     def untested(self, run: RunSignals) -> str:
         """Return why no occasion was judged."""
@@ -373,11 +368,9 @@ class after(Limited):
     def slack(self, run: RunSignals) -> int | None:
         """Return how many steps before the time limit it was fulfilled, on the worst occasion."""
         expected = self.consequence
-        if not isinstance(expected, eventually) or expected.within is None:
+        if not isinstance(expected, eventually):
             return None
-        spans = expected.spans(run)
-        slacks = (expected.slack_at(at, spans, run) for at in self.triggered(run).tolist())
-        return min((slack for slack in slacks if slack is not None), default=None)
+        return expected.least_slack(self.triggered(run).tolist(), run)
 
 
 class answered(Limited):
@@ -479,8 +472,14 @@ class count(Total):
 
     def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
         """Return how many occasions have passed."""
-        steps = self.part.occasions(run)
-        return lambda first, end: _counts(steps, first, end)
+        steps = np.sort(self.part.occasions(run))
+
+        def count_in(first: int, end: int) -> Trace:
+            inside = steps[(steps >= first) & (steps < end)]
+            start = np.union1d([first], inside).astype(np.int64)
+            return Trace(start, np.searchsorted(inside, start, side="right").astype(float), end)
+
+        return count_in
 
 
 class share(Total):
@@ -558,13 +557,6 @@ class at_most(Invariant):
     def operand(self) -> Expectation:
         """The condition that it hasn't begun more often."""
         return count(self.part, per=self.per) <= self.times
-
-
-def _counts(steps: I64, first: int, end: int) -> Trace:
-    """Return how many of `steps` have passed at each step from `first` on."""
-    steps = np.sort(steps[(steps >= first) & (steps < end)])
-    start = np.union1d([first], steps).astype(np.int64)
-    return Trace(start, np.searchsorted(steps, start, side="right").astype(np.float64), end)
 
 
 def _period_begins(run: RunSignals, per: str | None) -> list[int]:

@@ -170,16 +170,11 @@ class RosMessages:
         return bytes(self.types.serialize_cdr(message, message.__msgtype__))
 
     def _map(self, time: int) -> bytes:
-        plan = self._run.plan
-        lattice = plan.lattice
-        stamp = self._header(time, "map").stamp
-        x, y = lattice.origin
-        corner = self._pose(x, y, 0.0, 1.0)
-        info = self._new(
-            "nav_msgs/msg/MapMetaData", stamp, lattice.cell, lattice.columns, lattice.rows, corner
-        )
+        plan, header = self._run.plan, self._header(time, "map")
+        lattice, corner = plan.lattice, self._pose(*plan.lattice.origin, 0.0, 1.0)
+        size = lattice.cell, lattice.columns, lattice.rows
+        info = self._new("nav_msgs/msg/MapMetaData", header.stamp, *size, corner)
         grid = np.where(plan.free, 0, 100).astype(np.int8).ravel()
-        header = self._header(time, "map")
         return self._data(self._new("nav_msgs/msg/OccupancyGrid", header, info, grid))
 
     def _pose(self, x: float, y: float, z: float, w: float) -> Any:

@@ -116,8 +116,7 @@ class Run:
     @property
     def digest(self) -> str | None:
         """Digest of all tables; None if the run was never closed."""
-        digest = self.manifest["digest"]
-        return None if digest is None else str(digest)
+        return self.manifest["digest"]
 
     @property
     def clock(self) -> Clock:

@@ -93,22 +93,15 @@ class McapWriter:
     def __init__(self, file: BinaryIO, topics: Sequence[tuple[Topic, str]]) -> None:
         """Begin a file with topics and the definitions of their messages."""
         self._file, self._at = file, 0
-        self._channels = {topic.name: i + 1 for i, (topic, _) in enumerate(topics)}
-        self._definitions = b"".join(
-            _record(
-                SCHEMA,
-                struct.pack("<H", i + 1),
-                *map(_text, (topic.type, "ros2msg", definition)),
-            )
-            + _record(
-                CHANNEL,
-                struct.pack("<HH", i + 1, i + 1),
-                _text(topic.name),
-                _text("cdr"),
-                _map(_text(key) + _text(value) for key, value in _metadata(topic).items()),
-            )
-            for i, (topic, definition) in enumerate(topics)
-        )
+        self._channels: dict[str, int] = {}
+        definitions = []
+        for number, (topic, definition) in enumerate(topics, 1):
+            self._channels[topic.name], code = number, struct.pack("<H", number)
+            texts = map(_text, (topic.type, "ros2msg", definition))
+            qos = _map(_text(key) + _text(value) for key, value in _metadata(topic).items())
+            definitions.append(_record(SCHEMA, code, *texts))
+            definitions.append(_record(CHANNEL, code, code, _text(topic.name), _text("cdr"), qos))
+        self._definitions = b"".join(definitions)
         self._chunks: list[_WrittenChunk] = []
         self.counts: Counter[str] = Counter()
         self._put(MAGIC, _record(HEADER, _text("ros2"), _text("fleet2d")), self._definitions)
