@@ -127,15 +127,12 @@ def label_objects(plan: FloorPlan, axes: Axes) -> None:
     for item in plan.objects:
         x0, y0, x1, y1 = item.footprint.bounds
         label = item.type.replace("_", " ")
-        across, up = x1 - x0, y1 - y0
-        flat = min(across / (LETTER_WIDTH * len(label)), up / 1.2) * points_per_m
-        upright = min(up / (LETTER_WIDTH * len(label)), across / 1.2) * points_per_m
-        size = min(max(flat, upright), LABEL_PT[1])
+        space = (x1 - x0) * points_per_m, (y1 - y0) * points_per_m
+        size, rotation = _fit(space, LETTER_WIDTH * len(label), 1.2, LABEL_PT[1])
         if size < LABEL_PT[0] or item.type in UNLABELLED:
             continue
         middle = item.footprint.centroid
         style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
-        rotation = 90 * (upright > flat)
         axes.text(middle.x, middle.y, label, fontsize=size, rotation=rotation, zorder=4, **style)
 
 
@@ -144,6 +141,17 @@ def _points_per_m(axes: Axes) -> float:
     axes.apply_aspect()  # needed for the transform to pixels
     pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
     return float(pixels[1, 0] - pixels[0, 0]) * 72 / axes.figure.dpi
+
+
+def _fit(space: tuple[float, float], width: float, height: float, most: float) -> tuple[float, int]:
+    """Return the size of a text that fits into a space [points], and its rotation [degrees].
+
+    Its width and height are in multiples of its size. It is upright if it would be too small.
+    """
+    across, up = space
+    flat, upright = min(across / width, up / height), min(up / width, across / height)
+    is_upright = flat < min(upright, SMALL_PT)
+    return min(upright if is_upright else flat, most), 90 * is_upright
 
 
 def _symbol(item: PlacedObject) -> list[F64]:
@@ -196,6 +204,7 @@ SHORT_SIDE_IN = 3.2
 DPI = 150
 MAX_FONT_PT = 9.0
 MIN_FONT_PT = 3.5
+SMALL_PT = 5.0
 # Width of a letter of the font as a share of its size; share of a room that its name may fill.
 FILL = 0.9
 # The middle of a room consists of cells with at least this share of its greatest squared depth.
@@ -445,20 +454,17 @@ def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
         inside = plan.room_of_cell == room.index
     row, column = _middle(inside)
     across, up = _clear_lengths(plan.lattice.cell, inside, row, column)
-    points_per_m = _points_per_m(axes)
+    points_per_m = FILL * _points_per_m(axes)
+    space = across * points_per_m, up * points_per_m
     name_and_area = f"{room.name}\n{room.area_m2:,.1f} m²"
     for text in (name_and_area, room.name.rpartition("_")[2]):
-        # Widths and heights in multiples of the font size.
         lines = text.split("\n")
         width, height = LETTER_WIDTH * max(map(len, lines)), 1.5 * len(lines)
-        flat = FILL * points_per_m * min(across / width, up / height)
-        upright = FILL * points_per_m * min(up / width, across / height)
-        is_upright = flat < min(upright, 5.0)
-        size = min(upright if is_upright else flat, MAX_FONT_PT)
+        size, rotation = _fit(space, width, height, MAX_FONT_PT)
         if size >= MIN_FONT_PT:
             x, y = plan.lattice.to_metres(plan.lattice.cell_centre(row, column)).tolist()
             style: dict[str, Any] = {"ha": "center", "va": "center", "color": TEXT_COLOR}
-            axes.text(x, y, text, fontsize=size, rotation=90 * is_upright, zorder=5, **style)
+            axes.text(x, y, text, fontsize=size, rotation=rotation, zorder=5, **style)
             return
 
 

@@ -497,25 +497,18 @@ def best_view(
     if len(index) == 0:
         index = np.arange(len(robot.step))
     index = index[:: 1 + len(index) // CANDIDATES]
-    highest, best = -1.0, None
     near, far = camera["range"]
     sector_area = (far**2 - near**2) * np.deg2rad(camera["angle_deg"]) / 2
-    for i in index.tolist():
-        if robot.room[i] < 0:
-            continue
-        outline = field_of_view(plan, robot.xy[i], float(robot.heading[i]), camera)
-        area = outline.area
-        step = int(robot.step[i])
-        users = seen_xy[seen_at == step]
-        score = area if area < 0.97 * sector_area else 0.3 * area
+    scored: list[tuple[float, CameraView]] = []
+    for i in index[robot.room[index] >= 0].tolist():
+        step, xy, heading = int(robot.step[i]), robot.xy[i], float(robot.heading[i])
+        region, users = field_of_view(plan, xy, heading, camera), seen_xy[seen_at == step]
+        score = region.area * (1.0 if region.area < 0.97 * sector_area else 0.3)
         if len(users):
-            distance = float(np.hypot(*(users - robot.xy[i]).T).max())
-            score *= min(1.0, distance / FAR_APART_M)
-        if score > highest:
-            highest = score
-            parts = [shapely.get_coordinates(p.exterior) for p in shapely.get_parts(outline)]
-            best = CameraView(robot, step, robot.xy[i], float(robot.heading[i]), parts, users)
-    return best
+            score *= min(1.0, float(np.hypot(*(users - xy).T).max()) / FAR_APART_M)
+        parts = [shapely.get_coordinates(part.exterior) for part in region.geoms]
+        scored.append((score, CameraView(robot, step, xy, heading, parts, users)))
+    return max(scored, key=lambda each: each[0])[1] if scored else None
 
 
 def field_of_view(

@@ -282,11 +282,11 @@ class _Picture:
             self.notes.append(f"{MAX_BODIES} of {len(names)} {bucket} are shown")
         if not self.steps:
             return []
-        traces = []
-        for number, name in enumerate(names[:MAX_BODIES]):
-            trace = trace_of(self.run, self.plan, name, number, robot=robot)
-            if trace is not None:
-                traces.append(trace)
+        stored = (
+            trace_of(self.run, self.plan, name, number, robot=robot)
+            for number, name in enumerate(names[:MAX_BODIES])
+        )
+        traces = [trace for trace in stored if trace is not None]
         if names and not traces:
             self.notes.append(f"where {bucket} were is not stored")
         return traces

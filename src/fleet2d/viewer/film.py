@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -222,7 +221,7 @@ def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_P
 def draw_frames(stage: Stage, first: int, moments: I64) -> Iterator[tuple[int, U8]]:
     """Yield the number and the pixels of some frames of a film."""
     canvas: Any = stage.figure.canvas
-    for _, artist in (*stage.body_artists, *stage.clock_artists):
+    for artist in (*stage.body_artists, *stage.clock_artists):
         artist.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(stage.figure.bbox)
@@ -230,13 +229,13 @@ def draw_frames(stage: Stage, first: int, moments: I64) -> Iterator[tuple[int, U
     width, height = canvas.get_width_height()
     stamps = TextStamps(width, height, stage.figure.dpi)
 
-    def draw(artists: Sequence[tuple[Axes | None, Artist]]) -> None:
+    def draw(artists: Sequence[Artist]) -> None:
         pixels = np.asarray(canvas.buffer_rgba())
-        for axes, artist in artists:
+        for artist in artists:
             if isinstance(artist, Text):
                 stamps.paste(artist, pixels)
-            elif axes is not None:
-                axes.draw_artist(artist)
+            elif artist.axes is not None:
+                artist.axes.draw_artist(artist)
 
     for moment in moments.tolist():
         if stage.show(first + moment * stage.stride):

@@ -205,16 +205,14 @@ class Stage:
         return [*below, self._noses, self._discs]
 
     @property
-    def body_artists(self) -> list[tuple[Axes, Artist]]:
+    def body_artists(self) -> list[Artist]:
         """The artists of bodies, of their paths and of their views, in the order of drawing."""
-        names = (body.name for body in self.bodies)
-        return [(self._axes, artist) for artist in (*self._collections, *names)]
+        return [*self._collections, *(body.name for body in self.bodies)]
 
     @property
-    def clock_artists(self) -> list[tuple[Axes | None, Artist]]:
+    def clock_artists(self) -> list[Artist]:
         """The artists that change while nobody moves: the cursor of the strip, and the texts."""
-        cursor = [] if self._cursor is None else [(self._strip, self._cursor)]
-        return [*cursor, (None, self._clock), (None, self._away)]
+        return [*filter(None, [self._cursor]), self._clock, self._away]
 
     def show(self, step: int) -> bool:
         """Show a step of the run; return whether any body, path or view differs from before."""
