@@ -15,12 +15,7 @@ from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.configuration.units import WEEKDAYS
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.kernels import F64, I64
-from fleet2d.metrics.rtp_score import (
-    calibration_error,
-    classwise_error,
-    reliability_curve,
-    top_k,
-)
+from fleet2d.metrics.rtp_score import calibration_error, classwise_error, reliability_curve, top_k
 from fleet2d.pictures.floorplan import picture, write_picture
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life

@@ -50,7 +50,8 @@ def convert_file(old: Path, new: Path) -> list[str]:
     reader.check_kind()
     data = _convert(reader, old, new)
     remarks = reader.finish()
-    _write_new(new, _header(old, remarks) + _dump(data))
+    style: dict[str, Any] = {"sort_keys": False, "default_flow_style": None, "width": 100}
+    _write_new(new, _header(old, remarks) + yaml.safe_dump(data, allow_unicode=True, **style))
     return remarks
 
 
@@ -128,12 +129,6 @@ def _move_starts(
 # The new file
 
 
-def _dump(data: Mapping[str, Any]) -> str:
-    return yaml.safe_dump(
-        data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
-    )
-
-
 def _header(old: Path, remarks: list[str]) -> str:
     """Return the comment at the top: the source of the scenario, and all remarks."""
     text = (
@@ -142,17 +137,12 @@ def _header(old: Path, remarks: list[str]) -> str:
     lines = [text, *(["What changed:"] if remarks else []), *(f"- {remark}" for remark in remarks)]
     # Only printable characters, as a line break in a key would end the comment.
     printable = ("".join(c if c.isprintable() else "?" for c in line) for line in lines)
-    wrapped = (
-        textwrap.wrap(
-            line,
-            98,
-            subsequent_indent="  " * line.startswith("- "),
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-        for line in printable
-    )
-    return "".join(f"# {line}\n" for part in wrapped for line in part) + "\n"
+    wrapper = textwrap.TextWrapper(98, break_long_words=False, break_on_hyphens=False)
+    wrapped = []
+    for line in printable:
+        wrapper.subsequent_indent = "  " * line.startswith("- ")
+        wrapped += wrapper.wrap(line)
+    return "".join(f"# {line}\n" for line in wrapped) + "\n"
 
 
 def _check_target(new: Path) -> None:

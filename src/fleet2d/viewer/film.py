@@ -143,13 +143,7 @@ MAX_WAITING = 16
 
 
 def write_film(
-    run: Run,
-    path: Path,
-    first: int,
-    end: int,
-    *,
-    speed: float = 60.0,
-    height: int = HEIGHT_PX,
+    run: Run, path: Path, first: int, end: int, *, speed: float = 60.0, height: int = HEIGHT_PX
 ) -> int:
     """Write a stretch of a run as a film; return the number of distinct frames.
 

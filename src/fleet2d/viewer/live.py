@@ -145,9 +145,8 @@ class LiveEngine:
         """
         name, place = order["target"], (order["x"], order["y"])
         if order["action"] == "door":
-            self.simulation.change(
-                HomeChange(open=name) if order["value"] else HomeChange(shut=name)
-            )
+            change = HomeChange(open=name) if order["value"] else HomeChange(shut=name)
+            self.simulation.change(change)
         elif order["action"] == "place":
             self.simulation.put(name, self._near(name, place))
             if name in self._called:
@@ -310,10 +309,8 @@ class LiveRun:
 
     def _apply(self, order: LiveOrder) -> None:
         action = order["action"]
-        if action == "pause":
-            self._paused = True
-        elif action == "resume":
-            self._paused = False
+        if action in ("pause", "resume"):
+            self._paused = action == "pause"
         elif action == "end":
             self._is_ending = True
         elif action == "speed":

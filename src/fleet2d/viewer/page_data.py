@@ -273,17 +273,15 @@ def embedded_run(data: PageData, first: int, end: int) -> dict[str, Any]:
     """Return all data of a run that the page needs, as its type ``EmbeddedRun``."""
     facts: RunFacts = {**data.facts, "first_step": first, "end_step": end}
     is_whole = first == 0 and end == facts["steps"]
-    tables = {}
-    for table in facts["tables"]:
-        name = table["name"]
-        if name == KEY_FRAMES and facts["walks_every_s"] > 0:
-            name = POSES
-        tables[name] = _base64_table(data, name, None if is_whole else (first, end))
+    names = [table["name"] for table in facts["tables"]]
+    if facts["walks_every_s"] > 0:
+        names = [POSES if name == KEY_FRAMES else name for name in names]
+    part = None if is_whole else (first, end)
     return {
         "facts": facts,
         "sightings": [_cut(lane, first, end) for lane in data.sightings],
         "walls": data.all_walls(),
-        "tables": tables,
+        "tables": {name: _base64_table(data, name, part) for name in names},
     }
 
 

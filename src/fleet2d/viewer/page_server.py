@@ -158,11 +158,7 @@ MEDIA = {
 
 
 def page_app(
-    runs: ServedRuns,
-    token: str,
-    port: int,
-    live: LiveRuns | None = None,
-    seen_at: str = "",
+    runs: ServedRuns, token: str, port: int, live: LiveRuns | None = None, seen_at: str = ""
 ) -> ASGIApp:
     """Return the application that serves the page and some runs.
 
