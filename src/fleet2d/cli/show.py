@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from fleet2d.configuration.problems import refusal, suggest
+from fleet2d.configuration.problems import suggest, validating
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
     Resolution,
@@ -31,7 +31,7 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
     Raises:
         InputError: There is no such persona, or the file is not a persona.
     """
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import TypeAdapter
 
     from fleet2d.pictures.charts import diary_days, diary_lines, draw_diary
     from fleet2d.routines.persona import AnyPersona, bundled_names
@@ -46,10 +46,8 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
             f"there is no persona {name!r}{suggest(name, bundled_names())}; your own is the path of"
             " a YAML file"
         )
-    try:
+    with validating(name):
         persona = TypeAdapter(AnyPersona).validate_python(name)
-    except ValidationError as error:
-        raise refusal(name, error) from None
     diary = diary_days(persona, days, seed)
     target = out or Path(f"{path.stem}-diary.png")
     draw_diary(persona, path.stem, diary, target)

@@ -1,6 +1,7 @@
 """Errors that validators raise: a message about a key, with the nearest valid name."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, get_args
 
 from fleet2d.bounds import one_line
@@ -87,6 +88,21 @@ def refusal(prefix: str, error: "ValidationError") -> ScenarioError:
     key = ".".join(str(part) for part in first["loc"])
     reason = first.get("ctx", {}).get("error", first["msg"])
     return ScenarioError(": ".join(filter(None, [prefix, key, str(reason)])))
+
+
+@contextmanager
+def validating(prefix: str) -> Iterator[None]:
+    """Raise a ScenarioError, on one line, in place of a validation's errors in the block.
+
+    Args:
+        prefix: The beginning of the message, as of `refusal`.
+    """
+    from pydantic_core import ValidationError
+
+    try:
+        yield
+    except ValidationError as error:
+        raise refusal(prefix, error) from None
 
 
 def did_you_mean(name: object, known: Iterable[object]) -> str:

@@ -3,10 +3,10 @@
 from datetime import timedelta
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import check_known, refusal, suggest
+from fleet2d.configuration.problems import check_known, suggest, validating
 from fleet2d.configuration.units import AngleDeg, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior
 from fleet2d.entities.body import Pose
@@ -207,10 +207,8 @@ class Configure(BodyIntervention):
         """Return the behavior with the changed keys, not started."""
         behavior = actor.behaviors[behavior_number(actor, self.behavior)]
         present = behavior.model_dump(mode="json", exclude_defaults=True)
-        try:
+        with validating(f"behavior {self.behavior} of {self.entity}"):
             return type(behavior).model_validate({**present, **self.keys})
-        except ValidationError as error:
-            raise refusal(f"behavior {self.behavior} of {self.entity}", error) from None
 
 
 @register("intervention", "drive")

@@ -28,10 +28,10 @@ from fleet2d.configuration.problems import (
     did_you_mean,
     problem,
     problem_at,
-    refusal,
     rewrite,
     shown,
     suggest,
+    validating,
 )
 from fleet2d.configuration.units import (
     Duration,
@@ -293,10 +293,8 @@ def parse_intervention(content: Mapping[str, Any]) -> Intervention:
         >>> parse_intervention({"put": "ana", "to": "kitchen"}).to
         ('kitchen',)
     """
-    try:
+    with validating(""):
         return _ADAPTER.validate_python(content)
-    except ValidationError as error:
-        raise refusal("", error) from None
 
 
 def dump_intervention(act: Intervention) -> dict[str, Any]:
@@ -513,10 +511,8 @@ def parse_entry(content: Mapping[str, Any]) -> Entry:
     Raises:
         ScenarioError: It is not valid; the message says what is wrong.
     """
-    try:
+    with validating(""):
         return Entry.model_validate(dict(content))
-    except ValidationError as error:
-        raise refusal("", error) from None
 
 
 def causes_errors(act: Intervention, robot: str) -> bool:

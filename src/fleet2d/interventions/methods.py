@@ -5,10 +5,8 @@ from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from typing import Any, Literal, cast
 
-from pydantic import ValidationError
-
 from fleet2d.configuration.components import lookup
-from fleet2d.configuration.problems import refusal
+from fleet2d.configuration.problems import validating
 from fleet2d.entities.sensor import SensorFault
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.placed_objects import Posture
@@ -522,17 +520,13 @@ class InterventionMethods(ABC):
         Raises:
             ScenarioError: The keys are no change, or name something unknown.
         """
-        try:
+        with validating("change()"):
             change = HomeChange(**keys) if change is None else change
-        except ValidationError as error:
-            raise refusal("change()", error) from None
         self._do("change", change=change)
 
     def _do(self, verb: str, **fields: Any) -> None:
         """Apply an intervention; its module is imported when it is first used."""
         intervention = cast(type[Intervention], lookup("intervention", verb))
-        try:
+        with validating(f"{verb}()"):
             act = intervention(**{key: value for key, value in fields.items() if value is not None})
-        except ValidationError as error:
-            raise refusal(f"{verb}()", error) from None
         self.intervene(act)

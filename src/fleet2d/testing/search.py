@@ -12,11 +12,11 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from fleet2d.bounds import one_line
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
-from fleet2d.configuration.problems import did_you_mean, refusal, suggest
+from fleet2d.configuration.problems import did_you_mean, suggest, validating
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.model import Scenario, scenario_of
@@ -100,7 +100,7 @@ def read_space(content: Mapping[str, Any]) -> SearchSpace:
     if not content:
         raise InputError("nothing to search over: name an axis, such as home={synthetic: 20}")
     for name, axis in content.items():
-        try:
+        with validating(f"over {name}"):
             if isinstance(axis, list):
                 axis = {"key": name, "values": axis}
             if isinstance(axis, Mapping) and {"low", "high"} & axis.keys():
@@ -109,8 +109,6 @@ def read_space(content: Mapping[str, Any]) -> SearchSpace:
             if isinstance(axis, Mapping) and {"values", "range"} & axis.keys():
                 axis = {"key": name, **axis}
             choices[name] = tuple(_AXIS.validate_python(axis).choices(name))
-        except ValidationError as error:
-            raise refusal(f"over {name}", error) from None
     return SearchSpace(ranges, choices)
 
 

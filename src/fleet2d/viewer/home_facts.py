@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from fleet2d.artifacts.manifest import FILE_NAME
-from fleet2d.configuration.problems import refusal
+from fleet2d.configuration.problems import validating
 from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.home import Home
@@ -140,10 +139,8 @@ def _doors_of(run: Run) -> dict[str, Door]:
     doors = {}
     for name, settings in run.manifest["scenario"].get("objects", {}).items():
         if settings.get("type") == "door":
-            try:
+            with validating(f"{FILE_NAME}: scenario.objects.{name}"):
                 doors[name] = Door(**{k: value for k, value in settings.items() if k != "type"})
-            except ValidationError as error:
-                raise refusal(f"{FILE_NAME}: scenario.objects.{name}", error) from None
     return doors
 
 
