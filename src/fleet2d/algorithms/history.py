@@ -354,15 +354,8 @@ class Log:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         seen = self.observations(first, end)
         patch = seen.room_in(self._nearest_patches).astype(np.int64)
-        return gather(
-            self.clock,
-            first,
-            self.bin_steps,
-            self.patches,
-            bins,
-            (seen.step, seen.user.astype(np.int64), patch),
-            self.activities.users,
-        )
+        observed, users = (seen.step, seen.user.astype(np.int64), patch), self.activities.users
+        return gather(self.clock, first, self.bin_steps, self.patches, bins, observed, users)
 
     def exposure(self, first: int, end: int) -> I64:
         """Return how much of each room each robot had in view in the steps `first` to `end` - 1.

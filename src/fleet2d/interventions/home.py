@@ -141,8 +141,23 @@ class Slow(SlowArea, Lasting):
         world.slow([act for act in world.lasting if isinstance(act, Slow)])
 
 
+class SensorIntervention(Intervention):
+    """Base of interventions on a sensor.
+
+    Attributes:
+        sensor: The sensor.
+    """
+
+    subject: ClassVar[str] = "sensor"
+    sensor: str
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown sensor."""
+        check_known(self.sensor, "sensor", world.sensors)
+
+
 @register("intervention", "report")
-class Report(Intervention):
+class Report(SensorIntervention):
     """Let a real sensor report its state: one of the type `live_sensor`.
 
     Attributes:
@@ -150,13 +165,11 @@ class Report(Intervention):
         says: Whether it is on or off from now on.
     """
 
-    subject: ClassVar[str] = "sensor"
-    sensor: str
     says: Literal["on", "off"]
 
     def check(self, world: World) -> None:
         """Refuse an unknown sensor, and one that is simulated."""
-        check_known(self.sensor, "sensor", world.sensors)
+        super().check(world)
         if world.sensors[self.sensor].type_name != "live_sensor":
             raise ScenarioError(
                 f"{self.sensor} is simulated: only a sensor of the type live_sensor reports what"
@@ -169,7 +182,7 @@ class Report(Intervention):
 
 
 @register("intervention", "stick")
-class Stick(Lasting):
+class Stick(SensorIntervention, Lasting):
     """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long.
 
     Attributes:
@@ -177,13 +190,7 @@ class Stick(Lasting):
         says: The state: on, always triggered; off, never triggered; silent, it reports nothing.
     """
 
-    subject: ClassVar[str] = "sensor"
-    sensor: str
     says: SensorFault = "silent"
-
-    def check(self, world: World) -> None:
-        """Refuse an unknown sensor."""
-        check_known(self.sensor, "sensor", world.sensors)
 
     def begin(self, world: World) -> None:
         """Apply the latest active intervention on the sensor."""

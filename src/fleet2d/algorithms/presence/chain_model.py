@@ -66,9 +66,8 @@ class Habits(NamedTuple):
         count, places = pull.shape
         leave = np.tile((1 - model.stay)[:, np.newaxis] * model.follow, (count, 1, 1))
         stages = len(model.stay) // places
-        leave[..., :places] *= (
-            pull[:, np.newaxis] / np.repeat(pull, stages, axis=1)[..., np.newaxis]
-        )
+        of_node = np.repeat(pull, stages, axis=1)[..., np.newaxis]
+        leave[..., :places] *= pull[:, np.newaxis] / of_node
         chance = np.zeros(leave.shape[:2])
         for column in range(leave.shape[2]):  # summed in the same order on every machine
             chance += leave[..., column]

@@ -359,10 +359,8 @@ class SightingShare(Estimator):
         seen = evidence.seen.astype(np.float64)
         is_seen = np.any(seen > 0, axis=2)
         has_view = np.any(evidence.watched > 0, axis=1)[:, np.newaxis] | is_seen
-        return np.concatenate(
-            [seen, np.stack([has_view, has_view & ~is_seen, np.ones_like(is_seen)], axis=-1)],
-            axis=-1,
-        )
+        bins = np.stack([has_view, has_view & ~is_seen, np.ones_like(is_seen)], axis=-1)
+        return np.concatenate([seen, bins], axis=-1)
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return sightings per room by all, and bins without a sighting by bins with a view."""

@@ -25,9 +25,8 @@ WEEK = 7 * DAY_MINUTES
 PERIODS = 100  # candidate periods: a week divided by 1, 2 … 100
 ORDERS = 5  # models with 0 to 4 periods
 SPANS = 1.5  # periods that the data must span before one is considered
-MIN_PROBABILITY = (
-    1e-6  # forecasts are clipped to MIN_PROBABILITY … 1 - MIN_PROBABILITY before they are scored
-)
+# Forecasts are clipped to MIN_PROBABILITY … 1 - MIN_PROBABILITY before they are scored.
+MIN_PROBABILITY = 1e-6
 RECENT = 0.5  # weight of an order's log loss a day later: periods found early are often wrong
 UNIT = 1 << 30
 

@@ -155,13 +155,8 @@ class StateLayout(NamedTuple):
     def no_moments(self, *people: int) -> Moments:
         """Return moments of some people that are all zero, with people as the first dimension."""
         places, nodes = self.rooms + 1, (self.rooms + 1) * self.stages
-        return Moments(
-            np.zeros((*people, nodes)),
-            np.zeros((*people, nodes, places + 1)),
-            np.zeros((*people, len(self.room))),
-            np.zeros((*people, places)),
-            np.zeros((*people, places)),
-        )
+        shapes = (nodes,), (nodes, places + 1), (len(self.room),), (places,), (places,)
+        return Moments(*(np.zeros((*people, *shape)) for shape in shapes))
 
 
 class Prior(NamedTuple):
