@@ -1,9 +1,11 @@
 """Generate a home: link the rooms of many layouts by doors, judge each, and finish the best."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+import numpy as np
 import shapely
 
 from fleet2d.errors import FloorPlanError
@@ -23,11 +25,13 @@ from fleet2d.floorplan.synthetic.slicing import (
     WALL,
     Box,
     LayoutRequest,
+    MisfitError,
     Rectangle,
     Wall,
     boxes_overlap,
     inner_walls,
     outer_walls,
+    overlap,
     turn_boxes,
 )
 from fleet2d.runtime.determinism import sum_in_order
@@ -118,26 +122,19 @@ class Widths:
         return self.bath if small and "garage" not in kinds else self.door
 
 
-@dataclass
-class Access:
-    """A tree of links that joins all rooms.
-
-    Attributes:
-        links: The walls with a passage, in the order in which they joined the tree.
-        cost: Sum of the costs of the links, see `COSTS`.
-    """
-
-    links: list[Wall]
-    cost: float
+RoomLinks = dict[tuple[int, int], tuple[float, Wall]]
+"""The cost of a passage between two rooms, and the wall that it is in, by their indices."""
 
 
-def link_rooms(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> Access | None:
-    """Return the tree of links that joins all rooms at the lowest cost, or None if there is none.
+def link_rooms(layout: RoomLayout, best: RoomLinks) -> tuple[list[Wall], float]:
+    """Return the tree of links that joins all rooms at the lowest cost, and that cost.
 
     Prim's algorithm from the entryway, else the living room. Nobody has to pass through a private
     room, except to the bathroom or wardrobe that belongs to it.
+
+    Raises:
+        MisfitError: There is no such tree.
     """
-    best = _best_links(layout, walls, widths)
     kinds = [brief.kind for brief in layout.briefs]
     start = kinds.index("entryway" if "entryway" in kinds else "living_room")
     reached, links, cost = {start}, [], 0.0
@@ -149,12 +146,12 @@ def link_rooms(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> Acc
             and _passable(layout.briefs, *(pair if pair[0] in reached else pair[::-1]))
         ]
         if not candidates:
-            return None
+            raise MisfitError
         price, pair, wall = min(candidates, key=lambda link: link[:2])
         reached.update(pair)
         links.append(wall)
         cost += price
-    return Access(links, cost)
+    return links, cost
 
 
 def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
@@ -164,12 +161,10 @@ def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
     return briefs[through].kind in _PASSABLE or briefs[to].partner == through
 
 
-def _best_links(
-    layout: RoomLayout, walls: Sequence[Wall], widths: Widths
-) -> dict[tuple[int, int], tuple[float, Wall]]:
+def _best_links(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> RoomLinks:
     """Return the cost and the longest common wall of each pair of rooms that may be linked."""
     briefs = layout.briefs
-    best: dict[tuple[int, int], tuple[float, Wall]] = {}
+    best: RoomLinks = {}
     for wall in walls:
         a, b = _rooms(layout, wall)
         if a == b:
@@ -191,21 +186,19 @@ def _price(briefs: Sequence[Brief], a: int, b: int, widths: Widths) -> float | N
     return widths.prices.get((briefs[a].kind, briefs[b].kind))
 
 
-def add_loops(
-    access: Access, layout: RoomLayout, walls: Sequence[Wall], widths: Widths, choices: Choices
-) -> list[Wall]:
-    """Return the tree's links and a few more, since real homes have circular routes.
+def add_loops(best: "_Candidate", choices: Choices) -> list[Wall]:
+    """Return the links of a layout and a few more, since real homes have circular routes.
 
     In an open plan only two of the three borders between living room, dining room and kitchen are
     open: three would leave a post in the middle.
     """
-    links = list(access.links)
-    open_pairs = {_rooms(layout, wall) for wall in links}
-    for pair, (price, wall) in _best_links(layout, walls, widths).items():
-        kinds = {layout.briefs[room].kind for room in pair}
+    links = list(best.links)
+    open_pairs = {_rooms(best.layout, wall) for wall in links}
+    for pair, (price, wall) in best.possible.items():
+        kinds = {best.layout.briefs[room].kind for room in pair}
         percent = 0
         if kinds <= set(_SOCIAL):
-            percent = 45 if not widths.open_plan else 0
+            percent = 45 if not best.widths.open_plan else 0
         elif kinds <= {*_SOCIAL, "hallway", "entryway"}:
             percent = 60 if price < 1 else 20
         elif kinds & {"laundry", "garage", "storage"} and price <= 0.3:
@@ -287,13 +280,16 @@ LONG_ASPECT, LONG_COST = {1: 1.5, 2: 1.5}, {1: 4, 2: 12}
 _COMFORTABLE_RATIO = 1.45
 
 
-def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float | None:
-    """Return how far the rooms' shapes are from comfortable ones; None if one is unacceptable.
+def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float:
+    """Return how far the rooms' shapes are from comfortable ones.
 
     Args:
         layout: The rooms.
         ease: Factor by which rooms and corridors may be longer than usual.
         edition: Of the generator.
+
+    Raises:
+        MisfitError: One is unacceptable.
     """
     cost = 0.0
     for box in layout.boxes:
@@ -301,27 +297,27 @@ def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float | None:
         size = SIZES[kind]
         short, long = sorted(box.clear)
         if short < size.side * UNITS_PER_M:
-            return None
+            raise MisfitError
         if kind == "hallway":
             if long > MAX_CORRIDOR * ease:
-                return None
+                raise MisfitError
             cost += 0.03 * max(long - LONG_CORRIDOR, 0)
             continue
         ratio = long / short
         is_rectangle = sum(b.room == box.room for b in layout.boxes) == 1
         if is_rectangle and ratio > size.slender * ease:
-            return None
+            raise MisfitError
         excess = max(ratio - _COMFORTABLE_RATIO, 0.0)
         cost += excess * excess * (2.0 if kind in _LIT else 0.7)
     x0, y0 = min(b.x0 for b in layout.boxes), min(b.y0 for b in layout.boxes)
     x1, y1 = max(b.x1 for b in layout.boxes), max(b.y1 for b in layout.boxes)
     short, long = sorted((x1 - x0, y1 - y0))
     if long > MAX_ASPECT[edition] * short:
-        return None
+        raise MisfitError
     cost += LONG_COST[edition] * max(long / short - LONG_ASPECT[edition], 0.0)
     corridor = corridor_share(layout)
     if corridor > MAX_CORRIDOR_SHARE[edition]:
-        return None
+        raise MisfitError
     return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE[edition], 0.0)
 
 
@@ -333,8 +329,12 @@ def corridor_share(layout: RoomLayout) -> float:
     return halls / sum_in_order(box.clear_area for box in layout.boxes)
 
 
-def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float | None:
-    """Return how badly rooms lack windows; None where a bedroom or the living room has none."""
+def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float:
+    """Return how badly rooms lack windows.
+
+    Raises:
+        MisfitError: A bedroom or the living room has none.
+    """
     longest: dict[int, int] = {}
     for wall in outer:
         room = layout.boxes[max(wall.first, wall.second)].room
@@ -345,7 +345,7 @@ def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float | None:
         if longest.get(room, 0) >= needed:
             continue
         if brief.kind in ("bedroom", "living_room"):
-            return None
+            raise MisfitError
         cost += 1.5
     return cost
 
@@ -362,15 +362,10 @@ def outline_corners(boxes: Sequence[Box]) -> list[bool]:
     closed = union.buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
     if closed.area > union.area + 1:
         return []
-    ring = shapely.get_coordinates(shapely.orient_polygons(union))[:-1].tolist()
-    turns = []
-    for (ax, ay), (bx, by), (cx, cy) in zip(
-        [ring[-1], *ring[:-1]], ring, [*ring[1:], ring[0]], strict=True
-    ):
-        turn = (bx - ax) * (cy - by) - (by - ay) * (cx - bx)
-        if turn:
-            turns.append(turn > 0)
-    return turns
+    ring = shapely.get_coordinates(shapely.orient_polygons(union))[:-1]
+    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    turns = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    return list(turns[turns != 0] > 0)
 
 
 def outline_kind(turns: Sequence[bool]) -> str | None:
@@ -438,10 +433,11 @@ class House:
 
 @dataclass(frozen=True)
 class _Candidate:
+    """A layout that is a home: its links, further ones that are possible, and how bad it is."""
+
     layout: RoomLayout
-    walls: list[Wall]
-    outer: list[Wall]
-    access: Access
+    possible: RoomLinks
+    links: list[Wall]
     widths: Widths
     cost: float
 
@@ -483,19 +479,20 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         request = LayoutRequest(
             briefs, decided.area_m2 or 0.0, widths.corridor, style.outline or usual, used.edition
         )
-        layout = draw_layout(request, Choices(seed, f"layout {number}"))
         limit = MAX_ACCESS_COST + LINK_TASTE * used.edition * used.variety / 100
-        candidate = layout and _judge(layout, widths, request, _ease(number), limit)
-        if candidate:
+        # Rooms may be longer than usual after some tries.
+        ease = 1.0 + 0.1 * min(number // (2 * PATIENCE), 3)
+        with suppress(MisfitError):
+            layout = draw_layout(request, Choices(seed, f"layout {number}"))
+            candidate = _judge(layout, widths, request, ease, limit)
             taste = Choices(seed, f"taste {number}").below(LAYOUT_TASTE * used.variety + 1)
             candidates.append(replace(candidate, cost=candidate.cost + taste / 100))
         # Where good layouts are rare, fewer are enough.
         if len(candidates) >= max(ENOUGH_LAYOUTS - number // PATIENCE, 1):
             break
     for best in sorted(candidates, key=lambda candidate: candidate.cost):
-        house = _finish(best, decided, Choices(seed, "doors"), style)
-        if house is not None:
-            return house
+        with suppress(MisfitError):
+            return _finish(best, decided, Choices(seed, "doors"), style)
     raise FloorPlanError(_failure(decided, style))
 
 
@@ -523,39 +520,39 @@ def _style(style: Style, choices: Choices, is_wide: bool) -> Widths:
     )
 
 
-def _ease(number: int) -> float:
-    """Return the factor by which rooms may be longer than usual, which grows with the tries."""
-    return 1.0 + 0.1 * min(number // (2 * PATIENCE), 3)
-
-
 def _judge(
     layout: RoomLayout, widths: Widths, request: LayoutRequest, ease: float, limit: float
-) -> _Candidate | None:
-    """Return the layout with its links and its cost, or None if it is not a home."""
+) -> _Candidate:
+    """Return the layout with its links and its cost.
+
+    Raises:
+        MisfitError: It is not a home.
+    """
     shape = shape_cost(layout, ease, request.edition)
-    if shape is None or boxes_overlap(layout.boxes):
-        return None
+    if boxes_overlap(layout.boxes):
+        raise MisfitError
     walls = inner_walls(layout.boxes)
-    access = link_rooms(layout, walls, widths)
-    if access is None or access.cost > limit:
-        return None
+    possible = _best_links(layout, walls, widths)
+    links, access = link_rooms(layout, possible)
+    if access > limit:
+        raise MisfitError
     outer = outer_walls(layout.boxes, walls)
     light = light_cost(layout, outer)
-    if light is None:
-        return None
-    front_wall = _front_wall(layout, outer)
-    if front_wall is None:
-        return None
+    rank, _ = _front_wall(layout, outer)
     corners = outline_corners(layout.boxes)
     if not corners or (request.outline and outline_kind(corners) != request.outline):
-        return None
-    cost = shape + 2 * access.cost + light + 2 * front_wall[0] + 0.15 * max(len(corners) - 8, 0)
-    return _Candidate(layout, walls, outer, access, widths, cost)
+        raise MisfitError
+    cost = shape + 2 * access + light + 2 * rank + 0.15 * max(len(corners) - 8, 0)
+    return _Candidate(layout, possible, links, widths, cost)
 
 
-def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) -> House | None:
-    """Turn a layout and give it its doors; None where no front door fits."""
-    links = add_loops(best.access, best.layout, best.walls, best.widths, choices)
+def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) -> House:
+    """Turn a layout and give it its doors.
+
+    Raises:
+        MisfitError: No front door fits.
+    """
+    links = add_loops(best, choices)
     layout = replace(best.layout, boxes=turn_boxes(best.layout.boxes, choices.below(8)))
     if style.edition == 2:
         layout = merge_rooms(layout, links, choices, style.variety)
@@ -565,9 +562,10 @@ def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) ->
     pairs = {frozenset((wall.first, wall.second)) for wall in links}
     doors = [wall for wall in inner if frozenset((wall.first, wall.second)) in pairs]
     gaps = draw_gaps(doors, layout, inner, best.widths, choices)
-    front_door = _front_door(layout, outer_walls(layout.boxes, inner), choices)
-    if front_door is None:
-        return None
+    _, wall = _front_wall(layout, outer_walls(layout.boxes, inner))
+    spare = wall.length - FRONT_DOOR
+    low = wall.low + (spare // 2 if spare < 30 else choices.between(4, spare - 4))
+    front_door = Gap(wall, low, low + FRONT_DOOR, True)
     shafts = draw_shafts(layout, [*gaps, front_door], choices) if style.edition == 2 else []
     return House(wishes, layout.briefs, layout.boxes, gaps, front_door, shafts)
 
@@ -623,30 +621,22 @@ def _near(shaft: Rectangle, gap: Gap) -> bool:
     wall = gap.wall
     low, high = gap.low - SHAFT_CLEARANCE, gap.high + SHAFT_CLEARANCE
     near, far = wall.at - SHAFT_CLEARANCE, wall.at + SHAFT_CLEARANCE
-    x0, y0, x1, y1 = (near, low, far, high) if wall.upright else (low, near, high, far)
-    return shaft[0] < x1 and x0 < shaft[2] and shaft[1] < y1 and y0 < shaft[3]
+    return overlap(shaft, (near, low, far, high) if wall.upright else (low, near, high, far))
 
 
-def _front_door(layout: RoomLayout, outer: Sequence[Wall], choices: Choices) -> Gap | None:
-    """Return the front door, in the best wall for it, or None where there is none."""
-    best = _front_wall(layout, outer)
-    if best is None:
-        return None
-    _, wall = best
-    spare = wall.length - FRONT_DOOR
-    low = wall.low + (spare // 2 if spare < 30 else choices.between(4, spare - 4))
-    return Gap(wall, low, low + FRONT_DOOR, True)
+def _front_wall(layout: RoomLayout, outer: Sequence[Wall]) -> tuple[int, Wall]:
+    """Return the rank of the best wall for the front door (0 is the best), and the wall.
 
-
-def _front_wall(layout: RoomLayout, outer: Sequence[Wall]) -> tuple[int, Wall] | None:
-    """Return the best wall for the front door, and its rank (0 is the best)."""
+    Raises:
+        MisfitError: There is none.
+    """
     candidates = []
     for wall in outer:
         kind = layout.briefs[layout.boxes[max(wall.first, wall.second)].room].kind
         if kind in _FRONT and wall.length >= FRONT_DOOR + 4 and _approachable(wall, layout.boxes):
             candidates.append((_FRONT.index(kind), -min(wall.length, 60), wall))
     if not candidates:
-        return None
+        raise MisfitError
     rank, _, wall = min(candidates)
     has_entryway = any(brief.kind == "entryway" for brief in layout.briefs)
     return (rank if has_entryway else max(rank - 2, 0)), wall
@@ -654,12 +644,11 @@ def _front_wall(layout: RoomLayout, outer: Sequence[Wall]) -> tuple[int, Wall] |
 
 def _approachable(wall: Wall, boxes: Sequence[Box]) -> bool:
     """Return whether the ground before an outer wall is open."""
-    near, far = (
-        (wall.at, wall.at + APPROACH) if wall.second == -1 else (wall.at - APPROACH, wall.at)
-    )
-    low, high = wall.low, wall.high
-    x0, x1, y0, y1 = (near, far, low, high) if wall.upright else (low, high, near, far)
-    return not any(b.x0 < x1 and x0 < b.x1 and b.y0 < y1 and y0 < b.y1 for b in boxes)
+    near = wall.at if wall.second == -1 else wall.at - APPROACH
+    ground = (near, wall.low, near + APPROACH, wall.high)
+    if not wall.upright:
+        ground = (wall.low, near, wall.high, near + APPROACH)
+    return not any(overlap(ground, box.sides) for box in boxes)
 
 
 def _failure(wishes: Wishes, style: Style) -> str:

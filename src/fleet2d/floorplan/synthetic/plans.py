@@ -1,7 +1,9 @@
 """Layouts of synthetic homes: rooms in groups, in wings, as rectangles."""
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from math import fsum, sqrt
 
@@ -13,10 +15,11 @@ from fleet2d.floorplan.synthetic.slicing import (
     UNITS_PER_M2,
     WALL,
     Box,
+    Corridor,
     Cut,
     LayoutRequest,
     Leaf,
-    Mouth,
+    MisfitError,
     Slot,
     Strip,
     Tree,
@@ -31,139 +34,17 @@ from fleet2d.runtime.determinism import sum_in_order
 
 RoomGroup = list[Slot]
 """Slots that stay next to each other in this order."""
+Areas = Mapping[int, float]
+"""Areas of rooms by their index."""
+Placing = Callable[[Areas], list[Box]]
+"""Places the rooms of a plan by their gross areas [units²]; MisfitError: they do not fit."""
 
-
-@dataclass
-class Groups:
-    """The rooms of a home, sorted by where they may go.
-
-    Attributes:
-        entry: The group with the entryway, or None; its first slot is the entryway.
-        private: Groups for strips; the first is that of the main bedroom, which comes last in it.
-        service: Rooms for a block of their own: garage, gym and what goes with them.
-        pantry: Small rooms beside the kitchen.
-        closet: A small room for the end of a corridor, or None.
-    """
-
-    entry: RoomGroup | None = None
-    private: list[RoomGroup] = field(default_factory=list)
-    service: list[int] = field(default_factory=list)
-    pantry: list[int] = field(default_factory=list)
-    closet: int | None = None
-
-
-def group_rooms(briefs: Sequence[Brief], choices: Choices) -> Groups:
-    """Group the rooms by where they may go."""
-    by_kind = _by_kind(briefs)
-    groups = Groups()
-    if by_kind["garage"]:
-        groups.service = by_kind["garage"] + by_kind["gym"]
-    small = _small_rooms(by_kind, groups, choices)
-    shared = [i for i in by_kind["bathroom"] if briefs[i].partner is None]
-    fronts = choices.shuffled(shared + small)
-    for bed in by_kind["bedroom"]:
-        owned = [i for i, brief in enumerate(briefs) if brief.partner == bed]
-        groups.private.append([*_beside(owned, fronts, briefs, choices), (bed,)])
-    if by_kind["entryway"]:
-        groups.entry = _entry_group(by_kind["entryway"][0], fronts, briefs, choices)
-    for room in fronts:
-        if briefs[room].kind == "bathroom":
-            groups.private.append([(room,)])
-        elif groups.closet is None and briefs[room].kind in ("storage", "toilet"):
-            groups.closet = room
-        else:
-            groups.pantry.append(room)
-    groups.private += [[(i,)] for i in by_kind["office"]]
-    if not by_kind["garage"]:
-        groups.private += [[(i,)] for i in by_kind["gym"]]
-    return groups
-
-
-def _by_kind(briefs: Sequence[Brief]) -> dict[str, list[int]]:
-    kinds = ("garage", "gym", "laundry", "storage", "toilet", "bathroom", "bedroom", "office")
-    return {
-        kind: [i for i, brief in enumerate(briefs) if brief.kind == kind]
-        for kind in (*kinds, "entryway")
-    }
-
-
-def _small_rooms(by_kind: dict[str, list[int]], groups: Groups, choices: Choices) -> list[int]:
-    """Return the small rooms for strips; the others go to the service block or the kitchen."""
-    strip_rooms = list(by_kind["toilet"])
-    for room in by_kind["laundry"] + by_kind["storage"]:
-        place = choices.weighted((("service", 60), ("pantry", 25), ("strip", 15)))
-        if place == "service" and groups.service:
-            groups.service.append(room)
-        elif place == "strip" or groups.pantry:
-            strip_rooms.append(room)
-        else:
-            groups.pantry.append(room)
-    return strip_rooms
-
-
-def _beside(
-    owned: list[int], fronts: list[int], briefs: Sequence[Brief], choices: Choices
-) -> list[Slot]:
-    """Return the slots beside a bedroom: a room of its own at the back, a shared one before it."""
-    if len(owned) >= 2:
-        first, second = sorted(owned, key=lambda i: briefs[i].area)[:2]
-        return [(first, second)]
-    if not owned:
-        return []
-    if fronts and choices.chance(60):
-        return [(fronts.pop(), owned[0])]
-    return [(owned[0],)]
-
-
-def _entry_group(
-    entry: int, fronts: list[int], briefs: Sequence[Brief], choices: Choices
-) -> list[Slot]:
-    """Return the entryway, maybe with a toilet beside it and a coat room behind that."""
-    toilets = [i for i in fronts if briefs[i].kind == "toilet"]
-    closets = [i for i in fronts if briefs[i].kind == "storage"]
-    if toilets and closets and choices.chance(75):
-        fronts.remove(toilets[0])
-        fronts.remove(closets[0])
-        return [(entry,), (toilets[0], closets[0])]
-    return [(entry,)]
-
-
-def core_trees(groups: Groups, briefs: Sequence[Brief], choices: Choices) -> list[Tree]:
-    """Draw trees of living room, dining room and kitchen; wings join them at high x or high y."""
-    room_of = {brief.kind: i for i, brief in enumerate(briefs)}
-    living = Leaf(room_of["living_room"])
-    trees: list[Tree] = []
-    for across in (True, False):
-        kitchen = _kitchen(room_of["kitchen"], groups.pantry, across, choices)
-        if "dining_room" in room_of:
-            trees += _with_dining(living, Leaf(room_of["dining_room"]), kitchen, across)
-            continue
-        trees += [Cut(across, (kitchen, living)), Cut(across, (living, kitchen))]
-        share = choices.between(45, 65)
-        low, high = Leaf(living.room, share), Leaf(living.room, 100 - share)
-        trees.append(Cut(across, (low, Cut(not across, (kitchen, high)))))
-    return choices.shuffled(trees)[: max(5, len(trees) * 5 // 6)]
-
-
-def _with_dining(living: Leaf, dining: Leaf, kitchen: Tree, across: bool) -> list[Tree]:
-    sides = (Cut(not across, (dining, kitchen)), Cut(not across, (kitchen, dining)))
-    return [
-        *(Cut(across, (side, living)) for side in sides),
-        *(Cut(across, (living, side)) for side in sides),
-        Cut(across, (kitchen, dining, living)),
-        Cut(across, (living, dining, kitchen)),
-    ]
-
-
-def _kitchen(kitchen: int, pantry: Sequence[int], across: bool, choices: Choices) -> Tree:
-    """Return the kitchen, with small rooms at one end of it."""
-    if not pantry:
-        return Leaf(kitchen)
-    side: Tree = Leaf(pantry[0])
-    if len(pantry) > 1:
-        side = Cut(across, tuple(Leaf(room) for room in pantry))
-    pair = (side, Leaf(kitchen))
-    return Cut(not across, pair if choices.chance(50) else pair[::-1])
+# Minimum depth of the core [units].
+MIN_CORE_DEPTH = 70
+# Times that a part of a layout is drawn before it is given up.
+TRIES = 3
+# Length of rows, squared, over the area of their rooms [%].
+LENGTH_RATIOS = (55, 70, 85, 105, 130, 160, 195)
 
 
 @dataclass(frozen=True)
@@ -184,7 +65,7 @@ class Service:
     at_high: bool
     out: int
 
-    def boxes(self, areas: Mapping[int, float], right: int, low: int, high: int) -> list[Box]:
+    def boxes(self, areas: Areas, right: int, low: int, high: int) -> list[Box]:
         """Return its rooms left of a core between two heights [units]."""
         area = tree_area(self.trees[0], areas)
         height = min(int(area / self.width + 0.5), high - low)
@@ -197,112 +78,425 @@ class Service:
         return choose_squarest(self.trees, areas, (right - width, low, right, high))
 
 
-def service_block(groups: Groups, outline: str | None, choices: Choices) -> Service | None:
-    """Draw a block of garage and what is beside it."""
-    if not groups.service:
-        return None
-    garage, *others = (Leaf(room) for room in groups.service)
-    trees: list[Tree] = []
-    for across in (True, False):
-        rest: Tree = others[0] if len(others) == 1 else Cut(not across, tuple(others))
+class Sketch:
+    """The rooms of a home while their layout is drawn, in groups by where they may go.
+
+    Attributes:
+        briefs: The rooms, and the hallways that the layout adds.
+        entry: The group with the entryway, or None; its first slot is the entryway.
+        private: Groups for strips; the first is that of the main bedroom, which comes last in it.
+        service: Rooms for a block of their own: garage, gym and what goes with them.
+        pantry: Small rooms beside the kitchen.
+        closet: A small room for the end of a corridor, or None.
+    """
+
+    def __init__(self, request: LayoutRequest, choices: Choices) -> None:
+        """Group the rooms by where they may go."""
+        self.request, self.choices = request, choices
+        self.briefs = list(request.briefs)
+        self.areas = {i: brief.area for i, brief in enumerate(self.briefs)}  # [m²]
+        self.gross = {i: gross_area(area) for i, area in self.areas.items()}
+        self.of_kind: defaultdict[str, list[int]] = defaultdict(list)
+        for i, brief in enumerate(self.briefs):
+            self.of_kind[brief.kind].append(i)
+        self.entry: RoomGroup | None = None
+        self.closet: int | None = None
+        self.private: list[RoomGroup] = []
+        self.pantry: list[int] = []
+        with_garage = bool(self.of_kind["garage"])
+        self.service = self.of_kind["garage"] + self.of_kind["gym"] * with_garage
+        small = self._small_rooms()
+        shared = [i for i in self.of_kind["bathroom"] if self.briefs[i].partner is None]
+        fronts = choices.shuffled(shared + small)
+        for bed in self.of_kind["bedroom"]:
+            owned = [i for i, brief in enumerate(self.briefs) if brief.partner == bed]
+            self.private.append([*self._beside(owned, fronts), (bed,)])
+        if self.of_kind["entryway"]:
+            self.entry = [(self.of_kind["entryway"][0],), *self._coat_room(fronts)]
+        for room in fronts:
+            if self.briefs[room].kind == "bathroom":
+                self.private.append([(room,)])
+            elif self.closet is None and self.briefs[room].kind in ("storage", "toilet"):
+                self.closet = room
+            else:
+                self.pantry.append(room)
+        others = self.of_kind["office"] + self.of_kind["gym"] * (not with_garage)
+        self.private += [[(room,)] for room in others]
+
+    def _small_rooms(self) -> list[int]:
+        """Return the small rooms for strips; the others go to the service block or the kitchen."""
+        strip_rooms = list(self.of_kind["toilet"])
+        for room in self.of_kind["laundry"] + self.of_kind["storage"]:
+            place = self.choices.weighted((("service", 60), ("pantry", 25), ("strip", 15)))
+            if place == "service" and self.service:
+                self.service.append(room)
+            elif place == "strip" or self.pantry:
+                strip_rooms.append(room)
+            else:
+                self.pantry.append(room)
+        return strip_rooms
+
+    def _beside(self, owned: list[int], fronts: list[int]) -> list[Slot]:
+        """Return the slots beside a bedroom: its own room at the back, a shared one before it."""
+        if len(owned) >= 2:
+            first, second = sorted(owned, key=self.areas.__getitem__)[:2]
+            return [(first, second)]
+        if owned and fronts and self.choices.chance(60):
+            return [(fronts.pop(), owned[0])]
+        return [(room,) for room in owned]
+
+    def _coat_room(self, fronts: list[int]) -> list[Slot]:
+        """Return, for some homes, a toilet for beside the entryway and a coat room behind that."""
+        toilets = [i for i in fronts if self.briefs[i].kind == "toilet"]
+        closets = [i for i in fronts if self.briefs[i].kind == "storage"]
+        if toilets and closets and self.choices.chance(75):
+            fronts.remove(toilets[0])
+            fronts.remove(closets[0])
+            return [(toilets[0], closets[0])]
+        return []
+
+    def add_hallway(self) -> int:
+        """Add a hallway and return its index."""
+        self.briefs.append(Brief("hallway", 0.0))
+        return len(self.briefs) - 1
+
+    # --- Core and service block ------------------------------------------------------------------
+
+    def core_trees(self) -> list[Tree]:
+        """Draw trees of living room, dining room and kitchen; wings join at high x or high y."""
+        choices, living = self.choices, Leaf(self.of_kind["living_room"][-1])
+        trees: list[Tree] = []
+        for across in (True, False):
+            kitchen = self._kitchen(across)
+            if self.of_kind["dining_room"]:
+                dining = Leaf(self.of_kind["dining_room"][-1])
+                sides = (Cut(not across, (dining, kitchen)), Cut(not across, (kitchen, dining)))
+                trees += [Cut(across, (side, living)) for side in sides]
+                trees += [Cut(across, (living, side)) for side in sides]
+                trees.append(Cut(across, (kitchen, dining, living)))
+                trees.append(Cut(across, (living, dining, kitchen)))
+                continue
+            trees += [Cut(across, (kitchen, living)), Cut(across, (living, kitchen))]
+            share = choices.between(45, 65)
+            low, high = Leaf(living.room, share), Leaf(living.room, 100 - share)
+            trees.append(Cut(across, (low, Cut(not across, (kitchen, high)))))
+        return choices.shuffled(trees)[: max(5, len(trees) * 5 // 6)]
+
+    def _kitchen(self, across: bool) -> Tree:
+        """Return the kitchen, with small rooms at one end of it."""
+        kitchen, pantry = Leaf(self.of_kind["kitchen"][-1]), tuple(map(Leaf, self.pantry))
+        if not pantry:
+            return kitchen
+        pair = (Cut(across, pantry) if len(pantry) > 1 else pantry[0], kitchen)
+        return Cut(not across, pair if self.choices.chance(50) else pair[::-1])
+
+    def service_block(self) -> Service | None:
+        """Draw a block of garage and what is beside it."""
+        if not self.service:
+            return None
+        choices, (garage, *others) = self.choices, map(Leaf, self.service)
+        trees: list[Tree] = []
+        for across in (True, False):
+            rest = others[0] if len(others) == 1 else Cut(not across, tuple(others))
+            trees += [Cut(across, (garage, rest)), Cut(across, (rest, garage))]
         if not others:
             trees = [garage]
+        return Service(
+            choices.shuffled(trees),
+            choices.between(72, 130),
+            self.request.outline is not None,
+            choices.chance(50),
+            choices.pick((0, 0, 20, 40)),
+        )
+
+    # --- Wings -----------------------------------------------------------------------------------
+
+    def wing(
+        self, groups: Sequence[RoomGroup], hall: int, outline: str | None, is_main: bool = True
+    ) -> Wing:
+        """Draw a wing.
+
+        Args:
+            groups: Its rooms; the first group is that of its main bedroom.
+            hall: Its hallway.
+            outline: Outline of the home.
+            is_main: Whether the entry and the closet are in it.
+
+        Raises:
+            MisfitError: No try fits.
+        """
+        entry, closet = (self.entry, self.closet) if is_main else (None, None)
+        for _ in range(TRIES):
+            suite = closet is None and self.choices.chance(55)
+            front, back = self._sides(groups, entry, suite)
+            if not front or not back:
+                continue
+            fore, aft = self._strips(front, back, outline, bool(entry))
+            rooms = [self.areas[slot[0]] for slot in aft.slots if len(slot) == 1]
+            middle = fsum(rooms) / len(rooms) if rooms else 14.0
+            corridor = Corridor(hall, self.request.corridor + WALL, suite, closet)
+            fitting = []
+            for percent in (78, 90, 102, 114):
+                depth = int(UNITS_PER_M * sqrt(middle) * percent / 100)
+                wing = Wing(fore, aft, corridor, min(max(depth, 56), 112))
+                with suppress(MisfitError):
+                    boxes = wing.place(self.gross).boxes
+                    if is_promising(boxes, self.briefs):
+                        fitting.append((slenderness(boxes), wing))
+            if fitting:
+                return min(fitting, key=lambda scored: scored[0])[1]
+        raise MisfitError
+
+    def _strips(
+        self,
+        front: Sequence[RoomGroup],
+        back: Sequence[RoomGroup],
+        outline: str | None,
+        entry: bool,
+    ) -> tuple[Strip, Strip]:
+        """Draw the strips on the two sides of a corridor, with bays."""
+        fore, aft = _strip(front), _strip(back)
+        if outline is None and self.choices.chance(45):
+            fore = self._add_bays(fore, entry)
+        if outline is None and self.choices.chance(35):
+            aft = self._add_bays(aft)
+        if outline == "U" and entry:  # a porch
+            fore = replace(fore, bays=(-self.choices.between(28, 40), *fore.bays[1:]))
+        return fore, aft
+
+    def _sides(
+        self, groups: Sequence[RoomGroup], entry: RoomGroup | None, suite: bool
+    ) -> tuple[list[RoomGroup], list[RoomGroup]]:
+        """Divide groups of rooms among the front and the back of a corridor.
+
+        Args:
+            groups: The rooms, those of the main bedroom first.
+            entry: The group that begins the front, or None.
+            suite: Whether the main bedroom ends the back.
+        """
+        choices, (main, *others) = self.choices, groups
+        first = [entry] if entry else []
+        front: list[RoomGroup] = []
+        back: list[RoomGroup] = []
+        weights = [self._area(first), self._area([main])]
+        for group in choices.shuffled(others):
+            # Mostly to the side with less in it, so that both come out about as deep.
+            to_back = (weights[0] > weights[1]) != choices.chance(15)
+            (back if to_back else front).append(group if choices.chance(50) else group[::-1])
+            weights[to_back] += self._area([group])
+        if suite:
+            back.append(main)
+            # The front room beside the suite must still reach the corridor: the largest does.
+            front.sort(key=lambda group: self._area([group[-1:]]))
         else:
-            trees += [Cut(across, (garage, rest)), Cut(across, (rest, garage))]
-    return Service(
-        choices.shuffled(trees),
-        choices.between(72, 130),
-        outline is not None,
-        choices.chance(50),
-        choices.pick((0, 0, 20, 40)),
-    )
+            back.insert(choices.below(len(back) + 1), main if choices.chance(50) else main[::-1])
+        return [*first, *front], back
 
+    def _area(self, groups: Sequence[RoomGroup]) -> float:
+        return fsum(self.areas[room] for group in groups for slot in group for room in slot)
 
-TRIES = 3
+    def _add_bays(self, strip: Strip, entry: bool = False) -> Strip:
+        """Move one end of a strip, or the entryway, outwards or inwards."""
+        count = len(strip.slots)
+        if count < 2:
+            return strip
+        step = self.choices.between(10, 34) * (1 if self.choices.chance(60) else -1)
+        if entry and self.choices.chance(40):
+            return replace(strip, bays=(-self.choices.between(16, 30), *[0] * (count - 1)))
+        moved = self.choices.between(1, count - 1)
+        return replace(strip, bays=(*[0] * (count - moved), *[step] * moved))
 
+    # --- Plans -----------------------------------------------------------------------------------
 
-def draw_wing(
-    groups: Sequence[RoomGroup],
-    entry: RoomGroup | None,
-    closet: int | None,
-    corridor: int,
-    request: LayoutRequest,
-    briefs: Sequence[Brief],
-    choices: Choices,
-) -> Wing | None:
-    """Draw a wing; the first group is that of its main bedroom. None if no try fits."""
-    areas = {i: brief.area for i, brief in enumerate(briefs)}
-    gross = {i: gross_area(area) for i, area in areas.items() if area}
-    for _ in range(TRIES):
-        suite = closet is None and choices.chance(55)
-        front, back = _sides(groups, entry, areas, suite, choices)
-        if not front or not back:
-            continue
-        fore, aft = _strips(front, back, request.outline, bool(entry), choices)
-        rooms = [areas[slot[0]] for slot in aft.slots if len(slot) == 1]
-        middle = fsum(rooms) / len(rooms) if rooms else 14.0
-        width = request.corridor + WALL
-        depths = [int(UNITS_PER_M * sqrt(middle) * percent / 100) for percent in (78, 90, 102, 114)]
-        wings = [
-            Wing(fore, aft, corridor, width, min(max(depth, 56), 112), suite, closet)
-            for depth in depths
+    def inline(self) -> Placing:
+        """Core in the middle, a wing in line with it, the service block on its other side."""
+        wing = self.wing(self.private, self.add_hallway(), self.request.outline)
+        core = self.core_trees()
+        below, above = self._offsets(self.request.outline)
+        service = self.service_block()
+        mouth = (0, 0, 0, wing.corridor.width)
+
+        def place(areas: Areas) -> list[Box]:
+            rooms = wing.place(areas)
+            low, high = rooms.low - below, rooms.high + above
+            left = -_core_width(core, areas, high - low)
+            boxes = rooms.boxes + choose_squarest(core, areas, (left, low, 0, high), [mouth])
+            return boxes + (service.boxes(areas, left, low, high) if service else [])
+
+        return place
+
+    def _offsets(self, outline: str | None) -> tuple[int, int]:
+        """Draw how far the core reaches beyond the wing at its low and its high side [units].
+
+        Between two wings it protrudes on one side (`bar`), or is set back there (`court`).
+        """
+        choices = self.choices
+        step = choices.between(24, 60)
+        side = choices.below(2)
+        if outline in ("rectangle", "U"):  # a wing's porch makes the U
+            return 0, 0
+        if outline == "T":
+            return choices.between(18, 34), choices.between(18, 34)
+        if outline in ("L", "bar", "court"):
+            if outline == "L":
+                out = step if choices.chance(60) else -step
+            else:
+                out = choices.between(24, 44) * (1 if outline == "bar" else -1)
+            return (out, 0) if side else (0, out)
+        low, high = (choices.weighted(((0, 50), (1, 30), (-1, 20))) for _ in range(2))
+        if low == -1 and high == -1:
+            low = 0
+        return low * step, high * choices.between(12, 44)
+
+    def across(self) -> Placing:
+        """A long core with a wing at a right angle to it, and the service block at its end."""
+        outline, choices = self.request.outline, self.choices
+        wing = self.wing(self.private, self.add_hallway(), outline)
+        core = self.core_trees()
+        service = self.service_block()
+        at = {"L": choices.pick((0, 100)), "T": 50}.get(outline or "")
+        if at is None:
+            at = choices.weighted(((0, 40), (100, 40), (50, 20)))
+        height = choices.between(86, 150)
+        mouth = (0, 0, wing.corridor.width, 0)
+
+        def place(areas: Areas) -> list[Box]:
+            rooms = wing.place(areas)
+            area = tree_area(core[0], areas)
+            depth = max(rooms.high - rooms.low, 1)
+            length = max(int(area / height + 0.5), depth if outline == "rectangle" else 0)
+            left = rooms.low + (depth - length) * at // 100
+            high = int(area / length + 0.5)
+            if high < MIN_CORE_DEPTH:
+                raise MisfitError
+            boxes = [box.turned() for box in rooms.boxes]
+            boxes += choose_squarest(core, areas, (left, -high, left + length, 0), [mouth])
+            return boxes + (service.boxes(areas, left, -high, 0) if service else [])
+
+        return place
+
+    def two_wings(self) -> Placing:
+        """A core between two wings."""
+        choices, outline = self.choices, self.request.outline
+        self.private += [[(room,)] for room in self.service]
+        main, *others = choices.shuffled(self.private)
+        half = (len(others) + choices.below(2)) // 2
+        if half < 1 or len(others) - half < 2:
+            raise MisfitError
+        plain = outline and "rectangle"  # without a porch
+        halls = self.add_hallway(), self.add_hallway()
+        first = self.wing([main, *others[:half]], halls[0], plain)
+        second = self.wing(others[half:], halls[1], plain, is_main=False)
+        core = self.core_trees()
+        shape = {"T": "bar", "U": "court"}.get(outline or "", outline)
+        below, above = self._offsets(shape)
+        as_core = choices.chance(50) if shape is None else shape in ("rectangle", "L")
+
+        def place(areas: Areas) -> list[Box]:
+            east = first.place(areas)
+            low, high = east.low - below, east.high + above
+            # The second wing is as deep as the core, or else as the first wing.
+            west = _fit_wing(second, areas, *((low, high) if as_core else (east.low, east.high)))
+            left = -_core_width(core, areas, high - low)
+            other = next(box for box in west if box.room == halls[1])
+            mouths = [(0, 0, 0, first.corridor.width), (left, other.y0, left, other.y1)]
+            boxes = east.boxes + choose_squarest(core, areas, (left, low, 0, high), mouths)
+            return boxes + [box.mirrored().moved(left, 0) for box in west]
+
+        return place
+
+    def columns(self) -> Placing:
+        """A small home without a corridor: rooms in a column beside the core open to it."""
+        choices, outline = self.choices, self.request.outline
+        slots = [*(self.entry or [])]
+        for group in choices.shuffled(self.private):
+            slots += group if choices.chance(50) else group[::-1]
+        column = _strip([slots])
+        if outline == "U":
+            if len(slots) < 3:
+                raise MisfitError
+            at = choices.between(1, len(slots) - 2)
+            column = replace(column, bays=tuple(-30 * (i == at) for i in range(len(slots))))
+        elif outline is None and choices.chance(35):
+            column = self._add_bays(column)
+        core = self.core_trees()
+        service = self.service_block()
+        ratio = choices.between(62, 110)
+        below, above = self._offsets(outline)
+
+        def place(areas: Areas) -> list[Box]:
+            height = int(sqrt(fsum(areas.values()) * 100 / (1.45 * ratio)))
+            low, high = -below, height + above
+            left = -_core_width(core, areas, high - low)
+            boxes = choose_squarest(core, areas, (left, low, 0, high))
+            depth = column.depth(areas, height)
+            if depth < 40:
+                raise MisfitError
+            boxes += [box.turned() for box in column.boxes(areas, height, depth)]
+            return boxes + (service.boxes(areas, left, low, high) if service else [])
+
+        return place
+
+    def rows(self, count: int) -> Placing:
+        """A compact home: the core and service block, along it a corridor and a strip of rooms.
+
+        With two rows there is such a strip on both of its sides.
+        """
+        halls = [self.add_hallway() for _ in range(count)]
+        strips, choices = self._row_strips(count), self.choices
+        core = self.core_trees()
+        service = self.service_block()
+        if service is not None:
+            pairs = [(tree, service.trees[choices.below(len(service.trees))]) for tree in core]
+            core = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
+        width, closets = self.request.corridor + WALL, [self.closet, None]
+        suites = [closet is None and choices.chance(65) for closet in closets]
+        corridors = [
+            Corridor(hall, width, suite and len(strip.slots) > 1, closet)
+            for hall, suite, closet, strip in zip(halls, suites, closets, strips, strict=False)
         ]
-        wing = _squarest_wing(wings, gross, briefs)
-        if wing is not None:
-            return wing
-    return None
 
+        def place(ratio: int, areas: Areas) -> list[Box]:
+            length = int(sqrt(fsum(areas.values()) * ratio / 100))
+            depth = int(tree_area(core[0], areas) / length + 0.5)
+            if depth < MIN_CORE_DEPTH:
+                raise MisfitError
+            first, *others = (
+                _row(strip, corridor, areas, length)
+                for strip, corridor in zip(strips, corridors, strict=True)
+            )
+            boxes = [box.moved(0, depth) for box in first]
+            boxes += [box.flipped() for other in others for box in other]
+            return boxes + choose_squarest(core, areas, (0, 0, length, depth))
 
-def _strips(
-    front: Sequence[RoomGroup],
-    back: Sequence[RoomGroup],
-    outline: str | None,
-    entry: bool,
-    choices: Choices,
-) -> tuple[Strip, Strip]:
-    """Draw the strips on the two sides of a corridor, with bays."""
-    fore, aft = _strip(front), _strip(back)
-    if outline is None and choices.chance(45):
-        fore = add_bays(fore, choices, entry)
-    if outline is None and choices.chance(35):
-        aft = add_bays(aft, choices, False)
-    if outline == "U" and entry:
-        fore = Strip(fore.slots, (-choices.between(28, 40), *fore.bays[1:]))  # a porch
-    return fore, aft
+        for ratio in choices.shuffled(LENGTH_RATIOS)[:TRIES]:
+            with suppress(MisfitError):
+                if is_promising(place(ratio, self.gross), self.briefs):
+                    return partial(place, ratio)
+        raise MisfitError
 
+    def _row_strips(self, count: int) -> list[Strip]:
+        """Divide the private rooms among strips.
 
-def _sides(
-    groups: Sequence[RoomGroup],
-    entry: RoomGroup | None,
-    areas: Mapping[int, float],
-    suite: bool,
-    choices: Choices,
-) -> tuple[list[RoomGroup], list[RoomGroup]]:
-    """Divide groups of rooms among the front and the back of a corridor.
-
-    Args:
-        groups: The rooms, those of the main bedroom first.
-        entry: The group that begins the front, or None.
-        areas: Of the rooms [m²].
-        suite: Whether the main bedroom ends the back.
-        choices: The stream to draw from.
-    """
-    main, *others = groups
-    front: list[RoomGroup] = []
-    back: list[RoomGroup] = []
-    weights = [_area([entry] if entry else [], areas), _area([main], areas)]
-    for group in choices.shuffled(others):
-        # Mostly to the side with less in it, so that both come out about as deep.
-        to_back = (weights[0] > weights[1]) != choices.chance(15)
-        (back if to_back else front).append(group if choices.chance(50) else group[::-1])
-        weights[to_back] += _area([group], areas)
-    if suite:
-        back.append(main)
-        # The front room beside the suite must still reach the corridor: the largest does.
-        front.sort(key=lambda group: _area([group[-1:]], areas))
-    else:
-        back.insert(choices.below(len(back) + 1), main if choices.chance(50) else main[::-1])
-    return [*([entry] if entry else []), *front], back
+        Raises:
+            MisfitError: A strip has no rooms.
+        """
+        choices, parts = self.choices, [list[RoomGroup]() for _ in range(count)]
+        # Groups of about one area share a strip, so that none is much narrower than it is deep.
+        ordered = sorted(choices.shuffled(self.private), key=lambda group: self._area([group]))
+        half = self._area(ordered) / count
+        for group in ordered if choices.chance(50) else ordered[::-1]:
+            part = next((part for part in parts if self._area(part) < half), parts[-1])
+            part.append(group if choices.chance(50) else group[::-1])
+        parts = [choices.shuffled(part) for part in parts]
+        if not all(parts):
+            raise MisfitError
+        if self.entry:
+            parts[-1].insert(0, self.entry)
+        strips = [_strip(part) for part in parts]
+        if self.request.outline is None:
+            strips = [self._add_bays(s) if choices.chance(40) else s for s in strips]
+        return strips
 
 
 def _strip(groups: Sequence[RoomGroup]) -> Strip:
@@ -310,364 +504,41 @@ def _strip(groups: Sequence[RoomGroup]) -> Strip:
     return Strip(slots, (0,) * len(slots))
 
 
-def _squarest_wing(
-    wings: Sequence[Wing], areas: Mapping[int, float], briefs: Sequence[Brief]
-) -> Wing | None:
-    """Return the wing with the squarest rooms, or None where none fits."""
-    best, least = None, 0.0
-    for wing in wings:
-        rooms = wing.place(areas)
-        if rooms is not None and is_promising(rooms.boxes, briefs):
-            score = slenderness(rooms.boxes)
-            if best is None or score < least:
-                best, least = wing, score
-    return best
+def _core_width(core: list[Tree], areas: Areas, depth: int) -> int:
+    """Return the width of a core of a depth [units].
 
-
-def _area(groups: Sequence[RoomGroup], areas: Mapping[int, float]) -> float:
-    return fsum(areas[room] for group in groups for slot in group for room in slot)
-
-
-def add_bays(strip: Strip, choices: Choices, entry: bool) -> Strip:
-    """Move one end of a strip, or the entryway, outwards or inwards."""
-    count = len(strip.slots)
-    if count < 2:
-        return strip
-    step = choices.between(10, 34) * (1 if choices.chance(60) else -1)
-    if entry and choices.chance(40):
-        return Strip(strip.slots, (-choices.between(16, 30), *[0] * (count - 1)))
-    moved_slots = choices.between(1, count - 1)
-    bays = [step if i >= count - moved_slots else 0 for i in range(count)]
-    return Strip(strip.slots, tuple(bays))
-
-
-# Minimum depth of the core [units].
-MIN_CORE_DEPTH = 70
-
-Areas = Mapping[int, float]
-Placing = Callable[[Areas], list[Box] | None]
-"""Places the rooms of a plan, by their gross areas [units²]; returns None where they do not fit."""
-
-
-def inline(
-    groups: Groups, request: LayoutRequest, briefs: Sequence[Brief], hall: int, choices: Choices
-) -> Placing | None:
-    """Core in the middle, a wing in line with it, the service block on its other side."""
-    wing = draw_wing(groups.private, groups.entry, groups.closet, hall, request, briefs, choices)
-    if wing is None:
-        return None
-    core = core_trees(groups, briefs, choices)
-    low, high = _offsets(request.outline, choices)
-    service = service_block(groups, request.outline, choices)
-
-    mouth = Mouth(True, 0, 0, wing.width)
-
-    def place(areas: Areas) -> list[Box] | None:
-        rooms = wing.place(areas)
-        if rooms is None:
-            return None
-        y0, y1 = rooms.low - low, rooms.high + high
-        if y1 - y0 < MIN_CORE_DEPTH:
-            return None
-        width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
-        boxes = rooms.boxes + choose_squarest(core, areas, (-width, y0, 0, y1), [mouth])
-        if service is not None:
-            boxes += service.boxes(areas, -width, y0, y1)
-        return boxes
-
-    return place
-
-
-def _offsets(outline: str | None, choices: Choices) -> tuple[int, int]:
-    """Draw how far the core reaches beyond the wing at its low and its high side [units].
-
-    Between two wings it protrudes on one side (`bar`), or is set back there (`court`).
+    Raises:
+        MisfitError: It is not deep enough.
     """
-    step = choices.between(24, 60)
-    side = choices.below(2)
-    if outline in ("rectangle", "U"):  # a wing's porch makes the U
-        return 0, 0
-    if outline == "L":
-        out = step if choices.chance(60) else -step
-        return (out, 0) if side else (0, out)
-    if outline == "T":
-        return choices.between(18, 34), choices.between(18, 34)
-    if outline in ("bar", "court"):
-        out = choices.between(24, 44) * (1 if outline == "bar" else -1)
-        return (out, 0) if side else (0, out)
-    low, high = (choices.weighted(((0, 50), (1, 30), (-1, 20))) for _ in range(2))
-    if low == -1 and high == -1:
-        low = 0
-    return low * step, high * choices.between(12, 44)
+    if depth < MIN_CORE_DEPTH:
+        raise MisfitError
+    return int(tree_area(core[0], areas) / depth + 0.5)
 
 
-def across(
-    groups: Groups, request: LayoutRequest, briefs: Sequence[Brief], hall: int, choices: Choices
-) -> Placing | None:
-    """A long core with a wing at a right angle to it, and the service block at its end."""
-    wing = draw_wing(groups.private, groups.entry, groups.closet, hall, request, briefs, choices)
-    if wing is None:
-        return None
-    core = core_trees(groups, briefs, choices)
-    service = service_block(groups, request.outline, choices)
-    at = {"L": choices.pick((0, 100)), "T": 50}.get(request.outline or "")
-    if at is None:
-        at = choices.weighted(((0, 40), (100, 40), (50, 20)))
-    height = choices.between(86, 150)
-
-    mouth = Mouth(False, 0, 0, wing.width)
-
-    def place(areas: Areas) -> list[Box] | None:
-        rooms = wing.place(areas)
-        if rooms is None:
-            return None
-        area = tree_area(core[0], areas)
-        depth = max(rooms.high - rooms.low, 1)
-        length = max(int(area / height + 0.5), depth if request.outline == "rectangle" else 0)
-        left = rooms.low + (depth - length) * at // 100
-        high = int(area / length + 0.5)
-        if high < MIN_CORE_DEPTH:
-            return None
-        boxes = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in rooms.boxes]
-        boxes += choose_squarest(core, areas, (left, -high, left + length, 0), [mouth])
-        if service is not None:
-            boxes += service.boxes(areas, left, -high, 0)
-        return boxes
-
-    return place
-
-
-def two_wings(
-    groups: Groups,
-    request: LayoutRequest,
-    briefs: Sequence[Brief],
-    halls: tuple[int, int],
-    choices: Choices,
-) -> Placing | None:
-    """A core between two wings."""
-    main, *others = choices.shuffled(groups.private)
-    half = (len(others) + choices.below(2)) // 2
-    if half < 1 or len(others) - half < 2:
-        return None
-    plain = replace(request, outline=request.outline and "rectangle")  # without a porch
-    first = draw_wing(
-        [main, *others[:half]], groups.entry, groups.closet, halls[0], plain, briefs, choices
-    )
-    second = draw_wing(others[half:], None, None, halls[1], plain, briefs, choices)
-    if first is None or second is None:
-        return None
-    core = core_trees(groups, briefs, choices)
-    shape = {"T": "bar", "U": "court"}.get(request.outline or "", request.outline)
-    offsets = _offsets(shape, choices)
-    as_core = choices.chance(50) if shape is None else shape in ("rectangle", "L")
-    return partial(_between, core, (first, second), offsets, as_core)
-
-
-def _between(
-    core: list[Tree],
-    wings: tuple[Wing, Wing],
-    offsets: tuple[int, int],
-    as_core: bool,
-    areas: Areas,
-) -> list[Box] | None:
-    """Place a core between two wings.
-
-    Args:
-        core: Ways to divide the core.
-        wings: The wing at its high x, and the one at its low x.
-        offsets: How far the core reaches beyond the first wing, at low and at high y [units].
-        as_core: Whether the second wing is as deep as the core, else as the first wing.
-        areas: Gross areas of the rooms [units²].
-    """
-    first, second = wings
-    east = first.place(areas)
-    if east is None:
-        return None
-    y0, y1 = east.low - offsets[0], east.high + offsets[1]
-    west = _fit_wing(second, areas, *((y0, y1) if as_core else (east.low, east.high)))
-    if west is None or y1 - y0 < MIN_CORE_DEPTH:
-        return None
-    width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
-    other = next(box for box in west if box.room == second.corridor)
-    mouths = [Mouth(True, 0, 0, first.width), Mouth(True, -width, other.y0, other.y1)]
-    boxes = east.boxes + choose_squarest(core, areas, (-width, y0, 0, y1), mouths)
-    return boxes + [Box(b.room, -width - b.x1, b.y0, -width - b.x0, b.y1) for b in west]
-
-
-def _fit_wing(wing: Wing, areas: Areas, low: int, high: int) -> list[Box] | None:
+def _fit_wing(wing: Wing, areas: Areas, low: int, high: int) -> list[Box]:
     """Return a wing's rooms, moved and deepened to fill a span along y [units]."""
-    rooms = wing.place(areas)
+    rooms, width = wing.place(areas), wing.corridor.width
     for _ in range(2):
-        if rooms is None:
-            return None
-        current = rooms.high - rooms.low - wing.width
-        depth = wing.back_depth * (high - low - wing.width) / current
+        depth = wing.back_depth * (high - low - width) / (rooms.high - rooms.low - width)
         wing = replace(wing, back_depth=int(depth + 0.5))
         rooms = wing.place(areas)
-    if rooms is None:
-        return None
     shift = low - rooms.low
     rest = high - rooms.high - shift
     if abs(rest) > 6:
-        return None
-    top = rooms.high
-    return [
-        Box(b.room, b.x0, b.y0 + shift, b.x1, b.y1 + shift + (rest if b.y1 == top else 0))
-        for b in rooms.boxes
-    ]
+        raise MisfitError
+    moved = [box.moved(0, shift) for box in rooms.boxes]
+    return [box._replace(y1=high) if box.y1 == rooms.high + shift else box for box in moved]
 
 
-def columns(
-    groups: Groups, request: LayoutRequest, briefs: Sequence[Brief], choices: Choices
-) -> Placing | None:
-    """A small home without a corridor: rooms in a column beside the core open to it."""
-    slots = [*(groups.entry or [])]
-    for group in choices.shuffled(groups.private):
-        slots += group if choices.chance(50) else group[::-1]
-    column = Strip(tuple(slots), (0,) * len(slots))
-    if request.outline == "U":
-        if len(slots) < 3:
-            return None
-        at = choices.between(1, len(slots) - 2)
-        column = replace(column, bays=tuple(-30 * (i == at) for i in range(len(slots))))
-    elif request.outline is None and choices.chance(35):
-        column = add_bays(column, choices, False)
-    core = core_trees(groups, briefs, choices)
-    service = service_block(groups, request.outline, choices)
-    ratio = choices.between(62, 110)
-    low, high = _offsets(request.outline, choices)
-
-    def place(areas: Areas) -> list[Box] | None:
-        total = fsum(areas.values())
-        height = int(sqrt(total * 100 / (1.45 * ratio)))
-        y0, y1 = -low, height + high
-        if y1 - y0 < MIN_CORE_DEPTH:
-            return None
-        width = int(tree_area(core[0], areas) / (y1 - y0) + 0.5)
-        boxes = choose_squarest(core, areas, (-width, y0, 0, y1))
-        depth = column.depth(areas, height)
-        if depth < 40:
-            return None
-        beside = column.boxes(areas, height, depth, 0, 1)
-        boxes += [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in beside]
-        if service is not None:
-            boxes += service.boxes(areas, -width, y0, y1)
-        return boxes
-
-    return place
-
-
-# Length of rows, squared, over the area of their rooms [%].
-LENGTH_RATIOS = (55, 70, 85, 105, 130, 160, 195)
-
-
-def rows(
-    groups: Groups,
-    request: LayoutRequest,
-    briefs: Sequence[Brief],
-    halls: Sequence[int],
-    choices: Choices,
-) -> Placing | None:
-    """A compact home: the core with the service block, along it a corridor and a strip of rooms.
-
-    With two halls there is such a strip on both of its sides.
-    """
-    areas_m2 = {i: brief.area for i, brief in enumerate(briefs)}
-    strips = _row_strips(groups, areas_m2, len(halls), request.outline, choices)
-    if not strips:
-        return None
-    core = core_trees(groups, briefs, choices)
-    service = service_block(groups, request.outline, choices)
-    if service is not None:
-        pairs = [(tree, service.trees[choices.below(len(service.trees))]) for tree in core]
-        core = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
-    width = request.corridor + WALL
-    closets = [groups.closet, None]
-    suites = [closet is None and choices.chance(65) for closet in closets]
-
-    def place(ratio: int, areas: Areas) -> list[Box] | None:
-        length = int(sqrt(fsum(areas.values()) * ratio / 100))
-        depth = int(tree_area(core[0], areas) / length + 0.5)
-        if depth < MIN_CORE_DEPTH:
-            return None
-        boxes: list[Box] = []
-        for strip, hall, suite, closet, away in zip(
-            strips, halls, suites, closets, (1, -1), strict=False
-        ):
-            side = depth if away == 1 else 0
-            beside = _corridor_row(strip, hall, suite, closet, areas, length, width)
-            if beside is None:
-                return None
-            boxes += [
-                Box(b.room, b.x0, min(side + away * b.y0, side + away * b.y1), b.x1,
-                    max(side + away * b.y0, side + away * b.y1))
-                for b in beside
-            ]  # fmt: skip
-        return boxes + choose_squarest(core, areas, (0, 0, length, depth))
-
-    gross = {i: gross_area(area) for i, area in areas_m2.items() if area}
-    for ratio in choices.shuffled(LENGTH_RATIOS)[:TRIES]:
-        boxes = place(ratio, gross)
-        if boxes is not None and is_promising(boxes, briefs):
-            return partial(place, ratio)
-    return None
-
-
-def _row_strips(
-    groups: Groups, areas: Areas, count: int, outline: str | None, choices: Choices
-) -> list[Strip]:
-    """Divide the private rooms among strips, at most two; an empty list where one has none."""
-    parts: list[list[RoomGroup]] = [[] for _ in range(count)]
-    # Groups of about one area share a strip, so that none is much narrower than it is deep.
-    ordered = sorted(choices.shuffled(groups.private), key=lambda group: _area([group], areas))
-    half = _area(ordered, areas) / len(parts)
-    for group in ordered if choices.chance(50) else ordered[::-1]:
-        part = next((part for part in parts if _area(part, areas) < half), parts[-1])
-        part.append(group if choices.chance(50) else group[::-1])
-    parts = [choices.shuffled(part) for part in parts]
-    if not all(parts):
-        return []
-    if groups.entry:
-        parts[-1].insert(0, groups.entry)
-    strips = [_strip(part) for part in parts]
-    if outline is None:
-        strips = [
-            add_bays(strip, choices, False) if choices.chance(40) else strip for strip in strips
-        ]
-    return strips
-
-
-def _corridor_row(
-    strip: Strip,
-    hall: int,
-    suite: bool,
-    closet: int | None,
-    areas: Areas,
-    length: int,
-    width: int,
-) -> list[Box] | None:
-    """Return a corridor from y = 0 on and the strip of rooms above it.
-
-    With `suite` the last room reaches over the end of the corridor; a closet ends it, too.
-    """
-    if suite and len(strip.slots) > 1:
-        strip = replace(strip, bays=(*strip.bays[:-1], strip.bays[-1] + width))
-    else:
-        suite = False
+def _row(strip: Strip, corridor: Corridor, areas: Areas, length: int) -> list[Box]:
+    """Return a corridor from y = 0 on and the strip of rooms above it."""
+    if corridor.suite:
+        strip = strip.deepened_at_end(corridor.width)
     depth = strip.depth(areas, length)
     if not MIN_DEPTH <= depth <= MAX_DEPTH:
-        return None
-    boxes = strip.boxes(areas, length, depth, width, 1)
-    end = length
-    if suite:
-        end = boxes[-1].x0
-        boxes = [
-            b if b.x0 < end else Box(b.room, b.x0, b.y0 - width, b.x1, b.y1 - width) for b in boxes
-        ]
-    if closet is not None:
-        end -= min(max(int(areas[closet] / width + 0.5), 24), 52)
-        boxes.append(Box(closet, end, 0, length, width))
-    return None if end < 24 else [*boxes, Box(hall, 0, 0, end, width)]
+        raise MisfitError
+    hallway, above = corridor.beside(strip.boxes(areas, length, depth), areas)
+    return above + hallway
 
 
 # Share of the home's clear area that is in rooms; the rest is in door gaps.
@@ -693,39 +564,28 @@ class RoomLayout:
     boxes: list[Box]
 
 
-def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout | None:
-    """Draw one layout, or return None where the rooms do not fit as drawn."""
+def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout:
+    """Draw one layout.
+
+    Raises:
+        MisfitError: The rooms do not fit as drawn.
+    """
     if all(brief.kind != "bedroom" for brief in request.briefs):
         return RoomLayout(request.briefs, _studio(request.briefs, choices))
-    groups = group_rooms(request.briefs, choices)
-    bedrooms = sum(brief.kind == "bedroom" for brief in request.briefs)
-    briefs = [*request.briefs, Brief("hallway", 0.0)]
-    hall = len(briefs) - 1
-    if (
-        request.edition == 2
-        and request.outline in (None, "rectangle")
-        and choices.chance(ROWS_PERCENT[min(bedrooms, 4)])
-    ):
-        halls = [hall]
-        if choices.chance(TWO_ROWS_PERCENT[min(bedrooms, 4)]):
-            briefs.append(Brief("hallway", 0.0))
-            halls.append(hall + 1)
-        placing = rows(groups, request, briefs, halls, choices)
-    elif groups.closet is None and bedrooms <= 2 and choices.chance(70 if bedrooms == 1 else 25):
-        briefs.pop()
-        placing = columns(groups, request, briefs, choices)
+    sketch = Sketch(request, choices)
+    bedrooms = len(sketch.of_kind["bedroom"])
+    may_have_rows = request.edition == 2 and request.outline in (None, "rectangle")
+    if may_have_rows and choices.chance(ROWS_PERCENT[min(bedrooms, 4)]):
+        placing = sketch.rows(1 + choices.chance(TWO_ROWS_PERCENT[min(bedrooms, 4)]))
+    elif sketch.closet is None and bedrooms <= 2 and choices.chance(70 if bedrooms == 1 else 25):
+        placing = sketch.columns()
     elif bedrooms > 3 and choices.chance(65 if bedrooms < 6 else 90):
-        groups.private += [[(room,)] for room in groups.service]
-        briefs.append(Brief("hallway", 0.0))
-        placing = two_wings(groups, request, briefs, (hall, hall + 1), choices)
+        placing = sketch.two_wings()
     elif choices.chance(65):
-        placing = inline(groups, request, briefs, hall, choices)
+        placing = sketch.inline()
     else:
-        placing = across(groups, request, briefs, hall, choices)
-    if placing is None:
-        return None
-    boxes = _place_at_scale(placing, briefs, request.area_m2)
-    return None if boxes is None else RoomLayout(briefs, boxes)
+        placing = sketch.across()
+    return RoomLayout(sketch.briefs, _place_at_scale(placing, sketch.briefs, request.area_m2))
 
 
 def _studio(briefs: Sequence[Brief], choices: Choices) -> list[Box]:
@@ -742,17 +602,17 @@ def _studio(briefs: Sequence[Brief], choices: Choices) -> list[Box]:
     ]
 
 
-def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box] | None:
+def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box]:
     """Place the rooms at the scale at which their clear areas add up to the requested area."""
     target = area_m2 * UNITS_PER_M2 * ROOMS_SHARE
     factor = 1.0
     for _ in range(ROUNDS):
         areas = {i: gross_area(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}
         boxes = placing(areas)
-        if boxes is None or not is_promising(boxes, briefs):
-            return None
+        if not is_promising(boxes, briefs):
+            break
         area = sum_in_order(box.clear_area for box in boxes)
         if abs(area - target) <= TOLERANCE * target:
             return boxes
         factor *= target / area
-    return None
+    raise MisfitError

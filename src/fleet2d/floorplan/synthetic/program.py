@@ -1,9 +1,10 @@
 """The program of a synthetic home: its rooms and their sizes, drawn to fit the request."""
 
 import hashlib
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from math import fsum
 from typing import NamedTuple, TypeVar
 
@@ -51,12 +52,8 @@ class Choices:
 
     def weighted(self, items: Sequence[tuple[T, int]]) -> T:
         """Return an item with probability in proportion to its weight."""
-        rest = self.below(sum(weight for _, weight in items))
-        for item, weight in items:
-            if rest < weight:
-                return item
-            rest -= weight
-        raise AssertionError("the draw is below the sum of the weights")
+        ends = list(accumulate(weight for _, weight in items))
+        return items[bisect_right(ends, self.below(ends[-1]))][0]
 
     def shuffled(self, items: Sequence[T]) -> list[T]:
         """Return `items` in random order (Fisher and Yates)."""

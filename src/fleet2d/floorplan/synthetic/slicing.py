@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import fsum, sqrt
 from typing import NamedTuple, TypeAlias
 
+from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.synthetic.program import SIZES, Brief
 
 UNIT_M = 0.05
@@ -17,6 +18,15 @@ OUTER_WALL = 6  # 0.30 m: the depth of the front door's reveal
 
 Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 [units]."""
+
+
+class MisfitError(FloorPlanError):
+    """A layout is none of a home: its rooms don't fit together as drawn, or can't be used."""
+
+
+def overlap(a: Rectangle, b: Rectangle) -> bool:
+    """Return whether two rectangles share more than their sides."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 class Box(NamedTuple):
@@ -47,6 +57,27 @@ class Box(NamedTuple):
         width, height = self.clear
         return width * height
 
+    @property
+    def sides(self) -> Rectangle:
+        """Its sides [units]."""
+        return self.x0, self.y0, self.x1, self.y1
+
+    def moved(self, x: int, y: int) -> "Box":
+        """Return the box moved [units]."""
+        return Box(self.room, self.x0 + x, self.y0 + y, self.x1 + x, self.y1 + y)
+
+    def turned(self) -> "Box":
+        """Return the box with x and y exchanged."""
+        return Box(self.room, self.y0, self.x0, self.y1, self.x1)
+
+    def mirrored(self) -> "Box":
+        """Return the box with low and high x exchanged."""
+        return Box(self.room, -self.x1, self.y0, -self.x0, self.y1)
+
+    def flipped(self) -> "Box":
+        """Return the box with low and high y exchanged."""
+        return Box(self.room, self.x0, -self.y1, self.x1, -self.y0)
+
 
 class Wall(NamedTuple):
     """The wall between two boxes, or between a box and outside.
@@ -76,21 +107,17 @@ class Wall(NamedTuple):
 def inner_walls(boxes: Sequence[Box]) -> list[Wall]:
     """Return the walls between boxes that touch along more than a corner."""
     walls = []
-    for i, a in enumerate(boxes):
-        for j in range(i + 1, len(boxes)):
-            b = boxes[j]
-            if a.x1 < b.x0 or b.x1 < a.x0 or a.y1 < b.y0 or b.y1 < a.y0:
-                continue
-            if a.x1 == b.x0 or b.x1 == a.x0:
-                low, high = max(a.y0, b.y0), min(a.y1, b.y1) - WALL
-                pair = (i, j, True, a.x1) if a.x1 == b.x0 else (j, i, True, b.x1)
-            elif a.y1 == b.y0 or b.y1 == a.y0:
-                low, high = max(a.x0, b.x0), min(a.x1, b.x1) - WALL
-                pair = (i, j, False, a.y1) if a.y1 == b.y0 else (j, i, False, b.y1)
-            else:
-                continue
-            if high > low:
-                walls.append(Wall(*pair, low, high))
+    for (i, a), (j, b) in combinations(enumerate(boxes), 2):
+        if a.x1 == b.x0 or b.x1 == a.x0:
+            low, high = max(a.y0, b.y0), min(a.y1, b.y1) - WALL
+            pair = (i, j, True, a.x1) if a.x1 == b.x0 else (j, i, True, b.x1)
+        elif a.y1 == b.y0 or b.y1 == a.y0:
+            low, high = max(a.x0, b.x0), min(a.x1, b.x1) - WALL
+            pair = (i, j, False, a.y1) if a.y1 == b.y0 else (j, i, False, b.y1)
+        else:
+            continue
+        if high > low:
+            walls.append(Wall(*pair, low, high))
     return walls
 
 
@@ -98,19 +125,19 @@ def outer_walls(boxes: Sequence[Box], walls: Sequence[Wall]) -> list[Wall]:
     """Return the parts of the boxes' sides that no other box touches."""
     outer = []
     for i, box in enumerate(boxes):
-        touching: dict[tuple[bool, bool], list[tuple[int, int]]] = {
-            (upright, high): [] for upright in (True, False) for high in (True, False)
-        }
-        for wall in walls:
-            if i in (wall.first, wall.second):
-                span = (wall.low, wall.high)
-                touching[wall.upright, wall.first == i].append(span)
-        for (upright, high), spans in touching.items():
-            low_end, high_end = (box.y0, box.y1) if upright else (box.x0, box.x1)
-            side = (box.x1 if upright else box.y1) if high else (box.x0 if upright else box.y0)
-            pair = (i, -1) if high else (-1, i)
-            for low, top in _gaps(sorted(spans), low_end, high_end - WALL):
-                outer.append(Wall(*pair, upright, side, low, top))
+        for side, first, second, upright in (
+            (box.x1, i, -1, True),
+            (box.x0, -1, i, True),
+            (box.y1, i, -1, False),
+            (box.y0, -1, i, False),
+        ):
+            touching = [wall for wall in walls if wall.upright == upright]
+            spans = [
+                (w.low, w.high) for w in touching if i == (w.first if second < 0 else w.second)
+            ]
+            low, high = (box.y0, box.y1) if upright else (box.x0, box.x1)
+            for start, end in _gaps(sorted(spans), low, high - WALL):
+                outer.append(Wall(first, second, upright, side, start, end))
     return outer
 
 
@@ -128,24 +155,20 @@ def _gaps(spans: Sequence[tuple[int, int]], low: int, high: int) -> list[tuple[i
 
 def boxes_overlap(boxes: Sequence[Box]) -> bool:
     """Return whether any two boxes share more than their sides."""
-    return any(
-        a.x0 < b.x1 and b.x0 < a.x1 and a.y0 < b.y1 and b.y0 < a.y1
-        for i, a in enumerate(boxes)
-        for b in boxes[i + 1 :]
-    )
+    return any(overlap(a.sides, b.sides) for a, b in combinations(boxes, 2))
 
 
 def turn_boxes(boxes: Sequence[Box], orientation: int) -> list[Box]:
     """Return the boxes in one of their eight orientations, turned and mirrored (0 to 7)."""
     oriented = list(boxes)
     if orientation & 1:
-        oriented = [Box(b.room, -b.x1, b.y0, -b.x0, b.y1) for b in oriented]
+        oriented = [box.mirrored() for box in oriented]
     if orientation & 2:
-        oriented = [Box(b.room, b.x0, -b.y1, b.x1, -b.y0) for b in oriented]
+        oriented = [box.flipped() for box in oriented]
     if orientation & 4:
-        oriented = [Box(b.room, b.y0, b.x0, b.y1, b.x1) for b in oriented]
+        oriented = [box.turned() for box in oriented]
     x0, y0 = min(b.x0 for b in oriented), min(b.y0 for b in oriented)
-    return [Box(b.room, b.x0 - x0, b.y0 - y0, b.x1 - x0, b.y1 - y0) for b in oriented]
+    return [box.moved(-x0, -y0) for box in oriented]
 
 
 # Penalty, in slenderness, for a corridor that ends at the wall between two rooms.
@@ -195,11 +218,8 @@ def slice_tree(
         return [Box(tree.room, x0, y0, x1, y1)]
     low, high = (x0, x1) if tree.across else (y0, y1)
     boxes: list[Box] = []
-    for part, (start, end) in zip(
-        tree.parts,
-        divide_span([tree_area(part, areas) for part in tree.parts], low, high),
-        strict=True,
-    ):
+    spans = divide_span([tree_area(part, areas) for part in tree.parts], low, high)
+    for part, (start, end) in zip(tree.parts, spans, strict=True):
         if tree.across:
             boxes += slice_tree(part, areas, start, y0, end, y1)
         else:
@@ -207,27 +227,11 @@ def slice_tree(
     return boxes
 
 
-class Mouth(NamedTuple):
-    """The end of a corridor at a rectangle's side.
-
-    Attributes:
-        upright: Whether that side runs along y.
-        at: The coordinate of that side [units].
-        low: The beginning of the corridor along it [units].
-        high: The end of the corridor along it [units].
-    """
-
-    upright: bool
-    at: int
-    low: int
-    high: int
-
-
 def choose_squarest(
     trees: Sequence[Tree],
     areas: Mapping[int, float],
-    sides: tuple[int, int, int, int],
-    mouths: Sequence[Mouth] = (),
+    sides: Rectangle,
+    mouths: Sequence[Rectangle] = (),
 ) -> list[Box]:
     """Return the rooms of the tree that makes them squarest, the first if tied.
 
@@ -235,24 +239,21 @@ def choose_squarest(
         trees: The trees to choose from.
         areas: Gross areas of the rooms [units²].
         sides: The rectangle (x0, y0, x1, y1) [units].
-        mouths: Corridors that a wall should not end in.
+        mouths: Ends of corridors at a side of the rectangle [units]: no wall should end there.
     """
-    layouts = [slice_tree(tree, areas, *sides) for tree in trees]
-    return min(
-        layouts,
-        key=lambda boxes: slenderness(boxes) + MOUTH_PENALTY * _blocked_mouths(boxes, mouths),
-    )
+
+    def penalty(boxes: list[Box]) -> float:
+        return slenderness(boxes) + MOUTH_PENALTY * _blocked_mouths(boxes, mouths)
+
+    return min((slice_tree(tree, areas, *sides) for tree in trees), key=penalty)
 
 
-def _blocked_mouths(boxes: Sequence[Box], mouths: Sequence[Mouth]) -> int:
+def _blocked_mouths(boxes: Sequence[Box], mouths: Sequence[Rectangle]) -> int:
     """Return how many corridors do not end at a single room."""
-    return sum(not any(_meets(box, mouth) for box in boxes) for mouth in mouths)
-
-
-def _meets(box: Box, mouth: Mouth) -> bool:
-    if mouth.upright:
-        return mouth.at in (box.x0, box.x1) and box.y0 <= mouth.low and mouth.high <= box.y1
-    return mouth.at in (box.y0, box.y1) and box.x0 <= mouth.low and mouth.high <= box.x1
+    return sum(
+        not any(b.x0 <= x0 and x1 <= b.x1 and b.y0 <= y0 and y1 <= b.y1 for b in boxes)
+        for x0, y0, x1, y1 in mouths
+    )
 
 
 def slenderness(boxes: Sequence[Box]) -> float:
@@ -260,9 +261,10 @@ def slenderness(boxes: Sequence[Box]) -> float:
     total = 0.0
     for _, x0, y0, x1, y1 in boxes:
         width, height = x1 - x0 - WALL, y1 - y0 - WALL
-        ratio = (
-            (width / height if height > 0 else 99.0) if width > height else height / max(width, 1)
-        )
+        if width > height:
+            ratio = width / height if height > 0 else 99.0
+        else:
+            ratio = height / max(width, 1)
         if ratio > 1.2:
             total += (ratio - 1.2) * (ratio - 1.2)
     return total
@@ -292,13 +294,9 @@ class Strip:
 
     def widths(self, areas: Mapping[int, float], depth: float) -> list[float]:
         """Return the widths of its slots [units] at a depth [units]."""
-        widths = []
-        for slot, bay in zip(self.slots, self.bays, strict=True):
-            area = areas[slot[0]]
-            if len(slot) > 1:
-                area += areas[slot[1]]
-            widths.append(max(area / (depth + bay), MIN_SLOT_WIDTH))
-        return widths
+        sizes = [areas[s[0]] + (areas[s[1]] if len(s) > 1 else 0.0) for s in self.slots]
+        depths = [depth + bay for bay in self.bays]
+        return [max(a / d, MIN_SLOT_WIDTH) for a, d in zip(sizes, depths, strict=True)]
 
     def depth(self, areas: Mapping[int, float], length: float) -> int:
         """Return the depth [units] at which it has a length [units]; 0 for none below 12 m."""
@@ -317,30 +315,29 @@ class Strip:
                 high = middle
         return high
 
-    def boxes(
-        self, areas: Mapping[int, float], length: int, depth: int, front: int, away: int
-    ) -> list[Box]:
-        """Return its rooms along x, from 0 on, with their front at y = `front`.
+    def boxes(self, areas: Mapping[int, float], length: int, depth: int) -> list[Box]:
+        """Return its rooms along x, from 0 on, with their front at y = 0.
 
         Args:
             areas: Gross areas of the rooms [units²].
             length: Its length [units].
             depth: Its depth [units].
-            front: y of its front [units].
-            away: 1 to extend upwards from its front, -1 downwards.
         """
         boxes: list[Box] = []
         spans = divide_span(self.widths(areas, depth), 0, length)
         for slot, bay, (x0, x1) in zip(self.slots, self.bays, spans, strict=True):
-            back = front + away * (depth + bay)
+            back = depth + bay
             if len(slot) == 1:
-                boxes.append(Box(slot[0], x0, min(front, back), x1, max(front, back)))
+                boxes.append(Box(slot[0], x0, 0, x1, back))
                 continue
             first, second = areas[slot[0]], areas[slot[1]]
-            middle = front + away * int((depth + bay) * first / (first + second) + 0.5)
-            boxes.append(Box(slot[0], x0, min(front, middle), x1, max(front, middle)))
-            boxes.append(Box(slot[1], x0, min(middle, back), x1, max(middle, back)))
+            middle = int(back * first / (first + second) + 0.5)
+            boxes += [Box(slot[0], x0, 0, x1, middle), Box(slot[1], x0, middle, x1, back)]
         return boxes
+
+    def deepened_at_end(self, depth: int) -> "Strip":
+        """Return the strip with its last slot as much deeper [units]."""
+        return replace(self, bays=(*self.bays[:-1], self.bays[-1] + depth))
 
 
 MIN_DEPTH = 44
@@ -350,78 +347,94 @@ REACH = 25
 
 
 @dataclass(frozen=True)
+class Corridor:
+    """A corridor along a strip of rooms.
+
+    Attributes:
+        hall: Index of the hallway.
+        width: Its gross width [units].
+        suite: Whether the last room of the strip ends the corridor, and is as much deeper.
+        closet: A small room at the end of the corridor, or None.
+    """
+
+    hall: int
+    width: int
+    suite: bool
+    closet: int | None = None
+
+    def beside(self, strip: list[Box], areas: Mapping[int, float]) -> tuple[list[Box], list[Box]]:
+        """Return the corridor from y = 0 on, with its closet, and the strip of rooms above it.
+
+        Args:
+            strip: The rooms along x, with their front at y = 0.
+            areas: Gross areas of the rooms [units²].
+
+        Raises:
+            MisfitError: There is no space for a corridor.
+        """
+        above = [box.moved(0, self.width) for box in strip]
+        length = end = strip[-1].x1
+        if self.suite:
+            end = strip[-1].x0
+            above = [new if new.x0 < end else old for old, new in zip(strip, above, strict=True)]
+        hallway: list[Box] = []
+        if self.closet is not None:
+            end -= min(max(int(areas[self.closet] / self.width + 0.5), 24), 52)
+            hallway = [Box(self.closet, end, 0, length, self.width)]
+        if end < 24:
+            raise MisfitError
+        return [*hallway, Box(self.hall, 0, 0, end, self.width)], above
+
+
+@dataclass(frozen=True)
 class Wing:
     """The strips and corridor of a wing; it starts at x = 0, its corridor at y = 0.
 
     Attributes:
         front: The strip below the corridor.
         back: The strip above it.
-        corridor: Index of the hallway, or None where the strips meet.
-        width: Gross width of the corridor [units].
+        corridor: The corridor between them.
         back_depth: Depth of the back strip [units].
-        suite: Whether the last room of the back strip ends the corridor, and is as much deeper.
-        closet: A small room at the end of the corridor, or None.
     """
 
     front: Strip
     back: Strip
-    corridor: int | None
-    width: int
+    corridor: Corridor
     back_depth: int
-    suite: bool
-    closet: int | None = None
 
-    def place(self, areas: Mapping[int, float]) -> "PlacedWing | None":
-        """Place the wing's rooms; None where they do not fit together.
+    def place(self, areas: Mapping[int, float]) -> "PlacedWing":
+        """Place the wing's rooms.
 
         Args:
             areas: Gross areas of the rooms [units²].
+
+        Raises:
+            MisfitError: They do not fit together.
         """
-        back = self._suite_strip()
+        width, is_suite = self.corridor.width, self.corridor.suite
+        back = self.back.deepened_at_end(width) if is_suite else self.back
         length = int(fsum(back.widths(areas, self.back_depth)) + 0.5)
         depth = self.front.depth(areas, length)
         if not MIN_DEPTH <= depth <= MAX_DEPTH:
-            return None
-        boxes = self.front.boxes(areas, length, depth, 0, -1)
-        upper = back.boxes(areas, length, self.back_depth, self.width, 1)
-        end = length
-        if self.suite:
-            suite = upper[-1]  # extends down over the corridor instead of up
-            upper[-1] = Box(suite.room, suite.x0, 0, suite.x1, suite.y1 - self.width)
-            end = suite.x0
-            if boxes[-1].x0 > end - REACH:
-                return replace(self, suite=False).place(areas)
-        if self.closet is not None:
-            depth_of_closet = int(areas[self.closet] / self.width + 0.5)
-            end -= min(max(depth_of_closet, 24), 52)
-            boxes.append(Box(self.closet, end, 0, length, self.width))
-        if self.corridor is not None:
-            if end < 24:
-                return None
-            boxes.append(Box(self.corridor, 0, 0, end, self.width))
-        return PlacedWing([*boxes, *upper], length, -depth, self.width + self.back_depth)
-
-    def _suite_strip(self) -> Strip:
-        """Return the back strip, its last slot as much deeper as the corridor is wide."""
-        if not self.suite:
-            return self.back
-        *bays, last = self.back.bays
-        return Strip(self.back.slots, (*bays, last + self.width))
+            raise MisfitError
+        front = [box.flipped() for box in self.front.boxes(areas, length, depth)]
+        strip = back.boxes(areas, length, self.back_depth)
+        if is_suite and front[-1].x0 > strip[-1].x0 - REACH:
+            return replace(self, corridor=replace(self.corridor, suite=False)).place(areas)
+        hallway, above = self.corridor.beside(strip, areas)
+        return PlacedWing([*front, *hallway, *above], -depth, width + self.back_depth)
 
 
-@dataclass(frozen=True)
-class PlacedWing:
+class PlacedWing(NamedTuple):
     """A wing's rooms in its own frame.
 
     Attributes:
         boxes: The rooms.
-        length: How far it reaches along x [units].
         low: The y of its front [units].
         high: The y of its back [units].
     """
 
     boxes: list[Box]
-    length: int
     low: int
     high: int
 

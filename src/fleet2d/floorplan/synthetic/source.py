@@ -1,13 +1,12 @@
 """The `synthetic` floor plan: a home generated from a seed, its settings, and its floor plan."""
 
 from collections.abc import Sequence
-from typing import Literal, Self
+from typing import Literal
 
 import shapely
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Length, Share
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
@@ -25,49 +24,9 @@ from fleet2d.floorplan.synthetic.slicing import (
     UNIT_M,
     UNITS_PER_M,
     WALL,
-    Box,
     Rectangle,
     Wall,
 )
-
-
-def floor_plan(
-    house: House, name: str, cell: float, source: str, scale: float | None = None
-) -> FloorPlan:
-    """Convert a generated home to a floor plan.
-
-    Args:
-        house: The home.
-        name: The name of the plan.
-        cell: Side of a grid cell [m].
-        source: The source of the plan, for readers.
-        scale: What its lengths are multiplied by; None for 1.
-    """
-    spaces = [_clear(box) for box in house.boxes]
-    through = [_hole(gap) for gap in [*house.gaps, house.front_door]]
-    doors = [_line(gap) for gap in house.gaps if gap.leaf is not None]
-    doors.append(_line(house.front_door, "front_door"))
-    regions, air = _regions(house), _metres([*spaces, *through])
-    holes = [shapely.Polygon(ring) for part in shapely.get_parts(air) for ring in part.interiors]
-    # No post stands where rectangles of one room meet.
-    posts = [hole for hole in holes if any(region.shape.covers(hole) for region in regions)]
-    shafts = shapely.union_all([_metres([shaft]) for shaft in house.shafts])
-    free = shapely.difference(shapely.union_all([air, *posts]), shafts)
-    assert isinstance(free, shapely.Polygon | shapely.MultiPolygon)
-    return FloorPlan.build(
-        name,
-        free,
-        regions,
-        cell,
-        source=source,
-        entrance=_entrance(house.front_door),
-        doorways=doors,
-        scale=scale,
-    )
-
-
-def _clear(box: Box) -> Rectangle:
-    return box.x0, box.y0, box.x1 - WALL, box.y1 - WALL
 
 
 def _hole(gap: Gap) -> Rectangle:
@@ -106,27 +65,22 @@ def _entrance(door: Gap) -> tuple[float, float]:
 
 
 def _regions(house: House) -> list[LabelledRegion]:
-    """Return the rooms up to the middle of their walls; the front door belongs to its room."""
-    regions = []
+    """Return the rooms up to the middle of their walls; the front door belongs to its room.
+
+    The living room also has the types of rooms that people need and the home lacks.
+    """
+    kinds = {brief.kind for brief in house.briefs}
+    lacking = [kind for kind in ("bedroom", "kitchen") if kind not in kinds]
+    regions, half = [], WALL // 2
     for index, brief in enumerate(house.briefs):
-        shapes = [_to_middle(box) for box in house.boxes if box.room == index]
+        boxes = [box for box in house.boxes if box.room == index]
+        shapes = [(b.x0 - half, b.y0 - half, b.x1 - half, b.y1 - half) for b in boxes]
         wall = house.front_door.wall
         if house.boxes[max(wall.first, wall.second)].room == index:
             shapes.append(_hole(house.front_door))
-        labels = _living_uses(house) if brief.kind == "living_room" else (brief.kind,)
+        labels = (brief.kind, *lacking) if brief.kind == "living_room" else (brief.kind,)
         regions.append(LabelledRegion(labels, _metres(shapes), None, brief.kind))
     return regions
-
-
-def _living_uses(house: House) -> tuple[str, ...]:
-    """Return the types that the living room has: also those of rooms that people need and lack."""
-    kinds = {brief.kind for brief in house.briefs}
-    return ("living_room", *(kind for kind in ("bedroom", "kitchen") if kind not in kinds))
-
-
-def _to_middle(box: Box) -> Rectangle:
-    half = WALL // 2
-    return box.x0 - half, box.y0 - half, box.x1 - half, box.y1 - half
 
 
 def _metres(sides: Sequence[Rectangle]) -> shapely.Polygon | shapely.MultiPolygon:
@@ -135,6 +89,21 @@ def _metres(sides: Sequence[Rectangle]) -> shapely.Polygon | shapely.MultiPolygo
     metres = shapely.transform(union, lambda xy: xy * UNIT_M)
     assert isinstance(metres, shapely.Polygon | shapely.MultiPolygon)
     return metres
+
+
+def _free_space(
+    house: House, regions: Sequence[LabelledRegion]
+) -> shapely.Polygon | shapely.MultiPolygon:
+    """Return the space of rooms and passages, without shafts [m]."""
+    spaces = [(box.x0, box.y0, box.x1 - WALL, box.y1 - WALL) for box in house.boxes]
+    air = _metres([*spaces, *(_hole(gap) for gap in [*house.gaps, house.front_door])])
+    holes = [shapely.Polygon(ring) for part in shapely.get_parts(air) for ring in part.interiors]
+    # No post stands where rectangles of one room meet.
+    posts = [hole for hole in holes if any(region.shape.covers(hole) for region in regions)]
+    shafts = shapely.union_all([_metres([shaft]) for shaft in house.shafts])
+    free = shapely.difference(shapely.union_all([air, *posts]), shafts)
+    assert isinstance(free, shapely.Polygon | shapely.MultiPolygon)
+    return free
 
 
 @register("floorplan", "synthetic")
@@ -167,18 +136,10 @@ class Synthetic(FloorPlanSource):
     garage: bool | None = None
     outline: Literal["rectangle", "L", "T", "U"] | None = None
     open_plan: bool | None = None
-    corridor_width: Length | None = None
-    door_width: Length | None = None
+    corridor_width: Length | None = Field(default=None, ge=0.9, le=2)
+    door_width: Length | None = Field(default=None, ge=0.7, le=1.2)
     variety: Share = 0.0
     edition: Literal[1, 2] = 1
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for name, low, high in (("corridor_width", 0.9, 2.0), ("door_width", 0.7, 1.2)):
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise problem(f"{name} is {value:g} m; {low:g} m to {high:g} m is possible")
-        return self
 
     def load(self) -> FloorPlan:
         """Generate the home.
@@ -196,9 +157,18 @@ class Synthetic(FloorPlanSource):
             self.edition,
         )
         house = generate(self.seed, wishes, style)
-        name = f"synthetic_{self.seed}"
-        source = f"synthetic home, seed {self.seed}"
-        return floor_plan(house, name, self.cell, source, self.scale)
+        regions = _regions(house)
+        doors = [_line(gap) for gap in house.gaps if gap.leaf is not None]
+        return FloorPlan.build(
+            f"synthetic_{self.seed}",
+            _free_space(house, regions),
+            regions,
+            self.cell,
+            source=f"synthetic home, seed {self.seed}",
+            entrance=_entrance(house.front_door),
+            doorways=[*doors, _line(house.front_door, "front_door")],
+            scale=self.scale,
+        )
 
 
 def _units(length: float | None) -> int | None:
