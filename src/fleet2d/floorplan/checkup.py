@@ -10,12 +10,13 @@ import shapely
 from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.problems import counted, did_you_mean
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import UNITS
 from fleet2d.floorplan.placed_objects import PlacedObject, Point
 from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.rooms.doorways import DoorLine, Doorway
 from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, LabelledRegion
 from fleet2d.floorplan.space import Space, grown_cells, with_approaches
 from fleet2d.kernels import Bool
@@ -189,52 +190,51 @@ def _unit_by_doors(plan: FloorPlan, door: float | None) -> tuple[str, int] | Non
     return (unit, doors) if error < DOOR_FACTOR else None
 
 
+def _found(
+    kind: str, severity: Severity, text: str, at: shapely.Point, shape: BaseGeometry, rest: str = ""
+) -> Finding:
+    """Return a finding about a shape [m]; the place stands between the text and the rest of it."""
+    return Finding(kind, severity, f"{text} at {_place(at)}{rest}", (at.x, at.y), shape)
+
+
 def _parts(plan: FloorPlan) -> Iterator[Finding]:
     parts = sorted(shapely.get_parts(plan.free_space).tolist(), key=lambda part: -part.area)[1:]
     ends = shapely.MultiPoint([at for p in plan.portals for at in (p.start, p.end)])
     parts = [part for part in parts if not part.intersects(ends)]
     for part in parts:
         if part.area >= PART_M2:
-            at = part.representative_point()
-            text = f"nothing joins a part of {part.area:.2f} m2 at {_place(at)} to the rest"
+            text, rest = f"nothing joins a part of {part.area:.2f} m2", " to the rest"
             others = shapely.difference(plan.free_space, part)
             if (apart := shapely.distance(part, others)) <= NEARLY_JOINED_M:
                 near = shapely.get_point(shapely.shortest_line(part, others), 0)
-                text += f", though they are only {apart:.3f} m apart at {_place(near)}"
-            yield Finding("parts", "wrong", text, (at.x, at.y), part)
+                rest += f", though they are only {apart:.3f} m apart at {_place(near)}"
+            yield _found("parts", "wrong", text, part.representative_point(), part, rest)
     small = [part for part in parts if part.area < PART_M2]
     if small:
-        at = small[0].representative_point()
-        lone = len(small) == 1
         text = (
-            f"nothing joins {len(small)} part{'' if lone else 's'} smaller than {PART_M2:g} m2 to"
-            f" the rest, {'' if lone else 'the largest '}at {_place(at)}"
+            f"nothing joins {counted(len(small), 'part')} smaller than {PART_M2:g} m2 to the rest,"
         )
-        yield Finding("parts", "odd", text, (at.x, at.y), shapely.MultiPolygon(small))
+        text += " the largest" * (len(small) > 1)
+        shape = shapely.MultiPolygon(small)
+        yield _found("parts", "odd", text, small[0].representative_point(), shape)
 
 
 def _no_go(plan: FloorPlan) -> Iterator[Finding]:
     covered = shapely.intersection(shapely.union_all(plan.no_go), plan.free_space)
     if covered.area > MAX_NO_GO_SHARE * plan.area_m2:
-        at = covered.representative_point()
         share = 100 * covered.area / plan.area_m2
-        text = f"robots keep out of {share:.0f} % of the floor: no_go covers it, at {_place(at)}"
-        yield Finding("no_go", "wrong", text, (at.x, at.y), covered)
+        text = f"robots keep out of {share:.0f} % of the floor: no_go covers it,"
+        yield _found("no_go", "wrong", text, covered.representative_point(), covered)
 
 
 def _specks(plan: FloorPlan) -> Iterator[Finding]:
     holes = [hole for part in shapely.get_parts(plan.free_space) for hole in part.interiors]
     specks = [s for s in map(shapely.Polygon, holes) if s.area < SPECK_M2]
     if specks:
-        at = specks[0].representative_point()
-        yield Finding(
-            "specks",
-            "odd",
-            f"{len(specks)} piece{'s' * (len(specks) > 1)} of wall smaller than {SPECK_M2:g} m2"
-            f" inside the home, the first at {_place(at)}",
-            (at.x, at.y),
-            shapely.MultiPolygon(specks),
-        )
+        size = f"of wall smaller than {SPECK_M2:g} m2 inside the home"
+        text, at = f"{counted(len(specks), 'piece')} {size}, the first", specks[0]
+        shape = shapely.MultiPolygon(specks)
+        yield _found("specks", "odd", text, at.representative_point(), shape)
 
 
 # --- Labels --------------------------------------------------------------------------------------
@@ -264,9 +264,8 @@ def _by_shape(plan: FloorPlan) -> list[LabelledRegion]:
     joined: dict[bytes, LabelledRegion] = {}
     for region in plan.regions:
         key = shapely.to_wkb(shapely.normalize(region.shape))
-        known = joined.get(key)
-        if known is not None:
-            region = replace(known, labels=known.labels + region.labels)
+        if key in joined:
+            region = replace(joined[key], labels=joined[key].labels + region.labels)
         if region.shape.area > 0:
             joined[key] = region
     return list(joined.values())
@@ -278,15 +277,9 @@ def _outside(plan: FloorPlan, regions: list[LabelledRegion]) -> Iterator[Finding
     for region in regions:
         outside = shapely.difference(region.shape, reach)
         if outside.area > MAX_OUTSIDE_SHARE * region.shape.area:
-            at = outside.representative_point()
-            yield Finding(
-                "outside",
-                "odd",
-                f"{100 * outside.area / region.shape.area:.0f} % of what is labelled"
-                f" {_called(region)} lies outside the home, at {_place(at)}",
-                (at.x, at.y),
-                outside,
-            )
+            share = f"{100 * outside.area / region.shape.area:.0f} %"
+            text = f"{share} of what is labelled {_called(region)} lies outside the home,"
+            yield _found("outside", "odd", text, outside.representative_point(), outside)
 
 
 def _overlaps(regions: list[LabelledRegion]) -> Iterator[Finding]:
@@ -299,15 +292,9 @@ def _overlaps(regions: list[LabelledRegion]) -> Iterator[Finding]:
         both = shapely.intersection(one.shape, other.shape)
         smaller = min(one.shape.area, other.shape.area)
         if both.area > max(MAX_OVERLAP_M2, MAX_OVERLAP_SHARE * smaller):
-            at = both.representative_point()
-            yield Finding(
-                "overlap",
-                "odd",
-                f"the labels {_called(one)} and {_called(other)} overlap by {both.area:.1f} m2"
-                f" at {_place(at)}: the smaller one counts there",
-                (at.x, at.y),
-                both,
-            )
+            text = f"the labels {_called(one)} and {_called(other)} overlap by {both.area:.1f} m2"
+            rest = ": the smaller one counts there"
+            yield _found("overlap", "odd", text, both.representative_point(), both, rest)
 
 
 def _called(region: LabelledRegion) -> str:
@@ -317,23 +304,19 @@ def _called(region: LabelledRegion) -> str:
 def _doors(plan: FloorPlan) -> Iterator[Finding]:
     for line in plan.lost_doorways:
         (x0, y0), (x1, y1) = line.start, line.end
-        yield Finding(
-            "door",
-            "wrong",
-            f"the door {line.name + ' ' if line.name else ''}from ({x0:.2f}, {y0:.2f}) to"
-            f" ({x1:.2f}, {y1:.2f}) m is in no wall: it doesn't close a passage",
-            ((x0 + x1) / 2, (y0 + y1) / 2),
-            shapely.LineString([line.start, line.end]),
-        )
+        called = f"{line.name + ' ' if line.name else ''}from ({x0:.2f}, {y0:.2f}) to"
+        text = f"the door {called} ({x1:.2f}, {y1:.2f}) m is in no wall: it doesn't close a passage"
+        yield Finding("door", "wrong", text, *_along(line))
     for door in plan.doorways:
         if door.leaf and door.width_m > WIDEST_DOOR_M:
-            yield Finding(
-                "door",
-                "odd",
-                f"the door {door.name} is {door.width_m:.2f} m wide",
-                _middle(door.start, door.end),
-                shapely.LineString([door.start, door.end]),
-            )
+            text = f"the door {door.name} is {door.width_m:.2f} m wide"
+            yield Finding("door", "odd", text, *_along(door))
+
+
+def _along(door: DoorLine | Doorway) -> tuple[Point, shapely.LineString]:
+    """Return the middle of a door, and its line [m]."""
+    (x0, y0), (x1, y1) = door.start, door.end
+    return ((x0 + x1) / 2, (y0 + y1) / 2), shapely.LineString([door.start, door.end])
 
 
 # --- Routes ---------------------------------------------------------------------------------------
@@ -451,7 +434,3 @@ def _place(at: shapely.Point) -> str:
 def _centre(thing: PlacedObject) -> Point:
     middle = thing.footprint.centroid
     return middle.x, middle.y
-
-
-def _middle(start: Point, end: Point) -> Point:
-    return (start[0] + end[0]) / 2, (start[1] + end[1]) / 2

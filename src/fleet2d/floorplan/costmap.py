@@ -11,7 +11,7 @@ from pydantic import Field
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.units import Length
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.plan import FloorPlan, cells_of, read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import (
     CELL_CENTRE,
@@ -60,7 +60,7 @@ def costs_of(
         obstacles: Footprints of obstacles besides the walls [m].
     """
     cell = plan.lattice.cell
-    free = plan.free & ~cells_within(plan, tuple(obstacles))
+    free = plan.free & ~cells_within(plan, obstacles)
     # Walls run along cells that aren't free, half a cell nearer than the middle of these.
     walls_away = (np.sqrt(squared_distance(free).astype(np.float64)) - 0.5) * cell
     near = 1.0 - np.clip(walls_away / max(settings.clearance, cell), 0.0, 1.0)
@@ -74,17 +74,14 @@ def costs_of(
     return np.minimum(costs, MAX_COST).astype(np.int32)
 
 
-def cells_within(plan: FloorPlan, areas: tuple[shapely.Polygon, ...]) -> Bool:
+def cells_within(plan: FloorPlan, areas: Sequence[shapely.Polygon]) -> Bool:
     """Return the cells whose centre is in one of the areas [m]: bool (rows, columns)."""
-    mask = np.zeros(plan.free.shape, np.bool_)
-    if areas:
-        xs, ys = plan.lattice.centre_axes()
-        grid = np.stack(np.broadcast_arrays(xs[None, :], ys[:, None]), axis=-1)
-        centres = plan.lattice.to_metres(grid)
-        whole = shapely.union_all(list(areas))
-        shapely.prepare(whole)
-        mask = shapely.intersects_xy(whole, centres[..., 0], centres[..., 1])
-    return mask
+    if not areas:
+        return np.zeros(plan.free.shape, np.bool_)
+    centres = plan.lattice.to_metres(np.stack(np.meshgrid(*plan.lattice.centre_axes()), axis=-1))
+    whole = shapely.union_all(areas)
+    shapely.prepare(whole)
+    return shapely.intersects_xy(whole, centres[..., 0], centres[..., 1])
 
 
 class CostedSpace(Space):
@@ -123,9 +120,8 @@ class CostedSpace(Space):
                 f"the costmap of {base.plan.name} is below 0 wherever a body of radius"
                 f" {base.radius:g} m fits: leave it a place to be"
             )
-        rank = np.empty(self.parts, np.int32)
-        rank[np.argsort(-sizes, kind="stable")] = np.arange(self.parts, dtype=np.int32)
-        self.part_of_cell = np.where(part >= 0, rank[part], np.int32(-1))
+        rank = np.argsort(np.argsort(-sizes, kind="stable"))
+        self.part_of_cell = np.where(part >= 0, rank[part], -1).astype(np.int32)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle it by the arguments that it was made from."""
@@ -142,9 +138,7 @@ class CostedSpace(Space):
         if self.base.part_at(x, y) < 0 or self.cost[row, column] < 0:
             return -1
         near = (row, column)
-        if (
-            self.part_of_cell[near] < 0
-        ):  # the point is in the space, but the centre of its cell isn't
+        if self.part_of_cell[near] < 0:  # the point is in the space, its cell's centre isn't
             near = _nearest(self.base, self.part_of_cell >= 0, (x, y)) or near
         return int(self.part_of_cell[near])
 
@@ -213,9 +207,7 @@ def route_by_cost(
     if begin is None or end is None:
         return None
     route = np.concatenate([begin[:-1], centres, end[1:]])
-    pulled = pull_taut(space.mesh, costs, np.ascontiguousarray(route))
-    pulled.setflags(write=False)
-    return pulled
+    return read_only(pull_taut(space.mesh, costs, np.ascontiguousarray(route)))
 
 
 def closed_cells_around(
@@ -235,10 +227,9 @@ def _nearest(space: Space, is_open: Bool, at: tuple[int, int]) -> tuple[int, int
     row, column = at[1] // SUB, at[0] // SUB
     if is_open[row, column]:
         return row, column
-    cells = np.argwhere(is_open)
+    cells = cells_of(is_open)
     if len(cells) == 0:
         return None
-    xs, ys = space.plan.lattice.centre_axes()
-    away = (xs[cells[:, 1]] - at[0]) ** 2 + (ys[cells[:, 0]] - at[1]) ** 2
-    nearest = cells[int(np.argmin(away))].tolist()
-    return int(nearest[0]), int(nearest[1])
+    away = space.plan.lattice.squared_distances(*cells.T, at)
+    row, column = cells[int(np.argmin(away))].tolist()
+    return row, column

@@ -1,6 +1,6 @@
 """The home of a run: its floor plan, what stands in it now, and changes of it as data."""
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
 from functools import lru_cache, partial
@@ -16,11 +16,10 @@ from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import format_duration, parse_duration
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.costmap import CostedSpace
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.layers import COSTMAP, Layers
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, UsePlace, find_named
-from fleet2d.floorplan.plan import Cache, FloorPlan, Room
+from fleet2d.floorplan.plan import Cache, FloorPlan, Room, cell_polygons
 from fleet2d.floorplan.rooms.doorways import Doorway, doorway_segments
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.slow_area import SlowRegion
@@ -139,7 +138,7 @@ class Home:
             without: Indices of the rooms that the body keeps out of.
         """
         shut = self.shut & self.locked if opens_doors else self.shut
-        space = self._shapes.space(radius, shut, self.objects, without)
+        space = self._shapes.space_of(radius, shut, _solid(self.objects), without)
         return self._shapes.linked(space) if uses_portals and self.plan.portals else space
 
     @property
@@ -281,7 +280,9 @@ class _Shapes:
         self.door_lines = door_lines
         self._room_of: dict[str, tuple[PlacedObject, Room | None]] = {}
         self.walls = lru_cache(CACHED_ARRANGEMENTS)(self._make_walls)
-        self._gates = lru_cache(CACHED_ARRANGEMENTS)(self._make_gates)
+        self._gates = lru_cache(CACHED_ARRANGEMENTS)(
+            lambda tall, glass: Gates(self._build_mesh(tall, glass), door_lines)
+        )
         self.space_of = lru_cache(CACHED_ARRANGEMENTS)(self._make_space)
         self.linked = lru_cache(CACHED_ARRANGEMENTS)(partial(LinkedSpace, portals=plan.portals))
 
@@ -297,24 +298,12 @@ class _Shapes:
             self._room_of[thing.name] = entry
         return entry[1]
 
-    def space(
-        self,
-        radius: float,
-        shut: Collection[int],
-        objects: tuple[PlacedObject, ...],
-        without: frozenset[int],
-    ) -> Space:
-        return self.space_of(radius, frozenset(shut), _solid(objects), without)
-
     def _make_walls(
         self, shut: frozenset[int], tall: tuple[PlacedObject, ...], glass: bool = True
     ) -> Mesh:
         if not self.door_lines:
             return self._build_mesh(tall, glass)
         return self._gates(tall, glass).shut(shut)
-
-    def _make_gates(self, tall: tuple[PlacedObject, ...], glass: bool) -> Gates:
-        return Gates(self._build_mesh(tall, glass), self.door_lines)
 
     def _build_mesh(self, tall: tuple[PlacedObject, ...], glass: bool) -> Mesh:
         plan = self.plan
@@ -337,14 +326,14 @@ class _Shapes:
         solid: tuple[PlacedObject, ...],
         without: frozenset[int],
     ) -> Space:
-        rooms = [room for room in self.plan.rooms if room.index in without]
+        rooms = [self.plan.room_of_cell == room for room in sorted(without)]
         space = Space(
             self.plan,
             radius,
             walls=self.walls(shut, _tall(solid), glass=not self.plan.glass),
             obstacles=[
                 *(lattice_footprint(self.plan, thing) for thing in solid),
-                *(shape for room in rooms for shape in _outlines(self.plan, room)),
+                *(shape for room in rooms for shape in cell_polygons(room)),
             ],
             shut=[self.door_lines[door] for door in sorted(shut)],
         )
@@ -369,15 +358,6 @@ def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
 def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:
     """Return the floor that an object covers [lattice], on even units as walls are."""
     return Polygon(plan.lattice.to_walls(np.asarray(thing.footprint.exterior.coords)[:-1]))
-
-
-def _outlines(plan: FloorPlan, room: Room) -> list[Polygon]:
-    """Return the outlines of the cells of a room [lattice]."""
-    rows, columns = np.nonzero(plan.room_of_cell == room.index)
-    x, y = columns * UNITS_PER_CELL, rows * UNITS_PER_CELL
-    cells = shapely.box(x, y, x + UNITS_PER_CELL, y + UNITS_PER_CELL)
-    parts: list[Polygon] = shapely.get_parts(shapely.union_all(cells)).tolist()
-    return parts
 
 
 def _tall(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.kernels import F64, I64
+from fleet2d.kernels import CELL_CENTRE, F64, I64
 
 UNITS_PER_CELL = 64
 MARGIN_CELLS = 2
@@ -93,16 +93,18 @@ class Lattice:
 
     def __post_init__(self) -> None:
         check_cell(self.cell)
+        width, height = self.size
         if UNITS_PER_CELL * max(self.columns, self.rows) >= COORDINATE_LIMIT:
-            width, height = self.size
+            # The size, in whole centimetres, at which the longer side fits.
+            cells = COORDINATE_LIMIT // UNITS_PER_CELL - 2 * MARGIN_CELLS - 2
+            fits = math.ceil(100 * max(width, height) / cells) / 100
             raise FloorPlanError(
                 f"the floor plan is {width:.0f} m x {height:.0f} m, too large for cells of"
                 f" {self.cell:g} m (at most {COORDINATE_LIMIT // UNITS_PER_CELL - 1} cells a side):"
-                f" set floorplan.cell to {_smallest_cell(max(width, height)):g} or more,"
-                f" and check that the file is in metres{unit_hint(self.size)}"
+                f" set floorplan.cell to {fits:g} or more, and check that the file is in"
+                f" metres{unit_hint(self.size)}"
             )
         if self.columns * self.rows > MAX_CELLS:
-            width, height = self.size
             fits = math.ceil(100 * math.sqrt(width * height / MAX_CELLS)) / 100
             millions, most = self.columns * self.rows / 1e6, MAX_CELLS / 1e6
             raise FloorPlanError(
@@ -126,17 +128,9 @@ class Lattice:
         # The bounds are snapped as walls are, so that a plan and its stored copy share a lattice.
         units = UNITS_PER_CELL / cell
         low_x, low_y, high_x, high_y = (2 * round(value * units / 2) for value in bounds)
-        first = (low_x // UNITS_PER_CELL - MARGIN_CELLS, low_y // UNITS_PER_CELL - MARGIN_CELLS)
-        last = (
-            -(-high_x // UNITS_PER_CELL) + MARGIN_CELLS,
-            -(-high_y // UNITS_PER_CELL) + MARGIN_CELLS,
-        )
-        return cls(
-            cell=cell,
-            origin=(first[0] * cell, first[1] * cell),
-            columns=last[0] - first[0],
-            rows=last[1] - first[1],
-        )
+        x0, y0 = (low // UNITS_PER_CELL - MARGIN_CELLS for low in (low_x, low_y))
+        x1, y1 = (-(-high // UNITS_PER_CELL) + MARGIN_CELLS for high in (high_x, high_y))
+        return cls(cell, origin=(x0 * cell, y0 * cell), columns=x1 - x0, rows=y1 - y0)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -198,16 +192,19 @@ class Lattice:
 
     def cell_centre(self, row: int, column: int) -> tuple[int, int]:
         """Return a cell's centre (x, y) [lattice]: the odd point next to its exact middle."""
-        half = UNITS_PER_CELL // 2 + 1
-        return UNITS_PER_CELL * column + half, UNITS_PER_CELL * row + half
+        return UNITS_PER_CELL * column + CELL_CENTRE, UNITS_PER_CELL * row + CELL_CENTRE
 
     def centre_axes(self) -> tuple[I64, I64]:
         """Return the x (columns,) and the y (rows,) of the cell centres, lattice units."""
-        half = UNITS_PER_CELL // 2 + 1
-        return (
-            np.arange(self.columns, dtype=np.int64) * UNITS_PER_CELL + half,
-            np.arange(self.rows, dtype=np.int64) * UNITS_PER_CELL + half,
-        )
+        columns, rows = (np.arange(n, dtype=np.int64) for n in (self.columns, self.rows))
+        return columns * UNITS_PER_CELL + CELL_CENTRE, rows * UNITS_PER_CELL + CELL_CENTRE
+
+    def squared_distances(self, rows: I64, columns: I64, point: tuple[int, int]) -> I64:
+        """Return the squared distances of the centres of cells (n,) from a point [lattice²]."""
+        x, y = point
+        across = columns * UNITS_PER_CELL + (CELL_CENTRE - x)
+        up = rows * UNITS_PER_CELL + (CELL_CENTRE - y)
+        return across * across + up * up
 
 
 def check_cell(cell: float) -> None:
@@ -217,9 +214,3 @@ def check_cell(cell: float) -> None:
             f"floorplan.cell is {cell:g} m: choose a cell size from {MIN_CELL_M:g} m to"
             f" {MAX_CELL_M:g} m (0.05 m is usual)"
         )
-
-
-def _smallest_cell(extent: float) -> float:
-    """Return a cell size, in whole centimetres, at which `extent` [m] fits."""
-    cells = COORDINATE_LIMIT // UNITS_PER_CELL - 2 * MARGIN_CELLS - 2
-    return math.ceil(100 * extent / cells) / 100

@@ -30,11 +30,6 @@ def repair(shape: BaseGeometry) -> BaseGeometry:
         >>> repair(bow).area
         2.0
     """
-    _check_crossings(shape)
-    return shapely.make_valid(shape, method="structure", keep_collapsed=False)
-
-
-def _check_crossings(shape: BaseGeometry) -> None:
     outlines = shapely.get_rings(shapely.get_parts(shape))
     corners = [shapely.get_coordinates(outline) for outline in outlines]
     ends = [np.stack([c[:-1], c[1:]], axis=1) for c in corners]
@@ -44,6 +39,7 @@ def _check_crossings(shape: BaseGeometry) -> None:
         pairs = tree.query(edges[begin : begin + _EDGES], predicate="crosses")
         count += pairs.shape[1] // 2  # each crossing is found from both edges
         CROSSINGS.check(count, "it", FloorPlanError, prefix="at least ")
+    return shapely.make_valid(shape, method="structure", keep_collapsed=False)
 
 
 GRID = 2
@@ -81,8 +77,7 @@ def snap_polygon(polygon: BaseGeometry) -> SnappedPolygon:
     """
     sound = polygon if polygon.is_valid else shapely.make_valid(polygon, method="structure")
     snapped = shapely.set_precision(sound, GRID)
-    parts = [part for part in shapely.get_parts(snapped) if part.area > 0]
-    parts = [shapely.orient_polygons(part) for part in parts]
+    parts = [shapely.orient_polygons(p) for p in shapely.get_parts(snapped) if p.area > 0]
     area_change = sum_in_order(part.area for part in parts) - polygon.area
     return SnappedPolygon(parts, area_change, GRID * polygon.length)
 
@@ -112,7 +107,8 @@ def build_mesh(
     mesh = _build(rings)
     if mesh is None:
         # A corner that touches the middle of another wall: make it a vertex of that wall, too.
-        mesh = _build(_split_at_touching_vertices(rings))
+        vertices = np.concatenate([ring for polygon in rings for ring in polygon])
+        mesh = _build(_split_at(rings, np.unique(vertices, axis=0)))
     if mesh is None:
         raise FloorPlanError(
             "The free space can't be cut into triangles that end at its walls. Send the outlines "
@@ -147,13 +143,8 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[I6
                 f"plan covers [0, 0] to [{width}, {height}], and nothing may reach "
                 f"{COORDINATE_LIMIT}. Use larger cells."
             )
-        oriented = shapely.orient_polygons(polygon)
-        rings.append(
-            [
-                shapely.get_coordinates(ring)[:-1].astype(np.int64)
-                for ring in shapely.get_rings(oriented)
-            ]
-        )
+        outlines = shapely.get_rings(shapely.orient_polygons(polygon))
+        rings.append([shapely.get_coordinates(r)[:-1].astype(np.int64) for r in outlines])
     return _drop_flat_vertices(rings)
 
 
@@ -174,13 +165,6 @@ def _drop_flat_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
         return ring[bends | np.isin(_keys(ring), touching)]
 
     return [[straighten(ring) for ring in rings] for rings in polygons]
-
-
-def _split_at_touching_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
-    """Insert every vertex that lies in the middle of a wall into that wall."""
-    return _split_at(
-        polygons, np.unique(np.concatenate([r for rings in polygons for r in rings]), axis=0)
-    )
 
 
 def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS, POLYGONS, ROOM_CORNERS
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.lattice import Lattice, unit_hint
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice, unit_hint
 from fleet2d.floorplan.mesh import (
     build_mesh,
     canonical_order,
@@ -129,6 +129,15 @@ def cells_of(mask: Bool) -> I64:
         [[0, 1], [1, 0]]
     """
     return np.stack(np.unravel_index(np.flatnonzero(mask), mask.shape), axis=1)
+
+
+def cell_polygons(mask: Bool) -> list[Polygon]:
+    """Return the area of cells as polygons [lattice]: the union of their runs along the rows."""
+    edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    row, first = np.nonzero(edges == 1)
+    _, end = np.nonzero(edges == -1)
+    corners = np.stack([first, row, end, row + 1]).astype(np.float64) * UNITS_PER_CELL
+    return shapely.get_parts(shapely.union_all(shapely.box(*corners))).tolist()
 
 
 def _scaled(part: Any, scale: float) -> Any:
@@ -280,9 +289,8 @@ class FloorPlan:
         room_of_cell, rooms, room_notes = divide(
             lattice, polygons, mesh, cells, regions, regions_are, passages
         )
-        cells.setflags(write=False)
-        room_of_cell.setflags(write=False)
-        fitted = [(line, at) for line, at in zip(lines, segments, strict=True) if at is not None]
+        found = list(zip(lines, segments, strict=True))
+        fitted = [(line, at) for line, at in found if at is not None]
         if doorways is None and passages is not None:
             fitted, polygons = select_doorways(
                 lattice, polygons, room_of_cell, passages, regions_are
@@ -296,27 +304,24 @@ class FloorPlan:
             lattice=lattice,
             polygons=tuple(polygons),
             mesh=mesh,
-            free=cells,
-            room_of_cell=room_of_cell,
+            free=read_only(cells),
+            room_of_cell=read_only(room_of_cell),
             rooms=rooms,
             entrance=entrance,
             doorways=name_doorways(lattice, fill_from_neighbors(room_of_cell), names, fitted),
             objects=number_objects(objects),
             no_go=tuple(no_go),
             glass=panes,
-            notes=(
-                *notes,
-                *part_notes(lattice, polygons),
-                *room_notes,
-                *door_notes,
-                *glass_notes,
-            ),
+            notes=(*notes, *part_notes(lattice, polygons), *room_notes, *door_notes, *glass_notes),
             regions=tuple(regions),
-            lost_doorways=tuple(
-                line for line, at in zip(lines, segments, strict=True) if at is None
-            ),
+            lost_doorways=tuple(line for line, at in found if at is None),
         )
-        plan._check_entrance()
+        if entrance is not None and not strictly_inside(mesh, *lattice.point_at(entrance)):
+            free_x, free_y = plan.nearest_free(*entrance)
+            raise FloorPlanError(
+                f"the entrance of {name} at ({entrance[0]:g}, {entrance[1]:g}) m is not in free"
+                f" space: the nearest free cell is at ({free_x:.2f}, {free_y:.2f}) m"
+            )
         return plan
 
     def __eq__(self, other: object) -> bool:
@@ -375,9 +380,7 @@ class FloorPlan:
         Like `room_of_cell`, but a cell that a wall cuts, so that its centre isn't free, has the
         room of a free cell beside it, since part of it may be free.
         """
-        rooms = fill_from_neighbors(self.room_of_cell)
-        rooms.setflags(write=False)
-        return rooms
+        return read_only(fill_from_neighbors(self.room_of_cell))
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -494,17 +497,17 @@ class FloorPlan:
             FloorPlanError: An end is in no room, or a way leads from one to the other already.
         """
         for number, portal in enumerate(portals):
-            ends = [shapely.Point(self.lattice.point_at(at)) for at in (portal.start, portal.end)]
-            for at, end in zip((portal.start, portal.end), ends, strict=True):
-                if not any(polygon.contains(end) for polygon in self.polygons):
+            ends = (portal.start, portal.end)
+            points = [shapely.Point(self.lattice.point_at(at)) for at in ends]
+            is_in = shapely.contains([[polygon] for polygon in self.polygons], points)
+            for at, is_free in zip(ends, is_in.any(axis=0), strict=True):
+                if not is_free:
                     x, y = self.nearest_free(*at)
                     raise FloorPlanError(
                         f"{where}[{number}]: its end at ({at[0]:g}, {at[1]:g}) m is in no room of"
                         f" {self.name}: the nearest free place is ({x:.2f}, {y:.2f}) m"
                     )
-            if any(
-                polygon.contains(ends[0]) and polygon.contains(ends[1]) for polygon in self.polygons
-            ):
+            if is_in.all(axis=1).any():
                 raise FloorPlanError(
                     f"{where}[{number}]: a way leads from its one end to the other already: each"
                     " should be on another storey, which is a part of the free space of its own"
@@ -523,10 +526,8 @@ class FloorPlan:
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the centre of the free cell nearest to a place [m]; ties: lowest row, column."""
         rows, columns = np.nonzero(self.free)
-        axis_x, axis_y = self.lattice.centre_axes()
-        at_x, at_y = np.clip(self.lattice.to_lattice(np.clip((x, y), -1e6, 1e6)), -(2**24), 2**24)
-        away = (axis_x[columns] - at_x) ** 2 + (axis_y[rows] - at_y) ** 2
-        nearest = int(np.argmin(away))
+        at = np.clip(self.lattice.to_lattice(np.clip((x, y), -1e6, 1e6)), -(2**24), 2**24)
+        nearest = int(np.argmin(self.lattice.squared_distances(rows, columns, at)))
         centre = self.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))
         near_x, near_y = self.lattice.to_metres(centre).tolist()
         return near_x, near_y
@@ -550,15 +551,3 @@ class FloorPlan:
         from fleet2d.configuration.components import hook
 
         return hook("plan", "png")(self)
-
-    def _check_entrance(self) -> None:
-        if self.entrance is None:
-            return
-        x, y = self.entrance
-        at = self.lattice.point_at(self.entrance)
-        if not strictly_inside(self.mesh, *at):
-            free_x, free_y = self.nearest_free(x, y)
-            raise FloorPlanError(
-                f"the entrance of {self.name} at ({x:g}, {y:g}) m is not in free space: the nearest"
-                f" free cell is at ({free_x:.2f}, {free_y:.2f}) m"
-            )

@@ -96,25 +96,21 @@ class Space:
         reach = radius * lattice.units_per_m
         blocks = grow_polygons([Polygon(o.exterior) for o in obstacles], reach)
         blocks += [grow_shape(np.array(segment, np.float64), reach) for segment in shut]
-        polygons = shrink(plan.polygons, reach, blocks)
-        if not polygons:
+        self.polygons = shrink(plan.polygons, reach, blocks)
+        if not self.polygons:
             raise FloorPlanError(
                 f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
                 " radius or check the scale of the plan"
             )
-        self.polygons = polygons
-        self.mesh: Mesh = build_mesh(polygons, lattice.columns, lattice.rows)
+        self.mesh: Mesh = build_mesh(self.polygons, lattice.columns, lattice.rows)
         triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
         part = label_triangles(self.mesh.neighbors)
         part_of_cell = np.where(triangles >= 0, part[triangles], -1)
         # Parts without a cell's centre rank last and aren't counted.
         sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
-        order = np.argsort(-sizes, kind="stable")
-        rank = np.empty_like(order)
-        rank[order] = np.arange(len(order))
-        self.part_of_cell = read_only(
-            np.where(triangles >= 0, rank[part_of_cell], -1).astype(np.int32)
-        )
+        rank = np.argsort(np.argsort(-sizes, kind="stable"))
+        ranked = np.where(triangles >= 0, rank[part_of_cell], -1)
+        self.part_of_cell = read_only(ranked.astype(np.int32))
         self._part_of_triangle = read_only(rank[part].astype(np.int32))
         self.parts = int(np.count_nonzero(sizes))
 
@@ -262,10 +258,8 @@ class Space:
         mask = parts >= 0 if part is None else parts == part
         if room is not None:
             mask = mask & (self.plan.room_of_cell[window] == room)
-        corner = np.array([window[0].start, window[1].start])
-        cells = cells_of(mask) + corner
-        xs, ys = self.plan.lattice.centre_axes()
-        return cells, (xs[cells[:, 1]] - x) ** 2 + (ys[cells[:, 0]] - y) ** 2
+        cells = cells_of(mask) + np.array([window[0].start, window[1].start])
+        return cells, self.plan.lattice.squared_distances(*cells.T, (x, y))
 
     def _corners(self) -> Corners:
         """Return the reflex vertices of the border, round which shortest ways bend."""
@@ -279,9 +273,8 @@ class Space:
                 after.append(np.roll(points, -1, axis=0))
         p, q, r = np.concatenate(before), np.concatenate(at), np.concatenate(after)
         into, out = q - p, r - q
-        reflex = (
-            into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
-        )  # the free space lies to the left
+        # The free space lies to the left.
+        reflex = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
         keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
         ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
         walls_meeting = np.bincount(ids, minlength=len(vertices))
@@ -365,19 +358,14 @@ class LinkedSpace(Space):
             begin, end = self._end(portal.start), self._end(portal.end)
             if begin is None or end is None:
                 continue  # furniture bars it
-            self._passings += [
-                Passing(begin, end, portal.takes_us),
-                Passing(end, begin, portal.takes_us),
-            ]
+            ways = ((begin, end), (end, begin))
+            self._passings += [Passing(*way, portal.takes_us) for way in ways]
             first, second = (owner[base.part_at(*place)] for place in (begin, end))
             owner[owner == max(first, second)] = min(first, second)
         # Part 0 stays the largest, unless parts that portals link are larger together.
         sizes = np.bincount(base.part_of_cell[base.part_of_cell >= 0], minlength=base.parts)
         total = np.bincount(owner, sizes, minlength=base.parts)
-        order = np.argsort(-total, kind="stable")
-        rank = np.empty(base.parts, np.int32)
-        rank[order] = np.arange(base.parts, dtype=np.int32)
-        self._rank = rank[owner]
+        self._rank = np.argsort(np.argsort(-total, kind="stable"))[owner].astype(np.int32)
         self.part_of_cell = read_only(np.append(self._rank, np.int32(-1))[base.part_of_cell])
         self.parts = len(set(owner.tolist()))
 
@@ -567,9 +555,11 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     reach = radius * lattice.units_per_m + HALF + SLACK
     a, b = int(np.ceil(reach)), int(np.ceil(reach * 0.41421357))
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
-    pieces = [footprint] if is_convex(footprint) else _triangles(footprint)
+    convex = footprint
+    if not is_convex(footprint):
+        convex = shapely.constrained_delaunay_triangles(footprint)
     hulls = []
-    for piece in pieces:
+    for piece in shapely.get_parts(convex):
         corners = lattice.to_lattice(shapely.get_coordinates(piece)[:-1])
         hull = shapely.convex_hull(shapely.multipoints((corners[:, None] + octagon).reshape(-1, 2)))
         hulls.append(shapely.get_coordinates(shapely.orient_polygons(hull)).astype(np.int64))
@@ -649,8 +639,7 @@ def nearest_standing(
     window = _window(lattice, np.array([(x - units, y - units), (x + units, y + units)]))
     rows, columns = np.nonzero(standing[window])
     rows, columns = rows + window[0].start, columns + window[1].start
-    xs, ys = lattice.centre_axes()
-    away = (xs[columns] - x) ** 2 + (ys[rows] - y) ** 2
+    away = lattice.squared_distances(rows, columns, (x, y))
     near = np.flatnonzero(away <= units * units)
     triangle = locate(plan.mesh, x, y)
     for i in near[np.argsort(away[near], kind="stable")][:ATTEMPTS].tolist():
@@ -670,9 +659,3 @@ def _window(lattice: Lattice, points: I64) -> Window:
     rows = slice(*np.clip((y0, y1 + 1), 0, lattice.rows).tolist())
     columns = slice(*np.clip((x0, x1 + 1), 0, lattice.columns).tolist())
     return rows, columns
-
-
-def _triangles(footprint: Polygon) -> list[Polygon]:
-    """Return a footprint as convex pieces."""
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(footprint))
-    return parts.tolist()

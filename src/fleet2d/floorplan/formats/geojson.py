@@ -37,9 +37,9 @@ from fleet2d.floorplan.formats.files import (
     read_json,
     shown_value,
 )
-from fleet2d.floorplan.formats.native import cell_polygons, object_document
+from fleet2d.floorplan.formats.native import object_document
 from fleet2d.floorplan.mesh import repair
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64

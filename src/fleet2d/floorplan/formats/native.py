@@ -46,7 +46,6 @@ from fleet2d.floorplan.formats.files import (
     shown_value,
     validate,
 )
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import (
     MAX_HEIGHT_M,
     Blocks,
@@ -55,11 +54,10 @@ from fleet2d.floorplan.placed_objects import (
     Posture,
     UsePlace,
 )
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.rooms.room import MAX_GAP_M2, UNKNOWN, LabelledRegion, room_type
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.kernels import Bool
 
 FORMAT = "fleet2d-floorplan"
 VERSION = 1
@@ -520,15 +518,6 @@ def _part_document(polygon: Polygon) -> dict[str, Any]:
     corners = shapely.get_coordinates
     outline, *holes = (corners(ring)[:-1].tolist() for ring in shapely.get_rings(polygon))
     return {"outline": outline, "holes": holes} if holes else {"outline": outline}
-
-
-def cell_polygons(mask: Bool) -> list[Polygon]:
-    """Return the area of cells as polygons [lattice]: the union of their runs along the rows."""
-    edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    row, first = np.nonzero(edges == 1)
-    _, end = np.nonzero(edges == -1)
-    corners = np.stack([first, row, end, row + 1]).astype(np.float64) * UNITS_PER_CELL
-    return shapely.get_parts(shapely.union_all(shapely.box(*corners))).tolist()
 
 
 HOMES = Path(__file__).with_name("homes")
