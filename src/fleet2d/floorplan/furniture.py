@@ -171,8 +171,6 @@ def stand_furniture(
     size: Sequence[float] | None = None,
     *,
     name: str = "",
-    blocks: Blocks | None = None,
-    height: float | None = None,
 ) -> PlacedObject:
     """Return a piece of furniture at a place, with the places to use it from.
 
@@ -182,8 +180,6 @@ def stand_furniture(
         heading: The direction of its front, headings (4096 to a turn) counter-clockwise from +x.
         size: Its width and depth [m]; None for the middle of its type's ranges.
         name: Its name; empty to be numbered by type.
-        blocks: As `Furniture.blocks`; None for what is usual for its type.
-        height: As `Furniture.height`; None for what is usual for its type.
 
     Raises:
         FloorPlanError: There is no such type.
@@ -215,8 +211,7 @@ def stand_furniture(
         name=name,
         type=kind,
         footprint=Polygon(corners),
-        blocks=model.blocks if blocks is None else blocks,
+        blocks=model.blocks,
         uses=tuple(uses),
         heading=float(in_radians(heading % TURN)),
-        height=height,
     )

@@ -17,7 +17,7 @@ from fleet2d.floorplan.home import lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.placed_objects import PlacedObject
-from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.plan import FloorPlan, Room, largest_part
 from fleet2d.floorplan.space import (
     BODY_RADIUS,
     Space,
@@ -286,13 +286,6 @@ def _bounds(plan: FloorPlan, room: Room) -> tuple[slice, slice]:
     low = lattice.to_lattice(room.bounds[:2]) // UNITS_PER_CELL
     high = lattice.to_lattice(room.bounds[2:]) // UNITS_PER_CELL
     return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
-
-
-def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
-    """Return the connected part of a mask with the most cells, counting only `within` if given."""
-    part = label_parts(np.ascontiguousarray(mask), False)
-    sizes = np.bincount(part[mask if within is None else mask & within], minlength=1)
-    return mask & (part == int(np.argmax(sizes)))
 
 
 def count_cells(cell: float, metres: float) -> int:

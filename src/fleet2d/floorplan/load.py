@@ -6,7 +6,6 @@ imported when a file needs them.
 
 import json
 import re
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +74,10 @@ def load_floorplan(
             f"{suggest(plan, names, 'Bundled homes')}; synthetic ones:"
             " synthetic:0, synthetic:1, …"
         )
-    return _load_document(path, cell, scale)
+    kind, content = _recognize(path)
+    if kind == "native":
+        return native_plan(content, path, usual, scale)
+    return _load_by(kind, path=path, cell=cell, scale=scale)
 
 
 def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
@@ -98,14 +100,6 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
         out = Path(f"{Path(plan).stem}-question.png")
         error.__cause__.mark(Path(plan), out)
         raise FloorPlanError(f"{error}; {out} marks it") from error
-
-
-def _load_document(path: Path, cell: float | None, scale: float | None) -> FloorPlan:
-    """Read a file whose ending or content determines its format."""
-    kind, content = _recognize(path)
-    if kind == "native":
-        return native_plan(content, path, DEFAULT_CELL_M if cell is None else cell, scale)
-    return _load_by(kind, path=path, cell=cell, scale=scale)
 
 
 def _load_by(kind: str, **settings: Any) -> FloorPlan:
@@ -311,15 +305,12 @@ def _yaml(document: dict[str, Any], path: Path) -> str:
 
 
 def _write_new(path: Path, text: str) -> None:
+    from fleet2d.storage.files import write_atomically  # few homes are written
+
     try:
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            try:
-                file.write(text)
-                file.flush()
-            except BaseException:
-                with suppress(OSError):
-                    path.unlink()
-                raise
+        if path.exists():
+            raise FileExistsError
+        write_atomically(path, text.encode())
     except FileExistsError:
         raise FloorPlanError(f"{path} exists already: remove it, or name another file") from None
     except OSError as error:

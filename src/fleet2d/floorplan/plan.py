@@ -56,6 +56,7 @@ from fleet2d.kernels import (
     Bool,
     Mesh,
     fill_from_neighbors,
+    label_parts,
     rasterize_cells,
     strictly_inside,
 )
@@ -129,6 +130,13 @@ def cells_of(mask: Bool) -> I64:
         [[0, 1], [1, 0]]
     """
     return np.stack(np.unravel_index(np.flatnonzero(mask), mask.shape), axis=1)
+
+
+def largest_part(mask: Bool, within: Bool | None = None) -> Bool:
+    """Return the connected part of a mask with the most cells, counting only `within` if given."""
+    part = label_parts(np.ascontiguousarray(mask), False)
+    sizes = np.bincount(part[mask if within is None else mask & within], minlength=1)
+    return mask & (part == int(np.argmax(sizes)))
 
 
 def cell_polygons(mask: Bool) -> list[Polygon]:

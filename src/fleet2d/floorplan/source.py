@@ -35,11 +35,10 @@ from fleet2d.floorplan.placed_objects import (
     Portal,
     number_objects,
 )
-from fleet2d.floorplan.plan import Cache, FloorPlan
+from fleet2d.floorplan.plan import Cache, FloorPlan, read_only
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (
     LabelledRegion,
-    Room,
     cells_in,
     make_rooms,
     snap_regions,
@@ -99,7 +98,7 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
     """
     if not corrections:
         return plan
-    regions = [_as_region(room) for room in plan.rooms]
+    regions = [LabelledRegion(r.labels, Polygon(), r.name, r.type) for r in plan.rooms]
     painted = plan.room_of_cell.astype(np.int64)
     for number, correction in enumerate(corrections):
         where = f"floorplan.rooms[{number}]"
@@ -113,33 +112,14 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
             index = _region_at(plan, painted, correction, where)
             regions[index] = _rename(regions[index], correction)
     room_of_cell, rooms = make_rooms(plan.lattice, painted, regions)
-    room_of_cell.setflags(write=False)
-    segments = doorway_segments(plan.lattice, plan.doorways)
-    return replace(
-        plan,
-        room_of_cell=room_of_cell,
-        rooms=rooms,
-        doorways=name_doorways(
-            plan.lattice,
-            fill_from_neighbors(room_of_cell),
-            [room.name for room in rooms],
-            [(line, segments[k]) for k, line in enumerate(_door_lines(plan))],
-        ),
-    )
+    doors = zip(_door_lines(plan), doorway_segments(plan.lattice, plan.doorways), strict=True)
+    places, names = fill_from_neighbors(room_of_cell), [room.name for room in rooms]
+    doorways = name_doorways(plan.lattice, places, names, list(doors))
+    return replace(plan, room_of_cell=read_only(room_of_cell), rooms=rooms, doorways=doorways)
 
 
 def _shape(corners: Sequence[tuple[float, float]]) -> Polygon:
     return Polygon(corners) if len(corners) >= 3 else Polygon([(0, 0), (1, 1), (0, 0)])
-
-
-def _make_valid(shape: Polygon | MultiPolygon) -> MultiPolygon:
-    """Return the polygons of a shape that rounding may have made self-intersecting."""
-    parts = shapely.get_parts(shapely.make_valid(shape))
-    return MultiPolygon([part for part in parts if part.geom_type == "Polygon"])
-
-
-def _as_region(room: Room) -> LabelledRegion:
-    return LabelledRegion(room.labels, Polygon(), room.name, room.type)
 
 
 def _rename(region: LabelledRegion, correction: RoomCorrection) -> LabelledRegion:
@@ -171,7 +151,9 @@ def _draw(plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int,
     """Return the regions of the cells, with those inside the polygon set to `index`."""
     shape = _shape(correction.polygon or ())
     (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
-    patch = cells_in(plan.free, _make_valid(region.shape))
+    parts = shapely.get_parts(shapely.make_valid(region.shape))  # rounding may cross its sides
+    polygons = [part for part in parts if part.geom_type == "Polygon"]
+    patch = cells_in(plan.free, MultiPolygon(polygons))
     if patch.cells == 0:
         x0, y0, x1, y1 = shape.bounds
         raise FloorPlanError(
@@ -264,15 +246,8 @@ class FurniturePiece(Settings):
     def stand(self) -> PlacedObject:
         """Return the piece as an object, with unchecked places to use it from."""
         heading = round(self.heading_deg / 360 * TURN) % TURN
-        return stand_furniture(
-            self.type,
-            self.at,
-            heading,
-            self.size,
-            name=self.name or "",
-            blocks=self.blocks,
-            height=self.height,
-        )
+        thing = stand_furniture(self.type, self.at, heading, self.size, name=self.name or "")
+        return replace(thing, blocks=self.blocks or thing.blocks, height=self.height)
 
 
 def place_furniture(

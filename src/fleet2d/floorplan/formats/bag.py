@@ -12,7 +12,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.cleaning import OccupancyMap
+from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I8
@@ -69,10 +69,9 @@ class BagMap(OccupancySource):
         """
         grid = _read(self.path, self.topic, self.scale or 1.0)
         x, y, heading = grid.origin
-        # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
-        turn = (round(math.cos(heading), 12), round(math.sin(heading), 12))
         free, occupied = grid.percent < FREE_BELOW, grid.percent > OCCUPIED_ABOVE
-        raw = OccupancyMap(free & (grid.percent >= 0), occupied, grid.resolution, (x, y), turn)
+        free &= grid.percent >= 0
+        raw = OccupancyMap(free, occupied, grid.resolution, (x, y), turn_by(heading))
         notes: list[str] = []
         home = self.clean(raw, notes)
         rows, columns = grid.percent.shape

@@ -68,6 +68,14 @@ class OccupancyMap:
         return replace(self, free=free, occupied=occupied, origin=(x, y))
 
 
+def turn_by(angle: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle [rad].
+
+    Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
+    """
+    return round(math.cos(angle), 12), round(math.sin(angle), 12)
+
+
 def bridge_gaps(
     raw: OccupancyMap, widest: int, evidence: Bool | None = None, ray_width: float = 0.0
 ) -> tuple[Bool, str]:

@@ -23,7 +23,7 @@ from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.plan import FloorPlan, largest_part
 from fleet2d.kernels import Bool, label_parts, squared_distance
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
@@ -156,7 +156,7 @@ class Image(PictureSource):
         pixel, dark = self.pixel, ~light
         if pixel > self.line_width / LINE_PIXELS or min(dark.shape) * pixel < SMALLEST_M:
             return None
-        home = _largest_part(enclosed)
+        home = largest_part(enclosed)
         for what, walls in wall_candidates(picture, dark, self.line_width, pixel):
             lines = np.count_nonzero(dark & ~walls)
             if lines < LINES_SHARE * np.count_nonzero(dark):
@@ -178,7 +178,7 @@ class Image(PictureSource):
                 for gap in among:
                     inside[gap.window] = is_open
             inside &= ~walls
-            area = np.count_nonzero(_largest_part(inside))
+            area = np.count_nonzero(largest_part(inside))
             at_least = 0 if _frames(home, walls) else MOST * np.count_nonzero(home)
             if area < max(at_least, WHOLE * np.count_nonzero(inside), OBJECT_M2 / pixel**2):
                 continue
@@ -283,7 +283,7 @@ def _note_wide_gap(light: Bool, closed: Bool, close_gaps: float, pixel: float) -
     """Return a note if a wider gap in an outer wall than is closed leaves out a whole room."""
     for width in (width for width in WIDE_GAPS[:2] if width > close_gaps):
         whole = _enclosed(light, width / pixel)
-        room = _largest_part(whole & ~closed)
+        room = largest_part(whole & ~closed)
         if (room_m2 := np.count_nonzero(room) * pixel**2) >= ROOM_M2:
             row, column = _first_gap(light, closed, room)
             return [
@@ -312,14 +312,7 @@ def _enclosed(light: Bool, gap: float) -> Bool:
 
 def _largest(mask: Bool) -> int:
     """Return the number of pixels of the largest connected part."""
-    return int(np.count_nonzero(_largest_part(mask)))
-
-
-def _largest_part(mask: Bool) -> Bool:
-    """Return the pixels of the largest connected part."""
-    part = label_parts(mask, False)
-    largest: Bool = part == np.bincount(part[mask], minlength=1).argmax()
-    return largest & mask
+    return int(np.count_nonzero(largest_part(mask)))
 
 
 def _first_gap(light: Bool, inside: Bool, closed: Bool) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fleet2d.floorplan.formats.raster import GreyPicture
-from fleet2d.kernels import I32, I64, Bool, label_parts, squared_distance
+from fleet2d.kernels import I32, I64, Bool, label_frames, label_parts, squared_distance
 
 LINE_M = 0.06
 """What is drawn thinner than this is no wall [m]."""
@@ -212,15 +212,6 @@ def _narrow(light: Bool, widest: float) -> Bool:
 
 def _small_parts(part: I32, longest: float) -> Bool:
     """Return for each part whether it is shorter than some pixels, with an entry for -1."""
-    rows, columns = np.nonzero(part >= 0)
-    number = part[rows, columns]
-    count = int(part.max(initial=-1)) + 2
-    extents = []
-    for at in (rows, columns):
-        low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
-        np.minimum.at(low, number, at)
-        np.maximum.at(high, number, at)
-        extents.append(high - low + 1)
-    small: Bool = np.maximum(*extents) < longest
-    small[-1] = False
-    return small
+    frames = label_frames(part, int(part.max(initial=-1)) + 1)
+    extents = (frames[:, 2:] - frames[:, :2]).max(axis=1)
+    return np.append(extents < longest, False)

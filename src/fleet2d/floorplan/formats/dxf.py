@@ -11,12 +11,12 @@ from pydantic import Field
 from shapely import LineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.bounds import CORNERS, FILE_BYTES
+from fleet2d.bounds import CORNERS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, enclosed_space
-from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.formats.files import in_file, reading
 from fleet2d.floorplan.lattice import SIDE_M
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
@@ -113,15 +113,8 @@ def _read(path: Path) -> Any:
     """Return the document of a DXF file."""
     with extra("cad", "reading DXF needs ezdxf"):
         import ezdxf
-    try:
-        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
+    with reading(path, "DXF", ezdxf.DXFError, ValueError, LookupError, AttributeError, TypeError):
         return ezdxf.readfile(path)  # type: ignore[attr-defined,unused-ignore]
-    except FloorPlanError:
-        raise
-    except OSError as error:
-        raise FloorPlanError(f"{path} can't be read: {error.strerror or error}") from None
-    except (ezdxf.DXFError, ValueError, LookupError, AttributeError, TypeError) as error:
-        raise FloorPlanError(f"{path} is damaged, or not DXF: {error}") from None
 
 
 def _lines(drawing: Any, layers: set[str]) -> Iterator[F64]:

@@ -5,7 +5,7 @@ import math
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -25,7 +25,7 @@ from pydantic_core import ErrorDetails
 from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
 from fleet2d.configuration.components import DescribedModel
 from fleet2d.configuration.problems import Location, problem, suggest
-from fleet2d.errors import FloorPlanError, InputError
+from fleet2d.errors import FloorPlanError, InputError, errors_as, os_errors_as
 
 YAML = (".yaml", ".yml")
 # No home is as large: a coordinate beyond this is not in metres.
@@ -37,13 +37,26 @@ Listed = Annotated[list[T], Field(fail_fast=True)]
 """A list of which only the first wrong item is an error, however long it is."""
 
 
-@contextmanager
-def in_file(path: Path) -> Iterator[None]:
+def in_file(path: Path) -> AbstractContextManager[None]:
     """Put the path of a file before the errors that are raised in the block."""
-    try:
+    return errors_as(FloorPlanError, str(path), FloorPlanError)
+
+
+@contextmanager
+def reading(path: Path, form: str, *failures: type[Exception]) -> Iterator[None]:
+    """Refuse a file that is too large, and one in which a library fails in the block.
+
+    Args:
+        path: The file.
+        form: Its format.
+        failures: What the library raises for damaged files.
+    """
+    with (
+        os_errors_as(FloorPlanError, f"{path} can't be read"),
+        errors_as(FloorPlanError, f"{path} is damaged, or not {form}", failures),
+    ):
+        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
         yield
-    except FloorPlanError as error:
-        raise FloorPlanError(f"{path}: {error}") from error
 
 
 def read_document(path: Path) -> dict[str, Any]:

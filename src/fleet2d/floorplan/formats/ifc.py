@@ -9,12 +9,12 @@ import shapely
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.bounds import CORNERS, FILE_BYTES
+from fleet2d.bounds import CORNERS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
-from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.formats.files import in_file, reading
 from fleet2d.floorplan.formats.sweethome import furniture_type
 from fleet2d.floorplan.furniture import measured_height
 from fleet2d.floorplan.plan import FloorPlan
@@ -83,18 +83,11 @@ def _read(path: Path) -> Any:
     """Return the model in a file."""
     with extra("ifc", "reading IFC needs ifcopenshell"):
         import ifcopenshell
-    try:
-        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
+    with reading(path, "IFC", ifcopenshell.Error, RuntimeError, ValueError):
         with path.open("rb") as file:
             if not file.read(64).lstrip().startswith(b"ISO-10303-21"):
-                raise FloorPlanError(
-                    f"{path} is damaged, or not IFC: it has no header ISO-10303-21"
-                )
+                raise ValueError("it has no header ISO-10303-21")
         return ifcopenshell.open(str(path))
-    except OSError as error:
-        raise FloorPlanError(f"{path} can't be read: {error.strerror or error}") from None
-    except (ifcopenshell.Error, RuntimeError, ValueError) as error:
-        raise FloorPlanError(f"{path} is damaged, or not IFC: {error}") from None
 
 
 def _elements(model: Any, storey: Any) -> Iterator[tuple[str, Any]]:

@@ -185,10 +185,6 @@ class DoorwayEntry(FileModel):
     name: Text | None = None
     leaf: bool = True
 
-    def to_line(self) -> DoorLine:
-        """Return the doorway as a line of the plan."""
-        return DoorLine(self.start, self.end, self.name, self.leaf)
-
 
 class UseEntry(FileModel):
     """A place to use an object from.
@@ -412,7 +408,7 @@ def plan_of(file: PlanFile, path: Path, cell: float, scale: float | None = None)
         cell,
         source=f"Fleet2D floor plan, {path.name}",
         entrance=file.entrance,
-        doorways=None if file.doorways is None else [d.to_line() for d in file.doorways],
+        doorways=None if file.doorways is None else [DoorLine(**dict(d)) for d in file.doorways],
         regions_are="none" if file.rooms is None else "exact",
         objects=[thing.to_object() for thing in file.objects],
         no_go=[area.polygon for area in file.no_go],

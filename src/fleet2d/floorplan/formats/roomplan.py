@@ -1,8 +1,7 @@
 """Room scans of Apple's RoomPlan, as its JSON has them: walls, doors, openings and furniture."""
 
 import math
-from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
@@ -130,47 +129,39 @@ class RoomPlan(FloorPlanSource):
             FloorPlanError: The file can't be read, isn't such a scan, or its walls enclose nothing.
         """
         content = read_json(self.path)
-        return read_roomplan(content, self.path, self.cell, self.wall_m, self.scale)
+        with in_file(self.path):
+            features = _features(validate(_SCAN, content))
+            draft = Draft(features, self.wall_m, [], scale=self.scale)
+            return draft.plan(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
 
 
-def read_roomplan(
-    content: dict[str, Any], path: Path, cell: float, wall_m: float, scale: float | None = None
-) -> FloorPlan:
-    """Return the floor plan of a scan's content.
+def _features(scan: _Scan) -> list[Feature]:
+    """Return what a scan has as features [m]."""
+    lines = [wall.line for wall in scan.walls]
+    spans = [line[1] - line[0] for line in lines] or [np.array([1.0, 0.0])]
+    longest = max(spans, key=lambda span: float(span @ span))
+    x, y = longest / max(float(np.sqrt(longest @ longest)), 1e-9)
+    turn = np.array([[x, -y], [y, x]])
 
-    Raises:
-        FloorPlanError: It isn't such a scan, or its walls enclose nothing.
-    """
-    with in_file(path):
-        scan = validate(_SCAN, content)
-        lines = [wall.line for wall in scan.walls]
-        spans = [line[1] - line[0] for line in lines] or [np.array([1.0, 0.0])]
-        longest = max(spans, key=lambda span: float(span @ span))
-        x, y = longest / max(float(np.sqrt(longest @ longest)), 1e-9)
-        turn = np.array([[x, -y], [y, x]])
+    def place(points: F64) -> F64:
+        return np.round(points @ turn / ROUNDED_M) * ROUNDED_M
 
-        def place(points: F64) -> F64:
-            return np.round(points @ turn / ROUNDED_M) * ROUNDED_M
-
-        features = [
-            Feature("wall", f"walls[{k}]", LineString(place(line)), {})
-            for k, line in enumerate(lines)
+    features = [
+        Feature("wall", f"walls[{k}]", LineString(place(line)), {}) for k, line in enumerate(lines)
+    ]
+    openings = (("door", scan.doors), ("opening", scan.openings), ("window", scan.windows))
+    for kind, surfaces in openings:
+        features += [
+            Feature(kind, f"{kind}s[{k}]", LineString(place(surface.line)), {})
+            for k, surface in enumerate(surfaces)
         ]
-        openings = (("door", scan.doors), ("opening", scan.openings), ("window", scan.windows))
-        for kind, surfaces in openings:
-            features += [
-                Feature(kind, f"{kind}s[{k}]", LineString(place(surface.line)), {})
-                for k, surface in enumerate(surfaces)
-            ]
-        floor_m = min((wall.low_m for wall in scan.walls), default=0.0)
-        for k, thing in enumerate(scan.objects):
-            front_x, front_y = (thing.front @ turn).tolist()
-            piece = {
-                "type": thing.kind,
-                "heading": round(math.atan2(front_y, front_x), 6) % math.tau,
-                "height": thing.height(floor_m),
-            }
-            features.append(Feature("object", f"objects[{k}]", Polygon(place(thing.box)), piece))
-        sound = [f for f in features if f.kind != "object" or shapely.is_valid(f.shape)]
-        draft = Draft(sound, wall_m, [], scale=scale)
-        return draft.plan(path.stem, cell, f"RoomPlan scan, {path.name}")
+    floor_m = min((wall.low_m for wall in scan.walls), default=0.0)
+    for k, thing in enumerate(scan.objects):
+        front_x, front_y = (thing.front @ turn).tolist()
+        piece = {
+            "type": thing.kind,
+            "heading": round(math.atan2(front_y, front_x), 6) % math.tau,
+            "height": thing.height(floor_m),
+        }
+        features.append(Feature("object", f"objects[{k}]", Polygon(place(thing.box)), piece))
+    return [f for f in features if f.kind != "object" or shapely.is_valid(f.shape)]

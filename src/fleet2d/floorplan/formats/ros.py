@@ -11,7 +11,7 @@ import numpy as np
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.cleaning import OccupancyMap
+from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
 from fleet2d.floorplan.formats.occupancy import PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
@@ -77,9 +77,7 @@ class Ros(PictureSource):
         if not (settings.negate or settings.raw):
             free = self.known(picture, free, settings.resolution, notes, saved=True)
         x, y, yaw = settings.origin
-        # Rounded, so that the last bit of a machine's cosine doesn't matter, and for quarter turns.
-        turn = (round(math.cos(yaw), 12), round(math.sin(yaw), 12))
-        return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn)
+        return OccupancyMap(free[::-1], occupied[::-1], settings.resolution, (x, y), turn_by(yaw))
 
 
 # --- The YAML file -----------------------------------------------------------------------------

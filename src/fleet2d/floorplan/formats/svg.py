@@ -16,13 +16,13 @@ import shapely
 from pydantic import Field
 from shapely import LineString, Polygon
 
-from fleet2d.bounds import CORNERS, FILE_BYTES
+from fleet2d.bounds import CORNERS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, PositiveLength
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.dxf import WALLS, WINDOWS
 from fleet2d.floorplan.formats.features import Draft, Feature
-from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.formats.files import in_file, reading
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
@@ -98,15 +98,10 @@ def _read(path: Path) -> Any:
     """Return the groups of an SVG file."""
     with extra("svg", "reading SVG needs svgelements"):
         import svgelements
-    try:
-        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
+    with reading(path, "SVG", ParseError, ValueError, LookupError, AttributeError, TypeError):
         if b"<!ENTITY" in path.read_bytes():
             raise FloorPlanError(f"{path} defines entities of XML: save it as plain SVG")
         return svgelements.SVG.parse(str(path), reify=True, ppi=96)
-    except OSError as error:
-        raise FloorPlanError(f"{path} can't be read: {error.strerror or error}") from None
-    except (ParseError, ValueError, LookupError, AttributeError, TypeError) as error:
-        raise FloorPlanError(f"{path} is damaged, or not SVG: {error}") from None
 
 
 def _shapes(group: Any, name: str = "") -> Iterator[tuple[str, str, F64, bool]]:
