@@ -230,6 +230,6 @@ def _nearest(space: Space, is_open: Bool, at: tuple[int, int]) -> tuple[int, int
     cells = cells_of(is_open)
     if len(cells) == 0:
         return None
-    away = space.plan.lattice.squared_distances(*cells.T, at)
+    away = space.plan.lattice.squared_distances(cells, at)
     row, column = cells[int(np.argmin(away))].tolist()
     return row, column

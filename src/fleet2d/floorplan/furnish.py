@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -133,17 +134,15 @@ def _place_tv(interior: Interior, room: Room, first: int, draws: Draws) -> None:
     middle = sofa.footprint.centroid
     group = replace(_alone("tv", draws)[0], corner=0, away=0)
 
-    def score(turn: int, shape: tuple[int, int], size: tuple[int, int]) -> I64 | None:
+    def score(turn: int, shape: tuple[int, int], size: tuple[int, int]) -> I64:
         if turn != (turn_of_sofa + 2) % 4:
-            return None
+            return np.full(shape, -1)
         u, v = view.turn_place(turn, middle.x, middle.y)
         rows, columns = np.indices(shape)
         off = np.abs(2 * columns + size[0] - round(2 * u))  # in half cells
         ahead = (v - rows) * cell
-        is_watchable = (
-            (ahead > TV_DISTANCES_M[0]) & (ahead < TV_DISTANCES_M[1]) & (off * cell < 2.0)
-        )
-        return np.where(is_watchable, 4000 - 10 * off, -1).astype(np.int64)
+        is_far = (ahead > TV_DISTANCES_M[0]) & (ahead < TV_DISTANCES_M[1])
+        return np.where(is_far & (off * cell < 2.0), 4000 - 10 * off, -1).astype(np.int64)
 
     view = interior.view(room)
     interior.place(room, group, draws, score)
@@ -198,30 +197,26 @@ def _row(kinds: tuple[str, ...], draws: Draws) -> FurnitureGroup:
     return FurnitureGroup(at, deepest, tuple(pieces), front=front)
 
 
-def _bed(kind: str, side: float) -> GroupMaker:
+def _bed(draws: Draws, kind: str, side: float) -> list[FurnitureGroup]:
     """Make beds with floor on one side or both (`side` [m] wide), and nightstands there."""
-
-    def make(draws: Draws) -> list[FurnitureGroup]:
-        width, depth = _size(kind, draws)
-        least = FURNITURE[kind].width[0]
-        stand = (0.45, 0.4)
-        left = Piece("nightstand", side - stand[0], 0, *stand)
-        groups = []
-        for wide in (width, least):
-            bed = Piece(kind, side, 0, wide, depth)
-            right = Piece("nightstand", side + wide, 0, *stand)
-            if kind == "bed":
-                groups.append(FurnitureGroup(wide + 2 * side, depth, (bed, left, right), front=0.4))
-            groups.append(FurnitureGroup(wide + side, depth, (bed, left), front=0.3))
-            groups.append(FurnitureGroup(wide + side, depth, (replace(bed, left=0.0),)))
-        groups.append(FurnitureGroup(least, depth, (Piece(kind, 0, 0, least, depth),)))
-        return groups
-
-    return make
+    width, depth = _size(kind, draws)
+    least = FURNITURE[kind].width[0]
+    stand = (0.45, 0.4)
+    left = Piece("nightstand", side - stand[0], 0, *stand)
+    groups = []
+    for wide in (width, least):
+        bed = Piece(kind, side, 0, wide, depth)
+        right = Piece("nightstand", side + wide, 0, *stand)
+        if kind == "bed":
+            groups.append(FurnitureGroup(wide + 2 * side, depth, (bed, left, right), front=0.4))
+        groups.append(FurnitureGroup(wide + side, depth, (bed, left), front=0.3))
+        groups.append(FurnitureGroup(wide + side, depth, (replace(bed, left=0.0),)))
+    groups.append(FurnitureGroup(least, depth, (Piece(kind, 0, 0, least, depth),)))
+    return groups
 
 
 def _beds(draws: Draws) -> list[FurnitureGroup]:
-    return [*_bed("bed", 0.55)(draws), *_bed("single_bed", 0.5)(draws)]
+    return [*_bed(draws, "bed", 0.55), *_bed(draws, "single_bed", 0.5)]
 
 
 def _lounge(draws: Draws) -> list[FurnitureGroup]:
@@ -233,20 +228,16 @@ def _lounge(draws: Draws) -> list[FurnitureGroup]:
     ahead = depth + LEG_ROOM
     table = Piece("coffee_table", (width - table_w) / 2, ahead, table_w, table_d)
     beside = Piece("armchair", width + 0.1, ahead - 0.1, seat, seat, turn=1)
-    both = FurnitureGroup(width, ahead + table_d, (sofa, table), front=0.5, corner=15)
-    small = Piece("sofa", 0, 0, FURNITURE["sofa"].width[0], FURNITURE["sofa"].depth[0])
-    return [
-        FurnitureGroup(
-            width + 0.1 + seat,
-            ahead + max(table_d, seat),
-            (sofa, table, beside),
-            front=0.5,
-            corner=15,
-        ),
-        both,
-        FurnitureGroup(width, depth, (sofa,), front=0.5, corner=15),
-        FurnitureGroup(small.width, small.depth, (small,), front=0.4),
+    large = [
+        FurnitureGroup(*size, pieces, front=0.5, corner=15)
+        for size, pieces in (
+            ((width + 0.1 + seat, ahead + max(table_d, seat)), (sofa, table, beside)),
+            ((width, ahead + table_d), (sofa, table)),
+            ((width, depth), (sofa,)),
+        )
     ]
+    small = Piece("sofa", 0, 0, FURNITURE["sofa"].width[0], FURNITURE["sofa"].depth[0])
+    return [*large, FurnitureGroup(small.width, small.depth, (small,), front=0.4)]
 
 
 def _cinema(draws: Draws) -> list[FurnitureGroup]:
@@ -260,28 +251,22 @@ def _cinema(draws: Draws) -> list[FurnitureGroup]:
     return [FurnitureGroup(width, sofa.ahead + depth, (tv, table, sofa), corner=0)]
 
 
-def _dining(seats: int) -> GroupMaker:
+def _dining(draws: Draws, seats: int) -> list[FurnitureGroup]:
     """Make tables with chairs along their long sides, the largest first."""
-
-    def make(draws: Draws) -> list[FurnitureGroup]:
-        width, depth = _size("table", draws)
-        groups = []
-        for wide, deep, chairs in ((width, depth, seats), (1.2, 0.8, min(seats, 4)), (1.2, 0.8, 2)):
-            gap = CHAIR_M + 0.05
-            table = Piece("table", 0, gap, wide, deep)
-            chairs = chairs if wide >= 1.6 else min(chairs, 4)
-            pieces = [table]
-            for k in range(chairs // 2):
-                # The outer chairs stand at the places of the catalogue where people sit.
-                left = wide * (0.2 + 0.6 * k / max(chairs // 2 - 1, 1)) - CHAIR_M / 2
-                pieces.append(Piece("chair", left, 0, CHAIR_M, CHAIR_M))
-                pieces.append(Piece("chair", left, deep + gap + 0.05, CHAIR_M, CHAIR_M, turn=2))
-            groups.append(
-                FurnitureGroup(wide, deep + 2 * gap, tuple(pieces), wall=False, corner=0, away=30)
-            )
-        return groups
-
-    return make
+    width, depth = _size("table", draws)
+    groups = []
+    for wide, deep, chairs in ((width, depth, seats), (1.2, 0.8, min(seats, 4)), (1.2, 0.8, 2)):
+        gap = CHAIR_M + 0.05
+        pieces = [Piece("table", 0, gap, wide, deep)]
+        a_side = (chairs if wide >= 1.6 else min(chairs, 4)) // 2
+        for k in range(a_side):
+            # The outer chairs stand at the places of the catalogue where people sit.
+            left = wide * (0.2 + 0.6 * k / max(a_side - 1, 1)) - CHAIR_M / 2
+            pieces.append(Piece("chair", left, 0, CHAIR_M, CHAIR_M))
+            pieces.append(Piece("chair", left, deep + gap + 0.05, CHAIR_M, CHAIR_M, turn=2))
+        size = (wide, deep + 2 * gap)
+        groups.append(FurnitureGroup(*size, tuple(pieces), wall=False, corner=0, away=30))
+    return groups
 
 
 def _desk(draws: Draws) -> list[FurnitureGroup]:
@@ -305,17 +290,15 @@ def _kitchen(draws: Draws) -> list[FurnitureGroup]:
         ("sink", "stove"),
     )
     groups = [_row(row, draws) for row in rows]
-    if draws.below(2):
-        groups = [_mirror(group) for group in groups]
-    return groups
+    if not draws.below(2):
+        return groups
+    return [  # from right to left
+        replace(g, pieces=tuple(replace(p, left=g.width - p.left - p.width) for p in g.pieces))
+        for g in groups
+    ]
 
 
-def _mirror(group: FurnitureGroup) -> FurnitureGroup:
-    """Return a group with left and right exchanged; none of its pieces may face sideways."""
-    pieces = [replace(p, left=group.width - p.left - p.width) for p in group.pieces]
-    return replace(group, pieces=tuple(pieces))
-
-
+_DINE = partial(_dining, seats=4)
 _SLEEP = (
     FurnitureRule("wardrobe", min_m2=6),
     FurnitureRule("desk", _desk, min_m2=11, chance=35, unless=("office",)),
@@ -334,7 +317,7 @@ RULES = MappingProxyType(
         "bedroom": (FurnitureRule("bed", _beds, min_m2=4), *_SLEEP),
         "guest_room": (FurnitureRule("bed", _beds, min_m2=4), *_SLEEP[:3]),
         "child_room": (
-            FurnitureRule("single_bed", _bed("single_bed", 0.5), min_m2=4),
+            FurnitureRule("single_bed", partial(_bed, kind="single_bed", side=0.5), min_m2=4),
             FurnitureRule("desk", _desk, min_m2=8),
             *_SLEEP[:1],
             FurnitureRule("bookshelf", min_m2=10, chance=60),
@@ -343,13 +326,17 @@ RULES = MappingProxyType(
             FurnitureRule("sofa", _cinema, min_m2=30),
             FurnitureRule("sofa", _lounge, min_m2=6),
             FurnitureRule(
-                "table", _dining(4), min_m2=18, chance=80, unless=("dining_room", "kitchen")
+                "table",
+                _DINE,
+                min_m2=18,
+                chance=80,
+                unless=("dining_room", "kitchen"),
             ),
             FurnitureRule("bookshelf", min_m2=14, chance=70),
             FurnitureRule("dresser", min_m2=20, chance=60),
         ),
         "dining_room": (
-            FurnitureRule("table", _dining(6), min_m2=5),
+            FurnitureRule("table", partial(_dining, seats=6), min_m2=5),
             FurnitureRule("dresser", min_m2=12, chance=60),
         ),
         "kitchen": (
@@ -357,7 +344,7 @@ RULES = MappingProxyType(
             FurnitureRule("fridge"),
             FurnitureRule("sink"),
             FurnitureRule("stove"),
-            FurnitureRule("table", _dining(4), min_m2=12, unless=("dining_room",)),
+            FurnitureRule("table", _DINE, min_m2=12, unless=("dining_room",)),
         ),
         "bathroom": (
             *_WASH,

@@ -43,7 +43,7 @@ POCKET_M2 = 0.06
 # Distance from a door beyond which more distance earns no points [m].
 FAR_M = 3.0
 
-Score = Callable[[int, tuple[int, int], tuple[int, int]], I64 | None]
+Score = Callable[[int, tuple[int, int], tuple[int, int]], I64]
 
 
 @dataclass(frozen=True)
@@ -102,10 +102,10 @@ class RoomView:
         self.room = room
         self.lattice = lattice
         margin = 1 + count_cells(lattice.cell, 1.0)
-        rows, columns = _bounds(plan, room)
-        rows = slice(max(rows.start - margin, 0), min(rows.stop + margin, lattice.rows))
-        columns = slice(max(columns.start - margin, 0), min(columns.stop + margin, lattice.columns))
-        self.window = (rows, columns)
+        low, high = lattice.to_lattice(np.reshape(room.bounds, (2, 2))) // UNITS_PER_CELL
+        x0, y0 = np.maximum(low - margin, 0).tolist()
+        x1, y1 = np.minimum(high + margin, (lattice.columns, lattice.rows)).tolist()
+        self.window = (slice(y0, y1), slice(x0, x1))
         self.inside = largest_part(plan.room_of_cell[self.window] == room.index)
         self.pocket = int(POCKET_M2 / lattice.cell**2)
         self._whole, doors = whole[self.window], doors[self.window]
@@ -127,72 +127,57 @@ class RoomView:
             occupied: Cells that other things occupy, bool (rows, columns) of the plan.
             draws: The stream that chooses among good places.
             score: Called with a turn, the shape of the turned window and the size of the group;
-                returns points for each first cell, or None where no place has that turn.
+                returns points for each first cell, below 0 where the group must not be.
         """
         empty = ~occupied[self.window]
         sums = _sums(self._may_hold & empty), _sums(self._whole & empty)
-        turns, rows, columns, points = [], [], [], []
-        for turn in range(4):
-            options = self._options(group, turn, sums, score)
-            if options is not None:
-                turns.append(np.full(len(options[0]), turn))
-                rows.append(options[0])
-                columns.append(options[1])
-                points.append(options[2])
-        if not turns:
-            return
-        places = np.stack([np.concatenate(turns), np.concatenate(rows), np.concatenate(columns)], 1)
-        value = np.concatenate(points)
+        places = np.concatenate([self._options(group, turn, sums, score) for turn in range(4)])
         for _ in range(ATTEMPTS):
-            if not len(value):
+            if not len(places):
                 return
-            good = np.flatnonzero(value >= value.max() - VARIETY)
-            turn, row, column = places[good[draws.below(len(good))]].tolist()
+            good = np.flatnonzero(places[:, 3] >= places[:, 3].max() - VARIETY)
+            turn, row, column, _ = places[good[draws.below(len(good))]].tolist()
             yield turn, row, column
             # A group that doesn't fit at a place doesn't fit close by either.
-            near = np.abs(places[:, 1:] - (row, column)).max(axis=1) <= self._step
-            rest = ~(near & (places[:, 0] == turn))
-            places, value = places[rest], value[rest]
-
-    @property
-    def _step(self) -> int:
-        return count_cells(self.lattice.cell, 0.2)
+            away = np.abs(places[:, 1:3] - (row, column)).max(axis=1)
+            is_far = away > count_cells(self.lattice.cell, 0.2)
+            places = places[is_far | (places[:, 0] != turn)]
 
     def _options(
         self, group: FurnitureGroup, turn: int, sums: tuple[I64, I64], score: Score | None
-    ) -> tuple[I64, I64, I64] | None:
-        """Return the rows and columns of first cells where the group can be, and their points.
+    ) -> I64:
+        """Return where the group can be: turn, row and column of first cells, and their points.
 
         Args:
             group: The group.
             turn: The turn.
             sums: Of the cells that may hold furniture, and of those that may stay empty before it.
             score: See `places`.
+
+        Returns:
+            int64 (n, 4).
         """
         width, depth = self._size(group)
         front = count_cells(self.lattice.cell, group.front)
         high, wide = self.inside.shape[:: -1 if turn % 2 else 1]
         if depth + front > high or width > wide:
-            return None
-        extra = None if score is None else score(turn, (high, wide), (width, depth))
-        if score is not None and extra is None:
-            return None
+            return np.empty((0, 4), np.int64)
         possible = _is_full(sums[0], turn, depth, width)
         if front:
             before = _is_full(sums[1], turn, front, width)[depth:]
             possible = possible[: len(before)] & before
-        if not possible.any():
-            return None
         rows, columns = np.nonzero(possible)
         if group.wall:
             touching = self._beside_wall(turn, turn, rows, columns, 1, width)
             backed = 10 * touching >= MIN_WALL_TENTHS * width
             rows, columns = rows[backed], columns[backed]
         points = self._points(group, turn, rows, columns)
-        if extra is not None:
-            more = extra[rows, columns]
-            rows, columns, points = rows[more >= 0], columns[more >= 0], (points + more)[more >= 0]
-        return rows, columns, points
+        places = np.stack([np.full_like(rows, turn), rows, columns, points], axis=1)
+        if score is not None:
+            more = score(turn, (high, wide), (width, depth))[rows, columns]
+            places[:, 3] += more
+            places = places[more >= 0]
+        return places
 
     def _points(self, group: FurnitureGroup, turn: int, rows: I64, columns: I64) -> I64:
         """Return the points of first cells for corners and for the distance from doors."""
@@ -232,9 +217,9 @@ class RoomView:
         """Return the rows and columns of the plan that a group and the floor before it occupy."""
         width, depth = self._size(group)
         depth += count_cells(self.lattice.cell, group.front)
-        (x0, y0), (x1, y1) = self._unturned(turn, [(column, row), (column + width, row + depth)])
-        x0, x1, y0, y1 = min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1)
-        return slice(int(y0), int(y1)), slice(int(x0), int(x1))
+        x0, y0 = self._unturned(turn, column, row)
+        x1, y1 = self._unturned(turn, column + width, row + depth)
+        return slice(*sorted((y0, y1))), slice(*sorted((x0, x1)))
 
     def pieces(self, group: FurnitureGroup, turn: int, row: int, column: int) -> list[PlacedObject]:
         """Return the furniture of a group whose first cell is at a row and column.
@@ -250,11 +235,10 @@ class RoomView:
             v1 = count_cells(cell, piece.ahead + piece.depth)
             if u1 == u0 or v1 == v0:
                 return []  # the cells are larger than the piece
-            u0, u1, v0, v1 = column + u0, column + u1, row + v0, row + v1
-            (x0, y0), (x1, y1) = self._unturned(turn, [(u0, v0), (u1, v1)])
+            ends = ((column + u0, row + v0), (column + u1, row + v1))
             # The back is at the bottom: away from it is +y before turning.
             heading = (QUARTER * (turn + piece.turn + 1)) % TURN
-            corners = np.array([(x0, y0), (x1, y1)]) * UNITS_PER_CELL
+            corners = np.array([self._unturned(turn, *end) for end in ends]) * UNITS_PER_CELL
             (ax, ay), (bx, by) = self.lattice.to_metres(corners).tolist()
             size = (abs(bx - ax), abs(by - ay))
             if heading % (2 * QUARTER) == 0:
@@ -263,15 +247,11 @@ class RoomView:
             objects.append(stand_furniture(piece.type, middle, heading, size))
         return objects
 
-    def _unturned(self, turn: int, points: list[tuple[int, int]]) -> list[tuple[int, int]]:
-        """Return corners of cells (x, y) of the turned window as those of the plan."""
+    def _unturned(self, turn: int, u: int, v: int) -> tuple[int, int]:
+        """Return a corner of a cell (x, y) of the turned window as one of the plan."""
         height, width = self.inside.shape
-        x0, y0 = self.window[1].start, self.window[0].start
-        out = []
-        for u, v in points:
-            x, y = ((u, v), (width - v, u), (width - u, height - v), (v, height - u))[turn]
-            out.append((x0 + x, y0 + y))
-        return out
+        x, y = ((u, v), (width - v, u), (width - u, height - v), (v, height - u))[turn]
+        return self.window[1].start + x, self.window[0].start + y
 
     def turn_place(self, turn: int, x: float, y: float) -> tuple[float, float]:
         """Return a place (x, y) [m] as column and row of the turned window."""
@@ -279,13 +259,6 @@ class RoomView:
         low = self.lattice.to_lattice((x, y)) / UNITS_PER_CELL
         x, y = float(low[0]) - self.window[1].start, float(low[1]) - self.window[0].start
         return ((x, y), (y, width - x), (width - x, height - y), (height - y, x))[turn]
-
-
-def _bounds(plan: FloorPlan, room: Room) -> tuple[slice, slice]:
-    lattice = plan.lattice
-    low = lattice.to_lattice(room.bounds[:2]) // UNITS_PER_CELL
-    high = lattice.to_lattice(room.bounds[2:]) // UNITS_PER_CELL
-    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
 
 
 def count_cells(cell: float, metres: float) -> int:
@@ -318,14 +291,11 @@ def _is_full(sums: I64, turn: int, high: int, wide: int) -> Bool:
 def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
     """Return the cells that follow a cell of the mask within `reach`, or precede it if negative."""
     out = np.zeros_like(mask)
-    size = mask.shape[axis]
+    after, before = np.moveaxis(out, axis, 0), np.moveaxis(mask, axis, 0)
+    if reach < 0:
+        after, before = after[::-1], before[::-1]
     for step in range(1, abs(reach) + 1):
-        first, last = slice(0, size - step), slice(step, size)
-        target, origin = (last, first) if reach > 0 else (first, last)
-        if axis == 0:
-            out[target] |= mask[origin]
-        else:
-            out[:, target] |= mask[:, origin]
+        after[step:] |= before[:-step]
     return out
 
 
@@ -372,8 +342,7 @@ class Interior:
             window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
             self.occupied[window] |= covered
             if thing.blocks != "nothing":
-                window, covered = grown_cells(plan.lattice, thing.footprint, BODY_RADIUS)
-                self.standing[window] &= ~covered
+                self._stand_off(thing)
         for thing in plan.objects:
             self._record(thing)
         shapely.prepare(plan.free_space)
@@ -435,16 +404,10 @@ class Interior:
 
     def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
         """Add objects if they stand in free space, are usable and cut no route; return whether."""
-        for thing in things:
-            if not shapely.covers(self.plan.free_space, thing.footprint):
-                return False
+        if not shapely.covers(self.plan.free_space, [thing.footprint for thing in things]).all():
+            return False
         before = self.standing[view.window].copy()
-        grown = []
-        for thing in things:
-            if thing.blocks != "nothing":
-                window, covered = grown_cells(self.plan.lattice, thing.footprint, BODY_RADIUS)
-                self.standing[window] &= ~covered
-                grown.append(window)
+        grown = [self._stand_off(thing) for thing in things if thing.blocks != "nothing"]
         usable = spaces = None
         if self._ways_stay_open(view, before, grown):
             usable = self._usable(view, things)
@@ -459,6 +422,12 @@ class Interior:
             self._record(thing)
         return True
 
+    def _stand_off(self, thing: PlacedObject) -> Window:
+        """Take the floor that an object leaves no body to stand on, and return its window."""
+        window, covered = grown_cells(self.plan.lattice, thing.footprint, BODY_RADIUS)
+        self.standing[window] &= ~covered
+        return window
+
     def _ways_stay_open(self, view: RoomView, before: Bool, grown: list[Window]) -> bool:
         """Return whether connected cells stay connected, and the room can be entered.
 
@@ -468,9 +437,8 @@ class Interior:
             grown: The windows in which that has changed.
         """
         after = self.standing[view.window]
-        if bool((self._approached[view.window] & ~after).any()):
-            return False
-        if bool((before & view.inside).any()) and not bool((after & view.inside).any()):
+        is_barred = (before & view.inside).any() and not (after & view.inside).any()
+        if is_barred or (self._approached[view.window] & ~after).any():
             return False
         if not grown:
             return True
@@ -619,19 +587,18 @@ def whole_cells(plan: FloorPlan) -> Bool:
     may be missed.
     """
     cells: Bool = plan.free.copy()
-    for polygon in plan.polygons:
-        for ring in shapely.get_rings(polygon):
-            points = shapely.get_coordinates(ring)
-            parts = np.abs(np.diff(points, axis=0)).max(axis=1) // (UNITS_PER_CELL // 4) + 1
-            parts = parts.astype(np.int64)
-            piece = np.repeat(np.arange(len(parts)), parts)
-            step = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
-            share = (step / parts[piece])[:, None]
-            along = points[piece] * (1 - share) + points[piece + 1] * share
-            # A wall along the side of a cell touches it without being in it.
-            inner = along[(along % UNITS_PER_CELL != 0).all(axis=1)]
-            column, row = (inner // UNITS_PER_CELL).astype(np.int64).T
-            cells[row, column] = False
+    for ring in shapely.get_rings(plan.polygons):
+        points = shapely.get_coordinates(ring)
+        parts = np.abs(np.diff(points, axis=0)).max(axis=1) // (UNITS_PER_CELL // 4) + 1
+        parts = parts.astype(np.int64)
+        piece = np.repeat(np.arange(len(parts)), parts)
+        step = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
+        share = (step / parts[piece])[:, None]
+        along = points[piece] * (1 - share) + points[piece + 1] * share
+        # A wall along the side of a cell touches it without being in it.
+        inner = along[(along % UNITS_PER_CELL != 0).all(axis=1)]
+        column, row = (inner // UNITS_PER_CELL).astype(np.int64).T
+        cells[row, column] = False
     return cells
 
 
@@ -648,14 +615,12 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
         rooms = np.ascontiguousarray(np.rot90(plan.room_of_cell, turn))
         can_stand = np.ascontiguousarray(np.rot90(standing, turn))
         free = np.ascontiguousarray(np.rot90(plan.free, turn))
-        zone = np.zeros_like(free)
-        border = np.zeros_like(free)
+        zone, border = np.zeros_like(free), np.zeros_like(free)
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
         crossed[1:] &= can_stand[1:] & can_stand[:-1]
-        seeds = border & (
-            crossed | cells_after(crossed, beside, 1) | cells_after(crossed, -beside, 1)
-        )
+        near = crossed | cells_after(crossed, beside, 1) | cells_after(crossed, -beside, 1)
+        seeds = border & near
         seeds |= np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn)
         for _ in range(reach):
             zone |= seeds

@@ -199,11 +199,15 @@ class Lattice:
         columns, rows = (np.arange(n, dtype=np.int64) for n in (self.columns, self.rows))
         return columns * UNITS_PER_CELL + CELL_CENTRE, rows * UNITS_PER_CELL + CELL_CENTRE
 
-    def squared_distances(self, rows: I64, columns: I64, point: tuple[int, int]) -> I64:
-        """Return the squared distances of the centres of cells (n,) from a point [lattice²]."""
-        x, y = point
-        across = columns * UNITS_PER_CELL + (CELL_CENTRE - x)
-        up = rows * UNITS_PER_CELL + (CELL_CENTRE - y)
+    def squared_distances(self, cells: I64, point: Sequence[int]) -> I64:
+        """Return the squared distances of the centres of cells (row, column) from a point.
+
+        Args:
+            cells: int64 (n, 2).
+            point: (x, y) [lattice].
+        """
+        across = cells[:, 1] * UNITS_PER_CELL + (CELL_CENTRE - point[0])
+        up = cells[:, 0] * UNITS_PER_CELL + (CELL_CENTRE - point[1])
         return across * across + up * up
 
 

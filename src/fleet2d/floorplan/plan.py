@@ -507,7 +507,7 @@ class FloorPlan:
         for number, portal in enumerate(portals):
             ends = (portal.start, portal.end)
             points = [shapely.Point(self.lattice.point_at(at)) for at in ends]
-            is_in = shapely.contains([[polygon] for polygon in self.polygons], points)
+            is_in = np.array(shapely.contains([[polygon] for polygon in self.polygons], points))
             for at, is_free in zip(ends, is_in.any(axis=0), strict=True):
                 if not is_free:
                     x, y = self.nearest_free(*at)
@@ -533,10 +533,10 @@ class FloorPlan:
 
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the centre of the free cell nearest to a place [m]; ties: lowest row, column."""
-        rows, columns = np.nonzero(self.free)
+        cells = cells_of(self.free)
         at = np.clip(self.lattice.to_lattice(np.clip((x, y), -1e6, 1e6)), -(2**24), 2**24)
-        nearest = int(np.argmin(self.lattice.squared_distances(rows, columns, at)))
-        centre = self.lattice.cell_centre(int(rows[nearest]), int(columns[nearest]))
+        nearest = int(np.argmin(self.lattice.squared_distances(cells, at.tolist())))
+        centre = self.lattice.cell_centre(*cells[nearest].tolist())
         near_x, near_y = self.lattice.to_metres(centre).tolist()
         return near_x, near_y
 

@@ -259,7 +259,7 @@ class Space:
         if room is not None:
             mask = mask & (self.plan.room_of_cell[window] == room)
         cells = cells_of(mask) + np.array([window[0].start, window[1].start])
-        return cells, self.plan.lattice.squared_distances(*cells.T, (x, y))
+        return cells, self.plan.lattice.squared_distances(cells, (x, y))
 
     def _corners(self) -> Corners:
         """Return the reflex vertices of the border, round which shortest ways bend."""
@@ -555,7 +555,7 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     reach = radius * lattice.units_per_m + HALF + SLACK
     a, b = int(np.ceil(reach)), int(np.ceil(reach * 0.41421357))
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
-    convex = footprint
+    convex: BaseGeometry = footprint
     if not is_convex(footprint):
         convex = shapely.constrained_delaunay_triangles(footprint)
     hulls = []
@@ -637,13 +637,12 @@ def nearest_standing(
         return None
     units = int(reach * lattice.units_per_m) + HALF
     window = _window(lattice, np.array([(x - units, y - units), (x + units, y + units)]))
-    rows, columns = np.nonzero(standing[window])
-    rows, columns = rows + window[0].start, columns + window[1].start
-    away = lattice.squared_distances(rows, columns, (x, y))
+    cells = cells_of(standing[window]) + np.array([window[0].start, window[1].start])
+    away = lattice.squared_distances(cells, (x, y))
     near = np.flatnonzero(away <= units * units)
     triangle = locate(plan.mesh, x, y)
     for i in near[np.argsort(away[near], kind="stable")][:ATTEMPTS].tolist():
-        row, column = int(rows[i]), int(columns[i])
+        row, column = cells[i].tolist()
         centre = lattice.cell_centre(row, column)
         if not line_of_sight(plan.mesh, x, y, triangle, *centre):
             continue
