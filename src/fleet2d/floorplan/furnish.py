@@ -325,13 +325,7 @@ RULES = MappingProxyType(
         "living_room": (
             FurnitureRule("sofa", _cinema, min_m2=30),
             FurnitureRule("sofa", _lounge, min_m2=6),
-            FurnitureRule(
-                "table",
-                _DINE,
-                min_m2=18,
-                chance=80,
-                unless=("dining_room", "kitchen"),
-            ),
+            FurnitureRule("table", _DINE, min_m2=18, chance=80, unless=("dining_room", "kitchen")),
             FurnitureRule("bookshelf", min_m2=14, chance=70),
             FurnitureRule("dresser", min_m2=20, chance=60),
         ),

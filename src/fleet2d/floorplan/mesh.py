@@ -290,7 +290,19 @@ class Gates:
         Raises:
             FloorPlanError: The mesh has no such vertices, or a wall is between them.
         """
-        self.mesh, self._sides = _with_edges(mesh, segments)
+        vertices = mesh.vertices
+        corners = [tuple(triangle) for triangle in mesh.triangles.tolist()]
+        owner = {(t[k], t[(k + 1) % 3]): i for i, t in enumerate(corners) for k in range(3)}
+        ends = [(_vertex(vertices, a), _vertex(vertices, b)) for a, b in segments]
+        for a, b in ends:
+            _force_edge(vertices, corners, owner, a, b)
+        across = [[owner.get((t[(k + 1) % 3], t[k]), WALL) for k in range(3)] for t in corners]
+        self.mesh = Mesh(vertices, np.array(corners, np.int32), np.array(across, np.int32))
+        # Both sides of each: (triangle, edge).
+        self._sides = [
+            tuple((owner[edge], corners[owner[edge]].index(edge[0])) for edge in ((a, b), (b, a)))
+            for a, b in ends
+        ]
 
     def shut(self, gates: Collection[int]) -> Mesh:
         """Return the mesh with these gates shut, by their number."""
@@ -301,27 +313,6 @@ class Gates:
             for triangle, edge in self._sides[gate]:
                 neighbors[triangle, edge] = WALL
         return self.mesh.with_neighbors(neighbors)
-
-
-def _with_edges(
-    mesh: Mesh, segments: Sequence[Segment]
-) -> tuple[Mesh, list[tuple[tuple[int, int], ...]]]:
-    """Return the mesh with the segments as edges, and both sides of each: (triangle, edge)."""
-    vertices = mesh.vertices
-    corners = [tuple(triangle) for triangle in mesh.triangles.tolist()]
-    owner = {(t[k], t[(k + 1) % 3]): i for i, t in enumerate(corners) for k in range(3)}
-    ends = [(_vertex(vertices, a), _vertex(vertices, b)) for a, b in segments]
-    for a, b in ends:
-        _force_edge(vertices, corners, owner, a, b)
-    triangles = np.array(corners, np.int32)
-    neighbors = np.array(
-        [[owner.get((t[(k + 1) % 3], t[k]), WALL) for k in range(3)] for t in corners], np.int32
-    )
-    sides = [
-        tuple((owner[edge], corners[owner[edge]].index(edge[0])) for edge in ((a, b), (b, a)))
-        for a, b in ends
-    ]
-    return Mesh(vertices, triangles, neighbors), sides
 
 
 def _force_edge(

@@ -507,7 +507,8 @@ class FloorPlan:
         for number, portal in enumerate(portals):
             ends = (portal.start, portal.end)
             points = [shapely.Point(self.lattice.point_at(at)) for at in ends]
-            is_in = np.array(shapely.contains([[polygon] for polygon in self.polygons], points))
+            parts = [[polygon] for polygon in self.polygons]
+            is_in: Bool = np.array(shapely.contains(parts, points))
             for at, is_free in zip(ends, is_in.any(axis=0), strict=True):
                 if not is_free:
                     x, y = self.nearest_free(*at)
@@ -523,8 +524,8 @@ class FloorPlan:
         if not portals:
             return self
         linked = f"storeys are linked by stairs and lifts, which robots don't use: {len(portals)}"
-        parts = part_notes(self.lattice, self.polygons)
-        notes = (*(note for note in self.notes if note not in parts), linked)
+        unjoined = part_notes(self.lattice, self.polygons)
+        notes = (*(note for note in self.notes if note not in unjoined), linked)
         return replace(self, portals=(*self.portals, *portals), notes=notes)
 
     def named(self, name: str) -> Self:

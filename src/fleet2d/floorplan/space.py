@@ -576,10 +576,7 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
 
 
 def with_approaches(
-    plan: FloorPlan,
-    thing: PlacedObject,
-    standing: Bool,
-    others: Iterable[PlacedObject] = (),
+    plan: FloorPlan, thing: PlacedObject, standing: Bool, others: Iterable[PlacedObject] = ()
 ) -> PlacedObject:
     """Return an object with only those places of use that a body can get to.
 
@@ -616,11 +613,7 @@ def with_approaches(
 
 
 def nearest_standing(
-    plan: FloorPlan,
-    use: UsePlace,
-    standing: Bool,
-    reach: float,
-    obstacles: Sequence[Polygon] = (),
+    plan: FloorPlan, use: UsePlace, standing: Bool, reach: float, obstacles: Sequence[Polygon] = ()
 ) -> tuple[int, int] | None:
     """Return the cell (row, column) from which a body gets to a place of use, or None.
 

@@ -13,12 +13,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyMap
-from fleet2d.floorplan.formats.drawn_walls import (
-    LINE_M,
-    find_gaps,
-    told_apart,
-    wall_candidates,
-)
+from fleet2d.floorplan.formats.drawn_walls import LINE_M, find_gaps, told_apart, wall_candidates
 from fleet2d.floorplan.formats.files import in_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, read_grey

@@ -8,15 +8,13 @@ import numpy as np
 import shapely
 import shapely.geometry
 from pydantic import TypeAdapter
-from shapely import MultiPolygon, Point, Polygon
+from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.files import (
-    validate,
-)
+from fleet2d.floorplan.formats.files import validate
 from fleet2d.floorplan.formats.native import ObjectUse
-from fleet2d.floorplan.placed_objects import PlacedObject, distinct_names
+from fleet2d.floorplan.placed_objects import PlacedObject, Point, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
     TOUCH_M,
@@ -105,19 +103,6 @@ class Feature:
         return None
 
 
-@dataclass
-class _DrawnDoor:
-    """A doorway of the file, and its passage through the wall."""
-
-    feature: Feature
-    passage: Passage
-
-    @property
-    def line(self) -> DoorLine:
-        name = self.feature.text("name")
-        return DoorLine(*self.passage.line, name, self.feature.kind == "door")
-
-
 class Draft:
     """Converts features to the arguments of `FloorPlan.build`; all in metres."""
 
@@ -141,16 +126,14 @@ class Draft:
         """
         self.move = move
         if scale is not None:
-            features = [
-                replace(f, shape=shapely.transform(f.shape, lambda xy: xy * scale))
-                for f in features
-            ]
+            shapes = [shapely.transform(f.shape, lambda xy: xy * scale) for f in features]
+            features = [replace(f, shape=s) for f, s in zip(features, shapes, strict=True)]
             self.move = lambda xy: move(xy) * scale
         self.features = features
         self.notes = notes
         self.rooms = [_areas([room]) for room in self._of("room")]
         self.free = self._free(wall_m)
-        self.doors: list[_DrawnDoor] = []
+        self.doors: list[tuple[Feature, Passage]] = []
         self.ways_out: list[Passage] = []
         self._cut_doors()
         self.panes = list(self._glaze())
@@ -164,9 +147,9 @@ class Draft:
             cell,
             source=source,
             entrance=self._entrance(),
-            doorways=[door.line for door in self.doors] if self._of("door", "opening") else None,
+            doorways=self._doorways() if self._of("door", "opening") else None,
             regions_are="exact" if self.rooms else "none",
-            objects=self._objects(),
+            objects=[thing for f in self._of("object") for thing in _to_objects(f, self.move)],
             no_go=[part for area in self._of("no_go") for part in _parts(area.shape)],
             glass=self.panes,
             notes=self.notes,
@@ -221,42 +204,47 @@ class Draft:
     def _cut_doors(self) -> None:
         """Open the walls where doors are; a door that leads outside stays shut."""
         cuts: list[Polygon] = []
-        for feature in self._of("door", "opening"):
+        for feature, passages in self._passages("door", "opening"):
+            through = next((p for p in passages if p.through), None)
+            name = feature.text("name") or feature.where
+            if through:
+                self.doors.append((feature, through))
+                cuts += [through.opening] if through.halves else []
+            elif passages:
+                self.ways_out.append(passages[0])
+                self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
+            else:
+                self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
+        self.free = _multi(shapely.union_all([self.free, *cuts]))
+
+    def _passages(self, *kinds: str) -> Iterator[tuple[Feature, list[Passage]]]:
+        """Yield each door or window of some kinds, with its possible passages through a wall."""
+        for feature in self._of(*kinds):
             for axes in door_axes(feature.shape):
                 passages = [find_passage(self.free, start, end) for start, end in axes]
-                through = next((p for p in passages if p and p.through), None)
-                out = next((p for p in passages if p), None)
-                name = feature.text("name") or feature.where
-                if through:
-                    self.doors.append(_DrawnDoor(feature, through))
-                    cuts += [through.opening] if through.halves else []
-                elif out:
-                    self.ways_out.append(out)
-                    self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
-                else:
-                    self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
-        self.free = _multi(shapely.union_all([self.free, *cuts]))
+                yield feature, [passage for passage in passages if passage]
 
     def _glaze(self) -> Iterator[Polygon]:
         """Yield the panes of windows between two rooms; nobody sees in or out through others."""
         outer = 0
-        for feature in self._of("window"):
-            for axes in door_axes(feature.shape):
-                passages = [find_passage(self.free, start, end) for start, end in axes]
-                through = next((p for p in passages if p and p.through and p.halves), None)
-                if through:
-                    yield through.pane
-                outer += not through
+        for _, passages in self._passages("window"):
+            through = next((p for p in passages if p.through and p.halves), None)
+            if through:
+                yield through.pane
+            outer += not through
         if outer:
             self.notes.append(f"windows in outer walls, through which nobody is seen: {outer}")
+
+    def _doorways(self) -> list[DoorLine]:
+        return [DoorLine(*p.line, f.text("name"), f.kind == "door") for f, p in self.doors]
 
     # --- Rooms and objects ---------------------------------------------------------------------
 
     def _regions(self, cell: float) -> list[LabelledRegion]:
         """Return the rooms, each with its half of the passages through its walls."""
         halves: list[list[Polygon]] = [[] for _ in self.rooms]
-        for door in self.doors if self.rooms else ():
-            for half in door.passage.halves:
+        for _, passage in self.doors if self.rooms else ():
+            for half in passage.halves:
                 away = shapely.distance(self.rooms, half).tolist()
                 overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
                 if max(overlap) < half.area / 2:
@@ -294,11 +282,6 @@ class Draft:
                 at = near
         return round(float(at.x), 6), round(float(at.y), 6)
 
-    def _objects(self) -> list[PlacedObject]:
-        return [
-            thing for feature in self._of("object") for thing in _to_objects(feature, self.move)
-        ]
-
 
 def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     """Return a room's labels and type: by its use in the file, else by its name."""
@@ -309,15 +292,15 @@ def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     return () if kind == UNKNOWN else (use,), kind
 
 
-def _to_plan(move: Move, x: float, y: float) -> tuple[float, float]:
+def _to_plan(move: Move, at: Point) -> Point:
     """Return a place of the file in the frame of the plan [m]."""
-    plan_x, plan_y = move(np.array([[x, y]]))[0].tolist()
-    return plan_x, plan_y
+    x, y = move(np.array([at]))[0].tolist()
+    return x, y
 
 
 def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
     shape = feature.shape
-    if isinstance(shape, Point):
+    if isinstance(shape, shapely.Point):
         half = POINT_OBJECT_M / 2
         shape = shapely.box(shape.x - half, shape.y - half, shape.x + half, shape.y + half)
     kind = feature.text("type", "category", "object") or "object"
@@ -326,8 +309,8 @@ def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
     use_of = validate(_OBJECT_USE, present, f"{feature.where}.properties")
     uses = []
     for use in use_of.use_places():
-        x, y = _to_plan(move, use.x, use.y)
-        approach = None if use.approach is None else _to_plan(move, *use.approach)
+        x, y = _to_plan(move, (use.x, use.y))
+        approach = use.approach and _to_plan(move, use.approach)
         uses.append(replace(use, x=x, y=y, approach=approach))
     name, parts = feature.text("name") or "", _parts(shape)
     for number, part in enumerate(parts):

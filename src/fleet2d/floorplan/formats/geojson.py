@@ -23,13 +23,7 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.features import (
-    GEOMETRIES,
-    SURFACES,
-    Draft,
-    Feature,
-    Move,
-)
+from fleet2d.floorplan.formats.features import GEOMETRIES, SURFACES, Draft, Feature, Move
 from fleet2d.floorplan.formats.files import (
     MAX_COORDINATE_M,
     clean_coordinate,
@@ -151,8 +145,9 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
             return "wall", imdf
         if imdf == "unit" and category in _IMDF_NO_FLOOR:
             return None, category
-        if imdf == "opening" and _has_leaf(properties.get("door")):
-            return "door", imdf
+        door = properties.get("door")
+        if imdf == "opening" and isinstance(door, dict) and door.get("type") != "open":
+            return "door", imdf  # a leaf hangs in it
         return _IMDF_KINDS.get(imdf), imdf
     for key in ("type", "category"):
         text = properties.get(key)
@@ -163,17 +158,9 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
     return ("room", "room") if form in SURFACES else (None, f"{form or 'feature'} without a kind")
 
 
-def _has_leaf(door: object) -> bool:
-    """Return whether a door hangs in an opening, by its IMDF property."""
-    return isinstance(door, dict) and door.get("type") != "open"
-
-
 def _level(properties: dict[str, Any]) -> str | None:
-    for key in ("level_id", "level"):
-        value = properties.get(key)
-        if isinstance(value, str | int | float):
-            return str(value)
-    return None
+    values = (properties.get(key) for key in ("level_id", "level"))
+    return next((str(value) for value in values if isinstance(value, str | int | float)), None)
 
 
 def _on_one_floor(
@@ -187,17 +174,13 @@ def _on_one_floor(
         feature = Feature("level", "", Point(), floor)
         further = (floor.get("ordinal"), feature.text("short_name"), feature.text("name"))
         names_of[name] = [name, *(str(word) for word in further if word is not None)]
-    if level is None:
-        if len(levels) < 2:
-            return features
-        ground = (name for name in levels if "0" in names_of[name])
-        chosen = next(ground, levels[0])
-    else:
-        matches = [name for name in levels if level in names_of[name]]
-        if not matches:
-            known = ", ".join(" or ".join(names) for names in names_of.values()) or "none"
-            raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
-        chosen = matches[0]
+    if level is None and len(levels) < 2:
+        return features
+    matches = [name for name in levels if ("0" if level is None else level) in names_of[name]]
+    if level is not None and not matches:
+        known = ", ".join(" or ".join(names) for names in names_of.values()) or "none"
+        raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
+    chosen = (matches or levels)[0]
     others = ", ".join(names_of[name][-1] for name in levels if name != chosen)
     if others:
         notes.append(f"of its levels, {names_of[chosen][-1]} is used, not {others}")

@@ -164,17 +164,12 @@ class PictureSource(OccupancySource):
                 of an object.
         """
         free = self.clean(raw, notes)
-        self._refuse_outside(raw, free, picture)
-        return free
-
-    def _refuse_outside(self, raw: OccupancyMap, free: Polygon, picture: GreyPicture) -> None:
-        """Raise FloorPlanError if free space covers most of the edge of the picture."""
         rows, columns = raw.free.shape
         length = 2 * (rows + columns) * raw.pixel
         corners = np.array([(0, 0), (columns, 0), (columns, rows), (0, rows)], np.float64)
         edge = Polygon(raw.to_metres(corners)).exterior
         if float(edge.buffer(raw.pixel / 4).intersection(free.exterior).length) < length / 2:
-            return
+            return free
         grey, share = picture.edge_grey()
         raise FloorPlanError(
             "the free space runs along most of the edge of the picture: it is the ground around the"

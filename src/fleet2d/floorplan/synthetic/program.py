@@ -350,11 +350,7 @@ def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
     has_kitchen = area >= STUDIO_KITCHEN_M2 and choices.chance(STUDIO_KITCHEN_PERCENT)
     kind, (low, high) = ("kitchen", (45, 62)) if has_kitchen else ("entryway", (26, 36))
     bath, third = choices.between(33, 46) / 10, choices.between(low, high) / 10
-    return [
-        Brief("living_room", area - bath - third),
-        Brief("bathroom", bath),
-        Brief(kind, third),
-    ]
+    return [Brief("living_room", area - bath - third), Brief("bathroom", bath), Brief(kind, third)]
 
 
 def _assign_partners(briefs: Sequence[Brief], edition: int) -> list[Brief]:
