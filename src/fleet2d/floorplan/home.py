@@ -194,8 +194,8 @@ class Home:
     def use_room_as(self, room: Room, kind: str) -> None:
         """Change what a room is used for."""
         new_type = room_type(kind)
-        changed_room = replace(room, type=new_type, labels=(new_type,))
-        self.rooms = tuple(changed_room if r.index == room.index else r for r in self.rooms)
+        changed = replace(room, type=new_type, labels=(new_type,))
+        self.rooms = (*self.rooms[: room.index], changed, *self.rooms[room.index + 1 :])
         self.version += 1
 
     def object(self, name: str) -> PlacedObject:
@@ -231,14 +231,8 @@ class Home:
         if self._places[0] != self.version:
             point_at = self.plan.lattice.point_at
             uses = (use for thing in self.objects for use in thing.uses)
-            self._places = (
-                self.version,
-                {
-                    point_at((u.x, u.y)): point_at(u.approach)
-                    for u in uses
-                    if u.approach is not None
-                },
-            )
+            ways = {point_at((u.x, u.y)): point_at(u.approach) for u in uses if u.approach}
+            self._places = self.version, ways
         return self._places[1]
 
     def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
@@ -370,24 +364,17 @@ def _solid(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
 
 def parse_moment(value: Any) -> datetime | timedelta:
     """Parse a local time, or the time since the start."""
-    moment = _local_time(value)
-    if moment is None:
+    try:
+        moment = datetime.fromisoformat(value) if isinstance(value, str) else value
+    except ValueError:
+        moment = None
+    if isinstance(moment, date) and not isinstance(moment, datetime):
+        moment = datetime(moment.year, moment.month, moment.day)
+    if not isinstance(moment, datetime):
         return parse_duration(value)
     if moment.tzinfo is not None:
         raise problem("expected a local time of the home, without a time zone")
     return moment
-
-
-def _local_time(value: Any) -> datetime | None:
-    """Return the date and time that a value is, or None if it is something else."""
-    if isinstance(value, datetime):
-        return value
-    if isinstance(value, date):
-        return datetime(value.year, value.month, value.day)
-    try:
-        return datetime.fromisoformat(value) if isinstance(value, str) else None
-    except ValueError:
-        return None
 
 
 def format_moment(moment: datetime | timedelta) -> str:

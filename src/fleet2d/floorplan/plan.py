@@ -509,8 +509,8 @@ class FloorPlan:
             points = [shapely.Point(self.lattice.point_at(at)) for at in ends]
             parts = [[polygon] for polygon in self.polygons]
             is_in: Bool = np.array(shapely.contains(parts, points))
-            for at, is_free in zip(ends, is_in.any(axis=0), strict=True):
-                if not is_free:
+            for k, at in enumerate(ends):
+                if not is_in[:, k].any():
                     x, y = self.nearest_free(*at)
                     raise FloorPlanError(
                         f"{where}[{number}]: its end at ({at[0]:g}, {at[1]:g}) m is in no room of"

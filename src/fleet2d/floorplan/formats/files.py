@@ -26,6 +26,7 @@ from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
 from fleet2d.configuration.components import DescribedModel
 from fleet2d.configuration.problems import Location, problem, suggest
 from fleet2d.errors import FloorPlanError, InputError, errors_as, os_errors_as
+from fleet2d.floorplan.formats.foreign import foreign_file
 
 YAML = (".yaml", ".yml")
 # No home is as large: a coordinate beyond this is not in metres.
@@ -145,8 +146,6 @@ def _read_text(path: Path, language: str) -> str:
 
 def _refuse_foreign(path: Path, content: bytes) -> None:
     """Raise FloorPlanError if a file is one of another program, with what to convert it to."""
-    from fleet2d.floorplan.formats.foreign import foreign_file
-
     said = foreign_file(content)
     if said is not None:
         raise FloorPlanError(f"{path} {said}") from None

@@ -10,6 +10,7 @@ A plan that is written by `native_document` and read again at the same cell size
 `PlanFile` has all keys. The bundled homes are files in this format.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -76,7 +77,11 @@ class AreaEntry(FileModel):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_valid(self.polygon)
+        """Refuse an area that crosses itself, as only the traced outlines of others may."""
+        if not self.polygon.is_valid:
+            reason, _, at = shapely.is_valid_reason(self.polygon).partition("[")
+            place = f" at ({at.rstrip(']').replace(' ', ', ')}) m" if at else ""
+            raise problem(f"is not a valid outline: {reason.lower()}{place}")
         return self
 
     @cached_property
@@ -100,14 +105,6 @@ Area = Annotated[
     BeforeValidator(lambda value: value if isinstance(value, dict) else {"outline": value}),
     _CornersAlone(),
 ]
-
-
-def _check_valid(shape: Polygon | MultiPolygon) -> None:
-    """Refuse a shape that crosses itself, as only the traced outlines of other formats may."""
-    if not shape.is_valid:
-        reason, _, at = shapely.is_valid_reason(shape).partition("[")
-        place = f" at ({at.rstrip(']').replace(' ', ', ')}) m" if at else ""
-        raise problem(f"is not a valid outline: {reason.lower()}{place}")
 
 
 def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
@@ -235,14 +232,10 @@ class ObjectEntry(ObjectUse):
 
     def to_object(self) -> PlacedObject:
         """Return the object as one of the plan."""
+        shape, uses = self.footprint.polygon, self.use_places()
+        name = self.name or ""
         return PlacedObject(
-            name=self.name or "",
-            type=self.type,
-            footprint=self.footprint.polygon,
-            blocks=self.blocks,
-            uses=self.use_places(),
-            heading=self.heading,
-            height=self.height,
+            name, self.type, shape, self.blocks, uses, self.heading, height=self.height
         )
 
 
@@ -441,38 +434,36 @@ def _with_passages(
 def native_document(plan: FloorPlan) -> dict[str, Any]:
     """Return a plan as the mapping that `read_native` reads, of plain JSON data."""
     to_metres = plan.lattice.to_metres
+
+    def parts(polygons: Sequence[Polygon]) -> list[dict[str, Any]]:
+        return [_part_document(shapely.transform(polygon, to_metres)) for polygon in polygons]
+
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "name": plan.name,
-        "free": [
-            _part_document(shapely.transform(polygon, to_metres)) for polygon in plan.polygons
-        ],
+        "free": parts(plan.polygons),
         "rooms": [
             {
                 "name": room.name,
                 "type": room.type,
                 "labels": list(room.labels),
-                "region": [
-                    _part_document(shapely.transform(polygon, to_metres))
-                    for polygon in cell_polygons(plan.room_of_cell == room.index)
-                ],
+                "region": parts(cell_polygons(plan.room_of_cell == room.index)),
             }
             for room in plan.rooms
         ],
+        "doorways": [
+            {"name": d.name, "start": list(d.start), "end": list(d.end), "leaf": d.leaf}
+            for d in plan.doorways
+        ],
     }
-    document["doorways"] = [
-        {"name": d.name, "start": list(d.start), "end": list(d.end), "leaf": d.leaf}
-        for d in plan.doorways
-    ]
     if plan.objects:
         document["objects"] = [object_document(thing) for thing in plan.objects]
     if plan.no_go:
         document["no_go"] = [_area_document(area) for area in plan.no_go]
     if plan.glass:
-        document["glass"] = [
-            _area_document(shapely.transform(pane, to_metres)) for pane in plan.glass
-        ]
+        panes = [shapely.transform(pane, to_metres) for pane in plan.glass]
+        document["glass"] = [_area_document(pane) for pane in panes]
     if plan.portals:
         document["portals"] = [
             {"type": p.type, "start": list(p.start), "end": list(p.end), "takes": p.takes_us / 1e6}

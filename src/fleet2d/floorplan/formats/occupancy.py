@@ -71,12 +71,7 @@ class OccupancySource(PixelSource):
         Raises:
             FloorPlanError: There is none, or what was found is the inside of an object.
         """
-        free, changes = free_space(
-            raw,
-            speck_area_m2=self.speck_area_m2,
-            ray_width=self.ray_width,
-            bridge_pixels=self.bridge_pixels,
-        )
+        free, changes = free_space(raw, self.speck_area_m2, self.ray_width, self.bridge_pixels)
         refuse_object(raw, free)
         notes += changes
         return free
@@ -198,7 +193,7 @@ def refuse_object(raw: OccupancyMap, free: Polygon) -> None:
 
 
 def free_space(
-    raw: OccupancyMap, *, speck_area_m2: float, ray_width: float, bridge_pixels: int = 0
+    raw: OccupancyMap, speck_area_m2: float, ray_width: float, bridge_pixels: int = 0
 ) -> tuple[Polygon, list[str]]:
     """Return the home in an occupancy map, without noise, specks and rays.
 
