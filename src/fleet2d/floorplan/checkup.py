@@ -95,17 +95,9 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
         ...     print(finding.severity, finding.text)
         wrong a body of radius 0.15 m can't get to office_0 (15.2 m2)
     """
-    findings = [
-        *_scale(plan),
-        *_parts(plan),
-        *_no_go(plan),
-        *_specks(plan),
-        *_labels(plan),
-        *_doors(plan),
-        *_standing_in_walls(plan),
-        *_routes(Home(plan), radius),
-        *_unreachable_objects(plan),
-    ]
+    of_plan = (_scale, _parts, _no_go, _specks, _labels, _doors, _standing_in_walls)
+    findings = [finding for find in of_plan for finding in find(plan)]
+    findings += [*_routes(Home(plan), radius), *_unreachable_objects(plan)]
     return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
 
 
@@ -211,10 +203,8 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
             yield _found("parts", "wrong", text, part.representative_point(), part, rest)
     small = [part for part in parts if part.area < PART_M2]
     if small:
-        text = (
-            f"nothing joins {counted(len(small), 'part')} smaller than {PART_M2:g} m2 to the rest,"
-        )
-        text += " the largest" * (len(small) > 1)
+        parts_text = f"{counted(len(small), 'part')} smaller than {PART_M2:g} m2"
+        text = f"nothing joins {parts_text} to the rest,{' the largest' * (len(small) > 1)}"
         shape = shapely.MultiPolygon(small)
         yield _found("parts", "odd", text, small[0].representative_point(), shape)
 

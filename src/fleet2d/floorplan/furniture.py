@@ -192,13 +192,10 @@ def stand_furniture(
     model = furniture_type(kind)
     width, depth = size if size is not None else (sum(model.width) / 2, sum(model.depth) / 2)
     # The unit vectors come from a table, so that places are the same on every machine.
-    forward = (cosine(heading) / UNIT, sine(heading) / UNIT)
+    (x0, y0), dx, dy = at, cosine(heading) / UNIT, sine(heading) / UNIT
 
     def place(ahead: float, left: float) -> Point:
-        return (
-            at[0] + ahead * forward[0] - left * forward[1],
-            at[1] + ahead * forward[1] + left * forward[0],
-        )
+        return x0 + ahead * dx - left * dy, y0 + ahead * dy + left * dx
 
     ahead, left = depth / 2, width / 2
     corners = [place(-ahead, left), place(-ahead, -left), place(ahead, -left), place(ahead, left)]
@@ -207,11 +204,5 @@ def stand_furniture(
         x, y = place(use.ahead * depth + use.ahead_m, use.left * width + use.left_m)
         facing = float(in_radians((heading + use.facing) % TURN))
         uses.append(UsePlace(x, y, facing, use.posture))
-    return PlacedObject(
-        name=name,
-        type=kind,
-        footprint=Polygon(corners),
-        blocks=model.blocks,
-        uses=tuple(uses),
-        heading=float(in_radians(heading % TURN)),
-    )
+    facing = float(in_radians(heading % TURN))
+    return PlacedObject(name, kind, Polygon(corners), model.blocks, tuple(uses), facing)

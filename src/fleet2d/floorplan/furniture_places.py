@@ -490,9 +490,8 @@ class Interior:
         """Return the largest connected part of the standing cells in and around a room."""
         index = view.room.index
         if index not in self._main:
-            self._main[index] = np.zeros_like(self.standing)
-            main = largest_part(self.standing[view.window], view.inside)
-            self._main[index][view.window] = main
+            main = self._main[index] = np.zeros_like(self.standing)
+            main[view.window] = largest_part(self.standing[view.window], view.inside)
         # It is never split, so the rest of it is still connected.
         return self._main[index] & self.standing
 

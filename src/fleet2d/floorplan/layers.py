@@ -67,10 +67,8 @@ def check_layers(layers: dict[str, LayerSettings]) -> dict[str, LayerSettings]:
             for key, value in LayerSettings():
                 if key in ("store", "every") or getattr(settings, key) == value:
                     continue  # a stored scenario has all keys
-                raise problem_at(
-                    (name, key),
-                    f"{name} is a layer that the run maintains itself: leave out {key!r}",
-                )
+                text = f"{name} is a layer that the run maintains itself: leave out {key!r}"
+                raise problem_at((name, key), text)
     return layers
 
 

@@ -206,15 +206,11 @@ def move_object(
         turned = np.stack([(c * dx - s * dy + half) // UNIT, (s * dx + c * dy + half) // UNIT], -1)
         return lattice.to_metres(goal + turned)
 
-    uses = tuple(
-        replace(
-            use,
-            **dict(zip("xy", transform(np.array([[use.x, use.y]]))[0].tolist(), strict=True)),
-            heading=(use.heading + in_radians(turn)) % in_radians(TURN),
-            approach=None,
-        )
-        for use in thing.uses
-    )
+    uses = []
+    for use in thing.uses:
+        x, y = transform(np.array([[use.x, use.y]]))[0].tolist()
+        facing = (use.heading + in_radians(turn)) % in_radians(TURN)
+        uses.append(replace(use, x=x, y=y, heading=facing, approach=None))
     footprint = Polygon(transform(np.asarray(thing.footprint.exterior.coords)[:-1]))
     heading = (thing.heading + in_radians(turn)) % in_radians(TURN)
-    return replace(thing, footprint=footprint, uses=uses, heading=heading)
+    return replace(thing, footprint=footprint, uses=tuple(uses), heading=heading)

@@ -76,10 +76,10 @@ class RoomCorrection(Settings):
             raise problem("a room needs either 'at' (a point in it) or 'polygon' (its corners)")
         if self.at is not None and self.name is None and self.type is None:
             raise problem("a room at a place needs a name or a type to give it")
-        if self.polygon is not None and not _shape(self.polygon).is_valid:
-            raise problem(
-                "polygon is not a valid outline: at least 3 corners, and no crossing sides"
-            )
+        corners = self.polygon
+        if corners is not None and (len(corners) < 3 or not Polygon(corners).is_valid):
+            text = "polygon is not a valid outline: at least 3 corners, and no crossing sides"
+            raise problem(text)
 
 
 def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> FloorPlan:
@@ -105,9 +105,8 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
         if correction.polygon is not None:
             painted = _draw(plan, painted, correction, len(regions), where)
             types = (usual_type(correction.type),) if correction.type else ()
-            regions.append(
-                LabelledRegion(types, Polygon(), correction.name, None if types else "room")
-            )
+            kind = None if types else "room"
+            regions.append(LabelledRegion(types, Polygon(), correction.name, kind))
         else:
             index = _region_at(plan, painted, correction, where)
             regions[index] = _rename(regions[index], correction)
@@ -116,10 +115,6 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
     places, names = fill_from_neighbors(room_of_cell), [room.name for room in rooms]
     doorways = name_doorways(plan.lattice, places, names, list(doors))
     return replace(plan, room_of_cell=read_only(room_of_cell), rooms=rooms, doorways=doorways)
-
-
-def _shape(corners: Sequence[tuple[float, float]]) -> Polygon:
-    return Polygon(corners) if len(corners) >= 3 else Polygon([(0, 0), (1, 1), (0, 0)])
 
 
 def _rename(region: LabelledRegion, correction: RoomCorrection) -> LabelledRegion:
@@ -149,7 +144,7 @@ def _region_at(plan: FloorPlan, painted: I64, correction: RoomCorrection, where:
 
 def _draw(plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int, where: str) -> I64:
     """Return the regions of the cells, with those inside the polygon set to `index`."""
-    shape = _shape(correction.polygon or ())
+    shape = Polygon(correction.polygon)
     (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
     parts = shapely.get_parts(shapely.make_valid(region.shape))  # rounding may cross its sides
     polygons = [part for part in parts if part.geom_type == "Polygon"]

@@ -148,7 +148,10 @@ class Space:
         return ()
 
     def part_near(self, x: int, y: int) -> int:
-        """Return the part nearest to a point outside the space."""
+        """Return the part of a point; outside of the space, the nearest one."""
+        part = self.part_at(x, y)
+        if part >= 0:
+            return part
         near = self.nearest(x, y)
         return 0 if near is None else self.part_at(*near)
 
@@ -159,9 +162,7 @@ class Space:
 
     def _find_part(self, xy: tuple[float, float]) -> int:
         """Return the part of a place [m], or the nearest one."""
-        x, y = self.plan.lattice.point_at(xy)
-        part = self.part_at(x, y)
-        return self.part_near(x, y) if part < 0 else part
+        return self.part_near(*self.plan.lattice.point_at(xy))
 
     def _find_cells(self, room: int | None = None, part: int = 0) -> I64:
         """Return the cells (row, column) of a part of the space, or of a room, int64 (n, 2)."""
@@ -241,37 +242,27 @@ class Space:
             slice(max(0, row - NEAR_CELLS), max(0, row + NEAR_CELLS + 1)),
             slice(max(0, column - NEAR_CELLS), max(0, column + NEAR_CELLS + 1)),
         )
-        cells, away = self._distances_in(near, x, y, part, room)
-        # All others are farther away than the border of these.
-        if np.count_nonzero(away <= (NEAR_CELLS * SUB) ** 2) < most:
-            cells, away = self._distances_in((slice(0, None), slice(0, None)), x, y, part, room)
+        for window in (near, (slice(0, None), slice(0, None))):
+            parts = self.part_of_cell[window]
+            mask = parts >= 0 if part is None else parts == part
+            if room is not None:
+                mask = mask & (self.plan.room_of_cell[window] == room)
+            cells = cells_of(mask) + np.array([window[0].start, window[1].start])
+            away = self.plan.lattice.squared_distances(cells, (x, y))
+            # All others are farther away than the border of these.
+            if np.count_nonzero(away <= (NEAR_CELLS * SUB) ** 2) >= most:
+                break
         if len(cells) > most:
             is_near = away <= np.partition(away, most - 1)[most - 1]
             cells, away = cells[is_near], away[is_near]
         return cells[np.argsort(away, kind="stable")[:most]]
 
-    def _distances_in(
-        self, window: tuple[slice, slice], x: int, y: int, part: int | None, room: int | None
-    ) -> tuple[I64, I64]:
-        """Return the free cells (row, column) of some rows and columns; squared distances."""
-        parts = self.part_of_cell[window]
-        mask = parts >= 0 if part is None else parts == part
-        if room is not None:
-            mask = mask & (self.plan.room_of_cell[window] == room)
-        cells = cells_of(mask) + np.array([window[0].start, window[1].start])
-        return cells, self.plan.lattice.squared_distances(cells, (x, y))
-
     def _corners(self) -> Corners:
         """Return the reflex vertices of the border, round which shortest ways bend."""
         vertices = self.mesh.vertices
-        before, at, after = [], [], []
-        for polygon in self.polygons:
-            for ring in shapely.get_rings(polygon):
-                points = np.asarray(ring.coords)[:-1].astype(np.int64)
-                before.append(np.roll(points, 1, axis=0))
-                at.append(points)
-                after.append(np.roll(points, -1, axis=0))
-        p, q, r = np.concatenate(before), np.concatenate(at), np.concatenate(after)
+        outlines = shapely.get_rings(self.polygons)
+        rings = [shapely.get_coordinates(ring)[:-1].astype(np.int64) for ring in outlines]
+        p, q, r = (np.concatenate([np.roll(v, k, axis=0) for v in rings]) for k in (1, 0, -1))
         into, out = q - p, r - q
         # The free space lies to the left.
         reflex = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
@@ -384,7 +375,7 @@ class LinkedSpace(Space):
         The way is the shortest, in straight lines and with the times of portals as metres.
         """
         base, metre = self.base, self.plan.lattice.units_per_m
-        goal_part = self._part(goal)
+        goal_part = base.part_near(*goal)
         queue: list[tuple[float, int, PointXY, list[Passing]]] = [(0.0, 0, start, [])]
         best: dict[PointXY, float] = {}
         tries = 0
@@ -395,7 +386,7 @@ class LinkedSpace(Space):
             if best.get(place, np.inf) <= length:
                 continue
             best[place] = length
-            part = self._part(place)
+            part = base.part_near(*place)
             ways = [(goal, used, 0.0)] if part == goal_part else []
             ways += [
                 (p.end, [*used, p], math.dist(place, p.begin) / metre + p.takes_us / SECOND_US)
@@ -407,11 +398,6 @@ class LinkedSpace(Space):
                 far = metres or math.dist(place, goal) / metre
                 heapq.heappush(queue, (length + far, tries, other, through))
         return []
-
-    def _part(self, place: PointXY) -> int:
-        """Return the part of a storey that holds a lattice point, or is nearest to it."""
-        part = self.base.part_at(*place)
-        return part if part >= 0 else self.base.part_near(*place)
 
     def _end(self, at: tuple[float, float]) -> PointXY | None:
         """Return where a body stands at the end of a portal [lattice], or None if nowhere."""
@@ -485,11 +471,6 @@ def grow_polygons(polygons: Sequence[Polygon], radius: float) -> list[BaseGeomet
 CONVEX_SLACK = 1e-9
 
 
-def is_convex(polygon: Polygon) -> bool:
-    """Return whether a polygon is convex, but for rounding."""
-    return not polygon.interiors and polygon.area >= polygon.convex_hull.area * (1 - CONVEX_SLACK)
-
-
 def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:
     """Grow every wall of a ring by the octagon; return convex polygons."""
     ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
@@ -556,7 +537,8 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     a, b = int(np.ceil(reach)), int(np.ceil(reach * 0.41421357))
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
     convex: BaseGeometry = footprint
-    if not is_convex(footprint):
+    solid_area = footprint.convex_hull.area * (1 - CONVEX_SLACK)
+    if footprint.interiors or footprint.area < solid_area:
         convex = shapely.constrained_delaunay_triangles(footprint)
     hulls = []
     for piece in shapely.get_parts(convex):

@@ -73,9 +73,7 @@ class ReachTime(Metric):
             for i in calls[pair.at_home[calls]].tolist():
                 start = lattice.point_at(pair.robot_poses.at(i))
                 target = lattice.point_at(pair.user_poses.at(i))
-                part = space.part_at(*start)
-                part = space.part_near(*start) if part < 0 else part
-                route = _route(space, part, start, target)
+                route = _route(space, space.part_near(*start), start, target)
                 if route is None:
                     self.unreached[key] += 1
                 else:

@@ -116,7 +116,9 @@ class Image(PictureSource):
                     f"resolution is {pixel:g} m per pixel: above 0 and at most {MAX_CELL_M:g} m is"
                     " expected"
                 )
-            light = _light(picture, self.threshold)
+            light: Bool = picture.values >= self.threshold * picture.white
+            if picture.clear is not None:
+                light = light | picture.clear
             notes: list[str] = []
             found: list[str] = []
             inside = self.known(picture, light, pixel, found, saved=False)
@@ -211,11 +213,6 @@ def _frames(ground: Bool, walls: Bool) -> bool:
         if not len(outer) or outer[0] >= inner[0] or outer[-1] <= inner[-1]:
             return False
     return True
-
-
-def _light(picture: GreyPicture, threshold: float) -> Bool:
-    light: Bool = picture.values >= threshold * picture.white
-    return light if picture.clear is None else light | picture.clear
 
 
 def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> Bool:

@@ -110,12 +110,10 @@ def find_gaps(walls: Bool, dark: Bool, pixel: float) -> list[WallGap]:
         dark: All pixels that are drawn, of the same shape.
         pixel: Side of a pixel [m].
     """
-    across = [WallGap(box, is_window) for box, is_window in _row_gaps(walls, dark, pixel)]
-    return across + [
-        WallGap((left, top, right, bottom), is_window)
-        for (top, left, bottom, right), is_window in _row_gaps(
-            np.ascontiguousarray(walls.T), np.ascontiguousarray(dark.T), pixel
-        )
+    turned = _row_gaps(np.ascontiguousarray(walls.T), np.ascontiguousarray(dark.T), pixel)
+    return [
+        *(WallGap(box, is_window) for box, is_window in _row_gaps(walls, dark, pixel)),
+        *(WallGap((x0, y0, x1, y1), is_window) for (y0, x0, y1, x1), is_window in turned),
     ]
 
 

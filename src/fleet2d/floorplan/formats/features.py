@@ -30,14 +30,9 @@ from fleet2d.runtime.determinism import sum_in_order
 
 SURFACES, LINES = ("Polygon", "MultiPolygon"), ("LineString", "MultiLineString")
 GEOMETRIES = {
-    "room": SURFACES,
-    "free": SURFACES,
-    "no_go": SURFACES,
+    **dict.fromkeys(("room", "free", "no_go"), SURFACES),
     "object": (*SURFACES, "Point"),
-    "door": (*LINES, *SURFACES),
-    "opening": (*LINES, *SURFACES),
-    "window": (*LINES, *SURFACES),
-    "wall": (*LINES, *SURFACES),
+    **dict.fromkeys(("door", "opening", "window", "wall"), (*LINES, *SURFACES)),
     "entrance": ("Point", "LineString"),
 }
 """The types of geometry that each kind of feature may have."""
@@ -314,15 +309,10 @@ def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
         uses.append(replace(use, x=x, y=y, approach=approach))
     name, parts = feature.text("name") or "", _parts(shape)
     for number, part in enumerate(parts):
-        yield PlacedObject(
-            f"{name} {number + 1}" if name and len(parts) > 1 else name,
-            room_type(kind),
-            part,
-            use_of.blocks,
-            () if number else tuple(uses),
-            use_of.heading,
-            use_of.height,
-        )
+        own = f"{name} {number + 1}" if name and len(parts) > 1 else name
+        own_uses = () if number else tuple(uses)
+        further = (use_of.heading, use_of.height)
+        yield PlacedObject(own, room_type(kind), part, use_of.blocks, own_uses, *further)
 
 
 def _thick(lines: Iterable[BaseGeometry], wall_m: float) -> BaseGeometry:

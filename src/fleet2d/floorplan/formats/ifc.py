@@ -67,11 +67,8 @@ class Ifc(FloorPlanSource):
         with in_file(self.path):
             notes: list[str] = []
             storeys = {str(s.GlobalId): s for s in model.by_type("IfcBuildingStorey")}
-            level = choose_level(
-                [(k, s.Name or k, float(s.Elevation or 0.0)) for k, s in storeys.items()],
-                self.level,
-                notes,
-            )
+            levels = [(k, s.Name or k, float(s.Elevation or 0.0)) for k, s in storeys.items()]
+            level = choose_level(levels, self.level, notes)
             features = list(_features(model, None if level is None else storeys[level], notes))
             corners = shapely.get_num_coordinates([feature.shape for feature in features]).sum()
             CORNERS.check(int(corners), "it", FloorPlanError)

@@ -128,7 +128,7 @@ def read_grey(path: Path) -> GreyPicture:
         if content.startswith((b"P2", b"P5")):
             return _read_pgm(content)
         if content.startswith(_PNG):
-            return _read_png(content)
+            return _read_by_pillow(content, "PNG")
         if content.startswith(_JPEG):
             return _read_by_pillow(content, "JPEG")
     except FloorPlanError as error:
@@ -215,12 +215,6 @@ def _check_size(columns: int, rows: int) -> None:
 # --- PNG ---------------------------------------------------------------------------------------
 
 
-def _read_png(content: bytes) -> GreyPicture:
-    if len(content) >= 24:  # else it is cut off, as Pillow says
-        _check_size(*(int.from_bytes(content[at : at + 4], "big") for at in (16, 20)))
-    return _read_by_pillow(content, "PNG")
-
-
 def _read_by_pillow(content: bytes, kind: str) -> GreyPicture:
     """Read a PNG or JPEG picture, the mean of its colours."""
     try:
@@ -231,6 +225,8 @@ def _read_by_pillow(content: bytes, kind: str) -> GreyPicture:
             " image to PGM"
         ) from None
     try:
+        if kind == "PNG" and len(content) >= 24:  # else it is cut off, as Pillow says
+            _check_size(*_png_size(content))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # see _check_size
             picture = Image.open(io.BytesIO(content), formats=[kind])
@@ -250,6 +246,10 @@ def _read_by_pillow(content: bytes, kind: str) -> GreyPicture:
     return GreyPicture(shades, 3 * 255, clear if clear.any() else None)
 
 
+def _png_size(content: bytes) -> tuple[int, int]:
+    return int.from_bytes(content[16:20], "big"), int.from_bytes(content[20:24], "big")
+
+
 def _check_rows(content: bytes) -> None:
     """Refuse a PNG with fewer rows than its header says, which Pillow would fill with black.
 
@@ -257,7 +257,7 @@ def _check_rows(content: bytes) -> None:
         FloorPlanError: There are too few rows.
         zlib.error: The data can't be unpacked.
     """
-    width, height = (int.from_bytes(content[at : at + 4], "big") for at in (16, 20))
+    width, height = _png_size(content)
     bits, colours, interlaced = content[24], content[25], content[28]
     if interlaced:
         return

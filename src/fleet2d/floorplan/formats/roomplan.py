@@ -137,8 +137,8 @@ class RoomPlan(FloorPlanSource):
 
 def _features(scan: _Scan) -> list[Feature]:
     """Return what a scan has as features [m]."""
-    lines = [wall.line for wall in scan.walls]
-    spans = [line[1] - line[0] for line in lines] or [np.array([1.0, 0.0])]
+    spans = [end - start for start, end in (wall.line for wall in scan.walls)]
+    spans = spans or [np.array([1.0, 0.0])]
     longest = max(spans, key=lambda span: float(span @ span))
     x, y = longest / max(float(np.sqrt(longest @ longest)), 1e-9)
     turn = np.array([[x, -y], [y, x]])
@@ -146,15 +146,12 @@ def _features(scan: _Scan) -> list[Feature]:
     def place(points: F64) -> F64:
         return np.round(points @ turn / ROUNDED_M) * ROUNDED_M
 
-    features = [
-        Feature("wall", f"walls[{k}]", LineString(place(line)), {}) for k, line in enumerate(lines)
-    ]
-    openings = (("door", scan.doors), ("opening", scan.openings), ("window", scan.windows))
-    for kind, surfaces in openings:
-        features += [
-            Feature(kind, f"{kind}s[{k}]", LineString(place(surface.line)), {})
-            for k, surface in enumerate(surfaces)
-        ]
+    features = []
+    surfaces = (scan.walls, scan.doors, scan.openings, scan.windows)
+    for kind, things in zip(("wall", "door", "opening", "window"), surfaces, strict=True):
+        for k, surface in enumerate(things):
+            line = LineString(place(surface.line))
+            features.append(Feature(kind, f"{kind}s[{k}]", line, {}))
     floor_m = min((wall.low_m for wall in scan.walls), default=0.0)
     for k, thing in enumerate(scan.objects):
         front_x, front_y = (thing.front @ turn).tolist()

@@ -182,9 +182,8 @@ def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
     # A map that was copied from another computer may name its image by an absolute path.
     beside = path.parent / image.replace("\\", "/").rpartition("/")[2]
     if _is_file(beside):
-        return beside, [
-            (f"there is no image {image}: {beside.name} beside {path.name} is used instead")
-        ]
+        note = f"there is no image {image}: {beside.name} beside {path.name} is used instead"
+        return beside, [note]
     raise FloorPlanError(
         f"there is no image {file}: put it there, or correct `image`, which is relative to the"
         " YAML file"

@@ -6,7 +6,6 @@ The published layout of CubiCasa5K is one of them: groups of the classes `Wall`,
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree.ElementTree import ParseError
@@ -85,11 +84,9 @@ class Svg(FloorPlanSource):
                 for number, (kind, name, corners, closed) in enumerate(shapes, 1)
             ]
             sound = [f for f in features if not f.shape.is_empty]
-            panes = [
-                replace(f, kind="window", shape=f.shape.minimum_rotated_rectangle)
-                for f in sound
-                if f.kind == "wall" and f.properties.get("is_window")
-            ]
+            windows = [f for f in sound if f.properties.get("is_window")]
+            boxes = [f.shape.minimum_rotated_rectangle for f in windows]
+            panes = [Feature("window", f.where, b, {}) for f, b in zip(windows, boxes, strict=True)]
             draft = Draft([*sound, *panes], self.wall_m, notes)
             return draft.plan(self.path.stem, self.cell, f"SVG, {self.path.name}")
 
@@ -171,7 +168,8 @@ def _feature(where: str, kind: str, name: str, corners: F64, closed: bool) -> Fe
     if closed or (kind == "room" and len(outline) > 2):
         shape = shapely.make_valid(Polygon(outline), method="structure", keep_collapsed=False)
     if kind != "room":
-        return Feature(kind, where, shape, {"is_window": bool(WINDOWS.search(name))})
+        is_window = kind == "wall" and WINDOWS.search(name) is not None
+        return Feature(kind, where, shape, {"is_window": is_window})
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", ROOMS.sub(" ", name)).split()
     use = "_".join(words).lower() if words else None
     return Feature(kind, where, shape, {"type": use} if use else {})

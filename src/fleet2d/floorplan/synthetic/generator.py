@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +57,8 @@ class Gap(NamedTuple):
     leaf: bool | None
 
 
+Prices = Mapping[tuple[str, str], float]
+"""The costs of passages by the types of their two rooms."""
 # Cost of a passage between two types of rooms; other pairs never open to each other.
 _COSTS: dict[str, dict[str, float]] = {
     "entryway": {"hallway": 0, "living_room": 0, "dining_room": 1.5, "kitchen": 3},
@@ -88,7 +90,7 @@ _RARE_PAIRS = {
     ("toilet", "kitchen"): 2.0,
     ("bedroom", "kitchen"): 2.5,
 }
-COSTS: Mapping[tuple[str, str], float] = _PAIRS | {(b, a): cost for (a, b), cost in _PAIRS.items()}
+COSTS: Prices = _PAIRS | {(b, a): cost for (a, b), cost in _PAIRS.items()}
 # Rooms through which the way to other rooms may lead.
 _PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
 # Between these a passage needs no jambs: a corridor of 1 m may end in a door of 0.9 m.
@@ -114,7 +116,7 @@ class Widths:
     corridor: int
     open_plan: bool
     stub: int
-    prices: Mapping[tuple[str, str], float] = field(default_factory=lambda: COSTS)
+    prices: Prices
 
     def of(self, kinds: set[str]) -> int:
         """Return the width of a door between rooms of two kinds."""
@@ -169,21 +171,16 @@ def _best_links(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> Ro
         a, b = _rooms(layout, wall)
         if a == b:
             continue
-        price = _price(briefs, a, b, widths)
         kinds = {briefs[a].kind, briefs[b].kind}
+        price = widths.prices.get((briefs[a].kind, briefs[b].kind))
+        if briefs[a].partner is not None or briefs[b].partner is not None:
+            price = 0.0 if briefs[a].partner == b or briefs[b].partner == a else None
         needed = widths.of(kinds) + (0 if kinds <= _WITHOUT_JAMBS else 2 * JAMB)
         if price is None or wall.length < needed:
             continue
         if (a, b) not in best or wall.length > best[a, b][1].length:
             best[a, b] = (price, wall)
     return best
-
-
-def _price(briefs: Sequence[Brief], a: int, b: int, widths: Widths) -> float | None:
-    owners = {briefs[a].partner, briefs[b].partner} - {None}
-    if owners:
-        return 0.0 if briefs[a].partner == b or briefs[b].partner == a else None
-    return widths.prices.get((briefs[a].kind, briefs[b].kind))
 
 
 def add_loops(best: "_Candidate", choices: Choices) -> list[Wall]:
@@ -250,11 +247,11 @@ def _opening(
         if choices.chance(30):
             return None
         width = min(choices.between(28, 56), wall.length - 8)
-    elif kinds <= {"hallway", "entryway"}:
-        width = min(wall.length - 8, choices.between(24, 40))
     elif kinds in ({"hallway", "living_room"}, {"hallway", "dining_room"}) and wall.length < 40:
         return (wall.low, wall.high) if choices.chance(60) else None
-    elif kinds <= {"hallway", "entryway", *_SOCIAL} and choices.chance(60):
+    elif kinds <= {"hallway", "entryway"} or (
+        kinds <= {"hallway", "entryway", *_SOCIAL} and choices.chance(60)
+    ):
         width = min(wall.length - 8, choices.between(24, 40))
     else:
         return None
@@ -315,18 +312,12 @@ def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float:
     if long > MAX_ASPECT[edition] * short:
         raise MisfitError
     cost += LONG_COST[edition] * max(long / short - LONG_ASPECT[edition], 0.0)
-    corridor = corridor_share(layout)
+    halls = [box for box in layout.boxes if layout.briefs[box.room].kind == "hallway"]
+    areas = [sum_in_order(box.clear_area for box in boxes) for boxes in (halls, layout.boxes)]
+    corridor = areas[0] / areas[1]
     if corridor > MAX_CORRIDOR_SHARE[edition]:
         raise MisfitError
     return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE[edition], 0.0)
-
-
-def corridor_share(layout: RoomLayout) -> float:
-    """Return the part of the clear area that is hallway."""
-    halls = sum_in_order(
-        b.clear_area for b in layout.boxes if layout.briefs[b.room].kind == "hallway"
-    )
-    return halls / sum_in_order(box.clear_area for box in layout.boxes)
 
 
 def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float:
@@ -455,8 +446,8 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     """
     decided, used = settle_wishes(wishes, Choices(seed, "wishes"), style), style
     is_wide = style.edition == 2 and (decided.area_m2 or 0.0) >= WIDE_FROM_M2
-    widths = _style(style, Choices(seed, "style"), is_wide)
-    widths = replace(widths, prices=_tastes(Choices(seed, "taste"), style))
+    prices = _tastes(Choices(seed, "taste"), style)
+    widths = _style(style, Choices(seed, "style"), is_wide, prices)
     # A plain outline is only a first try; a requested outline is binding.
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
@@ -470,9 +461,8 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
                 decided = replace(decided, bedrooms=min(beds, max(beds - 1, baths, 1)))
             choices = Choices(seed, f"rooms {number // PATIENCE}")
             if number >= MAX_LAYOUTS * 3 // 4:  # rare rooms fit into no layout
-                used = replace(
-                    style, variety=style.variety // 2 if style.edition == 2 else 0, edition=1
-                )
+                less = style.variety // 2 if style.edition == 2 else 0
+                used = replace(style, variety=less, edition=1)
                 widths = replace(widths, prices=COSTS)
             briefs = choose_rooms(decided, choices, used)
         usual = "rectangle" if plain and number < 2 * PATIENCE else None
@@ -496,7 +486,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     raise FloorPlanError(_failure(decided, style))
 
 
-def _tastes(choices: Choices, style: Style) -> Mapping[tuple[str, str], float]:
+def _tastes(choices: Choices, style: Style) -> Prices:
     """Return costs of passages to which those of one family's taste are added."""
     if not style.variety:
         return COSTS
@@ -506,7 +496,7 @@ def _tastes(choices: Choices, style: Style) -> Mapping[tuple[str, str], float]:
     return prices | {(b, a): cost for (a, b), cost in prices.items()}
 
 
-def _style(style: Style, choices: Choices, is_wide: bool) -> Widths:
+def _style(style: Style, choices: Choices, is_wide: bool, prices: Prices) -> Widths:
     """Return the widths of a home; all are drawn, so that setting one leaves the others as is."""
     open_plan, corridor = choices.chance(45), choices.between(20, 26)
     door, bath = choices.pick((16, 17, 18)), choices.pick((14, 15, 16))
@@ -515,9 +505,8 @@ def _style(style: Style, choices: Choices, is_wide: bool) -> Widths:
         door = choices.pick((15, 15, 16, 16, 17, 18, 20))
     door = style.door or door
     open_plan = open_plan if style.open_plan is None else style.open_plan
-    return Widths(
-        door, min(bath, door), style.corridor or corridor, open_plan, 4 * style.edition - 4
-    )
+    stub = 4 * style.edition - 4
+    return Widths(door, min(bath, door), style.corridor or corridor, open_plan, stub, prices)
 
 
 def _judge(
@@ -652,11 +641,10 @@ def _approachable(wall: Wall, boxes: Sequence[Box]) -> bool:
 
 
 def _failure(wishes: Wishes, style: Style) -> str:
-    rooms = (
-        f"{wishes.area_m2:g} m2 with {wishes.bedrooms} bedrooms and {wishes.bathrooms} bathrooms"
-    )
+    numbers = f"{wishes.bedrooms} bedrooms and {wishes.bathrooms} bathrooms"
     shape = f" and the outline {style.outline}" if style.outline else ""
     return (
-        f"no synthetic home of {rooms}{shape} was found in {MAX_LAYOUTS} layouts: ask for more or"
-        " less area, other numbers of rooms, another floorplan.outline, or take another seed"
+        f"no synthetic home of {wishes.area_m2:g} m2 with {numbers}{shape} was found in"
+        f" {MAX_LAYOUTS} layouts: ask for more or less area, other numbers of rooms, another"
+        " floorplan.outline, or take another seed"
     )

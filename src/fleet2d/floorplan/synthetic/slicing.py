@@ -125,19 +125,18 @@ def outer_walls(boxes: Sequence[Box], walls: Sequence[Wall]) -> list[Wall]:
     """Return the parts of the boxes' sides that no other box touches."""
     outer = []
     for i, box in enumerate(boxes):
-        for side, first, second, upright in (
-            (box.x1, i, -1, True),
-            (box.x0, -1, i, True),
-            (box.y1, i, -1, False),
-            (box.y0, -1, i, False),
+        below = [wall for wall in walls if wall.second == i]
+        above = [wall for wall in walls if wall.first == i]
+        for side, pair, touching, upright in (
+            (box.x1, (i, -1), above, True),
+            (box.x0, (-1, i), below, True),
+            (box.y1, (i, -1), above, False),
+            (box.y0, (-1, i), below, False),
         ):
-            touching = [wall for wall in walls if wall.upright == upright]
-            spans = [
-                (w.low, w.high) for w in touching if i == (w.first if second < 0 else w.second)
-            ]
+            spans = sorted((wall.low, wall.high) for wall in touching if wall.upright == upright)
             low, high = (box.y0, box.y1) if upright else (box.x0, box.x1)
-            for start, end in _gaps(sorted(spans), low, high - WALL):
-                outer.append(Wall(first, second, upright, side, start, end))
+            for start, end in _gaps(spans, low, high - WALL):
+                outer.append(Wall(*pair, upright, side, start, end))
     return outer
 
 

@@ -148,14 +148,10 @@ class Synthetic(FloorPlanSource):
             FloorPlanError: The settings contradict each other.
         """
         wishes = Wishes(self.area_m2, self.bedrooms, self.bathrooms, self.garage)
-        style = Style(
-            self.outline,
-            self.open_plan,
-            _units(self.corridor_width),
-            _units(self.door_width),
-            round(self.variety * 100),
-            self.edition,
-        )
+        sizes = (self.corridor_width, self.door_width)
+        corridor, door = (None if m is None else int(m * UNITS_PER_M + 0.5) for m in sizes)
+        percent = round(self.variety * 100)
+        style = Style(self.outline, self.open_plan, corridor, door, percent, self.edition)
         house = generate(self.seed, wishes, style)
         regions = _regions(house)
         doors = [_line(gap) for gap in house.gaps if gap.leaf is not None]
@@ -169,7 +165,3 @@ class Synthetic(FloorPlanSource):
             doorways=[*doors, _line(house.front_door, "front_door")],
             scale=self.scale,
         )
-
-
-def _units(length: float | None) -> int | None:
-    return None if length is None else int(length * UNITS_PER_M + 0.5)
