@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,22 +15,11 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import I8
 from fleet2d.storage.bags import open_bag, planar
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 # Chances of being occupied, in percent, as map_server divides them.
 FREE_BELOW, OCCUPIED_ABOVE = 20, 65
-
-
-class _Grid(NamedTuple):
-    """An occupancy grid: percent, -1 for unknown, the first row at the bottom."""
-
-    percent: I8  # (rows, columns)
-    resolution: float  # side of a cell [m]
-    origin: tuple[float, float, float]  # x, y [m] and heading [rad] of its lower left corner
-    topic: str
-    maps: int  # messages of the topic
 
 
 @register("floorplan", "bag")
@@ -53,7 +42,7 @@ class BagMap(OccupancySource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
-        return _read(Path(settings["path"]), settings.get("topic"), settings["scale"]).resolution
+        return _read(Path(settings["path"]), settings.get("topic"), settings["scale"])[0].pixel
 
     def files(self) -> list[Path]:
         """Return the files of the bag."""
@@ -67,24 +56,14 @@ class BagMap(OccupancySource):
         Raises:
             FloorPlanError: The bag can't be read, or has no map, or the map has no home.
         """
-        grid = _read(self.path, self.topic, self.scale or 1.0)
-        x, y, heading = grid.origin
-        free, occupied = grid.percent < FREE_BELOW, grid.percent > OCCUPIED_ABOVE
-        free &= grid.percent >= 0
-        raw = OccupancyMap(free, occupied, grid.resolution, (x, y), turn_by(heading))
+        raw, note = _read(self.path, self.topic, self.scale or 1.0)
         notes: list[str] = []
         home = self.clean(raw, notes)
-        rows, columns = grid.percent.shape
-        notes.append(
-            f"{grid.topic}: the last of {grid.maps} maps, {columns} × {rows} cells of"
-            f" {grid.resolution:g} m, its corner at ({x:.2f}, {y:.2f}) m turned by"
-            f" {math.degrees(heading):.1f} degrees"
-        )
-        return self.build(home, grid.resolution, f"map of a bag, {self.path.name}", notes)
+        return self.build(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
 
 
-def _read(path: Path, topic: str | None, scale: float) -> _Grid:
-    """Return the last map of a topic.
+def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, str]:
+    """Return the last map of a topic, and a note about it.
 
     Raises:
         FloorPlanError: The bag can't be read, or has no such map; or its map is damaged.
@@ -114,5 +93,9 @@ def _read(path: Path, topic: str | None, scale: float) -> _Grid:
             f" {side:g} m"
         )
     x, y, heading = planar(info.origin.position, info.origin.orientation)
-    origin = (x * scale, y * scale, heading)
-    return _Grid(cells.reshape(rows, columns), round(side, 6), origin, topic, connection.msgcount)
+    x, y, side, percent = x * scale, y * scale, round(side, 6), cells.reshape(rows, columns)
+    free = (percent >= 0) & (percent < FREE_BELOW)
+    return OccupancyMap(free, percent > OCCUPIED_ABOVE, side, (x, y), turn_by(heading)), (
+        f"{topic}: the last of {connection.msgcount} maps, {columns} × {rows} cells of {side:g} m,"
+        f" its corner at ({x:.2f}, {y:.2f}) m turned by {math.degrees(heading):.1f} degrees"
+    )

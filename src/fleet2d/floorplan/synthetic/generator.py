@@ -499,10 +499,10 @@ def _tastes(choices: Choices, style: Style) -> Prices:
 def _style(style: Style, choices: Choices, is_wide: bool, prices: Prices) -> Widths:
     """Return the widths of a home; all are drawn, so that setting one leaves the others as is."""
     open_plan, corridor = choices.chance(45), choices.between(20, 26)
-    door, bath = choices.pick((16, 17, 18)), choices.pick((14, 15, 16))
+    door, bath = choices.choice((16, 17, 18)), choices.choice((14, 15, 16))
     if style.edition == 2:
         corridor = choices.between(*choices.weighted(CORRIDORS)) if is_wide else corridor
-        door = choices.pick((15, 15, 16, 16, 17, 18, 20))
+        door = choices.choice((15, 15, 16, 16, 17, 18, 20))
     door = style.door or door
     open_plan = open_plan if style.open_plan is None else style.open_plan
     stub = 4 * style.edition - 4
@@ -595,8 +595,8 @@ def draw_shafts(layout: RoomLayout, gaps: Sequence[Gap], choices: Choices) -> li
     shafts = []
     for box in layout.boxes:
         width, depth = choices.between(*SHAFT_SIDE), choices.between(*SHAFT_SIDE)
-        x = choices.pick((box.x0, box.x1 - WALL - width))
-        y = choices.pick((box.y0, box.y1 - WALL - depth))
+        x = choices.choice((box.x0, box.x1 - WALL - width))
+        y = choices.choice((box.y0, box.y1 - WALL - depth))
         if not choices.chance(SHAFT_PERCENT) or min(box.clear) < SHAFT_ROOM_SIDE:
             continue
         shaft = (x, y, x + width, y + depth)

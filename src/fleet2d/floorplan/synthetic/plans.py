@@ -206,7 +206,7 @@ class Sketch:
             choices.between(72, 130),
             self.request.outline is not None,
             choices.chance(50),
-            choices.pick((0, 0, 20, 40)),
+            choices.choice((0, 0, 20, 40)),
         )
 
     # --- Wings -----------------------------------------------------------------------------------
@@ -354,7 +354,7 @@ class Sketch:
         wing = self.wing(self.private, self.add_hallway(), outline)
         core = self.core_trees()
         service = self.service_block()
-        at = {"L": choices.pick((0, 100)), "T": 50}.get(outline or "")
+        at = {"L": choices.choice((0, 100)), "T": 50}.get(outline or "")
         if at is None:
             at = choices.weighted(((0, 40), (100, 40), (50, 20)))
         height = choices.between(86, 150)

@@ -1,6 +1,5 @@
 """The program of a synthetic home: its rooms and their sizes, drawn to fit the request."""
 
-import hashlib
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,16 +7,14 @@ from itertools import accumulate, pairwise
 from math import fsum
 from typing import NamedTuple, TypeVar
 
-import numpy as np
-
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import FloorPlanError
-from fleet2d.kernels import random_below
+from fleet2d.runtime.determinism import Draws, stream_key
 
 T = TypeVar("T")
 
 
-class Choices:
+class Choices(Draws):
     """A stream of random choices, addressed by a seed and a purpose.
 
     Example:
@@ -28,15 +25,11 @@ class Choices:
         2
     """
 
-    def __init__(self, seed: int, purpose: str) -> None:
-        digest = hashlib.blake2b(f"{seed}\0synthetic home\0{purpose}".encode(), digest_size=8)
-        self._key = np.uint64(int.from_bytes(digest.digest(), "little"))
-        self._count = 0
+    __slots__ = ()
 
-    def below(self, bound: int) -> int:
-        """Return an integer from 0 to bound - 1."""
-        self._count += 1
-        return int(random_below(self._key, self._count - 1, bound))
+    def __init__(self, seed: int, purpose: str) -> None:
+        # Its draws are those of the stream itself, which has no steps.
+        self.__setstate__((int(stream_key(seed, "synthetic home", purpose)), 0))
 
     def between(self, low: int, high: int) -> int:
         """Return an integer from low to high, both possible; `low` where high is less."""
@@ -46,22 +39,10 @@ class Choices:
         """Return True with a probability of `percent` in a hundred."""
         return self.below(100) < percent
 
-    def pick(self, items: Sequence[T]) -> T:
-        """Return one of `items`, all equally likely."""
-        return items[self.below(len(items))]
-
     def weighted(self, items: Sequence[tuple[T, int]]) -> T:
         """Return an item with probability in proportion to its weight."""
         ends = list(accumulate(weight for _, weight in items))
         return items[bisect_right(ends, self.below(ends[-1]))][0]
-
-    def shuffled(self, items: Sequence[T]) -> list[T]:
-        """Return `items` in random order (Fisher and Yates)."""
-        order = list(items)
-        for i in range(len(order) - 1, 0, -1):
-            j = self.below(i + 1)
-            order[i], order[j] = order[j], order[i]
-        return order
 
 
 # Area of a home over that of its rooms: corridors and door gaps add to it.
