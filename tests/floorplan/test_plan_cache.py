@@ -19,8 +19,8 @@ SHORT = "simulation.duration=6 h"
 
 @pytest.fixture(autouse=True)
 def empty_caches() -> None:
-    source._PLANS.clear()
-    homes._SHAPES.clear()
+    source.PLAN_CACHE.clear()
+    homes.HOME_CACHE.clear()
 
 
 def test_value_used_least_recently_is_dropped() -> None:

@@ -216,10 +216,7 @@ class Home:
         x, y = self.plan.lattice.point_at(at)
         if space.part_at(x, y) == part:
             return x, y
-        point = space.nearest(x, y, part)
-        if point is None:
-            raise PlacementError(f"a body of radius {space.radius:g} m fits nowhere here")
-        return point
+        return self._nearest(space, x, y, part)
 
     def room_of(self, thing: PlacedObject) -> Room | None:
         """Return the room of the plan that holds the middle of an object."""
@@ -246,11 +243,13 @@ class Home:
         Raises:
             PlacementError: The space has no such part.
         """
-        point = space.nearest(*self._door(space, part), part)
+        return self._nearest(space, *self._door(space, part), part)
+
+    def _nearest(self, space: Space, x: int, y: int, part: int) -> tuple[int, int]:
+        point = space.nearest(x, y, part)
         if point is None:
-            raise PlacementError(
-                f"a body of radius {space.radius:g} m fits nowhere in {self.plan.name}"
-            )
+            body = f"a body of radius {space.radius:g} m"
+            raise PlacementError(f"{body} fits nowhere in {self.plan.name}")
         return point
 
     def _door(self, space: Space, part: int) -> tuple[int, int]:
@@ -335,18 +334,14 @@ class _Shapes:
         return space
 
 
-_SHAPES = Cache(CACHED_HOMES)
-
-
-def keep_homes(count: int) -> None:
-    """Cache the walls and spaces of at least `count` homes for later runs, about 10 MB each."""
-    _SHAPES.grow(count)
+HOME_CACHE = Cache(CACHED_HOMES)
+"""The walls and spaces of homes, about 10 MB each."""
 
 
 def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
     """Return the walls and spaces of a plan with doors, which all runs in it share."""
     # By identity, since a state that is saved to a file refers to the plan itself.
-    return _SHAPES.get((id(plan), *door_lines), lambda: _Shapes(plan, door_lines))
+    return HOME_CACHE.get((id(plan), *door_lines), lambda: _Shapes(plan, door_lines))
 
 
 def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:

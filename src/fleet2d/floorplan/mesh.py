@@ -322,14 +322,12 @@ def _force_edge(
     if (a, b) in owner and (b, a) in owner:
         return
     crossing = _crossing(vertices, owner, a, b)
-    attempts = 16 * (len(crossing) + 1) ** 2
-    while crossing:
-        attempts -= 1
+    for _ in range(16 * (len(crossing) + 1) ** 2):
+        if not crossing:
+            break
         p, q = crossing.pop(0)
         left, right = owner[p, q], owner[q, p]
         c, d = (next(v for v in corners[t] if v not in (p, q)) for t in (left, right))
-        if attempts == 0:
-            break
         if _turn(vertices, d, c, q) * _turn(vertices, d, c, p) >= 0:
             crossing.append((p, q))  # the quadrilateral is not convex yet
             continue

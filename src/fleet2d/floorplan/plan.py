@@ -148,21 +148,18 @@ def cell_polygons(mask: Bool) -> list[Polygon]:
     return shapely.get_parts(shapely.union_all(shapely.box(*corners))).tolist()
 
 
+# Fields of parts of a home that are lengths on the floor, or made of them.
+_LENGTHS = ("shape", "start", "end", "footprint", "uses", "x", "y", "approach")
+
+
 def _scaled(part: Any, scale: float) -> Any:
     """Return a part of a home, or a sequence of parts, with all lengths on the floor multiplied."""
     match part:
         case BaseGeometry():
             return shapely.transform(part, lambda xy: xy * scale)
-        case LabelledRegion():
-            return replace(part, shape=_scaled(part.shape, scale))
-        case DoorLine():
-            return replace(part, start=_scaled(part.start, scale), end=_scaled(part.end, scale))
-        case PlacedObject():
-            footprint, uses = _scaled(part.footprint, scale), _scaled(part.uses, scale)
-            return replace(part, footprint=footprint, uses=uses)
-        case UsePlace():
-            x, y = _scaled((part.x, part.y), scale)
-            return replace(part, x=x, y=y, approach=_scaled(part.approach, scale))
+        case LabelledRegion() | DoorLine() | PlacedObject() | UsePlace():
+            own = {name: value for name, value in vars(part).items() if name in _LENGTHS}
+            return replace(part, **{name: _scaled(value, scale) for name, value in own.items()})
         case float() | int():
             return part * scale
         case None:
@@ -409,16 +406,14 @@ class FloorPlan:
             "rings": [[len(ring.coords) for ring in shapely.get_rings(p)] for p in self.polygons],
         }
         # Parts that a plan doesn't have are left out, so that older digests stay valid.
-        if self.doorways:
-            head["doorways"] = [[d.name, *d.start, *d.end, d.leaf] for d in self.doorways]
-        if self.objects:
-            head["objects"] = [describe_object(thing) for thing in self.objects]
-        if self.no_go:
-            head["no_go"] = [shapely.get_coordinates(area).tolist() for area in self.no_go]
-        if self.glass:
-            head["glass"] = [shapely.get_coordinates(pane).tolist() for pane in self.glass]
-        if self.portals:
-            head["portals"] = [[p.type, *p.start, *p.end, p.takes_us] for p in self.portals]
+        further = {
+            "doorways": [[d.name, *d.start, *d.end, d.leaf] for d in self.doorways],
+            "objects": [describe_object(thing) for thing in self.objects],
+            "no_go": [shapely.get_coordinates(area).tolist() for area in self.no_go],
+            "glass": [shapely.get_coordinates(pane).tolist() for pane in self.glass],
+            "portals": [[p.type, *p.start, *p.end, p.takes_us] for p in self.portals],
+        }
+        head |= {key: part for key, part in further.items() if part}
         content = hashlib.sha256(json.dumps(head).encode())
         content.update(shapely.get_coordinates(self.polygons).astype("<i8").tobytes())
         content.update(self.room_of_cell.astype("<i2").tobytes())

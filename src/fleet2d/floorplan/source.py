@@ -290,13 +290,8 @@ def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
 # Homes that a process caches, read and furnished.
 CACHED_PLANS = 8
 
-_PLANS = Cache(CACHED_PLANS)
-
-
-def keep_plans(count: int) -> None:
-    """Cache at least `count` homes, read and furnished, for later runs."""
-    _PLANS.grow(count)
-
+PLAN_CACHE = Cache(CACHED_PLANS)
+"""Homes, read and furnished."""
 
 # Largest `scale`: of a file in kilometres.
 MAX_SCALE = 1000.0
@@ -363,7 +358,7 @@ class FloorPlanSource(Component):
             FloorPlanError: The file can't be read, is not a home, or a piece doesn't fit into it.
         """
         key = self._cache_key()
-        return self._read() if key is None else _PLANS.get(key, self._read)
+        return self._read() if key is None else PLAN_CACHE.get(key, self._read)
 
     def _cache_key(self) -> Hashable:
         """Return all that the plan depends on, or None if that is unknown, as for a plugin."""

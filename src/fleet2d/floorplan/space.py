@@ -434,9 +434,9 @@ def shrink(
 
 def _octagon(radius: float) -> I64:
     """Return the corners of the octagon that approximates a body."""
-    a = _even_at_least(radius + ROUNDING)
+    a = 2 * math.ceil((radius + ROUNDING) / 2)
     # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
-    b = _even_at_least(a * 0.41421357)
+    b = 2 * math.ceil(a * 0.41421357 / 2)
     return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
 
 
@@ -475,10 +475,6 @@ def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:
     """Grow every wall of a ring by the octagon; return convex polygons."""
     ends = np.concatenate([ring[:-1, None] + octagon, ring[1:, None] + octagon], axis=1)
     return np.asarray(shapely.convex_hull(shapely.multipoints(ends)))
-
-
-def _even_at_least(value: float) -> int:
-    return 2 * int(np.ceil(value / 2))
 
 
 @lru_cache(CACHED_ROUTES)

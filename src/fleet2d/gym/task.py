@@ -18,8 +18,8 @@ from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import check_known, problem, suggest
 from fleet2d.entities.robots.policy import Policy
 from fleet2d.errors import InputError, ScenarioError
-from fleet2d.floorplan.home import keep_homes
-from fleet2d.floorplan.source import keep_plans
+from fleet2d.floorplan.home import HOME_CACHE
+from fleet2d.floorplan.source import PLAN_CACHE
 from fleet2d.scenario.model import Scenario, explain, load_scenario
 
 FOLDER = Path(__file__).with_name("tasks")
@@ -107,8 +107,8 @@ class Variants:
 
     def __init__(self, task: LearningTask, overrides: tuple[str, ...] = ()) -> None:
         self.task, self.overrides = task, overrides
-        keep_plans(HOMES)
-        keep_homes(HOMES)
+        PLAN_CACHE.grow(HOMES)
+        HOME_CACHE.grow(HOMES)
         self._load: Callable[[tuple[str, ...]], LifeScenario] = lru_cache(KEPT)(self._read)
 
     def __reduce__(self) -> Any:

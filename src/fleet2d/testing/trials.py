@@ -17,8 +17,8 @@ from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.temporal import after, at_end, eventually, until
 from fleet2d.expectations.verdict import Verdict, VerdictEvidence
-from fleet2d.floorplan.home import keep_homes
-from fleet2d.floorplan.source import keep_plans
+from fleet2d.floorplan.home import HOME_CACHE
+from fleet2d.floorplan.source import PLAN_CACHE
 from fleet2d.interventions.bodies import Decide, TakeControl
 from fleet2d.interventions.intervention import Intervention, dump_intervention
 from fleet2d.scenario.model import Scenario
@@ -307,8 +307,8 @@ def run_claim(claim: Claim, body: Body) -> ClaimResult:
     Raises:
         Fleet2DError: The scenario or the test is wrong, or a component failed.
     """
-    for keep in (keep_homes, keep_plans):
-        keep(min(len(claim.variants), MAX_HOMES))
+    for cache in (HOME_CACHE, PLAN_CACHE):
+        cache.grow(min(len(claim.variants), MAX_HOMES))
     __tracebackhide__ = True
     rate, trials, failures = claim.rate, list[TrialResult](), 0
     for variant in claim.trials():

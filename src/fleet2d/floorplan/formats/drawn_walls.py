@@ -126,26 +126,21 @@ def _row_gaps(
     joined = drawn[rows, ends] - drawn[rows, starts] >= JOINED_SHARE * (ends - starts)
     ragged = max(round(RAGGED_M / pixel), 1)
     thickest, door = WALL_M / pixel, DOOR_M / pixel
-    open_groups: list[list[int]] = []  # first row, start, end, last row, is joined
-    row_before = -1
+    groups: list[list[int]] = []  # first row, start, end, last row, is joined
+    recent, row_before = groups[:], -1  # those that the present row may continue
     runs = zip(rows.tolist(), starts.tolist(), ends.tolist(), joined.tolist(), strict=True)
-    groups: list[list[int]] = []
     for row, start, end, is_joined in runs:
         if row != row_before:
-            groups += [group for group in open_groups if group[3] < row - 1]
-            open_groups = [group for group in open_groups if group[3] >= row - 1]
-            row_before = row
-        for group in open_groups:
-            if (
-                group[3] == row - 1
-                and abs(group[1] - start) <= ragged
-                and abs(group[2] - end) <= ragged
-            ):
+            recent, row_before = [group for group in recent if group[3] >= row - 1], row
+        for group in recent:
+            is_beside = abs(group[1] - start) <= ragged and abs(group[2] - end) <= ragged
+            if group[3] == row - 1 and is_beside:
                 group[3], group[4] = row, group[4] | is_joined
                 break
         else:
-            open_groups.append([row, start, end, row, is_joined])
-    for top, left, right, last, is_window in (*groups, *open_groups):
+            recent.append([row, start, end, row, is_joined])
+            groups.append(recent[-1])
+    for top, left, right, last, is_window in groups:
         height, width = last + 1 - top, right - left
         if 2 <= height <= thickest and (is_window or width <= door) and width > ragged:
             yield (top, left, last + 1, right), bool(is_window)

@@ -138,13 +138,11 @@ def _panes(lines: Sequence[F64]) -> list[Feature]:
     """Return the windows that lines [m] draw: a box round those that are near each other."""
     shapes = np.array([LineString(line) for line in lines], np.object_)
     near = shapely.union_all(shapely.buffer(shapes, WINDOW_LINES_M / 2))
-    windows = [
-        shapely.union_all(shapes[shapely.intersects(p, shapes)]) for p in shapely.get_parts(near)
-    ]
-    return [
-        Feature("window", f"window {k}", window.minimum_rotated_rectangle, {})
-        for k, window in enumerate(windows, 1)
-    ]
+    windows = []
+    for k, place in enumerate(shapely.get_parts(near), 1):
+        window = shapely.union_all(shapes[shapely.intersects(place, shapes)])
+        windows.append(Feature("window", f"window {k}", window.minimum_rotated_rectangle, {}))
+    return windows
 
 
 def _scale(units: int, extent: float, notes: list[str]) -> float:

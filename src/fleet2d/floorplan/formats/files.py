@@ -339,9 +339,7 @@ Coordinate = Annotated[
 _POINT = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 Point = Annotated[tuple[float, float], PlainValidator(_point), WithJsonSchema(_POINT)]
 """A place (x, y) [m]."""
-BoxSides = Annotated[
-    tuple[float, float, float, float], PlainValidator(lambda box: _numbers(box, 4))
-]
+BoxSides = Annotated[tuple[float, float, float, float], PlainValidator(lambda v: _numbers(v, 4))]
 """The sides of a box (x0, y0, x1, y1) [m]."""
 RING_SCHEMA = {"type": "array", "items": _POINT, "minItems": 3}
 Ring = Annotated[

@@ -425,10 +425,7 @@ def _with_passages(
         beside = [k for k, shape in enumerate(shapes) if part.distance(shape) == 0]
         if len(beside) > 1 and 0 < part.area < MAX_GAP_M2:
             grown[beside[0]] = shapely.union_all([grown[beside[0]], part])
-    return [
-        replace(region, shape=shape) if shape is not region.shape else region
-        for region, shape in zip(regions, grown, strict=True)
-    ]
+    return [replace(r, shape=shape) for r, shape in zip(regions, grown, strict=True)]
 
 
 def native_document(plan: FloorPlan) -> dict[str, Any]:
@@ -457,18 +454,17 @@ def native_document(plan: FloorPlan) -> dict[str, Any]:
             for d in plan.doorways
         ],
     }
-    if plan.objects:
-        document["objects"] = [object_document(thing) for thing in plan.objects]
-    if plan.no_go:
-        document["no_go"] = [_area_document(area) for area in plan.no_go]
-    if plan.glass:
-        panes = [shapely.transform(pane, to_metres) for pane in plan.glass]
-        document["glass"] = [_area_document(pane) for pane in panes]
-    if plan.portals:
-        document["portals"] = [
+    panes = [shapely.transform(pane, to_metres) for pane in plan.glass]
+    further: dict[str, list[Any]] = {
+        "objects": [object_document(thing) for thing in plan.objects],
+        "no_go": [_area_document(area) for area in plan.no_go],
+        "glass": [_area_document(pane) for pane in panes],
+        "portals": [
             {"type": p.type, "start": list(p.start), "end": list(p.end), "takes": p.takes_us / 1e6}
             for p in plan.portals
-        ]
+        ],
+    }
+    document |= {key: part for key, part in further.items() if part}
     if plan.entrance is not None:
         document["entrance"] = list(plan.entrance)
     return document

@@ -132,13 +132,14 @@ class PictureSource(OccupancySource):
             if saved:
                 greys += [SAVED_UNKNOWN] * (picture.share(SAVED_UNKNOWN) > 0)
                 greys += picture.filled_greys(free)
-            greys = [g for g in greys if picture.count(free, g + SPREAD) * pixel**2 >= FLOOR_M2]
+            counts = np.bincount(picture.greys[free], minlength=256)
+            greys = [g for g in greys if counts[g + SPREAD :].sum() * pixel**2 >= FLOOR_M2]
             grey = limit = max(greys, default=0)
             if grey == edge:
                 limit += spread
             if grey == SAVED_UNKNOWN and picture.share(grey) >= UNKNOWN_SHARE:
                 # What a robot saw rarely, such as rays, is nearer to unknown than to the floor.
-                limit = grey + int((picture.floor_grey(free, grey + 1) - grey) * RARE_SHARE)
+                limit = grey + int((1 + counts[grey + 1 :].argmax()) * RARE_SHARE)
         else:
             grey = limit = self.unknown_grey
         known: Bool = free & (picture.greys > limit)

@@ -67,17 +67,9 @@ class GreyPicture:
         grey = int(np.bincount(edge, minlength=256).argmax())
         return grey, float(np.mean((edge >= grey - spread) & (edge <= grey + spread)))
 
-    def count(self, light: Bool, first: int, last: int = 255) -> int:
-        """Return the number of some pixels whose shade is between two, inclusively."""
-        return int(np.count_nonzero(light & (self.greys >= first) & (self.greys <= last)))
-
     def share(self, grey: int) -> float:
         """Return the share of the picture that has a shade."""
         return float(np.count_nonzero(self.greys == grey) / self.greys.size)
-
-    def floor_grey(self, light: Bool, first: int) -> int:
-        """Return the most frequent shade of light pixels from a shade on, which the floor has."""
-        return first + int(np.bincount(self.greys[light], minlength=256)[first:].argmax())
 
     def filled_greys(self, light: Bool) -> list[int]:
         """Return shades of light pixels that something else than the floor is filled with.

@@ -136,13 +136,10 @@ def _features(element: ET.Element) -> Iterator[Feature]:
 
 def _box(element: ET.Element) -> Polygon:
     """Return the box that a door or a piece of furniture covers [m]."""
-    width, depth = (
-        max(_number(element, key), MIN_SIDE_CM) / CM_PER_M for key in ("width", "depth")
-    )
-    box = Polygon([(-width, -depth), (width, -depth), (width, depth), (-width, depth)])
-    turned = affinity.rotate(
-        affinity.scale(box, 0.5, 0.5), -_number(element, "angle"), (0, 0), True
-    )
+    sides = (max(_number(element, key), MIN_SIDE_CM) for key in ("width", "depth"))
+    x, y = (side / CM_PER_M / 2 for side in sides)
+    box = Polygon([(-x, -y), (x, -y), (x, y), (-x, y)])
+    turned = affinity.rotate(box, -_number(element, "angle"), (0, 0), True)
     (x, y) = _metres([(_number(element, "x"), _number(element, "y"))])[0]
     moved = affinity.translate(turned, x, y)
     return Polygon(np.round(np.asarray(moved.exterior.coords), 4))
