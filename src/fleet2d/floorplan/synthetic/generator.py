@@ -124,6 +124,8 @@ class Widths:
         return self.bath if small and "garage" not in kinds else self.door
 
 
+Pair = frozenset[int]
+"""Two boxes."""
 RoomLinks = dict[tuple[int, int], tuple[float, Wall]]
 """The cost of a passage between two rooms, and the wall that it is in, by their indices."""
 
@@ -168,10 +170,10 @@ def _best_links(layout: RoomLayout, walls: Sequence[Wall], widths: Widths) -> Ro
     briefs = layout.briefs
     best: RoomLinks = {}
     for wall in walls:
-        a, b = _rooms(layout, wall)
+        a, b = layout.rooms(wall)
         if a == b:
             continue
-        kinds = {briefs[a].kind, briefs[b].kind}
+        kinds = layout.kinds(wall)
         price = widths.prices.get((briefs[a].kind, briefs[b].kind))
         if briefs[a].partner is not None or briefs[b].partner is not None:
             price = 0.0 if briefs[a].partner == b or briefs[b].partner == a else None
@@ -190,7 +192,7 @@ def add_loops(best: "_Candidate", choices: Choices) -> list[Wall]:
     open: three would leave a post in the middle.
     """
     links = list(best.links)
-    open_pairs = {_rooms(best.layout, wall) for wall in links}
+    open_pairs = {best.layout.rooms(wall) for wall in links}
     for pair, (price, wall) in best.possible.items():
         kinds = {best.layout.briefs[room].kind for room in pair}
         percent = 0
@@ -206,24 +208,24 @@ def add_loops(best: "_Candidate", choices: Choices) -> list[Wall]:
     return links
 
 
-def _rooms(layout: RoomLayout, wall: Wall) -> tuple[int, int]:
-    """Return the rooms on the two sides of an inner wall, the lower first."""
-    a, b = sorted((layout.boxes[wall.first].room, layout.boxes[wall.second].room))
-    return a, b
-
-
 def draw_gaps(
-    links: Sequence[Wall],
-    layout: RoomLayout,
-    walls: Sequence[Wall],
-    widths: Widths,
-    choices: Choices,
+    layout: RoomLayout, walls: Sequence[Wall], links: set[Pair], widths: Widths, choices: Choices
 ) -> list[Gap]:
-    """Draw the passages: openings between living spaces, elsewhere doors near a corner."""
-    inside = [wall for wall in walls if len(set(_rooms(layout, wall))) == 1]
+    """Draw the passages: openings between living spaces, elsewhere doors near a corner.
+
+    Args:
+        layout: The rooms.
+        walls: The walls between their boxes.
+        links: The pairs of boxes that a passage links.
+        widths: The widths of passages.
+        choices: The stream to draw from.
+    """
+    inside = [wall for wall in walls if len(set(layout.rooms(wall))) == 1]
     gaps = [Gap(wall, wall.low, wall.high, None) for wall in inside]
-    for wall in links:
-        kinds = {layout.briefs[room].kind for room in _rooms(layout, wall)}
+    for wall in walls:
+        if frozenset((wall.first, wall.second)) not in links:
+            continue
+        kinds = layout.kinds(wall)
         opening = _opening(kinds, wall, widths, choices)
         if opening:
             gaps.append(Gap(wall, *opening, False))
@@ -326,19 +328,15 @@ def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float:
     Raises:
         MisfitError: A bedroom or the living room has none.
     """
-    longest: dict[int, int] = {}
+    lit = set()
     for wall in outer:
-        room = layout.boxes[max(wall.first, wall.second)].room
-        longest[room] = max(longest.get(room, 0), wall.length)
-    cost = 0.0
-    for room, brief in enumerate(layout.briefs):
-        needed = _LIT.get(brief.kind, 0)
-        if longest.get(room, 0) >= needed:
-            continue
-        if brief.kind in ("bedroom", "living_room"):
-            raise MisfitError
-        cost += 1.5
-    return cost
+        room = layout.room_inside(wall)
+        if wall.length >= _LIT.get(layout.briefs[room].kind, 0):
+            lit.add(room)
+    dark = [b.kind for room, b in enumerate(layout.briefs) if b.kind in _LIT and room not in lit]
+    if "bedroom" in dark or "living_room" in dark:
+        raise MisfitError
+    return 1.5 * len(dark)
 
 
 def outline_corners(boxes: Sequence[Box]) -> list[bool]:
@@ -402,21 +400,17 @@ _FRONT = ("entryway", "hallway", "living_room", "dining_room", "kitchen")
 
 
 @dataclass(frozen=True)
-class House:
+class House(RoomLayout):
     """A generated home, on a grid of 5 cm.
 
     Attributes:
         wishes: The request, with everything decided.
-        briefs: Its rooms.
-        boxes: The rectangles that they are made of [units].
         gaps: The passages through inner walls.
         front_door: The passage to the outside.
         shafts: Ducts and chimneys in corners of rooms [units].
     """
 
     wishes: Wishes
-    briefs: list[Brief]
-    boxes: list[Box]
     gaps: list[Gap]
     front_door: Gap
     shafts: list[Rectangle]
@@ -545,18 +539,17 @@ def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) ->
     layout = replace(best.layout, boxes=turn_boxes(best.layout.boxes, choices.below(8)))
     if style.edition == 2:
         layout = merge_rooms(layout, links, choices, style.variety)
-        links = [wall for wall in links if len(set(_rooms(layout, wall))) == 2]
+        links = [wall for wall in links if len(set(layout.rooms(wall))) == 2]
     # The turned walls, for the same pairs of boxes.
     inner = inner_walls(layout.boxes)
     pairs = {frozenset((wall.first, wall.second)) for wall in links}
-    doors = [wall for wall in inner if frozenset((wall.first, wall.second)) in pairs]
-    gaps = draw_gaps(doors, layout, inner, best.widths, choices)
+    gaps = draw_gaps(layout, inner, pairs, best.widths, choices)
     _, wall = _front_wall(layout, outer_walls(layout.boxes, inner))
     spare = wall.length - FRONT_DOOR
     low = wall.low + (spare // 2 if spare < 30 else choices.between(4, spare - 4))
     front_door = Gap(wall, low, low + FRONT_DOOR, True)
     shafts = draw_shafts(layout, [*gaps, front_door], choices) if style.edition == 2 else []
-    return House(wishes, layout.briefs, layout.boxes, gaps, front_door, shafts)
+    return House(layout.briefs, layout.boxes, wishes, gaps, front_door, shafts)
 
 
 # Probability [%] that a room of edition 2 is part of one that it opens to: an alcove, or a living
@@ -621,7 +614,7 @@ def _front_wall(layout: RoomLayout, outer: Sequence[Wall]) -> tuple[int, Wall]:
     """
     candidates = []
     for wall in outer:
-        kind = layout.briefs[layout.boxes[max(wall.first, wall.second)].room].kind
+        kind = layout.briefs[layout.room_inside(wall)].kind
         if kind in _FRONT and wall.length >= FRONT_DOOR + 4 and _approachable(wall, layout.boxes):
             candidates.append((_FRONT.index(kind), -min(wall.length, 60), wall))
     if not candidates:

@@ -23,6 +23,7 @@ from fleet2d.floorplan.synthetic.slicing import (
     Slot,
     Strip,
     Tree,
+    Wall,
     Wing,
     choose_squarest,
     gross_area,
@@ -562,6 +563,19 @@ class RoomLayout:
 
     briefs: list[Brief]
     boxes: list[Box]
+
+    def rooms(self, wall: Wall) -> tuple[int, int]:
+        """Return the rooms on the two sides of an inner wall, the lower first."""
+        a, b = sorted((self.boxes[wall.first].room, self.boxes[wall.second].room))
+        return a, b
+
+    def kinds(self, wall: Wall) -> set[str]:
+        """Return the types of the rooms on the two sides of an inner wall."""
+        return {self.briefs[room].kind for room in self.rooms(wall)}
+
+    def room_inside(self, wall: Wall) -> int:
+        """Return the room on the inner side of an outer wall."""
+        return self.boxes[max(wall.first, wall.second)].room
 
 
 def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout:

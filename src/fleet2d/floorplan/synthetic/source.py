@@ -75,8 +75,7 @@ def _regions(house: House) -> list[LabelledRegion]:
     for index, brief in enumerate(house.briefs):
         boxes = [box for box in house.boxes if box.room == index]
         shapes = [(b.x0 - half, b.y0 - half, b.x1 - half, b.y1 - half) for b in boxes]
-        wall = house.front_door.wall
-        if house.boxes[max(wall.first, wall.second)].room == index:
+        if house.room_inside(house.front_door.wall) == index:
             shapes.append(_hole(house.front_door))
         labels = (brief.kind, *lacking) if brief.kind == "living_room" else (brief.kind,)
         regions.append(LabelledRegion(labels, _metres(shapes), None, brief.kind))
