@@ -138,26 +138,23 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
     from rich.table import Table
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    has_untested = any(v.holds is None for case in cases for v in case.verdicts.values())
-    columns = ["untested"] if has_untested else []
-    has_occasions = any(v.occasions is not None for case in cases for v in case.verdicts.values())
-    columns += ["occasions"] if has_occasions else []
+    all_verdicts = [v for case in cases for v in case.verdicts.values()]
+    has_untested = any(v.holds is None for v in all_verdicts)
+    has_occasions = any(v.occasions is not None for v in all_verdicts)
+    columns = [*(["untested"] * has_untested), *(["occasions"] * has_occasions)]
     table = Table("scenario", "expectation", "held", *columns, "at least by", show_edge=False)
     for source in dict.fromkeys(case.source for case in cases):
         cases_of_source = [case for case in cases if case.source == source]
-        label = source
-        for name in cases_of_source[0].scenario.expect:
+        for number, name in enumerate(cases_of_source[0].scenario.expect):
             verdicts = [case.verdicts[name] for case in cases_of_source if name in case.verdicts]
             held = f"{sum(v.holds is True for v in verdicts)} of {len(cases_of_source)}"
             numbers = [str(sum(v.holds is None for v in verdicts) or "")] if has_untested else []
             if has_occasions:
                 occasions = [v.occasions for v in verdicts if v.occasions is not None]
                 numbers.append(str(sum(occasions)) if occasions else "")
-            table.add_row(label, name, held, *numbers, _lowest(verdicts))
-            label = ""
+            table.add_row("" if number else source, name, held, *numbers, _lowest(verdicts))
     console.print(table, soft_wrap=False)
-    verdicts = [v for case in cases for v in case.verdicts.values()]
-    notes = dict.fromkeys(note for verdict in verdicts for note in verdict.notes)
+    notes = dict.fromkeys(note for verdict in all_verdicts for note in verdict.notes)
     failures = [line for case in cases for line in _failure_lines(case)]
     failed, runs = sum(case.fails for case in cases), counted(len(cases), "run")
     end = f"{failed} of {runs} failed" if failed else f"all held: {runs}"

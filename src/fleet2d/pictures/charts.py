@@ -4,10 +4,11 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from datetime import date, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -24,10 +25,6 @@ from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Episode
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.runtime.clock import HOUR_S, midnight_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 MONDAY = date(2026, 1, 5)
 INTERRUPTION_ROLES = (INTERRUPTS, FINISHES)
@@ -347,7 +344,7 @@ def answers_figure(run: Run) -> Figure:
     return figure
 
 
-def _stack(axes: "Axes", answers: Sequence[tuple[float, str]], width: int, end: int) -> None:
+def _stack(axes: Axes, answers: Sequence[tuple[float, str]], width: int, end: int) -> None:
     """Draw the answers in intervals of a width up to an end, stacked."""
     edges = np.arange(0, end + width, width)
     below = np.zeros(len(edges) - 1)
@@ -360,7 +357,7 @@ def _stack(axes: "Axes", answers: Sequence[tuple[float, str]], width: int, end: 
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _draw_annoyance(run: Run, robot: str, user: str, axes: "Axes") -> None:
+def _draw_annoyance(run: Run, robot: str, user: str, axes: Axes) -> None:
     """Draw the annoyance of a person over the days, if the run has stored it."""
     tables = run.tables
     if "interactions" not in tables or "annoyance" not in tables["interactions"].column_names:

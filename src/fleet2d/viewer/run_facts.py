@@ -75,10 +75,8 @@ def intervention_label(record: Mapping[str, Any]) -> str:
     >>> intervention_label({"do": "put", "step": 4, "entity": "ana", "x": 5, "by": "script.0"})
     'put ana (script.0)'
     """
-    change = record.get("change")
-    fields = change if isinstance(change, Mapping) else record
-    parts = [value for key, value in fields.items() if isinstance(value, str) and key != "by"]
-    if isinstance(change, Mapping):
+    parts = [value for key, value in record.items() if isinstance(value, str) and key != "by"]
+    if isinstance(change := record.get("change"), Mapping):
         parts = next(([key, value] for key, value in change.items() if value), ["change"])
     by = f" ({record['by']})" if record.get("by") else ""
     return " ".join(str(part) for part in parts[:3]) + by
@@ -88,27 +86,25 @@ def slow_floors(
     scenario: Mapping[str, Any], records: Iterable[Mapping[str, Any]], clock: Clock
 ) -> list[SlowFacts]:
     """Return the floors that slow robots down, of a scenario and of records of interventions."""
-    floors = [_slow_floor(area, 0, clock.steps) for area in scenario["floorplan"].get("slows", ())]
-    return [*floors, *slow_floors_of(records, clock)]
+    areas = scenario["floorplan"].get("slows", ())
+    return slow_floors_of([*({"do": "slow", "step": 0, **a} for a in areas), *records], clock)
 
 
 def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[SlowFacts]:
     """Return the floors that slow robots down since interventions."""
     floors = []
     for record in records:
-        if record["do"] == "slow":
-            step, end, duration = int(record["step"]), clock.steps, record.get("duration")
-            if duration is not None:
-                end = min(end, step + clock.step_at_or_after(micros(parse_duration(duration))))
-            floors.append(_slow_floor(record, step, end))
+        if record["do"] != "slow":
+            continue
+        step, end, duration = int(record["step"]), clock.steps, record.get("duration")
+        if duration is not None:
+            end = min(end, step + clock.step_at_or_after(micros(parse_duration(duration))))
+        area = SlowArea(**{key: record[key] for key in SlowArea.model_fields if key in record})
+        parts = [f"robots drive at {area.speed:.0%}"] if area.speed < 1 else []
+        parts += [f"robots stop for {area.stop.total_seconds():g} s"] if area.stop else []
+        words = ", ".join(parts)
+        floors.append(SlowFacts(outline=list(area.area), words=words, step=step, end=end))
     return floors
-
-
-def _slow_floor(settings: Mapping[str, Any], step: int, end: int) -> SlowFacts:
-    area = SlowArea(**{key: settings[key] for key in SlowArea.model_fields if key in settings})
-    parts = [f"robots drive at {area.speed:.0%}"] if area.speed < 1 else []
-    parts += [f"robots stop for {area.stop.total_seconds():g} s"] if area.stop else []
-    return SlowFacts(outline=list(area.area), words=", ".join(parts), step=step, end=end)
 
 
 def _starts_unlit(scenario: Mapping[str, Any]) -> bool:
