@@ -178,7 +178,7 @@ class Arbiter:
         interrupted, step, interrupts, kept_out = self._interrupted.pop(number)
         if kept_out != now.actor.kept_out:
             return None  # its way may lead through a room that the body keeps out of now
-        plan = giving_way.resumed(now.actor, now.plan(), interrupted, step)
+        plan = giving_way.resumed(now.plan(), interrupted, step)
         if plan is not None:
             plan.interrupts = interrupts
         return plan

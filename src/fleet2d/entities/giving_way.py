@@ -25,16 +25,13 @@ from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
 Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
 
 
-def resumed(
-    body: Body, plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None
-) -> Plan | None:
+def resumed(plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted.
 
     The body goes straight to the next place at which it would have stopped. From there on all is as
     it was planned, only later; of a stop that was interrupted, the remaining time.
 
     Args:
-        body: The body.
         plan: An empty plan that begins at the present step.
         interrupted: The plan that was interrupted.
         step: The step at which it was interrupted.
@@ -43,10 +40,10 @@ def resumed(
     Returns:
         The plan; None if nothing is left to do, or no way leads there at present.
     """
-    return _rest(body, plan, interrupted, step * body.clock.step_us, detour)
+    return _rest(plan, interrupted, step * plan.step_us, detour)
 
 
-def without_next_stop(body: Body, plan: Plan, interrupted: Plan, step: int) -> Plan | None:
+def without_next_stop(plan: Plan, interrupted: Plan, step: int) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted, without its next stop.
 
     Returns:
@@ -56,27 +53,27 @@ def without_next_stop(body: Body, plan: Plan, interrupted: Plan, step: int) -> P
     if not isinstance(motion, Track):
         return None
     x, y, time = motion.breakpoints.x, motion.breakpoints.y, motion.breakpoints.time
-    stop = next_stop(body, motion.breakpoints, step * body.clock.step_us)
+    stop = next_stop(plan.body, motion.breakpoints, step * plan.step_us)
     if stop is None:
         return None
     leaves = np.flatnonzero((x[stop:] != x[stop]) | (y[stop:] != y[stop]))
     if not len(leaves):
         return None
-    rest = _rest(body, plan, interrupted, int(time[stop + leaves[0]]), None)
+    rest = _rest(plan, interrupted, int(time[stop + leaves[0]]))
     if rest is not None:
         rest.root = rest  # a plan of its own: one stop of the interrupted one is missing
     return rest
 
 
 def _rest(
-    body: Body, plan: Plan, interrupted: Plan, interrupted_us: int, detour: Detour | None
+    plan: Plan, interrupted: Plan, interrupted_us: int, detour: Detour | None = None
 ) -> Plan | None:
     """Fill a plan with the part of another one that comes after a moment."""
     motion = interrupted.finish()
     if not isinstance(motion, Track) or interrupted.postures or plan.away:
         return None
     track = motion.breakpoints
-    stop = next_stop(body, track, interrupted_us)
+    stop = next_stop(plan.body, track, interrupted_us)
     if stop is None or track.away[stop:].any():
         return None
     goes_on_us = max(int(track.time[stop]), interrupted_us)
@@ -222,7 +219,7 @@ class WaitForPeople:
 
     def continued(self, now: Situation) -> Plan | None:
         """Return the rest of the plan; None if nothing is left."""
-        return self._with_interrupts(resumed(now.actor, now.plan(), self.interrupted, self.step))
+        return self._with_interrupts(resumed(now.plan(), self.interrupted, self.step))
 
     def go_around(self, now: Situation, people: I64, distance: float) -> Plan | None:
         """Return the rest of the plan by a way that keeps clear of people; None without such a way.
@@ -236,7 +233,7 @@ class WaitForPeople:
         for gap in (max(distance, PASSING_GAP_M) + lattice.cell, PASSING_GAP_M):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
             plan, detour = self._stand_for_a_step(now), RoutesAround(actor, around)
-            rest = resumed(actor, plan, self.interrupted, self.step, detour)
+            rest = resumed(plan, self.interrupted, self.step, detour)
             if rest is not None:
                 return self._with_interrupts(rest)
         return None
@@ -244,8 +241,7 @@ class WaitForPeople:
     def skip_stop(self, now: Situation, person: str) -> Plan | None:
         """Return the plan without the stop that it can't get to; None if that was the last."""
         plan = self.give_up(now, person)
-        rest = without_next_stop(now.actor, plan, self.interrupted, self.step)
-        return self._with_interrupts(rest)
+        return self._with_interrupts(without_next_stop(plan, self.interrupted, self.step))
 
     def give_up(self, now: Situation, person: str) -> Plan:
         """Stand for a step, after which the behaviors are asked again."""

@@ -40,6 +40,7 @@ class Plan:
     The behavior is asked again when the plan is over, or when one of `interrupts` happens.
 
     Attributes:
+        body: The body that follows it.
         began: The step at which it begins, and the state of the body then.
         time_us: The moment up to which it is planned [us since the start].
         legs: Its breakpoints so far.
@@ -53,7 +54,7 @@ class Plan:
 
     def __init__(self, body: Body, step: int) -> None:
         state = body.state
-        self._body = body
+        self.body = body
         self.began = (step, state)
         self.legs = Legs()
         self._motion: Motion | None = None
@@ -83,12 +84,12 @@ class Plan:
     @property
     def step_us(self) -> int:
         """Length of a step [us]."""
-        return self._body.clock.step_us
+        return self.body.clock.step_us
 
     @property
     def time(self) -> datetime:
         """The local time up to which it is planned."""
-        return self._body.clock.start + timedelta(microseconds=self.time_us)
+        return self.body.clock.start + timedelta(microseconds=self.time_us)
 
     def go_to(
         self, place: RoomChoice | Point | str | Iterable[object], purpose: str = "spot"
@@ -100,10 +101,10 @@ class Plan:
         In a room, the place is a spot drawn from its free cells by the stream `purpose`. People use
         furniture that they go to; robots stop in front of it.
         """
-        thing = seat_at(self._body, place)
+        thing = seat_at(self.body, place)
         if thing is not None:
             return self.use(thing)
-        return self.go_to_point(*self._body.find(place, self.time_us, purpose))
+        return self.go_to_point(*self.body.find(place, self.time_us, purpose))
 
     def go_to_point(self, x: int, y: int, *, route: I64 | None = None) -> Self:
         """Walk to a lattice point by the shortest path, or by a route (n, 2) that leads there.
@@ -113,7 +114,7 @@ class Plan:
         """
         self.come_home()
         self._check_goes_on()
-        body, space = self._body, self._body.space
+        body, space = self.body, self.body.space
         self.take("stand")
         off = body.step_off(self.x, self.y)
         if route is None and self._go_shortest(space, x, y, off):
@@ -135,7 +136,7 @@ class Plan:
 
     def _go_shortest(self, space: Space, x: int, y: int, off: tuple[int, int] | None) -> bool:
         """Step `off` an object and walk a shortest route, if that is all; return whether it was."""
-        body, routes = self._body, space.shortest
+        body, routes = self.body, space.shortest
         if routes is None or body.drive is not None or body.slows:
             return False
         now = self.time_us, self.x, self.y, self.heading
@@ -145,7 +146,7 @@ class Plan:
         return end is not None
 
     def _walk(self, route: I64) -> None:
-        body = self._body
+        body = self.body
         walk = self.time_us, self.heading, route, body.speed, body.turn_rate
         if body.drive is None and not body.slows:
             self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(*walk)
@@ -173,11 +174,11 @@ class Plan:
             PlacementError: There is no such object, or no place to use it from.
             NoWayError: There is no way to it, or none at present.
         """
-        at = self._body.place_at(thing, place)
+        at = self.body.place_at(thing, place)
         if self.away or (self.x, self.y) != (at.x, at.y):
             self.go_to_point(*at.approach)
         self._check_goes_on()
-        body, now = self._body, (self.time_us, self.x, self.y, self.heading)
+        body, now = self.body, (self.time_us, self.x, self.y, self.heading)
         if body.drive is None:
             self.time_us, self.x, self.y, self.heading, _ = self.legs.settle(
                 *now, at.x, at.y, at.heading, body.speed, body.turn_rate
@@ -215,7 +216,7 @@ class Plan:
 
     def reaches(self, x: int, y: int) -> bool:
         """Return whether there is a way to a lattice point from where the plan ends so far."""
-        space, at = self._body.space, (self.x, self.y)
+        space, at = self.body.space, (self.x, self.y)
         return space.route(at, (x, y)) is not None or bool(space.passings(at, (x, y)))
 
     def follow(self, breakpoints: I64) -> Self:
@@ -233,7 +234,7 @@ class Plan:
             times = breakpoints[:, 0]
             if times[0] < self.time_us or bool((times[1:] < times[:-1]).any()):
                 raise ComponentError(
-                    f"{self._body.path}: breakpoints must be in order of time, from"
+                    f"{self.body.path}: breakpoints must be in order of time, from"
                     f" {self.time_us} us on"
                 )
             self.legs.add(breakpoints)
@@ -261,7 +262,7 @@ class Plan:
     def _turn(self, headings: int) -> Self:
         self._check_goes_on()
         if headings:
-            now, rate = (self.time_us, self.x, self.y, self.heading), self._body.turn_rate
+            now, rate = (self.time_us, self.x, self.y, self.heading), self.body.turn_rate
             turned = self.legs.turn(*now, self.away, headings, rate)
             self.time_us, self.heading = turned[0], turned[3]
         return self
@@ -278,12 +279,12 @@ class Plan:
         if duration is not None:
             if not timedelta(0) <= duration <= MAX_DURATION:
                 raise ComponentError(
-                    f"{self._body.path}: can't stay for {duration}: 0 to 1000 years are possible;"
+                    f"{self.body.path}: can't stay for {duration}: 0 to 1000 years are possible;"
                     " leave the duration out to stay for good"
                 )
             self.time_us += micros(duration)
         elif until is not None:
-            self.time_us = max(self.time_us, self._body.clock.elapsed(until))
+            self.time_us = max(self.time_us, self.body.clock.elapsed(until))
         else:
             self.endless = True
         self._mark()
@@ -300,7 +301,7 @@ class Plan:
     def leave_home(self) -> Self:
         """Walk to the way out of the home, and be away from then on."""
         if not self.away:
-            self.go_to_point(*self._body.way_out)
+            self.go_to_point(*self.body.way_out)
             self.away = 1
             self.note("left_home")
             self._mark()
@@ -319,9 +320,9 @@ class Plan:
         self.come_home()
         self._check_goes_on()
         if len(self.legs) > 2 or self.time_us != self.began[0] * self.step_us:
-            raise ComponentError(f"{self._body.path}: a plan that meanders can do nothing before")
+            raise ComponentError(f"{self.body.path}: a plan that meanders can do nothing before")
         self.take("stand")
-        home, body = self._body.home, self._body
+        home, body = self.body.home, self.body
         # A random walk doesn't open doors: a shut one is a wall.
         self._motion = RandomWalk(home.barriers, home.space(body.entity.radius).mesh, rule)
         self.endless = True
@@ -333,9 +334,9 @@ class Plan:
         Raises:
             ComponentError: Neither Fleet2D nor a behavior of the body declares such events.
         """
-        if event not in KINDS and not self._body.may_record(event):
+        if event not in KINDS and not self.body.may_record(event):
             raise ComponentError(
-                f"{self._body.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
+                f"{self.body.path}: there is no event {event!r}{did_you_mean(event, KINDS)} A"
                 f" behavior declares its own: records = frozenset({{{event!r}}})"
             )
         self.notes.append(new_note((self.time_us, event, detail)))
@@ -355,7 +356,7 @@ class Plan:
         Raises:
             ComponentError: No such event interrupts plans of the body.
         """
-        body = self._body
+        body = self.body
         names = frozenset(event if isinstance(event, str) else event.type_name for event in events)
         for name in sorted(names - body.interrupts):
             with errors_as(ComponentError, body.path, of=ComponentError):
@@ -366,7 +367,7 @@ class Plan:
 
     def ask_by(self, time: datetime) -> Self:
         """Ask the behavior again no later than a local time, even if the plan isn't over."""
-        asks_us, self._over = self._body.clock.elapsed(time), None
+        asks_us, self._over = self.body.clock.elapsed(time), None
         self.asks_us = asks_us if self.asks_us is None else min(asks_us, self.asks_us)
         return self
 
@@ -382,7 +383,7 @@ class Plan:
         if end_us is None:
             return None
         # Else a behavior would be asked forever at one step for plans that take no time.
-        return max(self._body.clock.step_at_or_after(end_us), self.began[0] + 1)
+        return max(self.body.clock.step_at_or_after(end_us), self.began[0] + 1)
 
     def is_over(self, step: int) -> bool:
         """Return whether it is over at a step."""
@@ -399,7 +400,7 @@ class Plan:
     def _check_goes_on(self) -> None:
         if self.endless:
             raise ComponentError(
-                f"{self._body.path}: a plan that stays or meanders for good can't go on: give"
+                f"{self.body.path}: a plan that stays or meanders for good can't go on: give"
                 " stay() a duration, or make that the end"
             )
 

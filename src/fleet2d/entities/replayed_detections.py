@@ -111,10 +111,8 @@ class ReplayedDetections(EvidenceSource):
             f"{log.path.name}: {len(step)} detections of {counted(log.days, 'day')}{since}; who"
             " was really there is unknown",
             *log.notes,
+            *self.frame.notes(),
         ]
-        if self.frame.matches:
-            fit = float(self.frame.errors().max())
-            notes.append(f"the frame fits its {len(self.frame.matches)} matches to {fit:.2f} m")
         if not used.any():
             raise LogError(
                 f"none of its {len(step)} detections is in the run: {early} before it begins,"

@@ -105,6 +105,13 @@ class LogFrame(Settings):
         residuals = self.to_plan(log) - plan
         return np.sqrt(residuals[:, 0] ** 2 + residuals[:, 1] ** 2)
 
+    def notes(self) -> list[str]:
+        """Return a line about how well it fits its matches, if it has some."""
+        if not self.matches:
+            return []
+        worst = float(self.errors().max())
+        return [f"the frame fits its {len(self.matches)} matches to {worst:.2f} m"]
+
     def _factor(self) -> tuple[Pair, Pair]:
         """Return the complex numbers a and b of plan = a * log + b, as pairs."""
         if not self.matches:

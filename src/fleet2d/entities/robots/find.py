@@ -264,7 +264,7 @@ class Find(BeliefBehavior):
         last = now.actor.plan
         if not now.events or last.root is not self.plan or last.is_over(now.step):
             return None
-        plan = resumed(now.actor, now.plan(), last, now.step)
+        plan = resumed(now.plan(), last, now.step)
         return None if plan is None else plan.interrupt_on("user_seen")
 
     def _is_due(self, now: Situation) -> bool:

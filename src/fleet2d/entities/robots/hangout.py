@@ -105,7 +105,7 @@ class HangoutPlaces:
         if plan.doorways and off_doors > 0:
             lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
             gaps = shapely.distance(
-                np.atleast_1d(shapely.points(points))[:, None],
+                shapely.points(points[:, None]),
                 np.array([shapely.LineString(line) for line in lines]),
             )
             clear = gaps.min(axis=1, initial=np.inf) >= off_doors * plan.lattice.units_per_m

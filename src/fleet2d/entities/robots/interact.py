@@ -401,7 +401,7 @@ class Interact(BeliefBehavior):
             return None
         last, plan, is_in_view = now.actor.plan, None, served.request.to in now.in_view
         if not is_in_view and not last.is_over(now.step):
-            plan = resumed(now.actor, now.plan(), last, now.step)
+            plan = resumed(now.plan(), last, now.step)
         if plan is None:
             self._end_round(now, served.request.to, is_in_view=is_in_view)
             return None

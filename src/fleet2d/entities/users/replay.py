@@ -381,10 +381,8 @@ def report_fixes(
     log: PositionLog, follower: FixFollower, thinned: int, frame: LogFrame
 ) -> tuple[str, ...]:
     """Return lines about a log of positions: omitted and moved fixes, gaps, implausible legs."""
-    lines, fixes = [_head(log, len(log.time_us), "fixes"), *log.notes], follower.fixes
-    if frame.matches:
-        off = frame.errors()
-        lines.append(f"the frame fits its {len(off)} matches to {float(off.max()):.2f} m")
+    lines = [_head(log, len(log.time_us), "fixes"), *log.notes, *frame.notes()]
+    fixes = follower.fixes
     counts = (
         (thinned, "fixes are left out: one in a step is enough"),
         (fixes.outside, "fixes are outside the home and left out"),
