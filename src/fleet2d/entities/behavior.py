@@ -137,7 +137,8 @@ LightHours = Annotated[
 
 def holds(hours: "Sequence[HoursSpan | Sun]", time: datetime) -> datetime | None:
     """Return the end of the hours that a moment lies in; None if it lies outside."""
-    return max((end for span in hours if (end := span.end_at(time))), default=None)
+    ends = [end for span in hours if (end := span.end_at(time))]
+    return max(ends, default=None)
 
 
 class Attention(NamedTuple):
