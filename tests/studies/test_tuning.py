@@ -14,8 +14,14 @@ from fleet2d.studies.driver import check_study
 from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule, WorkerJob
 from fleet2d.studies.simulator import StagedRun
 from fleet2d.studies.specification import TuneSettings
-from fleet2d.studies.trials import TrialJob, TrialSchedule, TrialTask
-from fleet2d.studies.tuning import TRIALS, TuneResult, tune
+from fleet2d.studies.tuning import (
+    TRIALS,
+    TrialJob,
+    TrialSchedule,
+    TrialTask,
+    TuneResult,
+    tune,
+)
 
 pytest.importorskip("optuna")
 pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
@@ -110,7 +116,7 @@ def test_what_goes_on_is_not_begun_anew(tmp_path: Path, monkeypatch: pytest.Monk
             starts.append(scenario)
             super().__init__(scenario)
 
-    monkeypatch.setattr("fleet2d.studies.trials.StagedRun", Counted)
+    monkeypatch.setattr("fleet2d.studies.tuning.StagedRun", Counted)
     spy = Spy()
     tuned(tmp_path, spy, trials=8, prune_at=["1 min", "2 min"])
     runs = {(task.trial, task.index) for task in spy.trials}

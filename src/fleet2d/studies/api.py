@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeVar
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.studies.cluster_executors import RayExecutor, SlurmExecutor
 from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import (
@@ -140,21 +141,18 @@ def make_executor(
     Raises:
         InputError: There is no executor of that name, or its package is missing.
     """
-    if not isinstance(executor, str):
-        return executor
-    if executor == "local":
-        return LocalExecutor(workers or cores())
-    if executor == "serial":
-        return SerialExecutor()
-    if executor == "ray":
-        from fleet2d.studies.cluster_executors import RayExecutor
-
-        return RayExecutor(workers)
-    if executor == "slurm":
-        from fleet2d.studies.cluster_executors import SlurmExecutor
-
-        return SlurmExecutor(workers, slurm)
-    raise InputError(f"there is no executor {executor!r}: give local, ray, slurm or serial")
+    match executor:
+        case "local":
+            return LocalExecutor(workers or cores())
+        case "serial":
+            return SerialExecutor()
+        case "ray":
+            return RayExecutor(workers)
+        case "slurm":
+            return SlurmExecutor(workers, slurm)
+        case str():
+            raise InputError(f"there is no executor {executor!r}: give local, ray, slurm or serial")
+    return executor
 
 
 def default_location(name: str) -> str:

@@ -9,7 +9,7 @@ import itertools
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from fleet2d.kernels import I32
-from fleet2d.studies.records import VARIANT, VariantRecord, check_numbers, numbers_of, results_table
+from fleet2d.studies.records import VARIANT, check_numbers, numbers_of, results_table
 from fleet2d.studies.storage import Storage, from_json, writing
 
 if TYPE_CHECKING:
@@ -166,13 +166,17 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
     files = {f"{RESULTS}/{name}.parquet": results}
     numbers = sorted(journal.with_tables)
     for record in map(journal.read, numbers):
-        _add_schemas(record, schemas)
+        for table, rows in record.tables().items():
+            schema = plain_schema(rows.schema)
+            common = schemas.setdefault(table, schema)
+            if common != schema:  # widened, so that all rows fit
+                schemas[table] = pa.unify_schemas([common, schema], promote_options="permissive")
     with ExitStack() as stack:
         writers: dict[str, _PartFileWriter] = {}
         for i, (table, schema) in enumerate(schemas.items()):
             local = scratch / f"{name}-table-{i}"
             files[f"{TABLES}/{table}/{name}.parquet"] = local
-            writers[table] = stack.enter_context(_PartFileWriter(local, schema))
+            writers[table] = stack.enter_context(closing(_PartFileWriter(local, schema)))
         for number in numbers:
             for table, rows in journal.read(number).tables().items():
                 writers[table].write(number, rows.read_all())
@@ -196,10 +200,8 @@ class _PartFileWriter:
         if sum(table.num_rows for table in self._buffer) >= ROWS_PER_GROUP:
             self._flush()
 
-    def __enter__(self) -> "_PartFileWriter":
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Write the rest."""
         self._flush()
         self._writer.close()
 
@@ -238,17 +240,6 @@ def plain_schema(schema: "pa.Schema") -> "pa.Schema":
         unit = (field.metadata or {}).get(b"unit")
         fields.append(pa.field(field.name, kind, True, {"unit": unit} if unit else None))
     return pa.schema(fields)
-
-
-def _add_schemas(record: VariantRecord, schemas: "dict[str, pa.Schema]") -> None:
-    """Widen the schema of each table so that the rows of a variant fit."""
-    import pyarrow as pa
-
-    for name, rows in record.tables().items():
-        schema = plain_schema(rows.schema)
-        common = schemas.setdefault(name, schema)
-        if common != schema:
-            schemas[name] = pa.unify_schemas([common, schema], promote_options="permissive")
 
 
 def read_results(

@@ -18,6 +18,7 @@ from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.model import Scenario, explain
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
+from fleet2d.studies.records import RESULT_COLUMNS
 
 
 def _with_type(value: Any) -> Any:
@@ -64,11 +65,7 @@ class TuneSettings(Settings):
 
 
 SEED = "seed"
-RESERVED = (
-    "variant", "identity", "status", "digest", "error", "wall_s", "setup_s", "simulate_s",
-    "attempts", "step", "time", "scenario", "template", "home_key", "simulated_s", "trace",
-    "peak_rss_mb",
-)  # fmt: skip
+RESERVED = (*RESULT_COLUMNS, "step", "time", "scenario", "template", "home_key", "simulated_s")
 """Columns of the results; no axis may have such a name."""
 
 
@@ -197,18 +194,18 @@ class StudyFile(Settings):
 
     @model_validator(mode="after")
     def _columns_differ(self) -> Self:
-        owners: dict[str, str] = {}
+        owners = dict.fromkeys((SEED, *RESERVED), "")
         for name, axis in self.axes.items():
             for column in axis.columns(name):
-                if column in (SEED, *RESERVED):
-                    message = (
-                        f"an axis can't be called {column!r}, because results have a column of that"
-                        " name"
-                    )
+                if owner := owners.get(column):
+                    message = f"the axis {owner!r} has a column {column!r}, too"
                     raise problem_at(("axes", name), message)
                 if column in owners:
-                    message = f"the axis {owners[column]!r} has a column {column!r}, too"
-                    raise problem_at(("axes", name), message)
+                    raise problem_at(
+                        ("axes", name),
+                        f"an axis can't be called {column!r}, because results have a column of that"
+                        " name",
+                    )
                 owners[column] = name
         return self
 

@@ -15,7 +15,7 @@ from fleet2d.runs.run import Run
 from fleet2d.scenario.model import Scenario, load_scenario
 from fleet2d.sight.perception_error import PerceptionError
 
-SCENARIO = {
+SCENARIO: dict[str, Any] = {
     "simulation": {"start": "2026-01-05", "seed": 4},
     "floorplan": "bundled",
     "users": {"ana": "meander"},
@@ -90,7 +90,7 @@ def _repeat_problems(repeat: Callable[..., Run], run: Run, draw: str, spans: str
 
 def _scenario(algorithm: Algorithm, **simulation: Any) -> Scenario:
     duration = UPDATES * algorithm.period
-    times: dict[str, Any] = {**SCENARIO["simulation"], "duration": duration, **simulation}  # type: ignore[dict-item]
+    times = {**SCENARIO["simulation"], "duration": duration, **simulation}
     scenario = load_scenario({**SCENARIO, "simulation": times})
     return scenario.model_copy(update={"algorithms": {"checked": algorithm}})
 
@@ -184,11 +184,7 @@ def _run_with_error(error: PerceptionError, **simulation: Any) -> Run:
         "camera": {"angle_deg": 200, "detection": 0.9, "latency": "2 s"},
         "perception": {"errors": {"checked": error}, "false_positives": {"per_hour": 60}},
     }
-    content = {
-        "simulation": {"start": "2026-01-05", "seed": 4, "duration": "1 h", **simulation},
-        "floorplan": "bundled",
-        "users": {"ana": "meander", "ben": "meander"},
-        "robots": {"astro": robot, "bolt": robot},
-        "artifacts": {"trajectories": "off"},
-    }
+    times = {**SCENARIO["simulation"], "duration": "1 h", **simulation}
+    users, robots = {"ana": "meander", "ben": "meander"}, {"astro": robot, "bolt": robot}
+    content = {**SCENARIO, "simulation": times, "users": users, "robots": robots}
     return Simulation(load_scenario(content)).run()

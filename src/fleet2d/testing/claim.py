@@ -434,13 +434,13 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
     problem = f"seeds={seeds}: expected 1 or more seeds" if too_few else ""
 
     def decorate(function: Test) -> Test:
-        source = _beside(function, scenario)
-        varied = {**_homes(homes, function), **(axes or {})}
+        code = getattr(function, "__code__", None)
+        folder = Path(code.co_filename).parent if code is not None else Path()
         claim = Claim(
-            source,
+            _beside(folder, scenario),
             overrides,
             settings,
-            varied,
+            {**_homes(folder, homes), **(axes or {})},
             households or {},
             tuple(numbers),
             holds,
@@ -455,29 +455,19 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
     return decorate
 
 
-def _folder_of(function: Callable[..., Any]) -> Path:
-    """Return the folder of the file that defines a function."""
-    code = getattr(function, "__code__", None)
-    return Path(code.co_filename).parent if code is not None else Path()
-
-
-def _beside(function: Callable[..., Any], source: Any) -> Any:
-    """Return the path of a scenario beside the file of the test, if it exists there."""
+def _beside(folder: Path, source: Any) -> Any:
+    """Return the path of a scenario in the folder of the test, if it exists there."""
     if not isinstance(source, str | Path) or str(source).startswith("bundled:"):
         return source
-    path = _folder_of(function) / source
-    return path if path.is_file() else source
+    return folder / source if (folder / source).is_file() else source
 
 
-def _homes(
-    homes: int | str | Path | Sequence[str | Path] | None, function: Callable[..., Any]
-) -> dict[str, Any]:
+def _homes(folder: Path, homes: int | str | Path | Sequence[str | Path] | None) -> dict[str, Any]:
     if homes is None:
         return {}
     if isinstance(homes, int):
         return {HOME: {"synthetic": homes}}
     names = [homes] if isinstance(homes, str | Path) else list(homes)
-    folder = _folder_of(function)
     return {HOME: {"floorplans": [_near(folder, name) for name in names]}}
 
 

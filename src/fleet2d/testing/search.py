@@ -1,6 +1,7 @@
 """The search for a run that fails: over homes, households, timings, and any key of a scenario."""
 
 import importlib.util
+import math
 import pickle
 import random
 import sys
@@ -23,7 +24,7 @@ from fleet2d.scenario.model import Scenario, scenario_of
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
 from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
 from fleet2d.studies.simulator import describe_error
-from fleet2d.studies.trials import suggested
+from fleet2d.studies.tuning import suggested
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
 from fleet2d.testing.trials import Body, Trial, TrialResult, run_trial
 
@@ -215,47 +216,6 @@ class TryJob:
         return pickle.dumps((result.margin, what, None))
 
 
-class TrySchedule(TaskSchedule):
-    """The tasks of a search: random points at first, then those that Optuna suggests.
-
-    Attributes:
-        started: Number of runs started so far.
-    """
-
-    def __init__(self, search: "FailureSearch", budget: int, deadline: float | None) -> None:
-        """Begin without tasks."""
-        super().__init__(())
-        self._search, self._budget, self._deadline = search, budget, deadline
-        self._returned: list[TryTask] = []
-        self.started = 0
-
-    def __len__(self) -> int:
-        """Return the largest number of runs still to come."""
-        return self._budget - self.started + len(self._returned)
-
-    def __bool__(self) -> bool:
-        """Return whether there are runs to come."""
-        if self._search.is_over:
-            return False
-        is_late = self._deadline is not None and time.monotonic() > self._deadline
-        return bool(self._returned) or (self.started < self._budget and not is_late)
-
-    def take(self, worker: Hashable) -> WorkerTask | None:
-        """Return the next task."""
-        if not self:
-            return None
-        if self._returned:
-            return self._returned.pop()
-        task = self._search.ask(self.started)
-        self.started += 1
-        return task
-
-    def put_back(self, task: WorkerTask) -> None:
-        """Return a task to be run again."""
-        assert isinstance(task, TryTask)
-        self._returned.append(task)
-
-
 @dataclass(frozen=True)
 class FailingPoint:
     """A point of the search space at which the run fails.
@@ -275,8 +235,8 @@ class FailingPoint:
     what: str
 
 
-class FailureSearch:
-    """A search for runs in which an expectation fails.
+class FailureSearch(TaskSchedule):
+    """A search for runs in which an expectation fails: random points, then those of Optuna.
 
     Attributes:
         failures: The failures.
@@ -289,7 +249,10 @@ class FailureSearch:
         self, job: TryJob, budget: int, *, seed: int = 0, finds: int = 1, is_guided: bool = True
     ) -> None:
         """Prepare a search; with is_guided=False all points are random, for comparison."""
+        super().__init__()
         self._job, self._budget, self._seed, self._finds = job, budget, seed, finds
+        self._started, self._deadline = 0, math.inf
+        self._returned: list[WorkerTask] = []
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
         self._random = max(MIN_RANDOM_POINTS, round(RANDOM_SHARE * budget)) if is_guided else budget
         self._study = _optuna(seed, self._random) if is_guided else None
@@ -298,6 +261,28 @@ class FailureSearch:
         self.points: list[Settings] = []
         self.narrowest: tuple[float, dict[str, Any]] | None = None
         self.errors: dict[str, int] = {}
+
+    def __len__(self) -> int:
+        """Return the largest number of runs still to come."""
+        return self._budget - self._started + len(self._returned)
+
+    def __bool__(self) -> bool:
+        """Return whether there are runs to come."""
+        may_start = self._started < self._budget and time.monotonic() <= self._deadline
+        return not self.is_over and (bool(self._returned) or may_start)
+
+    def take(self, worker: Hashable) -> WorkerTask | None:
+        """Return the next run: one that was put back, or a new one."""
+        if not self:
+            return None
+        if self._returned:
+            return self._returned.pop()
+        self._started += 1
+        return self.ask(self._started - 1)
+
+    def put_back(self, task: WorkerTask) -> None:
+        """Return a task to be run again."""
+        self._returned.append(task)
 
     @property
     def tries(self) -> int:
@@ -343,9 +328,8 @@ class FailureSearch:
             seconds: Wall time after which no run is started.
             observer: Called after each run.
         """
-        deadline = None if seconds is None else time.monotonic() + seconds
-        schedule = TrySchedule(self, self._budget, deadline)
-        with closing(executor.run(self._job, schedule)) as events:
+        self._deadline = math.inf if seconds is None else time.monotonic() + seconds
+        with closing(executor.run(self._job, self)) as events:
             for event in events:
                 assert isinstance(event.task, TryTask)
                 margin, what, error = (
