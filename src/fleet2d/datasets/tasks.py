@@ -20,6 +20,7 @@ import numpy as np
 
 from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.learned import Weights, shipped_weights
+from fleet2d.configuration.problems import check_known
 from fleet2d.datasets.reader import Dataset
 from fleet2d.datasets.training import predict
 from fleet2d.datasets.windows import PRIOR, Windows, windows_of
@@ -81,9 +82,8 @@ def leaderboard(
     Raises:
         InputError: There is no such task or split.
     """
-    unknown = [task for task in tasks if task not in TASKS]
-    if unknown:
-        raise InputError(f"there is no task {unknown[0]!r}: tasks are {', '.join(TASKS)}")
+    for task in tasks:
+        check_known(task, "task", TASKS, InputError)
     names = tasks or [t for t in TASKS if t == "rtp" or TRAIN in data.splits]
     return [
         LeaderboardEntry(task, model, scores, cases)

@@ -354,9 +354,8 @@ def dwell_times(labels: I16, count: int) -> list[F64]:
     times: list[list[int]] = [[] for _ in range(count)]
     for day in labels:
         parts = runs(day)
-        for i, (label, _, length) in enumerate(parts):
-            is_inside = 0 < i < len(parts) - 1
-            if label >= 0 and is_inside and min(parts[i - 1][0], parts[i + 1][0]) >= 0:
+        for before, (label, _, length), after in zip(parts, parts[1:], parts[2:], strict=False):
+            if min(before[0], label, after[0]) >= 0:
                 times[label].append(length)
     return [np.sort(np.array(lengths, np.float64)) / per_minute for lengths in times]
 

@@ -204,14 +204,6 @@ def _analyse(data: F64, codes: Mapping[str, I64]) -> tuple[Spread, float, float,
         name: np.bincount(numbers, data) / np.bincount(numbers) for name, numbers in codes.items()
     }
     third = sum_in_order(_third_moment(means) / len(means) ** 2 for means in unit_means.values())
-    if len(codes) == 1:
-        ((name, numbers),) = codes.items()
-        means = unit_means[name]
-        variance = float(means.var(ddof=1)) / len(means)
-        within_units = float(((data - means[numbers]) ** 2).sum()) / max(count - len(means), 1)
-        between_units = max(0.0, float(means.var(ddof=1)) - within_units * len(means) / count)
-        spread = Spread(units, {name: between_units}, within_units, count)
-        return spread, variance, len(means) - 1.0, third
     residuals, squares = data - data.mean(), {}
     for name, numbers in codes.items():
         means = unit_means[name]
@@ -220,11 +212,13 @@ def _analyse(data: F64, codes: Mapping[str, I64]) -> tuple[Spread, float, float,
     residual_freedom = max(count - 1 - sum(n - 1 for n in units.values()), 1)
     residual = float((residuals**2).sum()) / residual_freedom
     share = residual / count
-    variance = max(sum_in_order(squares.values()) - (len(codes) - 1) * share, share)
-    parts = [(square, units[name] - 1.0) for name, square in squares.items()]
-    parts.append(((len(codes) - 1) * share, float(residual_freedom)))
-    freedom = variance**2 / max(sum_in_order(part**2 / df for part, df in parts), 1e-300)
-    freedom = max(freedom, min(units.values()) - 1.0)
+    variance, freedom = sum_in_order(squares.values()), min(units.values()) - 1.0
+    if len(codes) > 1:
+        variance = max(variance - (len(codes) - 1) * share, share)
+        parts = [(square, units[name] - 1.0) for name, square in squares.items()]
+        parts.append(((len(codes) - 1) * share, float(residual_freedom)))
+        squared = sum_in_order(part**2 / df for part, df in parts)
+        freedom = max(variance**2 / max(squared, 1e-300), freedom)
     components = {name: max(0.0, (squares[name] - share) * units[name]) for name in codes}
     return Spread(units, components, residual, count), variance, freedom, third
 
