@@ -10,7 +10,7 @@ import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.studies.answers import AnswerSource, holm, variance_ratio
+from fleet2d.studies.answers import StudyAnswers, holm, variance_ratio
 
 COLUMNS = ("method", "robot", "home", "seed")
 
@@ -33,13 +33,21 @@ def variants(
     )  # fmt: skip
 
 
-def answers(frame: pl.DataFrame, *more: str) -> AnswerSource:
-    return AnswerSource(frame, (*COLUMNS, *more), "score")
+class Answers(StudyAnswers):
+    """The answers of a study with these variants, whose metric is `score`."""
+
+    populations = ("home", "seed")
+
+    def __init__(self, frame: pl.DataFrame, *more: str) -> None:
+        self.frame, self.columns = frame, (*COLUMNS, *more)
+
+    def with_metric(self, metric: str, variants: Any = None) -> pl.DataFrame:
+        return self.frame
 
 
 def compare(frame: pl.DataFrame, **keys: Any) -> list[dict[str, Any]]:
     keys = {"by": ("home", "seed"), **keys}
-    return answers(frame).paired({"method": "old"}, **keys).to_dicts()
+    return Answers(frame).paired("score", {"method": "old"}, **keys).to_dicts()
 
 
 def test_a_known_difference_is_found_though_homes_differ_more() -> None:
@@ -86,7 +94,7 @@ def test_an_axis_that_applies_on_one_side_only_needs_no_partner() -> None:
     frame = variants().with_columns(
         explore=pl.when(pl.col("method") == "new").then(0.2).otherwise(None)
     )
-    table = answers(frame, "explore").paired({"method": "old"}, ("home", "seed"))
+    table = Answers(frame, "explore").paired("score", {"method": "old"})
     assert 64 == table["pairs"][0]
 
 
@@ -103,14 +111,14 @@ def test_without_pairs_there_is_no_answer() -> None:
 
 
 def test_main_effects_are_those_that_were_put_in() -> None:
-    table = answers(variants()).effects(("method", "robot"), ("home", "seed"))
+    table = Answers(variants()).effects("score")
     rows = {(row["axis"], row["value"]): row for row in table.to_dicts()}
     assert 0.25 == pytest.approx(rows["method", "new"]["effect"], abs=0.05)
     assert rows["robot", "patrol"]["low"] < 0 < rows["robot", "patrol"]["high"]
 
 
 def test_shares_of_the_variance_name_what_matters() -> None:
-    table = answers(variants(effect=0)).variance_shares()
+    table = Answers(variants(effect=0)).shares("score")
     assert "home" == table["source"][0]
     assert 1 == pytest.approx(table["share"].sum(), abs=0.05)
 
@@ -186,7 +194,7 @@ def test_an_effect_is_told_in_deviations_and_relative_to_the_reference() -> None
 
 def test_differences_of_each_home_have_the_mean_of_all() -> None:
     frame = variants()
-    rows = answers(frame).differences({"method": "old"}, "home")
+    rows = Answers(frame).differences("score", {"method": "old"}, "home")
     assert ["method", "home", "difference"] == rows.columns
     assert 8 == len(rows)
     (row,) = compare(frame)
@@ -195,31 +203,29 @@ def test_differences_of_each_home_have_the_mean_of_all() -> None:
 
 def test_differences_of_each_home_within_another_axis_are_of_its_values() -> None:
     frame = variants()
-    rows = answers(frame).differences({"method": "old"}, "home", ["robot"])
+    rows = Answers(frame).differences("score", {"method": "old"}, "home", ["robot"])
     assert ["method", "robot", "home", "difference"] == rows.columns
     for robot in frame["robot"].unique():
         some = frame.filter(pl.col("robot") == robot)
-        expected = answers(some).differences({"method": "old"}, "home")
+        expected = Answers(some).differences("score", {"method": "old"}, "home")
         assert expected.equals(rows.filter(pl.col("robot") == robot).drop("robot"))
 
 
 def test_what_no_axis_explains_is_the_residual() -> None:
-    table = answers(variants(noise=3.0)).variance_shares()
+    table = Answers(variants(noise=3.0)).shares("score")
     assert "residual" == table["source"][-1]
     assert table["share"][-1] > 0.1
     assert 1 == pytest.approx(table["share"].sum())
 
 
 def test_shares_of_nothing_are_zero_and_no_rounding_errors() -> None:
-    table = answers(variants(effect=0, noise=0)).variance_shares()
+    table = Answers(variants(effect=0, noise=0)).shares("score")
     shares = dict(table.iter_rows())
     assert 0 == shares["robot"] == shares["residual"] == shares["method × robot"]
 
 
 def power(frame: pl.DataFrame, effect: float | None) -> pl.DataFrame:
-    against = {"method": "old"}
-    units = ("home", "seed")
-    return answers(frame).power(against, units, effect, 0.8)
+    return Answers(frame).power("score", {"method": "old"}, effect)
 
 
 def test_more_homes_and_seeds_detect_smaller_differences() -> None:

@@ -14,7 +14,7 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import ComponentError, InputError, os_errors_as
 from fleet2d.metrics.rtp_score import ALL, GAPS
-from fleet2d.studies.answers import AnswerSource
+from fleet2d.studies.answers import group_means
 from fleet2d.studies.api import make_executor, study
 
 if TYPE_CHECKING:
@@ -143,8 +143,7 @@ def estimates(rows: "pl.DataFrame", row: str, column: str) -> "pl.DataFrame":
     Returns:
         A frame with the two columns, `mean`, `low` and `high`.
     """
-    means = AnswerSource(rows, (), "value").summary((row, column), ())
-    return means.select(row, column, "mean", "low", "high")
+    return group_means(rows, "value", (row, column), ()).select(row, column, "mean", "low", "high")
 
 
 def table_of_means(

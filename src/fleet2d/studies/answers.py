@@ -3,7 +3,6 @@
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.studies.intervals import MeanEstimate, estimate
+from fleet2d.studies.intervals import POWER, MeanEstimate, estimate
 from fleet2d.studies.records import VARIANT
 
 if TYPE_CHECKING:
@@ -35,46 +34,70 @@ def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
             raise InputError(f"the study has no axis {axis!r}{suggest(axis, columns, 'It has')}")
 
 
-@dataclass(frozen=True)
-class AnswerSource:
-    """A metric in variants of a study, and what they say of it.
+class StudyAnswers:
+    """What a study says of its metrics: the base of `Study`, which has its variants.
 
     Attributes:
-        frame: The variants that are complete and have the metric.
-        columns: The columns of all axes.
-        metric: The number that it is about.
+        columns: The columns of the axes, the seed last.
+        populations: The columns whose values are a sample of a population.
     """
 
-    frame: "pl.DataFrame"
-    columns: Sequence[str]
-    metric: str
+    columns: tuple[str, ...]
+    populations: tuple[str, ...]
 
-    def paired(
-        self, against: Mapping[str, Any], by: Sequence[str], within: Sequence[str] = ()
-    ) -> "pl.DataFrame":
-        """Return a row for each value of an axis that is compared with the reference.
-
-        Args:
-            against: The axis and its reference value.
-            by: The columns of the units: homes, people, seeds.
-            within: Axes with a comparison for each of their values.
+    def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
+        """Return the variants that are complete and have a metric, or some of them by number.
 
         Raises:
-            InputError: There is no such axis or value, or no pair.
+            InputError: There is no such metric.
+        """
+        raise NotImplementedError
+
+    def paired(
+        self,
+        metric: str,
+        against: Mapping[str, Any],
+        by: Sequence[str] | None = None,
+        within: Sequence[str] = (),
+        *,
+        variants: Sequence[int] | None = None,
+    ) -> "pl.DataFrame":
+        """Compare the values of an axis with one of them, pair by pair.
+
+        A pair is two variants that differ by that axis alone: same home, same people, same seed,
+        and so the same lives of the people.
+
+        Args:
+            metric: A number, such as `ltp_error.ana.tv`.
+            against: The axis and its reference value, as in {"robot": "patrol"}.
+            by: Columns of the units over which intervals hold; None: homes, people and seeds.
+            within: Axes with a comparison for each of their values; over other axes the differences
+                are averaged.
+            variants: Numbers of the variants to compare; None: all.
+
+        Returns:
+            A row for each other value: mean, reference, difference, low and high (95 %), relative
+            (to the size of the reference), effect_size (in standard deviations of the units'
+            differences), p, p_holm (corrected for the rows of this table), pairs, n_UNIT,
+            variance_ratio (of unpaired to paired differences), and a verdict in words.
+
+        Raises:
+            InputError: There is no such metric, axis or value, or no pair.
         """
         import polars as pl
 
+        frame, units = self.with_metric(metric, variants), self._units(by, against)
         ((axis, reference),) = against.items()
         check_axes((axis, *within), self.columns)
-        if axis in (*by, *within):
+        if axis in (*units, *within):
             raise InputError(f"{axis} is what is compared: leave it out of `by` and `within`")
         rows = []
-        for value, pairs in self._pairs(axis, reference):
+        for value, pairs in self._pairs(frame, metric, axis, reference):
             groups = pairs.partition_by(list(within), as_dict=True) if within else {(): pairs}
             for key, group in groups.items():
                 if len(group):
                     labels = dict(zip(within, key, strict=True))
-                    rows.append({axis: value, **labels, **_difference(group, by, reference)})
+                    rows.append({axis: value, **labels, **_difference(group, units, reference)})
         if not rows:
             raise InputError(
                 f"no two variants differ by {axis} alone, one of them with {axis} = {reference!r}:"
@@ -85,9 +108,15 @@ class AnswerSource:
         return table.insert_column(table.get_column_index("p") + 1, corrected)
 
     def differences(
-        self, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
+        self, metric: str, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
     ) -> "pl.DataFrame":
-        """Return the mean difference in each unit: axis, those of `within`, unit, `difference`."""
+        """Return the mean difference to the reference in each unit, such as each home.
+
+        With `within`, a row for each value of other axes and each unit.
+
+        Raises:
+            InputError: There is no such metric, axis or value.
+        """
         import polars as pl
 
         ((axis, reference),) = against.items()
@@ -96,22 +125,27 @@ class AnswerSource:
             by_units(pairs, [*within, unit], "difference").select(
                 pl.lit(value).alias(axis), pl.all()
             )
-            for value, pairs in self._pairs(axis, reference)
+            for value, pairs in self._pairs(self.with_metric(metric), metric, axis, reference)
         ]
         return pl.concat(tables)
 
     def power(
-        self, against: Mapping[str, Any], by: Sequence[str], effect: float | None, power: float
+        self,
+        metric: str,
+        against: Mapping[str, Any],
+        effect: float | None = None,
+        *,
+        power: float = POWER,
+        by: Sequence[str] | None = None,
     ) -> "pl.DataFrame":
-        """Return the differences that studies of some sizes detect, or what an effect needs.
-
-        The units of these variants vary as those of the next study will.
+        """Return how many homes and seeds detect an effect, from how much they vary in this study.
 
         Args:
-            against: The axis and its reference value.
-            by: The columns of the units: homes, people, seeds.
-            effect: The difference to detect; None: return what can be detected.
-            power: The share of studies that detect it.
+            metric: A number, such as `ltp_error.ana.tv`.
+            against: The axis and its reference value, as in {"robot": "patrol"}.
+            effect: The difference to detect; None: return the difference that each size detects.
+            power: The share of studies whose interval would exclude zero.
+            by: Columns of the units; None: homes, people and seeds.
 
         Returns:
             With an effect: for each value of the axis and each number of the other units, how many
@@ -119,15 +153,16 @@ class AnswerSource:
             and size, the column `detectable`.
 
         Raises:
-            InputError: There is no such axis or value, or less than two units.
+            InputError: There is no such metric, axis or value, or less than two units.
         """
         import polars as pl
 
+        units = self._units(by, against)
         ((axis, reference),) = against.items()
-        check_axes((axis, *by), self.columns)
+        check_axes((axis,), self.columns)
         rows: list[dict[str, Any]] = []
-        for value, pairs in self._pairs(axis, reference):
-            spread = estimate_units(pairs, by, "difference").spread
+        for value, pairs in self._pairs(self.with_metric(metric), metric, axis, reference):
+            spread = estimate_units(pairs, units, "difference").spread
             if not spread.units:
                 continue
             first, *others = spread.units
@@ -142,12 +177,14 @@ class AnswerSource:
                     rows.append({**label, first: count, "detectable": detectable})
         if not rows:
             raise InputError(
-                f"no two units of {self.metric} differ in {' or '.join(by)}: the power follows from"
+                f"no two units of {metric} differ in {' or '.join(units)}: the power follows from"
                 " how much units vary; run a small study with some homes and seeds first"
             )
         return pl.DataFrame(rows, infer_schema_length=None)
 
-    def _pairs(self, axis: str, reference: Any) -> "Iterator[tuple[Any, pl.DataFrame]]":
+    def _pairs(
+        self, frame: "pl.DataFrame", metric: str, axis: str, reference: Any
+    ) -> "Iterator[tuple[Any, pl.DataFrame]]":
         """Yield every value of an axis but the reference, with the pairs that differ by it alone.
 
         Pairs have the columns of the other axes, `metric`, `reference_metric` and `difference`. An
@@ -158,89 +195,86 @@ class AnswerSource:
         """
         import polars as pl
 
-        values = self.frame.get_column(axis).unique(maintain_order=True).drop_nulls().to_list()
+        values = frame.get_column(axis).unique(maintain_order=True).drop_nulls().to_list()
         if reference not in values:
             raise InputError(
-                f"no variant with {self.metric} has {axis} = {reference!r}"
-                f"{suggest(reference, values)}"
+                f"no variant with {metric} has {axis} = {reference!r}{suggest(reference, values)}"
             )
         others = [column for column in self.columns if column != axis]
-        of_reference = self.frame.filter(pl.col(axis) == reference)
+        of_reference = frame.filter(pl.col(axis) == reference)
         for value in (value for value in values if value != reference):
-            of_value = self.frame.filter(pl.col(axis) == value)
+            of_value = frame.filter(pl.col(axis) == value)
             sides = (of_value, of_reference)
             keys = [c for c in others if all(side[c].null_count() < len(side) for side in sides)]
-            pairs = of_value.select(*others, metric=self.metric).join(
-                of_reference.select(*keys, reference_metric=self.metric),
+            pairs = of_value.select(*others, metric=metric).join(
+                of_reference.select(*keys, reference_metric=metric),
                 on=keys, how="inner", nulls_equal=True,
             )  # fmt: skip
             difference = pl.col("metric") - pl.col("reference_metric")
             yield value, pairs.with_columns(difference=difference)
 
-    def summary(self, axes: Sequence[str], by: Sequence[str]) -> "pl.DataFrame":
-        """Return the mean of the metric for each combination of values of axes.
+    def summary(
+        self, metric: str, axes: Sequence[str], by: Sequence[str] | None = None
+    ) -> "pl.DataFrame":
+        """Return the mean of a metric for each combination of values of axes, with intervals.
 
         Raises:
-            InputError: There is no such axis.
+            InputError: There is no such metric or axis.
         """
-        import polars as pl
+        frame = self.with_metric(metric)
+        check_axes(axes, frame.columns)
+        return group_means(frame, metric, axes, self._units(by))
 
-        check_axes(axes, self.frame.columns)
-        units = [column for column in by if column not in axes]
-        groups = self.frame.partition_by(list(axes), as_dict=True) if axes else {(): self.frame}
-        rows = []
-        for key, group in groups.items():
-            mean = estimate_units(group, units, self.metric)
-            labels = dict(zip(axes, key, strict=True))
-            spread = float(group[self.metric].std() or 0.0)
-            rows.append(
-                {**labels, "mean": mean.mean, "low": mean.low, "high": mean.high,
-                 "deviation": spread, "variants": len(group)}
-            )  # fmt: skip
-        return pl.DataFrame(rows, infer_schema_length=None)
-
-    def effects(self, axes: Sequence[str], by: Sequence[str]) -> "pl.DataFrame":
-        """Return for each value of each axis the difference of its mean to the mean of all values.
+    def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
+        """Return the main effect of each value of each axis: its mean minus the mean of all.
 
         Differences are taken within units, so that differences between homes and lives don't count.
+
+        Raises:
+            InputError: There is no such metric.
         """
         import polars as pl
 
+        frame, units = self.with_metric(metric), self._units(by)
         rows = []
-        for axis in axes:
-            applicable = self.frame.filter(pl.col(axis).is_not_null())
+        for axis in (column for column in self.columns if column not in self.populations):
+            applicable = frame.filter(pl.col(axis).is_not_null())
             labels = applicable.get_column(axis).unique(maintain_order=True).to_list()
             if len(labels) < 2:
                 continue
-            cells = by_units(applicable, [*by, axis], self.metric)
-            unit, value = list(by) or [pl.lit(0)], pl.col(self.metric)
-            cells = cells.with_columns(value - value.mean().over(unit))
+            cells = by_units(applicable, [*units, axis], metric)
+            value = pl.col(metric)
+            cells = cells.with_columns(value - value.mean().over(list(units) or [pl.lit(0)]))
             for label in labels:
-                effect = estimate_units(cells.filter(pl.col(axis) == label), by, self.metric)
+                effect = estimate_units(cells.filter(pl.col(axis) == label), units, metric)
                 rows.append((axis, str(label), effect.mean, effect.low, effect.high))
         schema = {"axis": pl.String, "value": pl.String}
         floats = dict.fromkeys(("effect", "low", "high"), pl.Float64)
         return pl.DataFrame(rows, schema={**schema, **floats}, orient="row")
 
-    def variance_shares(self) -> "pl.DataFrame":
-        """Return the share of the metric's variance by axis and by the interaction of two axes.
+    def shares(self, metric: str) -> "pl.DataFrame":
+        """Return the share of a metric's variance by axis, and by pairs of axes beyond both.
 
         The largest share comes first, what is left over last. In designs that are not balanced the
         shares may overlap.
+
+        Raises:
+            InputError: There is no such metric.
         """
         import polars as pl
 
-        values = self.frame[self.metric]
+        frame = self.with_metric(metric)
+        values = frame[metric]
         total = float(((values - values.mean()) ** 2).sum()) if len(values) else 0.0
-        varying = [c for c in self.columns if self.frame[c].n_unique() > 1]
+        varying = [c for c in self.columns if frame[c].n_unique() > 1]
         rows: list[tuple[str, float]] = []
         if total > 0:
-            squares = {column: self._between(column) for column in varying}
+            squares = {column: _between(frame, metric, column) for column in varying}
             rows += [(column, square / total) for column, square in squares.items()]
             for a, b in itertools.combinations(varying, 2):
                 # With one variant a cell it is the residual, no interaction.
-                if self.frame.select(a, b).n_unique() < len(values):
-                    joint = self._between(a, b) - squares[a] - squares[b]
+                if frame.select(a, b).n_unique() < len(values):
+                    joint = _between(frame, metric, a, b) - squares[a] - squares[b]
                     rows.append((f"{a} × {b}", joint / total))
             rows = [(source, share if share > NOISE else 0.0) for source, share in rows]
             rows.sort(key=lambda row: -row[1])
@@ -248,14 +282,42 @@ class AnswerSource:
             rows.append((RESIDUAL, rest if rest > NOISE else 0.0))
         return pl.DataFrame(rows, schema={"source": pl.String, "share": pl.Float64}, orient="row")
 
-    def _between(self, *columns: str) -> float:
-        """Return the sum of squares between the groups of equal values of columns."""
-        import polars as pl
+    def _units(self, by: Sequence[str] | None, compared: Iterable[str] = ()) -> tuple[str, ...]:
+        units = tuple(by or ())
+        if by is None:
+            units = tuple(c for c in self.populations if c not in compared)
+        check_axes(units, self.columns)
+        return units
 
-        groups = self.frame.group_by(columns, maintain_order=True)
-        cells = groups.agg(pl.col(self.metric).mean(), pl.len().alias(VARIANT))
-        mean = float(self.frame[self.metric].mean())
-        return sum_in_order((cells[VARIANT] * (cells[self.metric] - mean) ** 2).to_list())
+
+def group_means(
+    frame: "pl.DataFrame", column: str, axes: Sequence[str], by: Sequence[str]
+) -> "pl.DataFrame":
+    """Return the mean of a column for each combination of values of axes, with intervals."""
+    import polars as pl
+
+    units = [unit for unit in by if unit not in axes]
+    groups = frame.partition_by(list(axes), as_dict=True) if axes else {(): frame}
+    rows = []
+    for key, group in groups.items():
+        mean = estimate_units(group, units, column)
+        labels = dict(zip(axes, key, strict=True))
+        spread = float(group[column].std() or 0.0)
+        rows.append(
+            {**labels, "mean": mean.mean, "low": mean.low, "high": mean.high,
+             "deviation": spread, "variants": len(group)}
+        )  # fmt: skip
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _between(frame: "pl.DataFrame", metric: str, *columns: str) -> float:
+    """Return the sum of squares between the groups of equal values of columns."""
+    import polars as pl
+
+    groups = frame.group_by(columns, maintain_order=True)
+    cells = groups.agg(pl.col(metric).mean(), pl.len().alias(VARIANT))
+    mean = float(frame[metric].mean())
+    return sum_in_order((cells[VARIANT] * (cells[metric] - mean) ** 2).to_list())
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

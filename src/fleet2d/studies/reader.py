@@ -1,15 +1,14 @@
 """Reading a study: its variants and its tables as one data set that needn't fit into memory."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import ArtifactError, InputError, extra
-from fleet2d.studies.answers import AnswerSource, check_axes
+from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, Counts, StudyDirectory
-from fleet2d.studies.intervals import POWER
 from fleet2d.studies.parts import TABLES, Part, plain_schema, with_variant
 from fleet2d.studies.records import RESULT_COLUMNS, VARIANT, VariantRecord, read_journal
 from fleet2d.studies.storage import damaged
@@ -25,12 +24,14 @@ if TYPE_CHECKING:
     from fleet2d.studies.specification import PairedComparison
 
 
-class Study:
+class Study(StudyAnswers):
     """A study that was run completely or partly.
 
     Attributes:
         location: The folder or store, without secrets.
         meta: Its description: name, columns, populations, comparisons.
+        columns: The columns of the axes, the seed last.
+        populations: The columns whose values are a sample of a population.
 
     Example:
         >>> study = open_study("studies/speed")  # doctest: +SKIP
@@ -42,6 +43,7 @@ class Study:
         self._directory = directory
         self.location = directory.location
         self.meta = directory.read_meta()
+        self.columns, self.populations = self.meta.columns, self.meta.populations
 
     def __repr__(self) -> str:
         """Return its location and its progress."""
@@ -87,11 +89,6 @@ class Study:
 
         with self._directory.storage.reading(META):
             return tuple(map(PairedComparison.model_validate, self.meta.compare))
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The columns of the axes, the seed last."""
-        return self.meta.columns
 
     @property
     def metrics(self) -> tuple[str, ...]:
@@ -250,111 +247,12 @@ class Study:
         """The variants that are complete."""
         return self.variants.filter(_polars().col("status") == "complete")
 
-    def paired(
-        self,
-        metric: str,
-        against: Mapping[str, Any],
-        by: Sequence[str] | None = None,
-        within: Sequence[str] = (),
-        *,
-        variants: Sequence[int] | None = None,
-    ) -> "pl.DataFrame":
-        """Compare the values of an axis with one of them, pair by pair.
-
-        A pair is two variants that differ by that axis alone: same home, same people, same seed,
-        and so the same lives of the people.
-
-        Args:
-            metric: A number, such as `ltp_error.ana.tv`.
-            against: The axis and its reference value, as in {"robot": "patrol"}.
-            by: Columns of the units over which intervals hold; None: homes, people and seeds.
-            within: Axes with a comparison for each of their values; over other axes the differences
-                are averaged.
-            variants: Numbers of the variants to compare; None: all.
-
-        Returns:
-            A row for each other value: mean, reference, difference, low and high (95 %), relative
-            (to the size of the reference), effect_size (in standard deviations of the units'
-            differences), p, p_holm (corrected for the rows of this table), pairs, n_UNIT,
-            variance_ratio (of unpaired to paired differences), and a verdict in words.
-
-        Raises:
-            InputError: There is no such metric, axis or value.
-        """
-        source = self._answers(metric, variants)
-        return source.paired(against, self._units(by, against), within)
-
-    def differences(
-        self, metric: str, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
-    ) -> "pl.DataFrame":
-        """Return the mean difference to the reference in each unit, such as each home.
-
-        With `within`, a row for each value of other axes and each unit.
-
-        Raises:
-            InputError: There is no such metric, axis or value.
-        """
-        return self._answers(metric).differences(against, unit, within)
-
-    def power(
-        self,
-        metric: str,
-        against: Mapping[str, Any],
-        effect: float | None = None,
-        *,
-        power: float = POWER,
-        by: Sequence[str] | None = None,
-    ) -> "pl.DataFrame":
-        """Return how many homes and seeds detect an effect, from how much they vary in this study.
-
-        Args:
-            metric: A number, such as `ltp_error.ana.tv`.
-            against: The axis and its reference value, as in {"robot": "patrol"}.
-            effect: The difference to detect; None: return the difference that each size detects.
-            power: The share of studies whose interval would exclude zero.
-            by: Columns of the units; None: homes, people and seeds.
-
-        Raises:
-            InputError: There is no such metric, axis or value, or less than two units.
-        """
-        return self._answers(metric).power(against, self._units(by, against), effect, power)
-
-    def summary(
-        self, metric: str, axes: Sequence[str], by: Sequence[str] | None = None
-    ) -> "pl.DataFrame":
-        """Return the mean of a metric for each combination of values of axes, with intervals.
-
-        Raises:
-            InputError: There is no such metric or axis.
-        """
-        return self._answers(metric).summary(axes, self._units(by))
-
-    def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
-        """Return the main effect of each value of each axis: its mean minus the mean of all.
+    def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
+        """Return the variants that are complete and have a metric, or some of them by number.
 
         Raises:
             InputError: There is no such metric.
         """
-        fixed = [column for column in self.columns if column not in self.meta.populations]
-        return self._answers(metric).effects(fixed, self._units(by))
-
-    def shares(self, metric: str) -> "pl.DataFrame":
-        """Return the share of a metric's variance by axis, and by pairs of axes beyond both.
-
-        Raises:
-            InputError: There is no such metric.
-        """
-        return self._answers(metric).variance_shares()
-
-    def _units(self, by: Sequence[str] | None, compared: Iterable[str] = ()) -> tuple[str, ...]:
-        units = tuple(by or ())
-        if by is None:
-            units = tuple(c for c in self.meta.populations if c not in compared)
-        check_axes(units, self.columns)
-        return units
-
-    def _answers(self, metric: str, variants: Sequence[int] | None = None) -> AnswerSource:
-        """Return a metric in the complete variants, or in some of them."""
         if metric not in self.metrics:
             hint = did_you_mean(metric, self.metrics)
             raise InputError(
@@ -363,9 +261,7 @@ class Study:
             )
         pl = _polars()
         frame = self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
-        if variants is not None:
-            frame = frame.filter(pl.col(VARIANT).is_in(list(variants)))
-        return AnswerSource(frame, self.columns, metric)
+        return frame if variants is None else frame.filter(pl.col(VARIANT).is_in(list(variants)))
 
     @cached_property
     def _parts(self) -> list[Part]:

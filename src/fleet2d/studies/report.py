@@ -210,7 +210,7 @@ class _Page:
         from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
 
         study, name, label = self.study, _file_name(metric), self._label(metric)
-        frame = self._shortened(study._answers(metric).frame)
+        frame = self._shortened(study.with_metric(metric))
         if not len(frame):
             return
         yield f"<h2>{html.escape(metric)}</h2>{self._describe(metric)}"
