@@ -118,7 +118,7 @@ def test_a_server_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) 
 def test_a_file_location_is_a_folder_like_others(tmp_path: Path) -> None:
     storage = Storage((tmp_path / "new" / "study").as_uri())
     storage.write("results/a.txt", b"a")
-    assert storage.is_local
+    assert storage.folder is not None
     assert b"a" == (tmp_path / "new" / "study" / "results" / "a.txt").read_bytes()
     assert str(tmp_path / "new" / "study") == storage.location
 

@@ -8,8 +8,8 @@ assume normal distributions, and they are open where the log bounds a parameter 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,8 +52,7 @@ class Factor:
         return share_of(value)
 
 
-@dataclass(frozen=True)
-class ParameterEstimate:
+class ParameterEstimate(NamedTuple):
     """A parameter: its most likely value and its 95 % interval.
 
     Attributes:
@@ -73,8 +72,7 @@ class ParameterEstimate:
         return f"{self.value:.3g} ({low} to {high})"
 
 
-@dataclass(frozen=True)
-class Fit:
+class Fit(NamedTuple):
     """The parameters of a maximum of the likelihood.
 
     Attributes:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,8 +222,7 @@ def _number(text: str) -> float:
         return math.nan
 
 
-@dataclass(frozen=True)
-class ProbabilityGroup:
+class ProbabilityGroup(NamedTuple):
     """Rows of similar predicted probability.
 
     Attributes:
@@ -268,8 +267,7 @@ class FittedProbability:
         return float(chi2.sf(self.chi_square, max(1, len(self.groups) - 2)))
 
 
-@dataclass(frozen=True)
-class Recognition:
+class Recognition(NamedTuple):
     """How users are recognized.
 
     Attributes:

@@ -204,7 +204,7 @@ class _Fitter:
         tasks, rest = self._tasks(days)
         return {
             "wake": _timing(wakes),
-            "sleep": {**_timing(beds), "at_least": _minutes(max(1, min(shortest, least_night)))},
+            "sleep": {**_timing(beds), "at_least": f"{max(1, min(shortest, least_night))} min"},
             "do": tasks,
             "leisure": self._leisure(rest, min(wakes), kind),
         }
@@ -296,7 +296,7 @@ class _Fitter:
             rooms = Counter(places[run.state].place for run in up)
             usual = max(rooms, key=lambda place: (rooms[place], place))
             fields |= {
-                "fetches": _minutes(max(1, asleep // len(up))),
+                "fetches": f"{max(1, asleep // len(up))} min",
                 "fetches_from": [usual, "any"],
                 "fetch_takes": _takes(up),
             }
@@ -398,7 +398,7 @@ def _timing(begins: Sequence[int]) -> dict[str, Any]:
     first, last = min(begins), max(begins)
     return {
         "at": _clock(min(max(round(mean), first), last)),
-        "spread": _minutes(max(1, round(std))),
+        "spread": f"{max(1, round(std))} min",
         "between": [_clock(first), _clock(last)],
     }
 
@@ -417,10 +417,6 @@ def _takes(done: Sequence[Stretch]) -> dict[str, Any]:
 
 def _clock(minute: int) -> str:
     return f"{minute // 60 % 24:02}:{minute % 60:02}"
-
-
-def _minutes(minutes: int) -> str:
-    return f"{minutes} min"
 
 
 def _seconds(seconds: int) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -129,8 +129,7 @@ SWITCHES = ("key_frames", "observations", "events", "decisions")
 """Keys of `artifacts` that are named after their tables."""
 
 
-@dataclass(frozen=True)
-class AxisPlan:
+class AxisPlan(NamedTuple):
     """An axis with its choices.
 
     Attributes:
@@ -148,8 +147,7 @@ class AxisPlan:
     changes: tuple[Document, ...]
 
 
-@dataclass(frozen=True)
-class RulePlan:
+class RulePlan(NamedTuple):
     """A change of the scenario for all variants that fulfil a condition on columns."""
 
     when: Mapping[str, Any]

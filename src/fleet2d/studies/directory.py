@@ -216,7 +216,7 @@ class StudyDirectory:
             part = None
             try:
                 part = Part.read(self.storage, record)
-                problem = part.problem(self.storage, checksums=self.storage.is_local)
+                problem = part.problem(self.storage, checksums=self.storage.folder is not None)
                 count = f"the {part.variants} variants of that part"
             except RunDirectoryError as error:
                 self.storage.path(record)  # refuses a link

@@ -416,7 +416,7 @@ class _ResultKeeper:
             self._journal = self._directory.open_journal(self._parts)
         self._journal.append(record)
         age_s = time.monotonic() - self._commit_time
-        is_due = not self._directory.storage.is_local and age_s > PART_S_REMOTE
+        is_due = self._directory.storage.folder is None and age_s > PART_S_REMOTE
         if is_due or self._journal.size > PART_BYTES:
             self._commit(self._journal)
 

@@ -1,6 +1,5 @@
 """Executors: they run the tasks of a study in this process, in others, or on a cluster."""
 
-import itertools
 import math
 import multiprocessing
 import os
@@ -16,7 +15,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from fleet2d.errors import InputError
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
@@ -25,8 +24,6 @@ TASKS_PER_WORKER = 2  # tasks of a worker: one runs, one waits, so that it is ne
 MAX_ATTEMPTS = 3  # of a task whose worker dies each time
 MAX_STARTS = 3  # of a worker that ends before it is ready
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
-
-_numbers = itertools.count()
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +117,7 @@ class TaskSchedule:
         return task
 
 
-@dataclass(frozen=True)
-class FinishedTask:
+class FinishedTask(NamedTuple):
     """A finished task with its results."""
 
     task: WorkerTask
@@ -129,8 +125,7 @@ class FinishedTask:
     attempts: int
 
 
-@dataclass(frozen=True)
-class LostTask:
+class LostTask(NamedTuple):
     """A task without results, as its worker died in each attempt; with the reason."""
 
     task: WorkerTask
@@ -165,28 +160,24 @@ class SerialExecutor:
             yield FinishedTask(task, job(task), 1)
 
 
-@dataclass(frozen=True)
 class Ready:
     """The message of a worker that is set up."""
 
 
-@dataclass(frozen=True)
-class Broken:
+class Broken(NamedTuple):
     """The message of a worker that can't be set up, with the traceback."""
 
     trace: str
 
 
-@dataclass(frozen=True)
-class Done:
+class Done(NamedTuple):
     """The message of a worker that has done its first task, with its memory [MB]."""
 
     payload: Any
     rss_mb: float = 0.0
 
 
-@dataclass(frozen=True)
-class Died:
+class Died(NamedTuple):
     """What the driver notes about a worker that has ended, with the reason."""
 
     reason: str
@@ -197,13 +188,11 @@ class Worker:
     """A worker, as the driver knows it.
 
     Attributes:
-        number: Its number, by which schedules know it.
         tasks: Its tasks; it is running the first.
         is_ready: Whether it is set up. Until then it gets no tasks.
         is_full: Whether it uses so much memory that it must be replaced.
     """
 
-    number: int = field(default_factory=lambda: next(_numbers), init=False)
     tasks: deque[WorkerTask] = field(default_factory=deque, init=False)
     is_ready: bool = field(default=False, init=False)
     is_full: bool = field(default=False, init=False)
@@ -272,10 +261,10 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
         self._end(full)
         for worker in full:
             self._crew.remove(worker)
-            tasks.leave(worker.number)
+            tasks.leave(worker)
         for worker in self._crew:
             while worker.is_ready and not worker.is_full and len(worker.tasks) < TASKS_PER_WORKER:
-                task = tasks.take(worker.number)
+                task = tasks.take(worker)
                 if task is None:
                     break
                 worker.tasks.append(task)
@@ -304,7 +293,7 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
     def _replace(self, worker: AnyWorker, reason: str, tasks: TaskSchedule) -> LostTask | None:
         """Drop a dead worker; return the task that it ran if that was the last attempt."""
         self._crew.remove(worker)
-        tasks.leave(worker.number)
+        tasks.leave(worker)
         if not worker.is_ready:
             self._failed_starts += 1
             if self._failed_starts >= MAX_STARTS * self.workers:

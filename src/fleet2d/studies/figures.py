@@ -149,19 +149,16 @@ def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
     """Draw the mean of a metric by the values of each axis, one panel for each axis."""
     figure, panels = _panels(2.8, len(tables))
     for panel, (axis, table) in zip(panels, tables.items(), strict=True):
-        rows = table.to_dicts()
-        x = np.arange(len(rows))
-        means = np.array([row["mean"] for row in rows])
-        ends = np.array([[row["low"], row["high"]] for row in rows])
-        is_numeric = all(isinstance(row[axis], int | float) for row in rows)
-        if is_numeric:
-            x = np.array([row[axis] for row in rows], np.float64)
+        labels, means = table[axis].to_list(), table["mean"].to_numpy()
+        ends = table.select("low", "high").to_numpy()
+        is_numeric = all(isinstance(label, int | float) for label in labels)
+        x = np.array(labels, np.float64) if is_numeric else np.arange(len(labels))
         finite = np.isfinite(ends).all(axis=1)
         errors = np.abs(ends[finite] - means[finite, None]).T
         panel.errorbar(x[finite], means[finite], yerr=errors, fmt="none", ecolor=PALE, lw=2)
         panel.plot(x, means, "o-" if is_numeric else "o", color=COLORS[0], ms=5, lw=1)
         if not is_numeric:
-            _label(panel, [str(row[axis]) for row in rows])
+            _label(panel, [str(label) for label in labels])
         panel.set_xlabel(axis)
     _label_y(panels[0], label)
     return figure

@@ -5,7 +5,8 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -137,11 +138,6 @@ class PlannedVariants:
         index = int(self.index[place])
         home = self.home_keys[self.home[index // self.seeds]]
         return WorkerTask(int(self.number[place]), index, unpacked(self.identity[place]), home)
-
-    @property
-    def homes(self) -> I32:
-        """The home of each variant, an index of `home_keys`: int32 (n,)."""
-        return self.home[self.index // self.seeds]
 
     @property
     def total_simulated_s(self) -> float:
@@ -333,7 +329,7 @@ class PlanSchedule(TaskSchedule):
     def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
         """Group variants, by their places, by home."""
         super().__init__()
-        homes = variants.homes[places]
+        homes = variants.home[variants.index[places] // variants.seeds]
         _, first = np.unique(homes, return_index=True)
         for home in homes[np.sort(first)].tolist():
             tasks = PlannedTasks(variants, places[homes == home].astype(np.int32))
@@ -369,26 +365,20 @@ def _covering(design: Design, numbers: NDArray[np.integer[Any]]) -> Iterator[int
         yield int(numbers[0])
 
 
-@dataclass
-class SetupJob:
-    """Sets variants up without running them, to find errors.
+def setup_problem(design: Design, trust: Trust | None, task: WorkerTask) -> str:
+    """Set a variant up without running it; return the error, empty if there is none.
 
-    Attributes:
+    Args:
         design: The design.
-        trust: The code that workers may run; None: any.
+        trust: The code that may run; None: any.
+        task: The variant.
     """
-
-    design: Design
-    trust: Trust | None = field(default_factory=current_trust)
-
-    def __call__(self, task: WorkerTask) -> str:
-        """Return the error of a variant's set-up; empty if there is none."""
-        try:
-            with restrict(self.trust):
-                check_setup(self.design.scenario(task.index))
-        except Fleet2DError as error:
-            return str(error)
-        return ""
+    try:
+        with restrict(trust):
+            check_setup(design.scenario(task.index))
+    except Fleet2DError as error:
+        return str(error)
+    return ""
 
 
 def check_setups(
@@ -402,7 +392,8 @@ def check_setups(
     problems: dict[int, str] = {}
     tasks = list(map(plan.variants.task, setups_to_check(plan)))
     runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
-    with closing(runner.run(SetupJob(plan.design), TaskSchedule(tasks))) as events:
+    job = partial(setup_problem, plan.design, current_trust())
+    with closing(runner.run(job, TaskSchedule(tasks))) as events:
         for done, event in enumerate(events):
             on_progress(done + 1, len(tasks))
             text = event.reason if isinstance(event, LostTask) else event.payload

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -41,8 +41,7 @@ MODEL_ERROR = 0.15  # of a forecast: machines change their speed, runs their fir
 MIN_FREEDOM = 3  # of the differences within strata
 
 
-@dataclass(frozen=True)
-class Forecast:
+class Forecast(NamedTuple):
     """The time that a study will take if other programs go on as they do now.
 
     Attributes:
@@ -58,8 +57,7 @@ class Forecast:
     core_share: float
 
 
-@dataclass(frozen=True)
-class SpeedSample:
+class SpeedSample(NamedTuple):
     """What one variant of a study takes.
 
     Attributes:

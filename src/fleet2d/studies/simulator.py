@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from fleet2d.engine.basis import input_files as input_files
 from fleet2d.engine.simulation import Simulation, run
@@ -165,8 +165,7 @@ def flat_numbers(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple
             yield f"{prefix}{name}", float(value)
 
 
-@dataclass(frozen=True)
-class RunSpeed:
+class RunSpeed(NamedTuple):
     """How fast a scenario runs on this machine.
 
     Attributes:

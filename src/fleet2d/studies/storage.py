@@ -120,11 +120,6 @@ class Storage:
             self.folder = Path(source).absolute()
             self.filesystem, self.root = pafs.LocalFileSystem(), str(self.folder)
 
-    @property
-    def is_local(self) -> bool:
-        """Whether it is a local folder."""
-        return self.folder is not None
-
     def path(self, name: str) -> str:
         """Return the path of a file in the file system.
 

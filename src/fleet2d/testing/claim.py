@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -25,8 +25,7 @@ ATTRIBUTE = "fleet2d_claim"
 HOME, HOUSEHOLD = "home", "household"
 
 
-@dataclass(frozen=True)
-class RateTest:
+class RateTest(NamedTuple):
     """A sequential test of a claimed rate, such as that a test holds in 95 % of trials.
 
     This is Wald's sequential probability ratio test (Ann. Math. Statist. 16(2), 1945, 117-186),

@@ -4,10 +4,10 @@ import re
 import shlex
 import shutil
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fleet2d.errors import Fleet2DError
 from fleet2d.runtime.clock import Clock
@@ -31,8 +31,7 @@ MAX_SEEDS_SHOWN = 8
 FILM_STEPS = 30  # before and after a failure
 
 
-@dataclass(frozen=True)
-class FailingCase:
+class FailingCase(NamedTuple):
     """A failing run, reduced so far.
 
     Attributes:
@@ -53,16 +52,11 @@ class FailingCase:
         simulation = self.variant.scenario.simulation
         end = simulation.start + simulation.duration
         people = ", ".join(self.variant.scenario.users) or "nobody"
-        number = f"{self.interventions} of {self.result.interventions} interventions"
+        number = len(self.result.acts)
+        shown = f", {number - len(self.without)} of {number} interventions" if number else ""
         return (
-            f"{simulation.start:%a %d %b %H:%M:%S} to {end:%a %d %b %H:%M:%S}, with {people}"
-            f"{f', {number}' if self.result.interventions else ''}"
+            f"{simulation.start:%a %d %b %H:%M:%S} to {end:%a %d %b %H:%M:%S}, with {people}{shown}"
         )
-
-    @property
-    def interventions(self) -> int:
-        """Number of remaining interventions."""
-        return self.result.interventions - len(self.without)
 
     @property
     def step(self) -> int:
@@ -159,7 +153,7 @@ class Shrinker:
 
     def _undone(self, case: FailingCase) -> FailingCase:
         """Leave out interventions, the last first."""
-        for number in reversed(range(case.result.interventions)):
+        for number in reversed(range(len(case.result.acts))):
             if not self._is_about(case, case.result.acts[number]):
                 case = self._try(case, case.variant, case.without | {number}) or case
         for number in reversed(range(len(case.variant.scenario.script))):

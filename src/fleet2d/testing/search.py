@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import TypeAdapter
 
@@ -26,7 +26,7 @@ from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTa
 from fleet2d.studies.simulator import describe_error
 from fleet2d.studies.tuning import suggested
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
-from fleet2d.testing.trials import Body, Trial, TrialResult, run_trial
+from fleet2d.testing.trials import Body, TrialResult, run_trial
 
 if TYPE_CHECKING:
     import optuna
@@ -41,8 +41,7 @@ MIN_RANDOM_POINTS = 10
 CANDIDATES = 64
 
 
-@dataclass(frozen=True)
-class SearchSpace:
+class SearchSpace(NamedTuple):
     """The dimensions of a search, by name: ranges of numbers, and lists of choices.
 
     Example:
@@ -169,7 +168,9 @@ class TryJob:
         Raises:
             InputError: There is no such test.
         """
-        return _empty_test if self.test is None else claimed_test(*self.test)[0]
+        if self.test is None:
+            return lambda _: None  # the expectations are in the scenario
+        return claimed_test(*self.test)[0]
 
     def scenario(self, point: Settings, seed: int) -> Scenario:
         """Return the scenario of a point.
@@ -216,8 +217,7 @@ class TryJob:
         return pickle.dumps((result.margin, what, None))
 
 
-@dataclass(frozen=True)
-class FailingPoint:
+class FailingPoint(NamedTuple):
     """A point of the search space at which the run fails.
 
     Attributes:
@@ -379,10 +379,6 @@ def _optuna(seed: int, startup: int) -> "optuna.Study":
         seed=seed, n_startup_trials=startup, n_ei_candidates=CANDIDATES, constant_liar=True
     )
     return optuna.create_study(sampler=sampler)
-
-
-def _empty_test(trial: Trial) -> None:
-    """Do nothing: the expectations are in the scenario."""
 
 
 def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:

@@ -208,11 +208,6 @@ class TrialResult:
     untested: str = ""
 
     @property
-    def interventions(self) -> int:
-        """Number of interventions."""
-        return len(self.acts)
-
-    @property
     def margin(self) -> float:
         """The smallest margin of all expectations, -1 to 1; 1 without expectations."""
         margins = [result.margin for result in (*self.results, *self.failures)]
