@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from fleet2d.errors import ArtifactError, RunDirectoryError, blame, own_frames
+from fleet2d.errors import ArtifactError, RunDirectoryError, blame, os_errors_as, own_frames
 from fleet2d.options import TrustFiles, TrustFolders, file_name, resume_hint, split, trust_of
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
@@ -256,20 +256,14 @@ def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> 
 
 def _fresh_directory(name: str) -> Path:
     """Create and return runs/NAME-001, or the directory of the first free number."""
-    stem = file_name(name) or "run"
-    number = 1
+    stem, number, advice = file_name(name) or "run", 1, "; name another directory by --out"
     while True:
         directory = Path("runs") / f"{stem}-{number:03d}"
-        try:
+        refusal = os_errors_as(RunDirectoryError, f"{directory} can't be created", advice)
+        with refusal, suppress(FileExistsError):
             directory.mkdir(parents=True)  # at once, so that a parallel run takes the next
-        except FileExistsError:
-            number += 1
-        except OSError as error:
-            raise RunDirectoryError(
-                f"{directory} can't be created: {error.strerror}; name another directory by --out"
-            ) from error
-        else:
             return directory
+        number += 1
 
 
 def resume(

@@ -17,7 +17,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import Trust, restrict
 from fleet2d.engine.simulation import Simulation
-from fleet2d.errors import Fleet2DError, InputError, extra
+from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
 from fleet2d.runs.run import Run, open_run
 from fleet2d.scenario.model import load_scenario
 
@@ -232,10 +232,8 @@ class Workspace:
             column, text = rows[parts[0]], parts[2].strip("'\"")
             if pa.types.is_dictionary(column.type):
                 column = pc.cast(column, pa.string())
-            try:
+            with errors_as(InputError, repr(where), pa.ArrowException):
                 value = pa.scalar(text).cast(column.type)
-            except pa.ArrowException as error:
-                raise InputError(f"{where!r}: {error}") from None
             rows = rows.filter(getattr(pc, _OPERATORS[parts[1]])(column, value))
         for name in columns or ():
             check_known(name, "column", rows.column_names, InputError)
@@ -287,10 +285,8 @@ class Workspace:
             if ":" in until:
                 run.run_until(until)
             else:
-                try:
+                with errors_as(InputError, of=PydanticCustomError):
                     passed = parse_duration(until)
-                except PydanticCustomError as error:
-                    raise InputError(error.message()) from None
                 run.advance(round(passed.total_seconds() * 1e6 / run.clock.step_us))
         return {
             "time": run.time.isoformat(),

@@ -20,7 +20,7 @@ from fleet2d.configuration.trust import current_trust
 from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
-from fleet2d.errors import InputError, extra, os_errors_as
+from fleet2d.errors import InputError, errors_as, extra, os_errors_as
 from fleet2d.live.bridge import LiveStep, Peer, Post, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
@@ -242,10 +242,8 @@ def open_peer(address: str) -> Peer:
         fleet2d.errors.InputError: 'wss://here:1' is not the address of a peer: did you mean 'ws'? \
 Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX
     """
-    try:
+    with errors_as(InputError, of=PydanticCustomError):
         parts = parse_peer_address(address)
-    except PydanticCustomError as error:
-        raise InputError(error.message()) from None
     host, port = parts.hostname or "127.0.0.1", parts.port
     if parts.scheme == "udp":
         return UdpPeer(host, port or 0)

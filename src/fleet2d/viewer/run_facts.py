@@ -13,7 +13,7 @@ from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.home_object import Door
-from fleet2d.errors import ArtifactError
+from fleet2d.errors import ArtifactError, errors_as
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
@@ -203,13 +203,11 @@ def _observations(run: Run) -> Iterator[Any]:
     if path is None or not path.is_file():
         yield run.tables["observations"]
         return
-    try:
+    with errors_as(ArtifactError, f"{path} can't be read", (pa.ArrowException, OSError)):
         file = pq.ParquetFile(path)
         names = [name for name in columns if name in file.schema_arrow.names]
         for batch in file.iter_batches(BATCH_ROWS, columns=names):
             yield pa.Table.from_batches([batch])
-    except (pa.ArrowException, OSError) as error:
-        raise ArtifactError(f"{path} can't be read: {error}") from None
 
 
 def _are_false(table: Any) -> Bool:
