@@ -255,7 +255,6 @@ class PlaceAt(NamedTuple):
 
     Attributes:
         thing: The object.
-        name: Its name.
         x: Where the body is while it uses it [lattice].
         y: Likewise.
         heading: Where the body faces [1/4096 turn].
@@ -264,7 +263,6 @@ class PlaceAt(NamedTuple):
     """
 
     thing: PlacedObject
-    name: str
     x: int
     y: int
     heading: int
@@ -426,7 +424,7 @@ class Body:
         x, y = lattice.point_at((use.x, use.y))
         heading = round(use.heading / (2 * np.pi) * TURN) % TURN
         approach = home.approach(use, self.space, self.part)
-        at = PlaceAt(thing, thing.name, x, y, heading, use.posture, approach)
+        at = PlaceAt(thing, x, y, heading, use.posture, approach)
         self._places[2][name, place] = at
         return at
 

@@ -136,9 +136,8 @@ MAX_CORRECTION_INTERVAL = timedelta(days=1)
 MINUTE_US = 60_000_000
 # Noise is in 1/65536 of the unit of what it is added to, per unit of random_bell.
 FINE = 1 << 16
-PURPOSES = (
-    "drift x", "drift y", "turn", "left x", "left y", "jump x", "jump y", "jumps", "when",
-)  # fmt: skip
+ALONG_AXES = [f"{kind} {axis}" for kind in ("drift", "left", "jump") for axis in "xy"]
+PURPOSES = (*ALONG_AXES, "turn", "jumps", "when")
 
 
 class Localization(Settings):

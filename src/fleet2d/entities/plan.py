@@ -187,7 +187,7 @@ class Plan:
             self._step_to(at.x, at.y)
             self.turn_to(at.heading)
         self.take(at.posture)
-        return self.note("uses", at.name)
+        return self.note("uses", at.thing.name)
 
     def take(self, posture: Posture) -> Self:
         """Stand, sit or lie from the present end of the plan until the next walk."""

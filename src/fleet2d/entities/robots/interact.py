@@ -449,7 +449,7 @@ class Opportunistic(Behavior):
         check_has_camera(actor, "opportunistic")
         self.avoided = avoided_rooms(actor, "opportunistic.avoid", self.avoid)
         self.asked: tuple[Request, str] | None = None  # the request, as events named it
-        self.last_opportunity: dict[str, datetime] = {}  # by person
+        self.left_alone: dict[str, datetime] = {}  # until when each person isn't approached
 
     def decide(self, now: Situation) -> Plan | None:
         """Approach somebody in view, or leave the decision to later behaviors."""
@@ -463,11 +463,11 @@ class Opportunistic(Behavior):
             return plan.note("interaction_over", person)
         avoided = self.avoided | now.actor.banned(now.step)
         for name, (x, y) in sorted(now.in_view.items()):
-            last, is_meant = self.last_opportunity.get(name), not self.users or name in self.users
-            is_left_alone = last is not None and now.time - last < self.again
+            is_meant = not self.users or name in self.users
+            is_left_alone = self.left_alone.get(name, now.time) > now.time
             if not is_meant or is_left_alone or is_in_rooms(now, x, y, avoided):
                 continue
-            self.last_opportunity[name] = now.time
+            self.left_alone[name] = now.time + self.again
             if now.random(f"chance {name}").uniform() < self.chance:
                 return self._approach(now, name, x, y)
         return None
