@@ -100,7 +100,8 @@ def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
         "robots.astro.radius": [0.1, 0.12, 0.14, 0.16],
     }
     study_plan = plan(axes=axes, replicates=2)
-    setups = [study_plan.parameters(study_plan.variants[i]) for i in setups_to_check(study_plan)]
+    indices = [study_plan.variants[i].index for i in setups_to_check(study_plan)]
+    setups = [study_plan.design.parameters(index) for index in indices]
     assert 8 == len(setups)  # of 32 combinations
     for column in (SPEED, "robots.astro.radius"):
         assert 8 == len({(row["home"], row[column]) for row in setups})

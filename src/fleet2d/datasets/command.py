@@ -19,11 +19,8 @@ if TYPE_CHECKING:
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")]
 training = typer.Typer(help="Train models on data sets.", no_args_is_help=True)
-
-
-@training.callback()
-def _commands() -> None:
-    """Train models on data sets."""
+# A callback, as typer would otherwise drop the name of the only subcommand.
+training.callback()(lambda: None)
 
 
 def dataset(

@@ -6,8 +6,8 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -121,6 +121,7 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
     rooms = {
         (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
     }
+    files, evidence = data.manifest["files"], f"{split}/evidence-"
     kinds: Counter[str] = Counter()
     for run, place, count in labels.collect().iter_rows():
         kinds[rooms.get((run, place), AWAY)] += count
@@ -129,15 +130,9 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
         "days": sum(runs["days"].to_pylist()),
         "homes": len(set(runs["home"].to_pylist())),
         "labels": kinds.total(),
-        "evidence": sum(
-            record["rows"]
-            for name, record in data.manifest["files"].items()
-            if name.startswith(f"{split}/evidence-")
-        ),
+        "evidence": sum(files[name]["rows"] for name in files if name.startswith(evidence)),
         "household": Counter(runs["household"].to_pylist()),
-        "varied": Counter(
-            part for text in runs["varied"].to_pylist() for part in text.split("; ") if part
-        ),
+        "varied": Counter(filter(None, "; ".join(runs["varied"].to_pylist()).split("; "))),
         "place": kinds,
         "rooms in a home": Counter(str(n) for n in Counter(run for run, _ in rooms).values()),
     }
@@ -300,7 +295,8 @@ def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[st
             planned = [run for own in runs.values() for run in own]
             new = [run for run in planned if not _part_path(root, run).is_file()]
             bar.advance(task, len(planned) - len(new))
-            writer = PartWriter(root, {run.seed: run for run in new}, plan.file.labels)
+            by_seed = {run.seed: run for run in new}
+            writer = partial(write_part, root, by_seed, plan.file.labels)
             scenarios = [run.scenario for run in new]
             map_runs(writer, scenarios, workers=workers, on_result=lambda _: bar.advance(task))
             records |= {shard: _join(root, shard, own) for shard, own in runs.items()}
@@ -331,31 +327,25 @@ def _part_path(root: Path, run: PlannedRun) -> Path:
     return root / PARTS / f"{run.number:06}.arrow"
 
 
-@dataclass
-class PartWriter:
-    """Writes what a data set stores of a run, in the process that simulated it.
+def write_part(
+    root: Path, planned: Mapping[int, PlannedRun], labels: timedelta, run: "Run"
+) -> None:
+    """Write what a data set stores of a run, in the process that simulated it.
 
-    Attributes:
+    The tables come one after the other, as streams of one file.
+
+    Args:
         root: The folder of the data set.
-        runs: The planned runs, by seed.
+        planned: The planned runs, by seed.
         labels: Time between labels.
+        run: The run.
     """
-
-    root: Path
-    runs: Mapping[int, PlannedRun]
-    labels: timedelta
-
-    def __call__(self, run: "Run") -> None:
-        """Write the tables of a run, one after the other, as streams of one file."""
-        planned = self.runs[int(run.manifest["seed"])]
-        tables = tables_of(run, planned, self.labels)
-        with (
-            partial_file(_part_path(self.root, planned)) as path,
-            pa.OSFile(str(path), "wb") as file,
-        ):
-            for name in SCHEMAS:
-                with pa.ipc.new_stream(file, tables[name].schema) as stream:
-                    stream.write_table(tables[name])
+    own = planned[int(run.manifest["seed"])]
+    tables = tables_of(run, own, labels)
+    with partial_file(_part_path(root, own)) as path, pa.OSFile(str(path), "wb") as file:
+        for name in SCHEMAS:
+            with pa.ipc.new_stream(file, tables[name].schema) as stream:
+                stream.write_table(tables[name])
 
 
 def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, dict[str, Any]]:

@@ -149,7 +149,10 @@ def forecasts(
             beliefs.setdefault(name, []).append(belief)
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
     return SplitForecasts(
-        {name: _padded(own, width) for name, own in beliefs.items()},
+        {
+            name: np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in own])
+            for name, own in beliefs.items()
+        },
         np.concatenate([part.truth for part in parts]),
         np.concatenate([part.gap for part in parts]),
         np.repeat([part.home for part in parts], [len(part.truth) for part in parts]),
@@ -178,11 +181,6 @@ def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
     ends = {"lower end": difference.low, "upper end": difference.high}
     scores = {"": difference.mean, **(ends if len(homes) > 1 else {})}
     return {f"log_loss - {PRIOR} {words}".rstrip(): value for words, value in scores.items()}
-
-
-def _padded(beliefs: Sequence[F64], width: int) -> F64:
-    """Pad the beliefs of homes that have fewer places than the largest with zeros."""
-    return np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in beliefs])
 
 
 def _score_ltp(data: Dataset, split: str, _: object) -> Scores:

@@ -11,7 +11,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
-from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL_ROOMS, LoggedVisit, VisitRule, visits_of
+from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL_ROOMS, VisitRule, visits_of
 from fleet2d.metrics.ltp_error import total_variation
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import sum_in_order
@@ -103,17 +103,9 @@ def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
         unknown=True,
         door_us=micros(MIN_ABSENCE),
     )
-    return _by_second(visits_of(log, kinds, rule).visits, rule.steps)
-
-
-def _kind(label: str) -> str:
-    kind = USUAL_ROOMS.get(room_type(label), (room_type(label),))[0]
-    return AWAY if label == AWAY else kind
-
-
-def _by_second(visits: list[LoggedVisit], count: int) -> tuple[list[ActivityPlace], I16]:
+    visits = visits_of(log, kinds, rule).visits
     index: dict[ActivityPlace, int] = {}
-    seconds = np.full(count, UNKNOWN_STATE, np.int16)
+    seconds = np.full(rule.steps, UNKNOWN_STATE, np.int16)
     for number, visit in enumerate(visits):
         if visit.place == UNKNOWN:
             continue
@@ -125,6 +117,11 @@ def _by_second(visits: list[LoggedVisit], count: int) -> tuple[list[ActivityPlac
             state = ActivityPlace("away" if place == AWAY and not name else name, place)
             seconds[step:end] = index.setdefault(state, len(index))
     return list(index), seconds
+
+
+def _kind(label: str) -> str:
+    kind = USUAL_ROOMS.get(room_type(label), (room_type(label),))[0]
+    return AWAY if label == AWAY else kind
 
 
 def by_minute(seconds: I16, states: int) -> I16:

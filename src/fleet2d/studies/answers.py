@@ -121,12 +121,10 @@ class StudyAnswers:
 
         ((axis, reference),) = against.items()
         check_axes((axis, unit, *within), self.columns)
-        tables = [
-            by_units(pairs, [*within, unit], "difference").select(
-                pl.lit(value).alias(axis), pl.all()
-            )
-            for value, pairs in self._pairs(self.with_metric(metric), metric, axis, reference)
-        ]
+        tables = []
+        for value, pairs in self._pairs(self.with_metric(metric), metric, axis, reference):
+            units = by_units(pairs, [*within, unit], "difference")
+            tables.append(units.select(pl.lit(value).alias(axis), pl.all()))
         return pl.concat(tables)
 
     def power(

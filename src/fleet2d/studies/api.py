@@ -198,8 +198,8 @@ class FunctionJob:
     def __call__(self, task: WorkerTask) -> bytes:
         """Return what the function returns, or the error, pickled."""
         try:
-            scenario = self.scenarios[task.index]
-            return pickle.dumps((True, self._callable(run_scenario(scenario))))
+            run = run_scenario(self.scenarios[task.index])
+            return pickle.dumps((True, self._callable(run)))
         except Exception as error:  # noqa: BLE001 - raised again in the driver
             return pickle.dumps((False, _portable(error)))
 

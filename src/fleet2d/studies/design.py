@@ -298,13 +298,13 @@ def build_design(specification: Specification) -> Design:
     """
     file = specification.file
     axes = tuple(_axis_plan(specification, name) for name in file.axes)
-    rules = tuple(
-        RulePlan(rule.when, _change(rule.set.items(), _place(specification, "rules", i)))
-        for i, rule in enumerate(file.rules)
-    )
+    rules = []
+    for i, rule in enumerate(file.rules):
+        place = ", ".join(filter(None, (f"rules.{i}", specification.places.place(("rules", i)))))
+        rules.append(RulePlan(rule.when, _change(rule.set.items(), place)))
     base = merge(specification.base, _artifacts(file.keep.tables))
     seeds = file.replicates or (_base_seed(specification.base),)
-    design = Design(base, specification.folder, axes, rules, file.exclude, seeds)
+    design = Design(base, specification.folder, axes, tuple(rules), file.exclude, seeds)
     _check_size(specification.name, design)
     _check_conditions(specification, design)
     if not len(design.combinations):
@@ -359,12 +359,6 @@ def _change(changes: Any, place: str) -> Document:
             f" replicates: [{simulation[SEED]}] there, or a list of seeds"
         )
     return result
-
-
-def _place(specification: Specification, *location: str | int) -> str:
-    place = specification.places.place(location)
-    key = ".".join(map(str, location))
-    return f"{key}, {place}" if place else key
 
 
 def _check_conditions(specification: Specification, design: Design) -> None:

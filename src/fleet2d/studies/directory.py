@@ -198,10 +198,6 @@ class StudyDirectory:
             content = json.dumps({"format": FORMAT, **asdict(meta)}, indent=1)
         self.storage.write(META, content.encode())
 
-    def parts(self) -> list[Part]:
-        """Return the parts of the data set that are committed."""
-        return read_parts(self.storage)
-
     def intact_parts(self, on_note: Callable[[str], None]) -> list[Part]:
         """Return the undamaged parts; delete the others, so that their variants are run again.
 
@@ -230,16 +226,6 @@ class StudyDirectory:
             for file in part.files if part else ():
                 self.storage.delete(file.name)
         return intact
-
-    def plan(self, columns: Sequence[str] | None = None) -> "pa.Table":
-        """Return the plan, or some of its columns, `variant` among them.
-
-        Raises:
-            RunDirectoryError: It is missing or damaged.
-        """
-        import pyarrow as pa
-
-        return pa.concat_tables(self.plan_batches(columns))
 
     def plan_batches(self, columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
         """Yield the plan, or some of its columns, `variant` among them, some rows at a time.
@@ -275,8 +261,8 @@ class StudyDirectory:
 
     def counts(self) -> Counts:
         """Return how far the study is."""
-        numbers = numbers_of(self.plan([VARIANT]))
-        status = self.statuses(self.parts())
+        numbers = np.concatenate([numbers_of(table) for table in self.plan_batches([VARIANT])])
+        status = self.statuses(read_parts(self.storage))
         status = np.append(status, np.zeros(int(numbers.max(initial=0)) + 1, np.uint8))[numbers]
         return Counts(len(numbers), *(int((status == c).sum()) for c in (COMPLETE, FAILED)))
 
@@ -307,7 +293,7 @@ class StudyDirectory:
         """
         import pyarrow as pa
 
-        parts = self.parts()
+        parts = read_parts(self.storage)
         headers = [record.header for record in read_journal(self.journal_path(parts))]
         if not headers and self.storage.exists(VARIANTS):
             table = self.storage.read_table(VARIANTS)
@@ -343,7 +329,7 @@ class StudyDirectory:
         Raises:
             ArtifactError: It can't be written.
         """
-        tables = map(observe, self._variant_tables(self.parts(), ()))
+        tables = map(observe, self._variant_tables(read_parts(self.storage), ()))
         self.storage.write_batches(VARIANTS, tables, self.scratch)
 
     def journal_path(self, parts: Iterable[Part]) -> Path:

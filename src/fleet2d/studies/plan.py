@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,8 +151,7 @@ class PlannedVariants:
         return replace(self, **{name: getattr(self, name)[places] for name in columns})
 
 
-@dataclass(frozen=True)
-class StudyPlan:
+class StudyPlan(NamedTuple):
     """A design and its variants, all checked.
 
     Attributes:
@@ -162,10 +161,6 @@ class StudyPlan:
 
     design: Design
     variants: PlannedVariants
-
-    def parameters(self, variant: PlannedVariant) -> dict[str, Label]:
-        """Return the labels of a variant by column."""
-        return self.design.parameters(variant.index)
 
 
 class KnownNames:
@@ -440,8 +435,7 @@ class ScenarioFile:
 
     def add(self, template: str, scenario: Scenario) -> None:
         """Add the scenario of a combination, with any of its seeds."""
-        content = json.dumps(scenario.resolved())
-        self._rows.append((template, content))
+        self._rows.append((template, json.dumps(scenario.resolved())))
         if len(self._rows) == BATCH:
             self._flush()
 

@@ -9,7 +9,7 @@ from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, Counts, StudyDirectory
-from fleet2d.studies.parts import TABLES, Part, plain_schema, with_variant
+from fleet2d.studies.parts import TABLES, Part, plain_schema, read_parts, with_variant
 from fleet2d.studies.records import RESULT_COLUMNS, VARIANT, VariantRecord, read_journal
 from fleet2d.studies.storage import damaged
 
@@ -265,7 +265,7 @@ class Study(StudyAnswers):
 
     @cached_property
     def _parts(self) -> list[Part]:
-        return self._directory.parts()
+        return read_parts(self._directory.storage)
 
     def _journal_records(self) -> Iterator[VariantRecord]:
         return read_journal(self._directory.journal_path(self._parts))

@@ -104,8 +104,7 @@ class _Page:
         metrics = self._metrics()
         for metric in metrics:
             yield from self._metric(metric)
-        more = len(self.study.metrics) - len(metrics)
-        if more:
+        if more := len(self.study.metrics) - len(metrics):
             yield f"<p>{more} more numbers are in <code>variants.parquet</code>.</p>"
         yield from self._methods()
         yield from self._failures()

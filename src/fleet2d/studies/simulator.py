@@ -129,12 +129,11 @@ def _outcome_of(
 ) -> VariantOutcome:
     """Return the results to keep of a run that began at a time of `perf_counter`."""
     wall_s: dict[str, float] = {**run.manifest["wall_s"], "total": time.perf_counter() - start_s}
-    numbers = dict(flat_numbers(run.metrics))
     patterns = tuple(metrics)
     return VariantOutcome(
         "complete",
         run.digest,
-        {name: value for name, value in numbers.items() if is_kept(name, patterns)},
+        {name: value for name, value in flat_numbers(run.metrics) if is_kept(name, patterns)},
         {name: run.tables[name] for name in tables if name in run.tables},
         wall_s,
         peak_memory_mb() or 0.0,

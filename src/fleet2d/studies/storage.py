@@ -3,6 +3,7 @@
 import itertools
 import os
 import re
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import is_dataclass
@@ -302,8 +303,7 @@ class Storage:
                     local.replace(path)
                     return
                 with self.filesystem.open_output_stream(path) as out:
-                    while block := file.read(COPY_BYTES):
-                        out.write(block)
+                    shutil.copyfileobj(file, out, COPY_BYTES)
             local.unlink()
 
     def delete(self, name: str) -> None:

@@ -373,7 +373,8 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
     """
     scenarios: dict[bool, list[str]] = {False: [], True: []}
     for variant in plan.variants:
-        scenarios[matches(settings.held_out, plan.parameters(variant))].append(variant.scenario)
+        is_held_out = matches(settings.held_out, plan.design.parameters(variant.index))
+        scenarios[is_held_out].append(variant.scenario)
     content = {key: content_hash(value) for key, value in settings.model_dump(mode="json").items()}
     return {
         "the training (homes, base scenario or seeds)": content_hash(sorted(scenarios[False])),
@@ -467,7 +468,7 @@ def _training(plan: StudyPlan, settings: TuneSettings) -> list[tuple[int, str]]:
         ScenarioError: There is none, or it isn't clear whether one is held out.
     """
     (axis,) = settings.held_out
-    labels = [plan.parameters(variant) for variant in plan.variants]
+    labels = [plan.design.parameters(variant.index) for variant in plan.variants]
     if any(label[axis] is None for label in labels):
         raise ScenarioError(
             f"tune.held_out: the axis {axis!r} doesn't apply to all variants, some of which would"
@@ -498,7 +499,7 @@ def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
         text = json.dumps({**content, "simulation": {**content["simulation"], "seed": None}})
         for path in input_files(scenario):
             text = text.replace(json.dumps(str(path)), json.dumps(file_hash(path)))
-        is_held_out = matches(settings.held_out, plan.parameters(variant))
+        is_held_out = matches(settings.held_out, plan.design.parameters(variant.index))
         was_held_out, other = first_of.setdefault(text, (is_held_out, variant.index))
         if is_held_out != was_held_out:
             raise ScenarioError(

@@ -136,13 +136,11 @@ def _body(item: pytest.Function) -> "Body":
 
 def _folder(item: pytest.Function) -> Path:
     """Return the folder for the artifacts of a failing test."""
-    option = item.config.getoption("--fleet2d-artifacts")
-    if option is not None:
-        return Path(option)
+    folder = item.config.getoption("--fleet2d-artifacts")
     cache = getattr(item.config, "cache", None)
-    if cache is not None:
-        return Path(cache.mkdir("fleet2d"))
-    return Path(".fleet2d")
+    if folder is None and cache is not None:
+        folder = cache.mkdir("fleet2d")
+    return Path(folder or ".fleet2d")
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
