@@ -19,9 +19,9 @@ from fleet2d.artifacts.table import (
     Chunk,
     Column,
     ColumnChunk,
-    Dictionary,
     Kind,
     TableSpec,
+    Words,
     empty_chunk,
     encode_strings,
 )
@@ -48,10 +48,7 @@ _TYPES = {
 
 def schema_of(spec: TableSpec) -> pa.Schema:
     """Return the Arrow schema of a table; its metadata holds the whole spec."""
-    fields = [
-        pa.field(column.name, _TYPES[column.kind], column.nullable, _metadata(column))
-        for column in spec.columns
-    ]
+    fields = [pa.field(c.name, _TYPES[c.kind], c.nullable, _metadata(c)) for c in spec.columns]
     return pa.schema(fields, {"fleet2d.table": spec.name, "description": spec.description})
 
 
@@ -90,7 +87,7 @@ def _column_of(field: pa.Field) -> Column:
 def table_of(
     chunks: Sequence[tuple[Chunk, int]],
     spec: TableSpec,
-    words: Mapping[str, Dictionary],
+    words: Words,
     schema: pa.Schema | None = None,
 ) -> pa.Table:
     """Return chunks, each with its number of rows, as one Arrow table."""
@@ -142,9 +139,7 @@ def _bits(flags: Bool) -> pa.Buffer:
     return pa.py_buffer(np.packbits(flags, bitorder="little"))
 
 
-def chunks_of(
-    table: pa.Table, spec: TableSpec, words: Mapping[str, Dictionary]
-) -> Iterator[tuple[Chunk, int]]:
+def chunks_of(table: pa.Table, spec: TableSpec, words: Words) -> Iterator[tuple[Chunk, int]]:
     """Yield the rows of a table as chunks, and the number of rows of each.
 
     Raises:
@@ -156,14 +151,11 @@ def chunks_of(
             f"but has {', '.join(table.column_names)}"
         )
     for batch in table.to_batches():
-        chunk = {
-            column.name: _chunk_of(batch.column(i), column, words)
-            for i, column in enumerate(spec.columns)
-        }
+        chunk = {c.name: _chunk_of(batch.column(i), c, words) for i, c in enumerate(spec.columns)}
         yield chunk, batch.num_rows
 
 
-def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Dictionary]) -> ColumnChunk:
+def _chunk_of(array: pa.Array, column: Column, words: Words) -> ColumnChunk:
     """Convert an Arrow array to the form that is hashed: nulls are zero."""
     if not len(array):
         return empty_chunk(column)
@@ -184,7 +176,7 @@ def _chunk_of(array: pa.Array, column: Column, words: Mapping[str, Dictionary]) 
     return ColumnChunk(values.astype(DTYPES[column.kind], casting="safe", copy=False), valid)
 
 
-def _codes_of(array: pa.Array, column: Column, words: Mapping[str, Dictionary]) -> Any:
+def _codes_of(array: pa.Array, column: Column, words: Words) -> Any:
     """Return the codes of an array in the dictionary of the column, whatever the array's own is."""
     if not pa.types.is_dictionary(array.type):
         array = array.dictionary_encode()
@@ -257,7 +249,7 @@ class ParquetTable:
             },
         )
 
-    def write(self, chunk: Chunk, rows: int, words: Mapping[str, Dictionary]) -> None:
+    def write(self, chunk: Chunk, rows: int, words: Words) -> None:
         """Write one row group."""
         table = table_of([(chunk, rows)], self.spec, words, self._schema)
         self._writer.write_table(table, row_group_size=max(rows, 1))

@@ -486,9 +486,8 @@ class Manifest(BaseModel):
         except ValidationError as error:
             raise _damaged(path, _problems(error)) from None
         # Tables that no simulation stored have no scenario, and no times.
-        if manifest.scenario and (
-            reason := time_problem(manifest.start, manifest.step_us, manifest.steps)
-        ):
+        reason = time_problem(manifest.start, manifest.step_us, manifest.steps)
+        if manifest.scenario and reason:
             raise _damaged(path, reason)
         return manifest
 

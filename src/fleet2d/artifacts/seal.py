@@ -24,7 +24,7 @@ from fleet2d.artifacts.manifest import (
     json_of,
     table_record,
 )
-from fleet2d.artifacts.table import Chunk, Dictionary, TableSpec, new_dictionaries
+from fleet2d.artifacts.table import Chunk, TableSpec, Words, new_dictionaries
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.errors import ArtifactError, RunDirectoryError, os_errors_as, printable
@@ -56,7 +56,7 @@ class TableDigest:
                     hasher.update(values.view(np.uint8).data)
         self.rows += rows
 
-    def hexdigest(self, words: Mapping[str, Dictionary]) -> str:
+    def hexdigest(self, words: Words) -> str:
         """Return the digest of all rows so far.
 
         Args:
@@ -243,9 +243,7 @@ def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
         else:
             parts[name] = value
     # The order of the keys of a scenario has an effect on the run.
-    return {
-        name: sha256_of(value, ordered=name.startswith("scenario")) for name, value in parts.items()
-    }
+    return {n: sha256_of(part, ordered=n.startswith("scenario")) for n, part in parts.items()}
 
 
 def _differing_parts(root: Path, manifest: Manifest) -> tuple[dict[str, str], list[str]]:

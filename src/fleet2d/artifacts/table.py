@@ -158,6 +158,10 @@ class Dictionary(dict[str | None, int]):
         return [word for word in self if word is not None]
 
 
+Words = Mapping[str, Dictionary]
+"""The dictionaries of the columns of a table whose dictionary grows, by the column's name."""
+
+
 def new_dictionaries(spec: TableSpec) -> dict[str, Dictionary]:
     """Return an empty dictionary for each column of a table whose dictionary grows."""
     return {column.name: Dictionary() for column in spec.columns if column.is_growing}
@@ -226,9 +230,8 @@ class TableBuffer:
         self._capacity = 0
         self._first_capacity = _FIRST_CAPACITY
         self._values: dict[str, NDArray[Any]] = {}
-        self._strings: dict[str, list[str | None]] = {
-            column.name: [] for column in spec.columns if column.kind == "string"
-        }
+        texts = [column.name for column in spec.columns if column.kind == "string"]
+        self._strings: dict[str, list[str | None]] = {name: [] for name in texts}
         self._valid: dict[str, Bool] = {}
         self._names = frozenset(spec.names)
 

@@ -27,6 +27,7 @@ from fleet2d.artifacts.table import (
     ColumnChunk,
     Dictionary,
     TableSpec,
+    Words,
     new_dictionaries,
 )
 from fleet2d.errors import ArtifactError
@@ -161,10 +162,8 @@ def _damage_of(path: Path) -> Iterator[None]:
 
 
 def _spec_of(description: Mapping[str, Any]) -> TableSpec:
-    columns = [
-        Column(**{**column, "categories": tuple(column["categories"])})
-        for column in description["columns"]
-    ]
+    parts = description["columns"]
+    columns = [Column(**{**part, "categories": tuple(part["categories"])}) for part in parts]
     spec = TableSpec(description["name"], tuple(columns), description["description"])
     for column in columns:
         texts = column.name, column.unit, column.description, *column.categories, spec.description
@@ -177,10 +176,7 @@ def _chunk_of(spec: TableSpec, rows: int, content: bytes, words: dict[str, Dicti
     if not 0 <= rows <= _MAX_ROWS:
         raise ValueError(f"{rows} rows at once")
     reader = ArrayReader(content)
-    return {
-        column.name: _column_of(column, reader, rows, words.get(column.name))
-        for column in spec.columns
-    }
+    return {c.name: _column_of(c, reader, rows, words.get(c.name)) for c in spec.columns}
 
 
 def _column_of(
@@ -378,13 +374,7 @@ class UnfinishedRun:
             table.words = {name: len(words) for name, words in entry.words.items()}
             yield entry
 
-    def add(
-        self,
-        spec: TableSpec,
-        arrays: list[NDArray[Any]],
-        rows: int,
-        words: Mapping[str, Dictionary],
-    ) -> None:
+    def add(self, spec: TableSpec, arrays: list[NDArray[Any]], rows: int, words: Words) -> None:
         """Append rows to the journal; readers see them after the next commit.
 
         Args:

@@ -46,13 +46,7 @@ from fleet2d.kernels import ViewQueryColumn as Query
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event, new_event
-from fleet2d.sight.camera import (
-    Disturbance,
-    TableContext,
-    error_tables,
-    is_perfect,
-    stack_lenses,
-)
+from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.perception import Perception
 

@@ -178,14 +178,14 @@ class ChangeQueue:
     """
 
     def __init__(self, basis: Basis) -> None:
-        self.home, self.clock = basis.home, basis.clock
+        self.home, self.clock, self._actors = basis.home, basis.clock, basis.actors
         objects = basis.scenario.objects
         self.doors = {name: item for name, item in objects.items() if isinstance(item, Door)}
         self.names = list(self.doors)
         self._used_us = [-1] * len(self.names)
         self._switches = PeopleSwitches(basis)
         self._floor = basis.scenario.floorplan.slows
-        self.slow((), 0, ())
+        self.home.slows = tuple(area.on(basis.home.plan.lattice) for area in self._floor)
         # By step; those of one step happen in the order in which they were put into the queue.
         self._queue: list[tuple[int, int, DueChange]] = []
         self._count = 0
@@ -196,13 +196,13 @@ class ChangeQueue:
                 self._put(DueChange(0, HomeChange(shut=self.names[number]), "at first"))
             self._schedule(number, door)
 
-    def slow(self, areas: Sequence[SlowArea], step: int, actors: Sequence[Actor]) -> None:
+    def slow(self, areas: Sequence[SlowArea], step: int) -> None:
         """Set the areas that slow robots down, besides those of the floor plan, at a step."""
         lattice, before = self.home.plan.lattice, self.home.slows
         self.home.slows = tuple(area.on(lattice) for area in (*self._floor, *areas))
-        robots = [actor for actor in actors if actor.entity.minds_floor]
+        robots = [actor for actor in self._actors if actor.entity.minds_floor]
         for region in {*before} ^ {*self.home.slows}:
-            self._stop(step, robots, np.array(region.corners, np.float64))
+            self._stop(step, np.array(region.corners, np.float64), robots)
 
     def next_due(self) -> int | None:
         """Return the step of the next change; None if there is none."""
@@ -247,7 +247,7 @@ class ChangeQueue:
                 plan = (row, actor.planned_at)
                 self._put(DueChange(step, None, actor.name, door, plan, moment))
 
-    def make(self, step: int, actors: Sequence[Actor]) -> list[Event]:
+    def make(self, step: int) -> list[Event]:
         """Make all changes that are due at a step; bodies whose way they block replan.
 
         Raises:
@@ -257,44 +257,42 @@ class ChangeQueue:
         while self._queue and self._queue[0][0] <= step:
             due = heapq.heappop(self._queue)[2]
             if due.change is not None:
-                events += self._make_change(due, due.change, step, actors)
+                events += self._make_change(due, due.change, step)
             elif due.door < 0 and due.opens_for is not None:
                 row = due.opens_for[0]
-                events += self._switches.see_to(row, actors[row], step)
+                events += self._switches.see_to(row, self._actors[row], step)
             elif due.opens_for is not None:
-                events += self._open_for(due, step, actors)
+                events += self._open_for(due, step)
             else:
-                events += self._close_unused(due, step, actors)
+                events += self._close_unused(due, step)
         return events
 
     # Changes that are due
 
-    def _make_change(
-        self, due: DueChange, change: HomeChange, step: int, actors: Sequence[Actor]
-    ) -> list[Event]:
+    def _make_change(self, due: DueChange, change: HomeChange, step: int) -> list[Event]:
         verb, target = change.verb, change.target
         if verb == "room":
             room = self.home.plan.room(target)
             self.home.use_room_as(room, usual_type(str(change.type)))
             return [Event(step, HOME, EventKind.ROOM_CHANGED, f"{target}: {change.type}")]
         if verb == "move":
-            return self._move(due, change, step, actors)
+            return self._move(due, change, step)
         if verb == "lights":
             lit = [r.index for r in self.home.rooms if target in (r.name, r.type, ALL_ROOMS)]
             return switch(self.home, lit, step, is_on=change.turn == "on")
         door = self.names.index(target)
         if verb in ("lock", "unlock"):
             self.home.set_lock(door, locked=verb == "lock")
-            self._stop(step, actors, self._door_shape(door))
+            self._stop(step, self._door_shape(door))
             return [Event(step, target, EventKind(f"{verb}ed"), due.by)]
         is_open = verb == "open"
         if is_open != (door in self.home.shut):
             return []
-        return self._turn(door, is_open, due, step, actors)
+        return self._turn(door, is_open, due, step)
 
-    def _open_for(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
+    def _open_for(self, due: DueChange, step: int) -> list[Event]:
         row, planned_at = due.opens_for or (0, 0)
-        if actors[row].planned_at != planned_at:
+        if self._actors[row].planned_at != planned_at:
             return []
         door = due.door
         self._used_us[door] = max(self._used_us[door], due.passed_us)
@@ -304,24 +302,22 @@ class ChangeQueue:
             self._put(DueChange(max(shuts, step + 1), None, door=door))
         if door not in self.home.shut or door in self.home.locked:
             return []
-        return self._turn(door, True, due, step, actors)
+        return self._turn(door, True, due, step)
 
-    def _close_unused(self, due: DueChange, step: int, actors: Sequence[Actor]) -> list[Event]:
+    def _close_unused(self, due: DueChange, step: int) -> list[Event]:
         """Shut a door that has not been used for its `closes_after`."""
         door, after = due.door, self.doors[self.names[due.door]].closes_after
         if after is None or step * self.clock.step_us < self._used_us[door] + micros(after):
             return []
-        return [] if door in self.home.shut else self._turn(door, False, due, step, actors)
+        return [] if door in self.home.shut else self._turn(door, False, due, step)
 
-    def _turn(
-        self, door: int, is_open: bool, due: DueChange, step: int, actors: Sequence[Actor]
-    ) -> list[Event]:
+    def _turn(self, door: int, is_open: bool, due: DueChange, step: int) -> list[Event]:
         shape = self._door_shape(door)
-        if not is_open and self._is_blocked(shape, actors):
+        if not is_open and self._is_blocked(shape):
             self._retry(due, step)
             return []
         self.home.set_door(door, is_open=is_open)
-        self._stop(step, actors, None if is_open else shape)
+        self._stop(step, None if is_open else shape)
         after = self.doors[self.names[door]].closes_after
         if is_open and due.opens_for is None and after is not None:
             now = step * self.clock.step_us
@@ -331,19 +327,17 @@ class ChangeQueue:
         kind = EventKind.OPENED if is_open else EventKind.SHUT
         return [Event(step, self.names[door], kind, due.by)]
 
-    def _move(
-        self, due: DueChange, change: HomeChange, step: int, actors: Sequence[Actor]
-    ) -> list[Event]:
+    def _move(self, due: DueChange, change: HomeChange, step: int) -> list[Event]:
         plan = self.home.plan
         assert change.to is not None
         new = move_object(self.home.object(change.target), plan.lattice, change.to, change.turn_deg)
         shape = np.asarray(lattice_footprint(plan, new).exterior.coords)
         is_solid = new.blocks != "nothing"
-        if is_solid and self._is_blocked(shape, actors):
+        if is_solid and self._is_blocked(shape):
             self._retry(due, step)
             return []
         self.home.put(new)
-        self._stop(step, actors, shape if is_solid else None)
+        self._stop(step, shape if is_solid else None)
         x, y = change.to
         return [Event(step, HOME, EventKind.MOVED, f"{new.name} to ({x:g}, {y:g})")]
 
@@ -352,20 +346,20 @@ class ChangeQueue:
     def _door_shape(self, door: int) -> F64:
         return np.array(self.home.door_line(door), np.float64)
 
-    def _is_blocked(self, shape: F64, actors: Sequence[Actor]) -> bool:
+    def _is_blocked(self, shape: F64) -> bool:
         """Whether a body stands where a shape [lattice units] is to be."""
         units = self.home.plan.lattice.units_per_m
-        for actor in actors:
+        for actor in self._actors:
             if not actor.state.away:
                 zone = grow_shape(shape, actor.entity.radius * units)
                 if shapely.intersects_xy(zone, actor.state.x, actor.state.y):
                     return True
         return False
 
-    def _stop(self, step: int, actors: Sequence[Actor], shape: F64 | None) -> None:
+    def _stop(self, step: int, shape: F64 | None, actors: Sequence[Actor] | None = None) -> None:
         """Make bodies replan whose way is blocked, or that walk at random along the walls."""
         units = self.home.plan.lattice.units_per_m
-        for actor in actors:
+        for actor in self._actors if actors is None else actors:
             if not isinstance(actor.motion, Track):
                 actor.ask(step)
             elif shape is not None and not self._passes(actor, shape):

@@ -187,10 +187,8 @@ class CheckpointWriter:
             release_memory()
         state.recorder.wall_s += time.perf_counter() - began
         now = time.process_time()
-        self._next_checkpoint = (
-            now + max(COMPUTING_S, SHARE * (now - computed)),
-            time.monotonic() + WAITING_S,
-        )
+        computing_s = max(COMPUTING_S, SHARE * (now - computed))
+        self._next_checkpoint = now + computing_s, time.monotonic() + WAITING_S
 
     def update_manifest(self, state: State) -> None:
         """Update the interventions and the inputs in the manifest."""

@@ -12,7 +12,6 @@ from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis, Watcher
@@ -211,22 +210,20 @@ class Clearance(Watcher):
         first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
         people = slice(0, len(self._users))
-        xs, ys, away = block.x[people], block.y[people], block.away[people]
+        places = block.x[people], block.y[people], block.away[people]
         for row, robot in self.robots.items():
-            meeting = self._first(robot, poses_of(block, row), xs, ys, away, first, begin=1)
+            meeting = self._first(robot, poses_of(block, row), places, first, begin=1)
             if meeting is not None:
                 end = min(end, first + meeting[0])
-            end = min(end, self._next_look(robot, xs, ys, away, first, end))
+            end = min(end, self._next_look(robot, places, first, end))
         return end
 
-    def _next_look(
-        self, robot: DecidingActor, xs: I64, ys: I64, away: U8, first: int, end: int
-    ) -> int:
+    def _next_look(self, robot: DecidingActor, people: Places, first: int, end: int) -> int:
         """Return the step at which a waiting robot checks whether its way is clear."""
         waiting = robot.waiting
         if waiting is None:
             return end
-        x, y, was_away = waiting.surroundings.users.T[:, :, None]
+        (x, y, was_away), (xs, ys, away) = waiting.surroundings.users.T[:, :, None], people
         has_changed = ((xs != x) | (ys != y) | (away != was_away)).any(axis=0)
         has_changed |= waiting.surroundings.arrangement != robot.arrangement
         column = int(has_changed.argmax())
@@ -251,7 +248,7 @@ class Clearance(Watcher):
             return None
         states = np.array([user.state for user in self._users], np.int64)
         x, y, _, away = np.repeat(states[:, :, None], 2, axis=2).swapaxes(0, 1)
-        meeting = self._first(robot, poses, x, y, away, step, begin=0)
+        meeting = self._first(robot, poses, (x, y, away), step, begin=0)
         return None if meeting is None else self._users[meeting[1]]
 
     def surroundings(self, robot: DecidingActor) -> Surroundings:
@@ -267,19 +264,12 @@ class Clearance(Watcher):
         return Surroundings(people, np.array(everybody, np.int64), robot.arrangement)
 
     def _first(
-        self,
-        robot: DecidingActor,
-        poses: Poses,
-        xs: I64,
-        ys: I64,
-        away: NDArray[np.integer],
-        first: int,
-        begin: int,
+        self, robot: DecidingActor, poses: Poses, people: Places, first: int, begin: int
     ) -> tuple[int, int] | None:
         """Return the first column, from `begin` to the last but one, and the user it drives at."""
         assert isinstance(robot.entity, Robot)
         assert robot.entity.gives_way is not None
-        x, y = poses.x, poses.y
+        (xs, ys, away), x, y = people, poses.x, poses.y
         moves = np.flatnonzero((x[1:] != x[:-1]) | (y[1:] != y[:-1]))
         moves = moves[moves >= begin]
         if not len(moves):  # the usual case: it stands

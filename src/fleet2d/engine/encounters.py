@@ -116,9 +116,8 @@ class Pair:
         u, r = self.user.row, self.robot.row
         walls, checked = self.user.home.walls, None
         rows = (block.x[u], block.y[u], block.x[r], block.y[r])
-        for column, *places in zip(
-            candidates.tolist(), *(row[candidates].tolist() for row in rows), strict=True
-        ):
+        numbers = (row[candidates].tolist() for row in rows)
+        for column, *places in zip(candidates.tolist(), *numbers, strict=True):
             if places == checked:
                 continue
             checked = places
@@ -194,9 +193,8 @@ class Encounters(Watcher):
             last = [e for e in self._ahead if e.pair is pair and e.column == count - 1]
             pair.advance(block, count, [e.event for e in last])
             x, y = pair.user.home.plan.lattice.to_metres(pair.at).tolist()
-            self._last += [
-                (pair.user.row, pair.user, SightEvent(e.event, e.robot.name, x, y)) for e in last
-            ]
+            events = (SightEvent(e.event, e.robot.name, x, y) for e in last)
+            self._last += [(pair.user.row, pair.user, event) for event in events]
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:

@@ -58,15 +58,11 @@ class RunExpectations:
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        run: MeasuredRun,
-        sensors: Sensors,
-        interventions: InterventionQueue,
+        self, scenario: Scenario, run: MeasuredRun, sensors: Sensors, queue: InterventionQueue
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
         self._run, self.actors, self.bodies, self.clock = run, run.actors, run.bodies, run.clock
-        self._scenario, self._sensors, self._queue = scenario, sensors, interventions
+        self._scenario, self._sensors, self._queue = scenario, sensors, queue
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []
 
@@ -227,9 +223,7 @@ class RunExpectations:
             Column("robustness", "float64", nullable=True, description="missing: infinite"),
         )
         store.add_table(TableSpec(TABLE, columns, "the violations of expectations"))
-        rows = sorted(
-            (v, names.index(n)) for n, verdict in verdicts.items() for v in verdict.violations
-        )
+        rows = sorted((v, names.index(n)) for n, each in verdicts.items() for v in each.violations)
         if not rows:
             return
         first, last, robustness, worst = zip(*(row[0] for row in rows), strict=True)

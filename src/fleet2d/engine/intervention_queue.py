@@ -325,9 +325,8 @@ def possible_details(
         for name, interaction in wanted.items() if not _is_own(robot) else ():
             texts = [f"{name} {person}" for person in interaction.people]
             for kind in OF_REQUESTS:
-                details[f"{kind} {robot.name}"] = [
-                    *details.get(f"{kind} {robot.name}", []), *texts
-                ]  # fmt: skip
+                key = f"{kind} {robot.name}"
+                details[key] = [*details.get(key, []), *texts]
     for user in users:
         # A log may hold any activities, and so may a class of the user's own.
         if not _is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:

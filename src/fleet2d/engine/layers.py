@@ -300,11 +300,8 @@ class LayerBook:
         """Return the area that each robot with a camera has seen, before the first step."""
         every, step_us = basis.scenario.sight.seen_every, self._clock.step_us
         steps = 1 if every is None else whole_steps(every, step_us, "sight.seen_every")
-        return [
-            SeenArea(robot, self._patches, basis.bodies, names, steps, self._bin_steps)
-            for robot in basis.robots
-            if robot.entity.eyes
-        ]
+        shared = self._patches, basis.bodies, names, steps, self._bin_steps
+        return [SeenArea(robot, *shared) for robot in basis.robots if robot.entity.eyes]
 
     def _add_seen_layers(self, scenario: Scenario, needs: Set[str]) -> None:
         """Add the layers of what robots have seen to the home, if they are needed."""

@@ -84,7 +84,7 @@ def change_home(state: State, span: Span) -> None:
     if due is not None and due <= span.first:
         state.settle(span.first)
         with blame("changes", span.first):
-            state.events.emit(state.changes.make(span.first, state.actors))
+            state.events.emit(state.changes.make(span.first))
 
 
 def decide(state: State, span: Span) -> None:
@@ -221,6 +221,7 @@ def _update(state: State, log: Log, end: int) -> None:
 
 
 Phase = Callable[[State, Span], None]
+Progress = Callable[[], None] | None
 
 PHASES: tuple[Phase, ...] = (intervene, change_home, decide, move, watch, record, learn)
 """The phases of a span, in order."""
@@ -256,11 +257,7 @@ class Loop:
         return 0.0 if self._began is None else perf_counter() - self._began
 
     def run(
-        self,
-        state: State,
-        end: int,
-        on_progress: Callable[[], None] | None = None,
-        spans: int | None = None,
+        self, state: State, end: int, on_progress: Progress = None, spans: int | None = None
     ) -> None:
         """Simulate up to a step, or a number of spans.
 
@@ -325,9 +322,7 @@ class Loop:
             self.save_s += stored_s
             self._began = None
 
-    def _simulate(
-        self, state: State, end: int, on_progress: Callable[[], None] | None, spans: int | None
-    ) -> None:
+    def _simulate(self, state: State, end: int, on_progress: Progress, spans: int | None) -> None:
         reported, bodies = perf_counter(), state.bodies
         while bodies.step < end and not self._is_stopping and spans != 0:
             most = self.pace.steps(self._step_us) if self.pace else end

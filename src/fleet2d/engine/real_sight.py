@@ -10,14 +10,7 @@ from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import SIGHTING, EvidenceSource, LiveDetections
 from fleet2d.errors import blame
-from fleet2d.kernels import (
-    I64,
-    NOBODY,
-    TURN,
-    UNKNOWN_TRUTH,
-    SightMemory,
-    turned,
-)
+from fleet2d.kernels import I64, NOBODY, TURN, UNKNOWN_TRUTH, SightMemory, turned
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.camera import FalseSighting
 

@@ -55,7 +55,7 @@ def table_specs(
         away = Column("away", "bool", description="not at home: x and y are where it left")
         specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
     if settings.observations and users and robots:
-        specs.append(_observation_table(users, robots, room, cameras, activities))
+        specs.append(_observation_table(basis, room, cameras, activities))
     if settings.events:
         event, detail = Column("event", "category"), Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=users)
@@ -89,16 +89,13 @@ def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
 
 
 def _observation_table(
-    users: Sequence[str],
-    robots: Sequence[str],
-    room: Column,
-    groups: Sequence[Cameras],
-    activities: bool,
+    basis: Basis, room: Column, groups: Sequence[Cameras], activities: bool
 ) -> TableSpec:
     """Return the table of what was perceived, with the truth if that can differ."""
     cameras = camera_names(groups)
-    robot = Column("robot", "category", categories=tuple(robots))
-    user = Column("user", "category", nullable=bool(cameras), categories=tuple(users))
+    users, robots = tuple(basis.scenario.users), tuple(basis.scenario.robots)
+    robot = Column("robot", "category", categories=robots)
+    user = Column("user", "category", nullable=bool(cameras), categories=users)
     columns = [STEP, TIME, robot, user, X, Y, room]
     if cameras:
         posture = Column("posture", "category", categories=POSTURES)
@@ -336,9 +333,8 @@ class Recorder:
         # Who gives way at the step of its decision decides twice: the last one counts.
         last = {entry[:2]: entry for entry in self._decisions}
         self._decisions = []
-        step, row, behavior, reason, next_step = zip(
-            *(last[key] for key in sorted(last)), strict=True
-        )
+        entries = [last[key] for key in sorted(last)]
+        step, row, behavior, reason, next_step = zip(*entries, strict=True)
         missing = np.array([at is None for at in next_step])
         self.store.append(
             "decisions",

@@ -12,13 +12,7 @@ from fleet2d.algorithms.history import SensorRow
 from fleet2d.configuration.problems import check_known
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.body import Bodies
-from fleet2d.entities.sensor import (
-    Sensor,
-    SensorFault,
-    SensorReading,
-    SensorState,
-    SensorView,
-)
+from fleet2d.entities.sensor import Sensor, SensorFault, SensorReading, SensorState, SensorView
 from fleet2d.errors import blame, errors_as
 from fleet2d.kernels import PoseBlock
 from fleet2d.runtime.clock import Clock
@@ -139,11 +133,8 @@ class Sensors(Watcher):
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
         """Return readings as events, with the sensor and its state in the words of the table."""
-        names, words = self.names, self.words
-        return [
-            Event(row.step, names[row.sensor], EventKind.SENSOR, words[row.sensor][not row.on])
-            for row in rows
-        ]
+        names, words, kind = self.names, self.words, EventKind.SENSOR
+        return [Event(r.step, names[r.sensor], kind, words[r.sensor][not r.on]) for r in rows]
 
     def take_events(self, events: Sequence[Event]) -> None:
         """Record the activities of users, for the readings."""

@@ -148,7 +148,7 @@ class EngineWorld:
 
     def slow(self, areas: Sequence[SlowArea]) -> None:
         """Set the areas that slow robots down, besides those of the floor plan."""
-        self._state.changes.slow(areas, self.step, self._state.actors)
+        self._state.changes.slow(areas, self.step)
 
     def emit(self, entity: str, event: EventKind, detail: str) -> None:
         """Record an event at the present step."""

@@ -270,12 +270,10 @@ class Term:
         """Return the same about another name."""
 
         def renamed(value: Any) -> Any:
-            is_old = value is old or (
-                isinstance(value, str) and isinstance(old, str) and value == old
-            )
-            return (
-                new if is_old else value.with_name(old, new) if isinstance(value, Term) else value
-            )
+            are_names = isinstance(value, str) and isinstance(old, str)
+            if value is old or (are_names and value == old):
+                return new
+            return value.with_name(old, new) if isinstance(value, Term) else value
 
         return self._rebuilt(renamed)
 
@@ -288,9 +286,7 @@ class Term:
         Raises:
             ScenarioError: There is nobody.
         """
-        return self._rebuilt(
-            lambda value: value.resolved(scene) if isinstance(value, Term) else value
-        )
+        return self._rebuilt(lambda part: part.resolved(scene) if isinstance(part, Term) else part)
 
     def _rebuilt(self, change: Callable[[Any], Any]) -> Self:
         """Return a copy with changed fields, itself if none changes."""

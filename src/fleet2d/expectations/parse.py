@@ -288,10 +288,7 @@ def _operator(value: Mapping[str, Any]) -> str:
 
 
 # Keys that can't be combined with an operator, if these are not "of" and "per".
-_REFUSED = {
-    "at_end": ("of", "per", "within"),
-    "at_most": ("after", "within", "during"),
-}
+_REFUSED = {"at_end": ("of", "per", "within"), "at_most": ("after", "within", "during")}
 
 
 def _condition(value: Mapping[str, Any], name: str) -> Expectation:

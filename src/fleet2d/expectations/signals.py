@@ -598,9 +598,8 @@ class SameWord(Expectation):
             float(code): names.setdefault(words[0], float(len(names)))
             for code, words in run.words[str(signal)].items()
         }
-        return signal.trace(run).map(
-            lambda value: np.array([numbers.get(code, -1.0) for code in value.tolist()])
-        )
+        number_of = np.vectorize(lambda code: numbers.get(code, -1.0), otypes=[np.float64])
+        return signal.trace(run).map(number_of)
 
     def __str__(self) -> str:
         """Return the text that `parse_expectation` reads back."""

@@ -19,14 +19,7 @@ from fleet2d.expectations.expectation import (
     number_text,
 )
 from fleet2d.expectations.signals import ANY_KIND, Signal, SignalComparison, WordComparison
-from fleet2d.expectations.temporal import (
-    Temporal,
-    Total,
-    Violation,
-    after,
-    at_end,
-    may_be_untested,
-)
+from fleet2d.expectations.temporal import Temporal, Total, Violation, after, at_end, may_be_untested
 from fleet2d.expectations.vocabulary import distance, during
 from fleet2d.runtime.clock import DAY_S, HOUR_S, Clock
 
@@ -279,9 +272,8 @@ def _violations(expectation: Expectation, run: RunSignals) -> list[Violation]:
     if value > 0:
         return []
     if isinstance(expectation, And) and not isinstance(expectation, Or):
-        return sorted(
-            v for part in (expectation.one, expectation.other) for v in _violations(part, run)
-        )
+        parts = expectation.one, expectation.other
+        return sorted(v for part in parts for v in _violations(part, run))
     return [Violation(run.first, run.end - 1, value, run.first)]
 
 

@@ -120,10 +120,7 @@ class RosMessages:
             for topic, times, sizes, data in blocks:
                 ends, content = np.cumsum(sizes), data.tobytes()
                 places = zip(times.tolist(), (ends - sizes).tolist(), ends.tolist(), strict=True)
-                messages += [
-                    Message(time, topic, content[begin + self._margin : end])
-                    for time, begin, end in places
-                ]
+                messages += [Message(t, topic, content[a + self._margin : b]) for t, a, b in places]
             messages.sort(key=itemgetter(0))
             yield from messages
 

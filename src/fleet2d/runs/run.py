@@ -122,9 +122,8 @@ class Run:
     def clock(self) -> Clock:
         """Its steps and their local times."""
         manifest = self.manifest
-        return Clock(
-            datetime.fromisoformat(manifest["start"]), manifest["step_us"], manifest["steps"]
-        )
+        start = datetime.fromisoformat(manifest["start"])
+        return Clock(start, manifest["step_us"], manifest["steps"])
 
     @property
     def metrics(self) -> dict[str, Any]:
