@@ -514,13 +514,11 @@ class RunStore:
         self._unfinished_run().end(keep=True, undo=True)
         self.manifest.status = "failed"
         self.manifest.notes.append(reason)
-        return _try_write(self.manifest, self.root) or (
-            # The file is lost anyway; its space is enough for a manifest on a full disk.
-            entry is not None
-            and entry.file is not None
-            and entry.file.empty()
-            and _try_write(self.manifest, self.root)
-        )
+        if _try_write(self.manifest, self.root):
+            return True
+        # The file is lost anyway; its space is enough for a manifest on a full disk.
+        file = None if entry is None else entry.file
+        return file is not None and file.empty() and _try_write(self.manifest, self.root)
 
 
 def _try_write(manifest: Manifest, root: Path | None) -> bool:

@@ -308,10 +308,8 @@ class TableBuffer:
             reuse: Whether the next rows may overwrite the arrays that are returned: the caller no
                 longer needs them by then.
         """
-        chunk = {
-            column.name: self._rows_of(column, 0) if self.rows else empty_chunk(column)
-            for column in self.spec.columns
-        }
+        columns = self.spec.columns
+        chunk = {c.name: self._rows_of(c, 0) if self.rows else empty_chunk(c) for c in columns}
         self.rows = 0
         if not reuse:
             # The next rows are likely to be as many.

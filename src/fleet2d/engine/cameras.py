@@ -398,10 +398,8 @@ class Cameras(Watcher):
         sightings = SightingTable(seen_at, index, distinct.T) if len(seen_at) else UNSEEN
         end = looked = self.next_step + count
         if self.sighting_errors is not None:
-            before = SightMemory(*old_memory)
-            rows, differs = self.sighting_errors.change(
-                sightings.rows(), self.memory, before, window, looked
-            )
+            before, seen = SightMemory(*old_memory), sightings.rows()
+            rows, differs = self.sighting_errors.change(seen, self.memory, before, window, looked)
             sightings, newest = SightingTable.of_rows(rows), newest_of(rows, len(newest))
             if differs:
                 patience = self.rule.patience
@@ -514,10 +512,8 @@ def points_seen(
     Raises:
         ComponentError: The method doesn't return a bool for each point.
     """
-    widest = np.array(
-        [[(math.isqrt(squared) + SLACK) ** 2 for squared in row] for row in lenses.widest.tolist()],
-        np.int64,
-    ).reshape(lenses.widest.shape)
+    radii = [[(math.isqrt(n) + SLACK) ** 2 for n in row] for row in lenses.widest.tolist()]
+    widest = np.array(radii, np.int64).reshape(lenses.widest.shape)
     queries, number = view_queries(
         lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
     )

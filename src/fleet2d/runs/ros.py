@@ -222,11 +222,9 @@ class RosMessages:
     def _transform_template(self, *names: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
             fours = [values[4 * i : 4 * i + 4] for i in range(len(names))]
-            parts = [
-                self._transform(time, self._frames(name), four)
-                for time, name, four in zip(times, names, fours, strict=True)
-            ]
-            return self._data(self._new("tf2_msgs/msg/TFMessage", parts))
+            parts = zip(times, names, fours, strict=True)
+            transforms = [self._transform(time, self._frames(n), four) for time, n, four in parts]
+            return self._data(self._new("tf2_msgs/msg/TFMessage", transforms))
 
         return Template(message, len(names), 4 * len(names))
 

@@ -455,9 +455,8 @@ def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
         )
     table = _layer_table(run, name)
     at_step = table["step"].to_numpy() == step
-    row, column, value = (
-        table[key].to_numpy(zero_copy_only=False)[at_step] for key in ("row", "column", "value")
-    )
+    columns = (table[key] for key in ("row", "column", "value"))
+    row, column, value = (each.to_numpy(zero_copy_only=False)[at_step] for each in columns)
     lattice = run.plan.lattice
     inside = (row < lattice.rows) & (column < lattice.columns) & (row >= 0) & (column >= 0)
     if not inside[1:].all() or row[0] != ALL_CELLS:

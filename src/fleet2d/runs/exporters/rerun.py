@@ -56,9 +56,8 @@ class _Writer:
     def __init__(self, rr: Any, stream: Any, records: Records) -> None:
         self._rr, self._stream, self._records = rr, stream, records
         users, robots = records.users, records.robots
-        self._colors = {name: _rgb(body_color(i, robot=False)) for i, name in enumerate(users)} | {
-            name: _rgb(body_color(i, robot=True)) for i, name in enumerate(robots)
-        }
+        self._colors = {name: _rgb(body_color(i, robot=False)) for i, name in enumerate(users)}
+        self._colors |= {name: _rgb(body_color(i, robot=True)) for i, name in enumerate(robots)}
         self._last: dict[str, tuple[float, float, float, bool]] = {}
 
     def write(self) -> None:
