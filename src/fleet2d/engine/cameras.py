@@ -281,7 +281,8 @@ class Cameras(Watcher):
     @property
     def waits(self) -> bool:
         """Whether an event of it may end the present span."""
-        return any(self.ends)
+        names = self.event_names
+        return not (self.awaited.isdisjoint(names) and self.owner.plan.interrupts.isdisjoint(names))
 
     @property
     def counts(self) -> I64:

@@ -160,7 +160,7 @@ def move(state: State, span: Span) -> None:
     if state.max_span is not None:
         end = min(end, span.first + state.max_span)
     queues = state.learners, state.changes, state.interventions
-    for due in (state.layers.next_due(span.first), *(queue.next_due() for queue in queues)):
+    for due in (state.layers.next_due(span.first), *[queue.next_due() for queue in queues]):
         if due is not None:
             end = min(end, max(due, span.first + 1))
     awaited = state.learners.awaited | state.awaited
