@@ -18,9 +18,9 @@ SHORT = "simulation.duration=6 h"
 
 
 @pytest.fixture(autouse=True)
-def empty_caches() -> None:
-    source.PLAN_CACHE.clear()
-    homes.HOME_CACHE.clear()
+def empty_caches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source, "PLAN_CACHE", Cache(source.CACHED_PLANS))
+    monkeypatch.setattr(homes, "HOME_CACHE", Cache(homes.CACHED_HOMES))
 
 
 def test_value_used_least_recently_is_dropped() -> None:

@@ -164,10 +164,6 @@ def _unit_by_doors(plan: FloorPlan, door: float | None) -> tuple[str, int] | Non
         door: The median width of its doors in the present unit; None if it has too few: then they
             are sought in the walls, in units that make the plan a home.
     """
-
-    def misfit(width: float) -> float:
-        return max(width / USUAL_DOOR_M, USUAL_DOOR_M / width)
-
     found: list[tuple[float, str, int]] = []
     for unit, metres in UNITS.items():
         widths = [door.width_m * metres for door in plan.doorways if door.leaf]
@@ -177,7 +173,8 @@ def _unit_by_doors(plan: FloorPlan, door: float | None) -> tuple[str, int] | Non
                 scaled = FloorPlan.build(plan.name, free, doorways=None, regions_are="none")
                 widths = [doorway.width_m for doorway in scaled.doorways]
         if len(widths) >= FEWEST_DOORS:
-            found.append((misfit(sorted(widths)[len(widths) // 2]), unit, len(widths)))
+            times = sorted(widths)[len(widths) // 2] / USUAL_DOOR_M
+            found.append((max(times, 1 / times), unit, len(widths)))
     error, unit, doors = min(found, default=(DOOR_FACTOR, "", 0))
     return (unit, doors) if error < DOOR_FACTOR else None
 
@@ -348,14 +345,12 @@ def main_part(plan: FloorPlan, space: Space) -> int | None:
     return part if part >= 0 else None
 
 
-def _closed_room(
-    room: Room, body: str, empty: Space | None, space: Space, in_room: Bool
-) -> Finding:
+def _closed_room(room: Room, body: str, empty: Space | None, space: Space, cells: Bool) -> Finding:
     severity: Severity = "wrong" if room.area_m2 >= TINY_ROOM_M2 else "odd"
     size = f"{room.name} ({room.area_m2:.1f} m2)"
-    if empty is not None and (in_room & (empty.part_of_cell == 0)).any():
+    if empty is not None and (cells & (empty.part_of_cell == 0)).any():
         text = f"furniture keeps {body} out of {size}"
-    elif (in_room & (space.part_of_cell >= 0)).any():
+    elif (cells & (space.part_of_cell >= 0)).any():
         text = f"{body} can't get to {size}"
     else:
         text = f"{body} fits nowhere in {size}"

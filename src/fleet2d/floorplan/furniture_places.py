@@ -362,8 +362,7 @@ class Interior:
         for turn, row, column in view.places(group, self.occupied, draws, score):
             things = view.pieces(group, turn, row, column)
             if things and self._add(view, things):
-                window = view.rectangle(group, turn, row, column)
-                self.occupied[window] = True
+                self.occupied[view.rectangle(group, turn, row, column)] = True
                 return True
         return False
 

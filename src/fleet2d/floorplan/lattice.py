@@ -144,8 +144,7 @@ class Lattice:
 
     @cached_property
     def _origin_units(self) -> I64:
-        cells = np.rint(np.asarray(self.origin) / self.cell).astype(np.int64)
-        return cells * UNITS_PER_CELL
+        return np.rint(np.asarray(self.origin) / self.cell).astype(np.int64) * UNITS_PER_CELL
 
     def to_lattice(self, xy: ArrayLike) -> I64:
         """Return positions (…, 2) [m] as the nearest lattice points, int64 of the same shape."""

@@ -105,11 +105,6 @@ class Cache:
         """Raise the capacity to at least `size` values."""
         self._size = max(self._size, size)
 
-    def clear(self) -> None:
-        """Drop all values."""
-        with self._lock:
-            self._values.clear()
-
 
 A = TypeVar("A", bound=NDArray[Any])
 

@@ -103,7 +103,7 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
     for number, correction in enumerate(corrections):
         where = f"floorplan.rooms[{number}]"
         if correction.polygon is not None:
-            painted = _draw(plan, painted, correction, len(regions), where)
+            _draw(plan, painted, correction, len(regions), where)
             types = (usual_type(correction.type),) if correction.type else ()
             kind = None if types else "room"
             regions.append(LabelledRegion(types, Polygon(), correction.name, kind))
@@ -142,8 +142,10 @@ def _region_at(plan: FloorPlan, painted: I64, correction: RoomCorrection, where:
     )
 
 
-def _draw(plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int, where: str) -> I64:
-    """Return the regions of the cells, with those inside the polygon set to `index`."""
+def _draw(
+    plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int, where: str
+) -> None:
+    """Set the regions of the cells inside the polygon to `index`."""
     shape = Polygon(correction.polygon)
     (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
     parts = shapely.get_parts(shapely.make_valid(region.shape))  # rounding may cross its sides
@@ -155,9 +157,7 @@ def _draw(plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int,
             f"{where}: no free cell of {plan.name} is inside the polygon from ({x0:g}, {y0:g}) to"
             f" ({x1:g}, {y1:g}) m"
         )
-    changed = painted.copy()
-    changed[patch.window][patch.mask] = index
-    return changed
+    painted[patch.window][patch.mask] = index
 
 
 def _door_lines(plan: FloorPlan) -> list[DoorLine]:

@@ -70,10 +70,9 @@ def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, st
     """
     with open_bag(path, FloorPlanError) as reader:
         topics = {c.topic: c for c in reader.connections if c.msgtype == GRID and c.msgcount}
-        if topic is None and len(topics) > 1 and "/map" in topics:
-            topic = "/map"
-        if topic is None and len(topics) == 1:
-            topic = next(iter(topics))
+        usual = ["/map"] if "/map" in topics else list(topics)
+        if topic is None and len(usual) == 1:
+            topic = usual[0]
         if topic is None or topic not in topics:
             if not topics:
                 names = ", ".join(sorted({c.topic for c in reader.connections})[:20])

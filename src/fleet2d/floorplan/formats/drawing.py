@@ -288,7 +288,6 @@ def _note_wide_gap(light: Bool, closed: Bool, close_gaps: float, pixel: float) -
 
 def _enclosed(light: Bool, gap: float) -> Bool:
     """Return the light pixels that a disc from outside doesn't reach; `gap` is its diameter."""
-    ground = np.pad(light, 1, constant_values=True)
     if gap > 0:
         # Beyond the margin is ground, too.
         wide = np.pad(light, math.ceil(gap) + 1, constant_values=True)
@@ -297,9 +296,8 @@ def _enclosed(light: Bool, gap: float) -> Bool:
         margin = math.ceil(gap)
         outside = squared_distance(~reached) < (gap / 2) ** 2
         return light & ~outside[margin + 1 : -margin - 1, margin + 1 : -margin - 1]
-    part = label_parts(ground, False)[1:-1, 1:-1]
-    enclosed: Bool = light & (part != 0)  # the first part is the margin
-    return enclosed
+    part = label_parts(np.pad(light, 1, constant_values=True), False)[1:-1, 1:-1]
+    return light & (part != 0)  # the first part is the margin
 
 
 def _largest(mask: Bool) -> int:

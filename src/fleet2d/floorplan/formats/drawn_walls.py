@@ -199,8 +199,7 @@ def _narrow(light: Bool, widest: float) -> Bool:
     np.maximum.at(deepest, part.ravel(), to_side2.ravel())
     is_narrow = deepest < (widest / 2) ** 2
     is_narrow[0] = is_narrow[-1] = False
-    narrow: Bool = is_narrow[part][1:-1, 1:-1]
-    return narrow
+    return is_narrow[part][1:-1, 1:-1]
 
 
 def _small_parts(part: I32, longest: float) -> Bool:

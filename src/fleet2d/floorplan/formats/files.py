@@ -85,12 +85,10 @@ def read_json(path: Path) -> dict[str, Any]:
         raise FloorPlanError(
             f"{path} is not JSON: {error.msg} in line {error.lineno}, column {error.colno}"
         ) from None
-    except RecursionError:
-        raise FloorPlanError(
-            f"{path} is not a floor plan: it has lists in lists without end"
-        ) from None
-    except ValueError as error:  # a number of more digits than Python converts
-        raise FloorPlanError(f"{path} is not a floor plan: {error}") from None
+    except (RecursionError, ValueError) as error:  # the latter of too long a number
+        is_deep = isinstance(error, RecursionError)
+        reason = "it has lists in lists without end" if is_deep else error
+        raise FloorPlanError(f"{path} is not a floor plan: {reason}") from None
     return _mapping(content, path, "a JSON object {…}")
 
 

@@ -31,6 +31,8 @@ KINDS = {
     "IfcSanitaryTerminal": "object",
     "IfcElectricAppliance": "object",
 }
+# What stands for no word in the model's vocabulary of furniture and appliances.
+UNDEFINED = (None, "", "NOTDEFINED", "USERDEFINED")
 # Coordinates are rounded to this, so that faces of one wall meet [m].
 ROUNDED_M = 1e-4
 # Objects whose lowest point is higher above the storey hang on a wall; through windows whose sill
@@ -123,19 +125,14 @@ def _features(model: Any, storey: Any, notes: list[str]) -> Iterator[Feature]:
         if kind in ("door", "window"):
             shape = shape.minimum_rotated_rectangle
         elif kind == "object":
-            words = " ".join(filter(None, (label, _predefined_type(element))))
-            type_name = furniture_type(words or "object")
+            words = [label, getattr(element, "PredefinedType", None)]
+            own = [str(word) for word in words if word not in UNDEFINED]
+            type_name = furniture_type(" ".join(own) or "object")
             height = measured_height(type_name, high - _height(storey))
             properties = {"type": type_name, "height": height}
         yield Feature(kind, f"{element.is_a()} {element.GlobalId}", shape, properties)
     if lost:
         notes.append(f"elements without a geometry, which are left out: {lost}")
-
-
-def _predefined_type(element: Any) -> str | None:
-    """Return the kind of furniture or appliance that the model's vocabulary has for it."""
-    kind = getattr(element, "PredefinedType", None)
-    return None if kind in (None, "NOTDEFINED", "USERDEFINED") else str(kind)
 
 
 def _height(storey: Any) -> float:

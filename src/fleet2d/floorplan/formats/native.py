@@ -234,9 +234,7 @@ class ObjectEntry(ObjectUse):
         """Return the object as one of the plan."""
         shape, uses = self.footprint.polygon, self.use_places()
         name = self.name or ""
-        return PlacedObject(
-            name, self.type, shape, self.blocks, uses, self.heading, height=self.height
-        )
+        return PlacedObject(name, self.type, shape, self.blocks, uses, self.heading, self.height)
 
 
 class PortalEntry(FileModel):

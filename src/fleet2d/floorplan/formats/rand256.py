@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from fleet2d.floorplan.formats.files import Listed, Point, validate
-from fleet2d.kernels import F64, I64
+from fleet2d.kernels import F64
 
 MAP_CLASS = "ValetudoMap"
 MAX_PIXEL_NUMBER = 2**20
@@ -97,11 +97,7 @@ def as_valetudo(content: dict[str, Any]) -> dict[str, Any]:
             {"type": kind, "metaData": meta, "pixels": _absolute(pixels, image)}
             for kind, pixels, meta in layers
         ],
-        "entities": [
-            {"type": kind, "points": _from_top(xy).ravel().tolist()}
-            for kind, xy in places
-            if len(xy)
-        ],
+        "entities": [{"type": kind, "points": _from_top(xy)} for kind, xy in places if len(xy)],
     }
 
 
@@ -109,14 +105,13 @@ def _pairs(values: list[float]) -> F64:
     return np.array(values[: len(values) // 2 * 2], np.float64).reshape(-1, 2)
 
 
-def _from_top(xy: F64) -> F64:
-    """Return places [mm] from the lower left corner in centimetres from the upper left one."""
-    return np.abs(xy / MM_PER_CM - (0, SIDE_CM))
+def _from_top(xy: F64) -> list[float]:
+    """Return places [mm] from the lower left corner as x, y, … [cm] from the upper left one."""
+    return np.abs(xy / MM_PER_CM - (0, SIDE_CM)).ravel().tolist()
 
 
 def _absolute(numbers: list[int], image: _RawImage) -> list[int]:
     """Return pixels that are numbered by rows of the image as x, y, x, y, … of the whole map."""
     row, column = np.divmod(np.array(numbers, np.int64), image.dimensions.width)
-    xy: I64 = np.stack([column + image.position.left, row + image.position.top], axis=1)
-    pixels: list[int] = xy.ravel().tolist()
-    return pixels
+    xy = np.stack([column + image.position.left, row + image.position.top], axis=1)
+    return xy.ravel().tolist()

@@ -79,8 +79,7 @@ class GreyPicture:
         counts = np.bincount(self.greys[light], minlength=256)
         beside = np.maximum(np.roll(counts, 2), np.roll(counts, -2))
         is_filled = (counts >= FILLED_SHARE * counts.sum()) & (counts > FILLED_PEAK * beside)
-        filled: list[int] = np.flatnonzero(is_filled[: counts.argmax() - FILLED_CONTRAST]).tolist()
-        return filled
+        return np.flatnonzero(is_filled[: counts.argmax() - FILLED_CONTRAST]).tolist()
 
 
 class UnclearPlaceError(FloorPlanError):

@@ -88,11 +88,9 @@ class _Surface(BaseModel):
     @property
     def box(self) -> F64:
         """The corners of what it covers of the floor, float64 (4, 2) [m]."""
-        matrix = np.array(self.transform).reshape(4, 4)
-        along, across = (matrix[k, [0, 2]] * self.dimensions[k] / 2 for k in (0, 2))
-        at = matrix[3, [0, 2]]
-        corners = [at - along - across, at + along - across, at + along + across]
-        return np.stack([*corners, at - along + across]) * (1, -1)
+        start, end = self.line
+        across = self.front * self.dimensions[2] / 2
+        return np.stack([start - across, end - across, end + across, start + across])
 
 
 class _Scan(BaseModel):

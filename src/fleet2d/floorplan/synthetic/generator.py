@@ -404,13 +404,11 @@ class House(RoomLayout):
     """A generated home, on a grid of 5 cm.
 
     Attributes:
-        wishes: The request, with everything decided.
         gaps: The passages through inner walls.
         front_door: The passage to the outside.
         shafts: Ducts and chimneys in corners of rooms [units].
     """
 
-    wishes: Wishes
     gaps: list[Gap]
     front_door: Gap
     shafts: list[Rectangle]
@@ -476,7 +474,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
             break
     for best in sorted(candidates, key=lambda candidate: candidate.cost):
         with suppress(MisfitError):
-            return _finish(best, decided, Choices(seed, "doors"), style)
+            return _finish(best, Choices(seed, "doors"), style)
     raise FloorPlanError(_failure(decided, style))
 
 
@@ -529,7 +527,7 @@ def _judge(
     return _Candidate(layout, possible, links, widths, cost)
 
 
-def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) -> House:
+def _finish(best: _Candidate, choices: Choices, style: Style) -> House:
     """Turn a layout and give it its doors.
 
     Raises:
@@ -549,7 +547,7 @@ def _finish(best: _Candidate, wishes: Wishes, choices: Choices, style: Style) ->
     low = wall.low + (spare // 2 if spare < 30 else choices.between(4, spare - 4))
     front_door = Gap(wall, low, low + FRONT_DOOR, True)
     shafts = draw_shafts(layout, [*gaps, front_door], choices) if style.edition == 2 else []
-    return House(layout.briefs, layout.boxes, wishes, gaps, front_door, shafts)
+    return House(layout.briefs, layout.boxes, gaps, front_door, shafts)
 
 
 # Probability [%] that a room of edition 2 is part of one that it opens to: an alcove, or a living

@@ -229,10 +229,10 @@ class Sketch:
         entry, closet = (self.entry, self.closet) if is_main else (None, None)
         for _ in range(TRIES):
             suite = closet is None and self.choices.chance(55)
-            front, back = self._sides(groups, entry, suite)
-            if not front or not back:
+            sides = self._sides(groups, entry, suite)
+            if not all(sides):
                 continue
-            fore, aft = self._strips(front, back, outline, bool(entry))
+            fore, aft = self._strips(sides, outline, bool(entry))
             rooms = [self.areas[slot[0]] for slot in aft.slots if len(slot) == 1]
             middle = fsum(rooms) / len(rooms) if rooms else 14.0
             corridor = Corridor(hall, self.request.corridor + WALL, suite, closet)
@@ -249,14 +249,10 @@ class Sketch:
         raise MisfitError
 
     def _strips(
-        self,
-        front: Sequence[RoomGroup],
-        back: Sequence[RoomGroup],
-        outline: str | None,
-        entry: bool,
+        self, sides: Sequence[Sequence[RoomGroup]], outline: str | None, entry: bool
     ) -> tuple[Strip, Strip]:
         """Draw the strips on the two sides of a corridor, with bays."""
-        fore, aft = _strip(front), _strip(back)
+        fore, aft = map(_strip, sides)
         if outline is None and self.choices.chance(45):
             fore = self._add_bays(fore, entry)
         if outline is None and self.choices.chance(35):

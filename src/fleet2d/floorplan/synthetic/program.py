@@ -224,7 +224,7 @@ def settle_wishes(wishes: Wishes, choices: Choices, style: Style) -> Wishes:
         area = _draw_area(choices)
         most = maximum_area(wishes.bedrooms or MAX_ROOMS_PER_TYPE, baths)
         area = round(min(max(area, 1.25 * minimum_area(beds, baths, garage)), most), 1)
-    _check(area, wishes)
+    _check(area, beds, baths, garage, wishes)
     if wishes.bedrooms is None:
         least, most_off = beds, 36 + 36 * style.variety // 100
         usual = (round(area) + choices.between(-most_off, most_off) + 38) // 66
@@ -253,9 +253,7 @@ def _draw_area(choices: Choices) -> float:
     return float(AREA_QUANTILES[-1][1])
 
 
-def _check(area: float, wishes: Wishes) -> None:
-    baths, garage = wishes.bathrooms or 1, bool(wishes.garage)
-    beds = wishes.bedrooms or max(baths - 2, 1)
+def _check(area: float, beds: int, baths: int, garage: bool, wishes: Wishes) -> None:
     if baths > beds + 2:
         raise FloorPlanError(
             f"a synthetic home with {counted(beds, 'bedroom')} has at most {beds + 2} bathrooms,"
