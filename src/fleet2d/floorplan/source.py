@@ -142,11 +142,9 @@ def _region_at(plan: FloorPlan, painted: I64, correction: RoomCorrection, where:
     )
 
 
-def _draw(
-    plan: FloorPlan, painted: I64, correction: RoomCorrection, index: int, where: str
-) -> None:
+def _draw(plan: FloorPlan, painted: I64, room: RoomCorrection, index: int, where: str) -> None:
     """Set the regions of the cells inside the polygon to `index`."""
-    shape = Polygon(correction.polygon)
+    shape = Polygon(room.polygon)
     (region,) = snap_regions(plan.lattice, [LabelledRegion((), shape)])
     parts = shapely.get_parts(shapely.make_valid(region.shape))  # rounding may cross its sides
     polygons = [part for part in parts if part.geom_type == "Polygon"]
