@@ -11,6 +11,7 @@ from tests.homes import all_homes, home_of
 from tests.strategies import homes, quick
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.kernels import Mesh
 
@@ -87,6 +88,20 @@ def test_rings_may_touch(holes: list[list[tuple[int, int]]]) -> None:
     assert polygon.is_valid
 
     check_mesh(build_mesh([polygon], 10, 10), [polygon])
+
+
+def test_map_in_which_geos_fails_has_a_mesh_all_the_same() -> None:
+    """A 70th of maps with thin slanted walls couldn't be read: "Unable to find a convex corner"."""
+    pixels = np.ones((14, 18), np.bool_)
+    for row, columns in ((6, "9-12"), (9, "9 17"), (10, "10-16"), (11, "11-14"), (12, "8-10")):
+        for span in columns.split():
+            first, _, last = span.partition("-")
+            pixels[row, int(first) : int(last or first) + 1] = False
+    polygon = shapely.transform(outline(pixels), lambda corners: corners * 64)
+    with pytest.raises(shapely.GEOSException):
+        shapely.constrained_delaunay_triangles(polygon)
+
+    check_mesh(build_mesh([polygon], 18, 14), [polygon])
 
 
 def test_polygons_may_touch_at_corners_and_at_walls() -> None:

@@ -1,6 +1,7 @@
 """Walls on the lattice: repaired, snapped, triangulated, and cut by gates that shut."""
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -209,12 +210,26 @@ def _build(polygons: list[list[I64]]) -> Mesh | None:
     return Mesh(vertices, triangles.astype(np.int32), neighbors)
 
 
+# GEOS fails for some polygons in which holes touch, but not for their mirror images.
+_MIRRORS = ((1, 1), (-1, -1), (-1, 1), (1, -1))
+
+
 def _triangulate(polygons: list[list[I64]]) -> I64:
-    """Return triangles that fill the polygons: int64 (t, 3, 2), counter-clockwise corners."""
-    shapes = [Polygon(rings[0], rings[1:]) for rings in polygons]
-    filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
+    """Return triangles that fill the polygons: int64 (t, 3, 2), counter-clockwise corners.
+
+    There are none where GEOS fails.
+    """
+    for sides in _MIRRORS:
+        shapes = [
+            Polygon(rings[0] * sides, [hole * sides for hole in rings[1:]]) for rings in polygons
+        ]
+        with suppress(shapely.GEOSException):
+            filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
+            break
+    else:
+        return np.zeros((0, 3, 2), np.int64)
     exact = shapely.get_coordinates(filled).reshape(len(filled), 4, 2)[:, :3]
-    corners: I64 = exact.astype(np.int64)
+    corners: I64 = exact.astype(np.int64) * sides
     areas = _doubled_areas(corners)
     corners[areas < 0] = corners[areas < 0][:, ::-1]
     return corners[areas != 0]

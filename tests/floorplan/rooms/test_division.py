@@ -7,6 +7,7 @@ import pytest
 import shapely
 from shapely import Polygon, affinity
 
+from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.division import MAX_CORNERS
@@ -180,6 +181,33 @@ def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
     )
 
     assert rooms == len(plan.rooms)
+
+
+def slanted_wall(*gaps: tuple[int, int]) -> FloorPlan:
+    """Return a map of 8 x 5 m with a slanted wall, a pixel thick, that gaps [pixels] interrupt."""
+    pixels = np.ones((100, 160), np.bool_)
+    for column in set(range(160)).difference(*(range(*gap) for gap in gaps)):
+        pixels[30 + column // 4, column] = False
+    free = shapely.transform(outline(pixels), lambda corners: corners * 0.05)
+    return FloorPlan.build("map", free, doorways=None, regions_are="none", pixel=0.05)
+
+
+def test_thin_slanted_wall_of_a_map_bounds_rooms() -> None:
+    """Its pixels touch at corners only: it was a row of small obstacles, taken for furniture."""
+    plan = slanted_wall((80, 98))
+
+    assert (2, 1) == (len(plan.rooms), len(plan.doorways))
+    assert 0.9 == pytest.approx(plan.doorways[0].width_m, abs=0.1)
+
+
+def test_piece_of_a_slanted_wall_bounds_rooms_between_two_doorways() -> None:
+    plan = slanted_wall((40, 58), (100, 118))
+
+    assert (2, 2) == (len(plan.rooms), len(plan.doorways))
+
+
+def test_short_slanted_chain_of_pixels_is_furniture() -> None:
+    assert 1 == len(slanted_wall((0, 70), (86, 160)).rooms)
 
 
 MAPS = {

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import LinearRing, MultiPolygon, Polygon
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh
@@ -325,6 +325,8 @@ ISLAND_M, WALL_M, THICK_M = 3.0, 1.2, 0.25
 """A free-standing obstacle counts as a wall from a length of `ISLAND_M` on, or of `WALL_M` if it is
 at most `THICK_M` thick, or parts of it are over such a length, as of a wall with a cupboard at it;
 shorter ones are columns or furniture."""
+BUMP_M = 0.3
+"""Obstacles up to this long that touch the outer wall at a corner are noise of it [m]."""
 
 
 @dataclass(frozen=True)
@@ -367,17 +369,31 @@ def search_passages(
 
 
 def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
-    """Return the polygon without its small holes: furniture and columns are not where rooms end."""
+    """Return the polygon without its small holes: furniture and columns are not where rooms end.
+
+    Holes that touch at corners are one obstacle: in a map of pixels, a thin slanted wall is a
+    chain of them. What touches the outer wall belongs to it, unless it is a mere bump.
+    """
     if not polygon.interiors:
         return polygon
-    holes = [hole for hole in polygon.interiors if _is_wall(Polygon(hole), units_per_m)]
-    return Polygon(polygon.exterior, holes)
+    holes = shapely.polygons(shapely.get_rings(polygon)[1:])
+    chain = np.arange(len(holes))
+    for one, other in shapely.STRtree(holes).query(holes, predicate="touches").T.tolist():
+        chain[chain == chain[one]] = chain[other]
+    at_outer_wall = shapely.intersects(holes, polygon.exterior)
+    kept: list[LinearRing] = []
+    for number in np.unique(chain):
+        links = chain == number
+        island = MultiPolygon(holes[links].tolist())
+        length = 2 * shapely.minimum_bounding_radius(island) / units_per_m
+        is_outer = at_outer_wall[links].any() and length > BUMP_M
+        if is_outer or (length >= WALL_M and _is_wall(island, units_per_m)):
+            kept += shapely.get_exterior_ring(holes[links]).tolist()
+    return Polygon(polygon.exterior, kept)
 
 
-def _is_wall(island: Polygon, units_per_m: float) -> bool:
+def _is_wall(island: MultiPolygon, units_per_m: float) -> bool:
     """Return whether a free-standing obstacle is a wall, or furniture with a wall."""
-    if 2 * shapely.minimum_bounding_radius(island) < WALL_M * units_per_m:
-        return False
     box = shapely.get_coordinates(shapely.oriented_envelope(island)) / units_per_m
     length = max(math.dist(box[0], box[1]), math.dist(box[1], box[2]))
     if length >= ISLAND_M or length < WALL_M:
