@@ -376,7 +376,7 @@ def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
     """
     if not polygon.interiors:
         return polygon
-    holes = shapely.polygons(shapely.get_rings(polygon)[1:])
+    holes = np.asarray(shapely.polygons(shapely.get_rings(polygon)[1:]))
     chain = np.arange(len(holes))
     for one, other in shapely.STRtree(holes).query(holes, predicate="touches").T.tolist():
         chain[chain == chain[one]] = chain[other]
