@@ -37,6 +37,7 @@ from fleet2d.floorplan.rooms.room import (
 from fleet2d.floorplan.rooms.segmentation import (
     MAX_DOOR_M,
     MIN_DOOR_M,
+    USUAL_PIXEL_M,
     Chambers,
     WallDirections,
     cut_chambers,
@@ -353,7 +354,8 @@ def search_passages(
         The free space [lattice], with corners added where passages meet slanted walls; and the
         passages.
     """
-    walls = [_without_islands(polygon, lattice.units_per_m) for polygon in polygons]
+    thick = (THICK_M + 2 * max(pixel - USUAL_PIXEL_M, 0)) * lattice.units_per_m
+    walls = [_without_islands(polygon, lattice.units_per_m, thick) for polygon in polygons]
     if len(walls) > 1:  # one may lie inside a former island of another
         walls = shapely.orient_polygons(shapely.get_parts(shapely.union_all(walls))).tolist()
     directions = WallDirections.of(walls, lattice.units_per_m) if kind == "none" else None
@@ -368,7 +370,7 @@ def search_passages(
     return polygons, Passages(segments, is_opening, directions)
 
 
-def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
+def _without_islands(polygon: Polygon, units_per_m: float, thick: float) -> Polygon:
     """Return the polygon without its small holes: furniture and columns are not where rooms end.
 
     Holes that touch at corners are one obstacle: in a map of pixels, a thin slanted wall is a
@@ -387,23 +389,25 @@ def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
         island = MultiPolygon(holes[links].tolist())
         length = 2 * shapely.minimum_bounding_radius(island) / units_per_m
         is_outer = at_outer_wall[links].any() and length > BUMP_M
-        if is_outer or (length >= WALL_M and _is_wall(island, units_per_m)):
+        if is_outer or (length >= WALL_M and _is_wall(island, units_per_m, thick)):
             kept += shapely.get_exterior_ring(holes[links]).tolist()
     return Polygon(polygon.exterior, kept)
 
 
-def _is_wall(island: MultiPolygon, units_per_m: float) -> bool:
-    """Return whether a free-standing obstacle is a wall, or furniture with a wall."""
+def _is_wall(island: MultiPolygon, units_per_m: float, thick: float) -> bool:
+    """Return whether a free-standing obstacle is a wall, or furniture with a wall.
+
+    A wall is at most as thick as given [lattice].
+    """
     box = shapely.get_coordinates(shapely.oriented_envelope(island)) / units_per_m
     length = max(math.dist(box[0], box[1]), math.dist(box[1], box[2]))
     if length >= ISLAND_M or length < WALL_M:
         return length >= ISLAND_M
-    if 2 * island.area <= THICK_M * units_per_m * island.length:
+    if 2 * island.area <= thick * island.length:
         return True
-    half = THICK_M / 2 * units_per_m
-    thick = island.buffer(-half, join_style="mitre").buffer(1.01 * half, join_style="mitre")
-    thin = shapely.length(shapely.get_parts(island.difference(thick))) / 2 / units_per_m
-    return float(thin[thin >= 2 * THICK_M].sum()) >= WALL_M
+    core = island.buffer(-thick / 2, join_style="mitre").buffer(0.505 * thick, join_style="mitre")
+    thin = shapely.length(shapely.get_parts(island.difference(core))) / 2
+    return float(thin[thin >= 2 * thick].sum()) >= WALL_M * units_per_m
 
 
 def _with_few_corners(walls: list[Polygon], units_per_m: float) -> list[Polygon]:
