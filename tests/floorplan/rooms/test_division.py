@@ -183,6 +183,17 @@ def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
     assert rooms == len(plan.rooms)
 
 
+@pytest.mark.parametrize(("pixel", "rooms"), [(0.05, 1), (0.1, 2)])
+def test_free_standing_wall_may_be_thicker_in_a_coarse_map(pixel: float, rooms: int) -> None:
+    """It is drawn so; in a fine map, an obstacle as thick is a sideboard."""
+    walls = [shapely.box(4, 1, 4.3, 1.6), shapely.box(4, 2.6, 4.3, 5), shapely.box(4, 6, 4.3, 7)]
+    free = shapely.box(1, 1, 7, 7) - shapely.union_all(walls)
+
+    plan = FloorPlan.build("map", free, doorways=None, regions_are="none", pixel=pixel)
+
+    assert rooms == len(plan.rooms)
+
+
 def slanted_wall(*gaps: tuple[int, int]) -> FloorPlan:
     """Return a map of 8 x 5 m with a slanted wall, a pixel thick, that gaps [pixels] interrupt."""
     pixels = np.ones((100, 160), np.bool_)
