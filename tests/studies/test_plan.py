@@ -1,5 +1,6 @@
 """Plans: all variants built and checked, with identities that change with what matters only."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from tests.studies.scenes import SPEED, base, run, small
 
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.model import load_scenario
-from fleet2d.studies.design import build_design, code_version, input_hash
+from fleet2d.studies.design import _LEAVES, build_design, code_version, input_hash
 from fleet2d.studies.driver import Observer, check_study
 from fleet2d.studies.executors import (
     SerialExecutor,
@@ -24,6 +25,7 @@ from fleet2d.studies.plan import (
 )
 from fleet2d.studies.specification import read_specification
 
+ROOT = Path(__file__).parents[2]
 ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
 
 
@@ -76,6 +78,13 @@ def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
 def test_the_code_has_a_version() -> None:
     assert code_version().startswith("fleet2d ")
     assert code_version() == code_version()
+
+
+def test_only_packages_that_run_or_show_simulations_are_no_part_of_that_version() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
+    above_the_engine = " | ".join(layers[: layers.index("engine")]).split(" | ")
+    assert sorted(above_the_engine) == sorted(_LEAVES)
 
 
 def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:

@@ -25,8 +25,12 @@ from fleet2d.studies.simulator import input_files
 from fleet2d.studies.specification import SEED, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
-# Packages that run, show or evaluate simulations without changing their results.
-_LEAVES = ("studies", "cli", "pictures", "viewer", "paper", "fit", "calibrate", "published")
+# Packages that run, show or evaluate simulations without changing their results: those above the
+# engine in the order of imports.
+_LEAVES = (
+    "cli", "datasets", "fit", "gym", "live", "paper", "pictures", "published", "studies", "testing",
+    "viewer",
+)  # fmt: skip
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 
