@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from matplotlib.container import BarContainer
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.errors import ComponentError, FloorPlanError, InputError
 from fleet2d.paper import results, speed
-from fleet2d.paper.pictures import draw
+from fleet2d.paper.pictures import DRAWERS, draw
 from fleet2d.paper.results import (
     ESTIMATORS,
     NAIVE_ESTIMATOR,
@@ -130,6 +131,19 @@ def test_a_result_is_kept_and_drawn(measured: dict[str, Result], name: str, tmp_
     draw(measured[name], tmp_path / "picture.png")
     assert (tmp_path / "picture.png").read_bytes().startswith(PNG)
     assert all(table.row_count for table in measured[name].tables)
+
+
+def test_errors_under_each_policy_are_bars_as_policies_have_no_order() -> None:
+    means = [
+        {"robot": robot, "estimator": estimator, "mean": 0.2, "low": 0.1, "high": 0.3}
+        for robot in HANGOUTS
+        for estimator in ("sighting_share", "likelihood")
+    ]
+    (axes,) = DRAWERS["feedback"]({"means": means}).axes
+    assert [2, 2] == [len(bars) for bars in axes.containers if isinstance(bars, BarContainer)]
+    assert ["sighting share", "likelihood"] == axes.get_legend_handles_labels()[1]
+    assert "hangout, 10 % of\nmoves at random" == axes.get_xticklabels()[0].get_text()
+    assert axes.get_ylim()[1] < 0.5  # as large as they allow
 
 
 def test_a_result_is_the_same_again(measured: dict[str, Result], tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The figures of the results."""
 
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fleet2d.metrics.rtp_score import GAPS
-from fleet2d.paper.results import RESULTS, Result
+from fleet2d.paper.results import FEEDBACK, LTP_GAP, RTP_GAP, SPEED, Result
 from fleet2d.pictures.floorplan import write_picture
 from fleet2d.studies.figures import COLORS, DARK, draw_interaction
 
@@ -83,23 +84,32 @@ def draw_rtp_gap(numbers: Mapping[str, Any]) -> Figure:
     """Draw the share of right rooms by gap, with intervals."""
     rows = [row for row in numbers["means"]["top_1"] if row["gap"] in DRAWN_GAPS]
     means = pl.DataFrame(rows).rename({"gap": "time since the user was last seen"})
-    return _draw_cells(means, "model", "share of right rooms")
-
-
-def draw_feedback(numbers: Mapping[str, Any]) -> Figure:
-    """Draw the mean errors of estimators under each policy, with intervals."""
-    means = pl.DataFrame(numbers["means"]).select("estimator", "robot", "mean", "low", "high")
-    means = means.with_columns(pl.col("estimator").str.replace_all("_", " "))
-    return _draw_cells(means, "estimator", "total variation from the truth")
-
-
-def _draw_cells(means: pl.DataFrame, second: str, label: str) -> Figure:
-    figure = draw_interaction(means, means.columns[1], second, label)
+    figure = draw_interaction(means, means.columns[1], "model", "share of right rooms")
     figure.set_size_inches(*SIZE)
     figure.axes[0].set_ylim(0, 1)
     return figure
 
 
-DRAWERS: dict[str, Callable[[Mapping[str, Any]], Figure]] = dict(
-    zip(RESULTS, (draw_speed, draw_ltp_gap, draw_rtp_gap, draw_feedback), strict=True)
-)
+def draw_feedback(numbers: Mapping[str, Any]) -> Figure:
+    """Draw the mean errors of estimators under each policy, with intervals."""
+    figure, axes = _figure()
+    estimators = pl.DataFrame(numbers["means"]).partition_by("estimator", maintain_order=True)
+    for number, of in enumerate(estimators):
+        x = np.arange(len(of)) + 0.16 * (number - (len(estimators) - 1) / 2)
+        mean, low, high = of.select("mean", "low", "high").to_numpy().T
+        label = of["estimator"][0].replace("_", " ")
+        ends = (mean - low, high - mean)
+        axes.bar(x, mean, 0.15, yerr=ends, color=COLORS[number], label=label, ecolor=DARK)
+    policies = [textwrap.fill(name, 18) for name in estimators[0]["robot"]]
+    axes.set_xticks(range(len(policies)), policies, fontsize=8)
+    axes.set(ylabel="total variation from the truth", ylim=(0, None))
+    axes.legend(frameon=False, fontsize=8, ncols=2)
+    return figure
+
+
+DRAWERS: Mapping[str, Callable[[Mapping[str, Any]], Figure]] = {
+    SPEED: draw_speed,
+    LTP_GAP: draw_ltp_gap,
+    RTP_GAP: draw_rtp_gap,
+    FEEDBACK: draw_feedback,
+}
