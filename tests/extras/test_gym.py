@@ -255,6 +255,16 @@ def test_pickled_environment_goes_on_as_the_original() -> None:
     assert np.array_equal(env.reset()[0], twin.reset()[0])
 
 
+def test_pickled_environments_go_on_as_the_originals() -> None:
+    lives = VectorRobotEnv(2, task=flat(), masked="rest")
+    lives.reset(seed=1)
+    twins = pickle.loads(pickle.dumps(lives))
+    for _ in range(5):
+        one, other = lives.step([1, 2]), twins.step([1, 2])
+        assert np.array_equal(one[0], other[0])
+        assert np.array_equal(one[1], other[1])
+
+
 def test_branch_goes_its_own_way_and_leaves_the_original_as_it_was() -> None:
     env = RobotEnv(flat())
     list(play(env, seed=1, steps=5))

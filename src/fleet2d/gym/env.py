@@ -3,6 +3,7 @@
 import copy
 import operator
 from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Self, SupportsFloat, cast
 
@@ -339,18 +340,20 @@ class VectorRobotEnv(SyncVectorEnv):  # type: ignore[misc]
     """
 
     def __init__(self, num_envs: int = 1, *overrides: str, **settings: Any) -> None:
-        first = RobotEnv(settings.pop("task", "hangout"), *overrides, **settings)
-
-        def make() -> RobotEnv:
-            env = RobotEnv(first.variants.task, *overrides, **settings)
-            env.variants = first.variants
-            return env
-
-        super().__init__([make] * num_envs)
+        variants = RobotEnv(settings.pop("task", "hangout"), *overrides, **settings).variants
+        # Gymnasium keeps what makes an environment: a function that can be pickled.
+        super().__init__([partial(_env_with, variants, settings)] * num_envs)
 
     def action_masks(self) -> Bool:
         """Return which actions are possible, bool (n, actions)."""
         return np.stack([env.action_masks() for env in self.envs])
+
+
+def _env_with(variants: Variants, settings: Mapping[str, Any]) -> RobotEnv:
+    """Return an environment that shares the homes of others."""
+    env = RobotEnv(variants.task, *variants.overrides, **settings)
+    env.variants = variants
+    return env
 
 
 Agents = dict[str, Any]
