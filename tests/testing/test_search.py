@@ -1,5 +1,6 @@
 """Searching for failures: what is found fails, is kept as a scenario, and wrong input is refused."""
 
+import pickle
 import random
 import sys
 from pathlib import Path
@@ -153,6 +154,13 @@ def test_a_search_is_the_same_again() -> None:
     assert [(("a", "b"), draws[0]["a.b"]), (("d", "e"), 1 + draws[0]["c"])] == space.changes(
         draws[0]
     )
+
+
+def test_a_job_that_has_run_here_goes_to_another_process(folder: Path) -> None:
+    job = command.job_of("flat.yaml", read_space({"simulation.seed": [1, 2]}))
+    margin = job.run({"simulation.seed": 1}, 3).margin
+    twin = pickle.loads(pickle.dumps(job))
+    assert margin == twin.run({"simulation.seed": 1}, 3).margin
 
 
 def test_axes_come_from_files_and_texts(folder: Path) -> None:
