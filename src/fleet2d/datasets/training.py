@@ -137,11 +137,11 @@ def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
     """Return batches of windows of homes with as many places, in a fixed random order."""
     batches = []
     for places, group in sorted(joined(parts).items()):
-        parts_of = []
+        inputs_of_homes = []
         for w in group:
-            places_of = np.broadcast_to(w.places, (len(w.truth), *w.places.shape))
-            parts_of.append(np.concatenate([places_of.astype(np.float32), w.features], axis=2))
-        inputs = np.concatenate(parts_of)
+            facts = np.broadcast_to(w.places.astype(np.float32), (len(w.truth), *w.places.shape))
+            inputs_of_homes.append(np.concatenate([facts, w.features], axis=2))
+        inputs = np.concatenate(inputs_of_homes)
         truth = np.concatenate([w.truth for w in group])
         order = np.random.default_rng(places).permutation(len(truth))
         batches += [

@@ -183,7 +183,7 @@ class StudyJob:
         with restrict(self.trust):
             try:
                 scenario = self.scenario(task)
-            except Fleet2DError as error:
+            except Fleet2DError as error:  # a file changed after the study was planned
                 outcome = VariantOutcome("failed", error=describe_error(error))
             else:
                 outcome = execute(scenario, self.metrics, self.tables)
