@@ -338,6 +338,27 @@ def test_abandoned_run_is_readable(tmp_path: Path) -> None:
     assert any("interrupted" in note for note in run.notes)
 
 
+def test_words_of_an_interrupted_append_are_not_part_of_the_digest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The digest counted a word that no row has, so that `verify` found the table changed."""
+
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    late = TableSpec("late", (Column("what", "category", nullable=True),))
+    store, same = opened(tmp_path / "run", late), opened(None, late)
+    for each in (store, same):
+        each.append("late", what=["on", "off"])
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "copyto", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            store.append("late", what=["lost", None])
+
+    assert same.close("interrupted") == store.close("interrupted")
+    assert [] == open_run(tmp_path / "run").verify()
+
+
 def test_close_after_an_interrupted_close(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C may come while the files are being finished."""
     store = opened(tmp_path / "run", POSES, NOISE)

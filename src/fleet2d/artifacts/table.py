@@ -280,8 +280,21 @@ class TableBuffer:
     def fill(self, batch: Batch, start: int) -> int:
         """Copy the rows of a batch from `start` on; return the first one that doesn't fit."""
         stop = min(batch.rows, start + self.limit - self.rows)
+        self._make_room(self.rows + stop - start)
+        known = [(words, len(words)) for words in self.words.values()]
+        try:
+            self._copy(batch, start, stop)
+        except BaseException:  # such as Ctrl-C: the digest counts no word that is in no row
+            for words, count in known:
+                while len(words) > count:
+                    words.popitem()
+            raise
+        self.rows += stop - start
+        return stop
+
+    def _copy(self, batch: Batch, start: int, stop: int) -> None:
+        """Copy some rows of a batch behind those of the buffer, which doesn't count them yet."""
         a, b = self.rows, self.rows + stop - start
-        self._make_room(b)
         for column in self.spec.columns:
             name, values, valid = column.name, batch.values[column.name], batch.valid[column.name]
             if column.takes_strings:
@@ -298,8 +311,6 @@ class TableBuffer:
                 self._valid[name][a:b] = valid
                 if valid is not True:
                     np.copyto(self._values[name][a:b], 0, where=~valid)
-        self.rows = b
-        return stop
 
     def take(self, *, reuse: bool = False) -> Chunk:
         """Return the rows and empty the buffer.
