@@ -191,6 +191,11 @@ def test_nothing_on_disk_before_open_and_nothing_after_discard(tmp_path: Path) -
     assert [] == names_in(tmp_path)
 
 
+def test_a_name_that_no_directory_can_have_is_found_before_the_run(tmp_path: Path) -> None:
+    with pytest.raises(RunDirectoryError, match="File name too long"):
+        RunStore(tmp_path / ("x" * 300)).check()
+
+
 def test_discard_before_open_touches_nothing(tmp_path: Path) -> None:
     stored(rows_of_every_kind(3), directory=tmp_path / "run")
     before = names_in(tmp_path / "run")

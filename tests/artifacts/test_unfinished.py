@@ -53,6 +53,17 @@ def begin_run(directory: Path, commits: int = 5, **options: Any) -> RunStore:
     return store
 
 
+def test_a_journal_that_begins_again_describes_its_tables_again(tmp_path: Path) -> None:
+    unfinished = UnfinishedRun(tmp_path)
+    for rows in (3, 2):
+        unfinished.begin()
+        unfinished.add(LATE, [np.arange(rows), np.zeros(rows, np.bool_), np.arange(rows)], rows, {})
+        commit = unfinished.commit(rows)
+        unfinished.journal.close()
+        assert {"late": rows} == commit.rows
+        assert commit == last_commit(tmp_path / FOLDER / JOURNAL_NAME)
+
+
 def kill(store: RunStore) -> Path:
     """End a run as the end of its process would: nothing more is written, the lock goes."""
     assert store._unfinished is not None

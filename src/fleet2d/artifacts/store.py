@@ -203,7 +203,7 @@ class RunStore:
                     f"{directory} can't be a run directory, because {nearest} is not a directory: "
                     "choose another --out or remove it"
                 )
-            if nearest == directory and any(directory.iterdir()):
+            if directory.is_dir() and any(directory.iterdir()):  # is_dir refuses impossible names
                 raise RunDirectoryError(
                     f"{directory} exists and is not empty: choose another --out or remove it"
                 )

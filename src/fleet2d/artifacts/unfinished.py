@@ -354,7 +354,7 @@ class UnfinishedRun:
         self.lock()
         self.folder.mkdir(exist_ok=True)
         self.checkpoint.unlink(missing_ok=True)
-        self._journal = FrameWriter(self.folder / JOURNAL_NAME, JOURNAL)
+        self._journal, self._tables = FrameWriter(self.folder / JOURNAL_NAME, JOURNAL), {}
 
     def resume(self, commit: Commit | None) -> Iterator[LoggedRows]:
         """Truncate the journal after a commit, and yield the rows before it.
