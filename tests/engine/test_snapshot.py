@@ -344,6 +344,9 @@ def test_a_place_where_nothing_can_be_written_is_an_error_in_words(tmp_path: Pat
     (tmp_path / "folder").mkdir()
     with pytest.raises(ArtifactError, match=r"folder can't be written"):
         simulation.save(tmp_path / "folder")
+    for path in (".", "/"):
+        with pytest.raises(ArtifactError, match=r"can't be written: Is a directory"):
+            simulation.save(path)
 
 
 @pytest.mark.parametrize("name", ["nowhere", "folder"])

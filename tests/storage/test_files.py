@@ -71,19 +71,28 @@ def test_a_link_in_place_of_a_file_is_replaced(tmp_path: Path) -> None:
     assert {"theirs", "plan.json"} == {path.name for path in tmp_path.iterdir()}
 
 
-def test_a_file_that_was_not_finished_leaves_the_old_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_a_file_that_was_not_finished_leaves_the_old_one(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
     file = tmp_path / "plan.json"
     file.write_text("old")
 
     def fail() -> None:
         with replacing(file) as handle:
             os.write(handle, b"ne")
-            raise ValueError("no more")
+            raise error("no more")
 
-    with pytest.raises(ValueError, match="no more"):
+    with pytest.raises(error, match="no more"):
         fail()
     assert "old" == file.read_text()
     assert [file] == list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("path", [".", "/"])
+def test_a_path_without_a_name_is_no_file(path: str) -> None:
+    with pytest.raises(OSError, match="Is a directory"):
+        write_atomically(Path(path), b"{}")
 
 
 def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path: Path) -> None:

@@ -187,12 +187,14 @@ def partial_file(path: Path) -> Iterator[Path]:
     Raises:
         OSError: It can't be written; the old content is unchanged.
     """
+    if not path.name:  # "." or "/"
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     partial = path.with_name(f"{path.name}{PARTIAL}")
     try:
         partial.unlink(missing_ok=True)  # left by a crash
         yield partial
         replace(path, partial)
-    except Exception:
+    except BaseException:  # also Ctrl-C
         with suppress(OSError):
             partial.unlink(missing_ok=True)
         raise
