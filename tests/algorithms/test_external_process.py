@@ -101,6 +101,15 @@ def program(folder: Path, answers: str) -> Path:
     return path
 
 
+def test_a_program_that_is_not_ready_is_quoted(tmp_path: Path) -> None:
+    path = tmp_path / "alg.py"
+    path.write_text('input()\nprint(\'{"state": "ready"}\', flush=True)\ninput()\n')
+
+    with pytest.raises(ComponentError) as caught:
+        fleet2d.run(scenario(path))
+    assert "answered {'state': 'ready'} to 'start', not 'ready'" in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("answers", "message"),
     [

@@ -161,7 +161,7 @@ class ExternalProgram:
             raise self._failure(
                 f"ended with code {process.poll()} instead of answering {content['type']!r}"
             )
-        kind, text = answer.content.get("type"), answer.content.get("text", "")
+        kind, text = answer.content.get("type", answer.content), answer.content.get("text", "")
         if kind == "error":
             raise self._failure(f"reports: {text}")
         if expected and kind != expected:
