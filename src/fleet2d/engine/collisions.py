@@ -277,8 +277,8 @@ class Clearance(Watcher):
         units = robot.home.plan.lattice.units_per_m
         first_meeting: tuple[int, int] | None = None
         now_x, now_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
-        passes, distance = first + moves < robot.passes_until, robot.entity.gives_way.distance
-        gap = np.where(passes, TOUCHING_GAP_M, distance)
+        passes, polite_gap = first + moves < robot.passes_until, robot.entity.gives_way.distance
+        gap = np.where(passes, TOUCHING_GAP_M, polite_gap)
         for number, user in enumerate(self._users):
             clearance = user.entity.radius + robot.entity.radius + gap
             user_x, user_y = xs[number, moves], ys[number, moves]

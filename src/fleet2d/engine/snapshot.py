@@ -172,11 +172,11 @@ _CONSTRUCTORS = frozenset({"object_array", "plain_array", "plain_scalar", "plain
 
 # Packages without classes of states: their objects could read, write or run something.
 _NO_STATE = (
-    *("artifacts.arrow", "artifacts.unfinished", "storage", "runs", "scenario", "options"),
-    *("configuration.components", "configuration.documents", "configuration.trust"),
-    *("engine.checkpoint", "engine.repeat", "engine.simulation", "engine.snapshot"),
-    *("cli", "fit", "paper", "pictures", "published", "studies", "testing", "viewer"),
-)
+    "artifacts.arrow", "artifacts.unfinished", "storage", "runs", "scenario", "options",
+    "configuration.components", "configuration.documents", "configuration.trust",
+    "engine.checkpoint", "engine.repeat", "engine.simulation", "engine.snapshot",
+    "cli", "fit", "paper", "pictures", "published", "studies", "testing", "viewer",
+)  # fmt: skip
 
 # Objects that are written as a module and a name.
 _REFERENCES = (type, FunctionType, BuiltinFunctionType)

@@ -269,9 +269,16 @@ class State:
 
         if self.expectations is None:
             cameras = {c.owner.name: c for c in [*self.user_cameras, *self.cameras]}
-            changes, now = self.changes, self.recorder.activities
-            home, clock, doors, on = self.home, changes.clock, changes.names, self.sensors.on
-            run = MeasuredRun(self.actors, self.bodies, home, clock, doors, on, cameras, now)
+            run = MeasuredRun(
+                self.actors,
+                self.bodies,
+                self.home,
+                self.changes.clock,
+                doors=self.changes.names,
+                sensors_on=self.sensors.on,
+                cameras=cameras,
+                activities=self.recorder.activities,
+            )
             self.expectations = RunExpectations(scenario, run, self.sensors, self.interventions)
             self.events.sinks.append(self.expectations)
         self.expectations.add(name, expectation, since, self.settled)

@@ -292,8 +292,12 @@ class activity(WordSignal):
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the code of the activity at each step."""
-        begun = [e for e in block.events if e[1:3] == (self.user, EventKind.ACTIVITY)]
-        return gauge.switched(block, [(e.step, _code(e.detail, gauge)) for e in begun])
+        changes = [
+            (event.step, _code(event.detail, gauge))
+            for event in block.events
+            if event.event == EventKind.ACTIVITY and event.entity == self.user
+        ]
+        return gauge.switched(block, changes)
 
 
 def _code(word: str, gauge: Gauge) -> float:
