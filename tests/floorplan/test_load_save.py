@@ -103,6 +103,42 @@ def test_file_that_exists_is_left_alone(tmp_path: Path) -> None:
     assert "mine" == path.read_text()
 
 
+def test_file_that_appears_while_a_plan_is_written_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text("mine")
+    monkeypatch.setattr(Path, "exists", lambda _: False)  # as it was before
+
+    with pytest.raises(FloorPlanError, match="exists already"):
+        save_floorplan(full_plan(), path)
+
+    assert "mine" == path.read_text()
+
+
+def test_link_that_leads_nowhere_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    path.symlink_to(tmp_path / "disk" / "plan.json")
+
+    with pytest.raises(FloorPlanError, match="exists already"):
+        save_floorplan(full_plan(), path)
+
+    assert path.is_symlink()
+
+
+def test_nothing_is_left_where_the_disk_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("fleet2d.storage.files.write_all", fail)
+    with pytest.raises(FloorPlanError, match="can't be written: No space left on device"):
+        save_floorplan(full_plan(), tmp_path / "plan.json")
+
+    assert [] == list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("name", ["plan.txt", "plan", "no/folder/plan.json"])
 def test_file_that_can_not_be_is_refused_and_nothing_is_left(tmp_path: Path, name: str) -> None:
     with pytest.raises(FloorPlanError, match=r"can't be written|a floor plan is written as"):

@@ -6,6 +6,7 @@ imported when a file needs them.
 
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -308,9 +309,13 @@ def _write_new(path: Path, text: str) -> None:
     from fleet2d.storage.files import write_atomically  # few homes are written
 
     try:
-        if path.exists():
-            raise FileExistsError
-        write_atomically(path, text.encode())
+        path.touch(exist_ok=False)  # at once, so that no file that appears meanwhile is replaced
+        try:
+            write_atomically(path, text.encode())
+        except BaseException:
+            with suppress(OSError):
+                path.unlink()
+            raise
     except FileExistsError:
         raise FloorPlanError(f"{path} exists already: remove it, or name another file") from None
     except OSError as error:
