@@ -384,7 +384,9 @@ def _to_float(quantity: Quantity) -> BeforeValidator:
     return BeforeValidator(parse)
 
 
-def _limit(is_valid: Callable[[Any], bool], expected: str) -> AfterValidator:
+def limited_to(is_valid: Callable[[Any], bool], expected: str) -> AfterValidator:
+    """Return what refuses values of a quantity that aren't valid; `expected` says which are."""
+
     def check(value: Any) -> Any:
         if not is_valid(value):
             text = format_duration(value) if isinstance(value, timedelta) else f"{value:g}"
@@ -411,20 +413,20 @@ Duration = Annotated[
 """A length of time, 0 or more, exact to the microsecond; a timedelta in Python."""
 
 PositiveDuration = Annotated[
-    Duration, _limit(lambda value: value > timedelta(0), "a duration longer than 0")
+    Duration, limited_to(lambda value: value > timedelta(0), "a duration longer than 0")
 ]
 """A :data:`Duration` above 0."""
 
 Length = Annotated[float, _to_float(LENGTH), LENGTH.schema()]
 """A length or a coordinate [m]."""
 
-PositiveLength = Annotated[Length, _limit(lambda value: value > 0, "a length above 0")]
+PositiveLength = Annotated[Length, limited_to(lambda value: value > 0, "a length above 0")]
 """A :data:`Length` above 0."""
 
 Speed = Annotated[
     float,
     _to_float(SPEED),
-    _limit(lambda value: value >= 0, "a speed of 0 or more"),
+    limited_to(lambda value: value >= 0, "a speed of 0 or more"),
     SPEED.schema(),
 ]
 """A speed, 0 or more [m/s]."""
@@ -435,7 +437,7 @@ AngleDeg = Annotated[float, _to_float(ANGLE), ANGLE.schema()]
 TurnRateDeg = Annotated[
     float,
     _to_float(TURN_RATE),
-    _limit(lambda value: value >= 0, "a turn rate of 0 or more"),
+    limited_to(lambda value: value >= 0, "a turn rate of 0 or more"),
     TURN_RATE.schema(),
 ]
 """How fast a body turns, 0 or more [degrees/s]."""
@@ -443,7 +445,7 @@ TurnRateDeg = Annotated[
 Share = Annotated[
     float,
     _to_float(SHARE),
-    _limit(lambda value: 0 <= value <= 1, "a share from 0 to 1, or from '0 %' to '100 %'"),
+    limited_to(lambda value: 0 <= value <= 1, "a share from 0 to 1, or from '0 %' to '100 %'"),
     SHARE.schema(),
 ]
 """A probability or a part of a whole, 0 to 1."""

@@ -194,6 +194,20 @@ def test_setting_out_of_range_is_refused(settings: dict) -> None:
         Synthetic(**settings)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("corridor_width", "300 cm", "expected a width of 0.9 m to 2 m, got 3"),
+        ("door_width", 0.1, "expected a width of 0.7 m to 1.2 m, got 0.1"),
+    ],
+)
+def test_width_out_of_range_is_refused_with_both_limits_and_the_unit(
+    key: str, value: object, message: str
+) -> None:
+    with pytest.raises(ValueError, match=rf"{key}\n *{message}"):
+        Synthetic(**{key: value})
+
+
 def test_walls_between_boxes_are_where_they_touch() -> None:
     boxes = [Box(0, 0, 0, 40, 40), Box(1, 40, 20, 80, 60), Box(2, 0, 40, 40, 60)]
     walls = {(wall.first, wall.second, wall.upright, *wall[3:]) for wall in inner_walls(boxes)}

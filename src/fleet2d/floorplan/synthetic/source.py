@@ -1,13 +1,13 @@
 """The `synthetic` floor plan: a home generated from a seed, its settings, and its floor plan."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Annotated, Literal
 
 import shapely
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.units import Length, Share
+from fleet2d.configuration.units import Length, Share, limited_to
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.floorplan.source import FloorPlanSource
@@ -105,6 +105,10 @@ def _free_space(
     return free
 
 
+_CorridorWidth = Annotated[Length, limited_to(lambda m: 0.9 <= m <= 2, "a width of 0.9 m to 2 m")]
+_DoorWidth = Annotated[Length, limited_to(lambda m: 0.7 <= m <= 1.2, "a width of 0.7 m to 1.2 m")]
+
+
 @register("floorplan", "synthetic")
 class Synthetic(FloorPlanSource):
     """A generated home; the same configuration is the same home on every machine.
@@ -135,8 +139,8 @@ class Synthetic(FloorPlanSource):
     garage: bool | None = None
     outline: Literal["rectangle", "L", "T", "U"] | None = None
     open_plan: bool | None = None
-    corridor_width: Length | None = Field(default=None, ge=0.9, le=2)
-    door_width: Length | None = Field(default=None, ge=0.7, le=1.2)
+    corridor_width: _CorridorWidth | None = None
+    door_width: _DoorWidth | None = None
     variety: Share = 0.0
     edition: Literal[1, 2] = 1
 
