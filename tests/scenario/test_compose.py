@@ -123,6 +123,20 @@ def test_extended_file_can_change_a_type(tmp_path: Path) -> None:
     ]
 
 
+def test_class_that_stays_the_same_is_not_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path, base="floorplan: {type: 'mine:House', width: 3}")
+    write(tmp_path, home="extends: base.yaml\nfloorplan: {type: 'mine:House', cell: 0.1}")
+    looked_up: list[str] = []
+    monkeypatch.setattr(compose_module, "lookup", lambda _, name: looked_up.append(name))
+
+    assert {"type": "mine:House", "width": 3, "cell": 0.1} == compose(tmp_path / "home.yaml").data[
+        "floorplan"
+    ]
+    assert [] == looked_up
+
+
 def test_text_keeps_the_folder_of_the_file_it_came_from(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -240,10 +240,11 @@ class _Merger:
             old_fields = {"type", *_type_fields(kind, base["type"])}
         elif "type" in change:
             # The type of an algorithm or a metric may be given by its name.
-            old = base.get("type", keys[-1])
-            cls, new_cls = (_class_of(kind, name) for name in (old, change["type"]))
-            if old != change["type"] and (cls is None or cls is not new_cls):
-                old_fields = {"behaviors", *_type_fields(kind, old)}
+            old, new = base.get("type", keys[-1]), change["type"]
+            if old != new:  # equal names need no class, which may be the user's code
+                cls = _class_of(kind, old)
+                if cls is None or cls is not _class_of(kind, new):
+                    old_fields = {"behaviors", *_type_fields(kind, old)}
         for key in old_fields & base.keys():
             self.forget(base[key], (*keys, key))
         return {key: value for key, value in base.items() if key not in old_fields}
