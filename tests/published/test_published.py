@@ -550,6 +550,15 @@ robot: {base: {radius: 0.1, fov_config: {}}}
     assert 2 == len(fleet2d.Simulation(scenario).state)
 
 
+def test_remarks_on_a_robot_come_before_those_on_its_camera(folder: Path) -> None:
+    remarks, _ = converted(folder, ("radius: 0.1\n", "radius: 0\n"))
+    keys = [remark.partition(":")[0] for remark in remarks]
+
+    assert keys.index("robot.base.radius") < keys.index(
+        "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute"
+    )
+
+
 def test_no_robot(folder: Path) -> None:
     text = OLD[: OLD.index("robot:")]
     (folder / "old.yaml").write_text(text)

@@ -471,8 +471,8 @@ def _turns(reader: ConfigReader, step_s: Fraction) -> dict[str, float]:
 
 def convert_robot(reader: ConfigReader, step: timedelta, sight: dict[str, Any]) -> dict[str, Any]:
     """Return the robot; `sight` is the section that `convert_sight` returned."""
-    camera = _camera(reader.at("fov_config"), ignores_limits=bool(sight))
-    return _body(reader, step) | {"camera": camera}
+    body = _body(reader, step)
+    return body | {"camera": _camera(reader.at("fov_config"), ignores_limits=bool(sight))}
 
 
 def _camera(reader: ConfigReader, *, ignores_limits: bool) -> dict[str, Any]:
