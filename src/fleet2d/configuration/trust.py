@@ -470,8 +470,10 @@ class _SourceFinder(MetaPathFinder):
                 return _own(own, [str(file.parent)] if is_package else None)
         if not folders or _TRUST.get() is None:
             return None
-        elsewhere = [entry for entry in sys.path if Path(entry).resolve() != folders[0]]
-        spec = None if path else PathFinder.find_spec(fullname, elsewhere)
+        spec = None
+        if not path:  # else it is in a package, and the rest of sys.path doesn't matter
+            elsewhere = [entry for entry in sys.path if Path(entry).resolve() != folders[0]]
+            spec = PathFinder.find_spec(fullname, elsewhere)
         packages = [str(folder / name) for folder in folders if _is_bare_package(folder / name)]
         if spec is None and packages:
             return _own(ModuleSpec(fullname, None, is_package=True), packages)

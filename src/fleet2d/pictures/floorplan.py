@@ -471,7 +471,9 @@ def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
 def _middle(cells: Bool) -> tuple[int, int]:
     """Return the (row, column) in the middle of the cells that are deepest inside."""
     rows, columns = np.nonzero(cells)
-    depth = squared_distance(np.pad(cells, 1))[rows + 1, columns + 1]
+    top, left = int(rows.min()), int(columns.min())
+    window = cells[top : rows.max() + 1, left : columns.max() + 1]  # small in a large home
+    depth = squared_distance(np.pad(window, 1))[rows - top + 1, columns - left + 1]
     deep = np.flatnonzero(depth >= MIDDLE_DEPTH * depth.max())
     rows, columns = rows[deep], columns[deep]
     distance = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2

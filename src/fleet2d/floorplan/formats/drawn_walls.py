@@ -127,7 +127,8 @@ def _row_gaps(
     ragged = max(round(RAGGED_M / pixel), 1)
     thickest, door = WALL_M / pixel, DOOR_M / pixel
     groups: list[list[int]] = []  # first row, start, end, last row, is joined
-    recent, row_before = groups[:], -1  # those that the present row may continue
+    recent: list[list[int]] = []  # those that the present row may continue
+    row_before = -1
     runs = zip(rows.tolist(), starts.tolist(), ends.tolist(), joined.tolist(), strict=True)
     for row, start, end, is_joined in runs:
         if row != row_before:
