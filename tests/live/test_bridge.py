@@ -1,6 +1,7 @@
 """Bridges: what arrives late, lost, wrong or too much; what is passed on; and its repetition."""
 
 import re
+import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from tests.live.scenes import LIVE, place
 
 import fleet2d
 from fleet2d.configuration.trust import Trust, restrict
+from fleet2d.engine import loop
 from fleet2d.errors import InputError
 from fleet2d.live import Bridge, LiveStep, from_iterator, open_peers, to_function
 
@@ -55,6 +57,18 @@ def bridged(messages: dict[int, list[Any]], **options: Any) -> tuple[Any, Now, B
     out = options.pop("out", None)
     bridge = Bridge(fleet2d.Simulation(LIVE, out=out), [peer], speed=0, **options)
     return bridge.run(), peer, bridge
+
+
+def test_ctrl_c_within_a_step_ends_the_run_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def press(_: object, span: Any) -> None:
+        if span.first == 3:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(loop, "PHASES", (press, *loop.PHASES))
+    run, peer, _ = bridged({})
+
+    assert ("interrupted", "interrupted") == (run.status, peer.ended)
+    assert [0, 1, 2, 3] == [frame.step for frame in peer.frames]
 
 
 def test_poses_are_where_the_body_is() -> None:

@@ -22,6 +22,7 @@ from typing import Any, Protocol
 import shapely
 
 from fleet2d.configuration.problems import suggest
+from fleet2d.engine.loop import deferred_interrupt
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.live.messages import (
@@ -222,13 +223,10 @@ class Bridge:
         self._standing: set[str] = set()  # the bodies for which none has arrived for a while
         self._numbers: dict[Sender, int] = {}
         self._told: Counter[str] = Counter()
+        self._is_stopping = False
 
     def run(self) -> Run:
-        """Simulate to the end, and return the run.
-
-        Raises:
-            KeyboardInterrupt: Ctrl-C; the run up to that step is stored.
-        """
+        """Simulate to the end, or to the step of Ctrl-C, and return the run."""
         simulation = self.simulation
         simulation.listen(self._events.extend)
         if self.rows:
@@ -282,10 +280,16 @@ class Bridge:
             for sender in gone:
                 self._withdraw(sender)
             self._stop_the_silent()
-            simulation.advance()
+            with deferred_interrupt(self._stop):  # half a step could not be stored
+                simulation.advance()
             self._send()
+            if self._is_stopping:
+                return
             if self.speed:
                 gc.collect()  # now, and not when a step is due
+
+    def _stop(self) -> None:
+        self._is_stopping = True
 
     # What arrives
 
