@@ -279,6 +279,18 @@ def test_a_run_is_reproduced_with_what_python_expected_of_it(tmp_path: Path) -> 
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
+def test_a_stored_run_may_have_an_expectation_that_was_never_put_to_the_test(
+    tmp_path: Path,
+) -> None:
+    """Its manifest was called damaged, because `holds` was null."""
+    waits = "after(speed(astro) > 50, moving(astro), within=1 min)"
+    stored = fleet2d.Simulation(home(expect={"waits": waits}), out=tmp_path / "run").run()
+
+    assert stored.manifest["expectations"]["waits"]["holds"] is None
+    assert "waits is untested" in stored.manifest["expectations"]["waits"]["says"]
+    assert fleet2d.reproduce(tmp_path / "run").same
+
+
 def test_what_is_expected_goes_on_in_copies_and_files() -> None:
     simulation = fleet2d.Simulation(home())
     simulation.advance(100)

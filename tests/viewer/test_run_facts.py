@@ -45,10 +45,11 @@ def test_stretches_of_an_expectation_tile_the_run(starts: list[tuple[int, int]])
         ({"holds": True, "decided": True}, "held"),
         ({"holds": True, "decided": False}, "open"),
         ({"holds": False, "decided": True}, "violated"),
+        ({"holds": None, "decided": True}, "open"),
     ],
 )
 def test_expectation_without_violations_is_what_its_verdict_says(
-    verdict: dict[str, bool], kind: str
+    verdict: dict[str, bool | None], kind: str
 ) -> None:
     (mark,) = expectation_marks("found", verdict, [], STEPS)
     assert (0, STEPS, kind) == (mark["step"], mark["end"], mark["kind"])

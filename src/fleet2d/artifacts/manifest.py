@@ -206,7 +206,7 @@ class _StoredIntervention(_StoredPart):
 class _StoredVerdict(_StoredPart):
     expectation: str
     first: Count
-    holds: bool = True
+    holds: bool | None = True  # None: it was never put to the test
     decided: bool = True
 
 

@@ -134,10 +134,12 @@ def expectation_marks(
     for first, last in violations:
         stretches += [(begin, first, "held"), (max(begin, first), last + 1, "violated")]
         begin = max(begin, last + 1)
-    if not stretches and not verdict.get("holds", True):
+    holds = verdict.get("holds", True)  # None: it was never put to the test
+    if not stretches and holds is False:
         stretches.append((begin, steps, "violated"))
     else:
-        stretches.append((begin, steps, "held" if verdict.get("decided", True) else "open"))
+        is_open = holds is None or not verdict.get("decided", True)
+        stretches.append((begin, steps, "open" if is_open else "held"))
     return [
         MarkFacts(lane=name, step=step, end=end, kind=kind, label=label)
         for step, end, kind in stretches
