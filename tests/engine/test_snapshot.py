@@ -34,7 +34,7 @@ HOUSE = {
 
 
 def house(duration: str = "10 min") -> dict[str, Any]:
-    """Doors that people open, sensors, layers, people who react, robots that give way."""
+    """Doors, sensors, layers, people who react, robots that give way and don't know their place."""
     content = everything(duration, objects=HOUSE)
     content["changes"] = [
         {"at": "4 min", "shut": "bath"},
@@ -44,7 +44,7 @@ def house(duration: str = "10 min") -> dict[str, Any]:
     seen = {name: {"store": True} for name in ("explored", "last_seen")}
     content["floorplan"]["layers"] = {**seen, "costmap": {"store": True, "every": "5 min"}}
     content["users"]["cleo"] = {"behaviors": ["reactions", "meander"]}
-    content["robots"]["astro"]["gives_way"] = {}
+    content["robots"]["astro"] |= {"gives_way": {}, "localization": {}}
     content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "3 min", "source": "rtp"}
     on = {"type": "tests.engine.test_events:Heard", "on": ["sensor", "user_lost"]}
     content["algorithms"] |= {"rtp": {"type": "rtp"}, "ltp": {"type": "ltp"}, "heard": on}

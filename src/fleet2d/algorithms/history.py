@@ -4,7 +4,7 @@ They read the log of the run: poses, observations and events, as far back as com
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
@@ -196,6 +196,13 @@ class Motions(Protocol):
         """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
 
 
+class PoseBelief(Protocol):
+    """Protocol of what a robot believes of its poses."""
+
+    def believed(self, runs: Window) -> Window:
+        """Return the poses that it believes it has, given the true ones."""
+
+
 class Log:
     """The motions and observations of a run, as far back as components may look."""
 
@@ -236,8 +243,7 @@ class Log:
         self._rooms = NearestRooms(home.plan)
         self._nearest_patches: NearestRooms | None = None
         self.untracked: frozenset[str] = frozenset()  # users whose place may be unknown
-        # For robots with `localization`: the believed poses from the true ones.
-        self.beliefs: dict[str, Callable[[Window], Window]] = {}
+        self.beliefs: dict[str, PoseBelief] = {}  # of robots with `localization`
         self._poses: dict[tuple[str, int, int, bool], BodyPoses] = {}
 
     def forget(self, before: int) -> None:
@@ -289,7 +295,7 @@ class Log:
         key = (name, first, end, true)
         if key not in self._poses:  # components that are updated at the same step share them
             runs = self._motions.runs(self.index[name], first, end)
-            path = runs if true else self.beliefs[name](runs)
+            path = runs if true else self.beliefs[name].believed(runs)
             self._poses[key] = BodyPoses(self.home, path)
         return self._poses[key]
 

@@ -219,5 +219,5 @@ def _log(
     log.untracked = frozenset(name for name, b in behaviors if EventKind.UNKNOWN in b.records)
     log.answers, log.wanted = conversations.log, conversations.wanted
     log.answer_models = {basis.users[u].name: each for u, each in conversations.answers.items()}
-    log.beliefs = {c.owner.name: c.drift.believed for c in cameras if c.drift is not None}
+    log.beliefs = {c.owner.name: c.drift for c in cameras if c.drift is not None}
     return log
