@@ -1,6 +1,7 @@
 """Distances and scores: against slow twins, and what must hold of each."""
 
 import math
+import tracemalloc
 from datetime import datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
@@ -270,3 +271,20 @@ def test_steps_are_counted_by_place_and_hour(
 
     assert expected.tolist() == steps_by_hour(history, state).tolist()
     assert expected.sum(axis=0).tolist() == steps_in_places(history, state).tolist()
+
+
+def test_counts_of_many_users_take_memory_in_proportion() -> None:
+    rng = np.random.default_rng(0)
+    users = rng.integers(-1, ROOMS, (500, STEPS)).tolist()
+    home = SimpleNamespace(rooms=range(ROOMS))
+    names = tuple(map(str, range(len(users))))
+    state: Any = SimpleNamespace(home=home, users=names, start=datetime(2026, 3, 2))
+    history: Any = History(users, 0)
+
+    tracemalloc.start()
+    counts = steps_in_places(history, state)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert (counts.sum(axis=1)[:-1] == STEPS).all()
+    assert peak < 20e6

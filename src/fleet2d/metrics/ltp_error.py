@@ -10,6 +10,7 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
+from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence, presence_of
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
 from fleet2d.configuration.components import register
@@ -129,24 +130,35 @@ def steps_in_places(history: History, state: Present) -> I64:
 
 def steps_by_hour(history: History, state: Present) -> I64:
     """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
-    step_us = round(history.step_s * 1e6)
+    steps, step_us = len(history), round(history.step_s * 1e6)
     first_us = micros(state.start - datetime.min) + history.first * step_us  # since a Monday
-    end_us = first_us + len(history) * step_us
-    hour_us = np.arange(first_us // HOUR_US, -(-end_us // HOUR_US)) * HOUR_US
-    visits = [history.poses(user).visits for user in state.users]
+    hours = np.arange(first_us // HOUR_US, -(-(first_us + steps * step_us) // HOUR_US))
+    hour_begins = np.maximum(-((first_us - hours * HOUR_US) // step_us), 0)
+    nobody = np.array([0]), np.array([steps]), np.array([NOWHERE])
+    visits = [*(history.poses(user).visits for user in state.users), nobody]
+    begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))
+    counts = np.zeros((HOURS, len(visits), len(state.home.rooms) + 1), np.int64)
+    # Each visit is divided into the hours that it lasts: how many, and which of them a part is in.
+    first = np.searchsorted(hour_begins, begin, side="right") - 1
+    parts = np.searchsorted(hour_begins, end) - first
+    visit = np.repeat(np.arange(len(begin)), parts)
+    hour = np.arange(len(visit)) + np.repeat(first - np.cumsum(parts) + parts, parts)
+    part_begin = np.maximum(begin[visit], hour_begins[hour])
+    part_end = np.minimum(end[visit], np.append(hour_begins, steps)[hour + 1])
+    row = np.repeat(np.arange(len(visits)), [len(begins) for begins, _, _ in visits])[visit]
+    place = room[visit]  # NOWHERE is -1: the last column
+    np.add.at(counts, (hours[hour] % HOURS, row, place), part_end - part_begin)
     # In the stretches between these steps nobody changes room, and the hour is the same.
-    hour_begins = np.maximum(-((first_us - hour_us) // step_us), 0)
-    begin = np.sort(np.concatenate([hour_begins, *(begins for begins, _, _ in visits)]))
-    steps = np.diff(begin, append=len(history))
-    is_there = np.zeros((len(begin), len(visits) + 1, len(state.home.rooms) + 1), np.bool_)
-    for row, (begins, _, room) in enumerate(visits):
-        place = room[np.searchsorted(begins, begin, side="right") - 1]
-        is_there[np.arange(len(begin)), row, place] = True  # NOWHERE is -1: the last column
-    is_there[:, -1, :-1] = is_there[:, :-1, :-1].any(axis=1)
-    is_there[:, -1, -1] = ~is_there[:, -1, :-1].any(axis=1)
-    counts = np.zeros((HOURS, *is_there.shape[1:]), np.int64)
-    hour = (first_us + begin * step_us) // HOUR_US % HOURS
-    np.add.at(counts, hour, is_there * steps[:, np.newaxis, np.newaxis])
+    at = np.unique(np.concatenate([hour_begins, begin]))
+    change = np.zeros((len(at) + 1, counts.shape[2]), np.int64)
+    np.add.at(change, (np.searchsorted(at, begin), room), 1)
+    np.add.at(change, (np.searchsorted(at, end), room), -1)
+    is_there = np.cumsum(change[:-1], axis=0) > 0
+    is_there[:, -1] = ~is_there[:, :-1].any(axis=1)
+    stretches = is_there * np.diff(at, append=steps)[:, np.newaxis]
+    at_hour = np.searchsorted(at, hour_begins)
+    counts[:, -1] = 0
+    np.add.at(counts[:, -1], hours % HOURS, np.add.reduceat(stretches, at_hour, axis=0))
     return counts
 
 
