@@ -248,19 +248,28 @@ class EvidenceTable(Algorithm):
     def update(self, history: History, state: Present) -> dict[str, Any] | None:
         """Return the rows of the period, by bin, room and user, anyone first; None without any."""
         evidence = history.evidence
-        seen = np.roll(evidence.seen, 1, axis=1).transpose(0, 2, 1)  # anyone first
-        is_row = seen > 0
-        is_row[:, :, 0] |= evidence.watched > 0
-        bins, rooms, users = np.nonzero(is_row)
+        user, bin_, room, steps, shape = evidence.sightings  # `seen` of many users is mostly zeros
+        anyone = shape[1] - 1
+        seen = np.zeros((shape[0], shape[2]), np.int64)
+        is_anyone = user == anyone
+        seen[bin_[is_anyone], room[is_anyone]] = steps[is_anyone]
+        watched_bin, watched_room = np.nonzero((evidence.watched > 0) | (seen > 0))
+        known = ~is_anyone
+        bins = np.concatenate([watched_bin, bin_[known]])
+        rooms = np.concatenate([watched_room, room[known]])
+        users = np.concatenate([np.full(len(watched_bin), -1), user[known]])
+        counts = np.concatenate([seen[watched_bin, watched_room], steps[known]])
         if not len(bins):
             return None
+        order = np.lexsort((users, rooms, bins))
+        bins, rooms, users = bins[order], rooms[order], users[order]
         return {
             "bin": evidence.begin + bins * evidence.bin_steps,
             "day": evidence.day[bins],
             "minute": evidence.minute[bins],
             "room": self.names[rooms],
             "kind": self.kinds[rooms],
-            "user": np.array([ANYONE, *state.users], object)[users],
+            "user": np.array([*state.users, ANYONE], object)[users],
             "watched": evidence.watched[bins, rooms],
-            "seen": seen[bins, rooms, users],
+            "seen": counts[order],
         }

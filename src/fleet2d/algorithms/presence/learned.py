@@ -268,7 +268,9 @@ def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:
         person: Row of the user; without users, 0 is anybody.
         belief: float64 (bins, rooms + 1), the belief to be corrected, away last.
     """
-    seen = evidence.seen[:, person] / evidence.bin_steps
+    bin_, room, steps = evidence.sightings.of_user(person)
+    seen = np.zeros(evidence.watched.shape)
+    seen[bin_, room] = steps / evidence.bin_steps
     unknown = evidence.sightings.unknown.astype(np.uint8)
     return TracedEvidence(evidence.day, evidence.minute, evidence.watched, seen, unknown, belief)
 
