@@ -1,5 +1,6 @@
 """Metrics of robots among people, against what an every-step record of a run says."""
 
+from datetime import timedelta
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -12,7 +13,7 @@ from tests.entities.robots.robots import CAMERA, events
 from tests.entities.robots.test_find import belief
 from tests.scenes import flat_document, run, scenario, table
 
-from fleet2d import Algorithm, Metric
+from fleet2d import Algorithm, Behavior, Metric, Plan, Situation
 from fleet2d.configuration.components import lookup
 from fleet2d.metrics.metric import kaplan_meier, quantile, restricted_mean
 from fleet2d.runs.run import Run
@@ -137,6 +138,27 @@ def test_users_who_step_aside_for_a_robot_are_counted(period: str) -> None:
     assert len(aside) > 3
     result = stored.metrics["blocking"]["astro"]["ana"]
     assert result["asides"] == pytest.approx(len(aside) * 14.4)
+
+
+class Polite(Behavior):
+    """Steps aside for another robot, in words."""
+
+    def decide(self, now: Situation) -> Plan:
+        return now.plan().note("reacts", "steps aside for astro").stay(timedelta(minutes=5))
+
+
+def test_robots_that_step_aside_for_a_robot_are_not_counted() -> None:
+    crossing = scenario(
+        "20 min",
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "meander"}, "bolt": {"type": f"{__name__}:Polite"}},
+        metrics={"blocking": {}},
+    )
+    stored = run(crossing)
+    assert events(stored, "bolt")
+    result = stored.metrics["blocking"]
+    assert ["ana"] == [*result["astro"]] == [*result["bolt"]]
+    assert "asides" not in result["astro"]["ana"]
 
 
 def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
