@@ -321,7 +321,8 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
     for u, user in enumerate(context.users):
         others = model.confusion.get(user)
         if others is None:
-            others = {u: 1 / (len(context.users) - 1) for u in context.users if u != user}
+            rest = [name for name in context.users if name != user]
+            others = {name: 1 / len(rest) for name in rest}
         _check_users(others, f"confusion.{user}", context)
         confusion[u] = _whole_sums(others, context.users)
 
