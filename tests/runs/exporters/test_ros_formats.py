@@ -33,6 +33,20 @@ def from_mcap(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     return messages
 
 
+def test_statistics_of_a_file_are_in_the_order_of_its_channels(tmp_path: Path) -> None:
+    """Their order was that of a set of names, another one in each process."""
+    from mcap.reader import make_reader
+
+    path = tmp_path / "day.mcap"
+    export_mcap(day(), path, part())
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    channels = list(summary.statistics.channel_message_counts)
+    assert sorted(channels) == channels
+
+
 @pytest.fixture(scope="module")
 def from_bag(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     from rosbags.highlevel import AnyReader

@@ -166,7 +166,8 @@ class McapWriter:
         """Write the summary, by which readers find what is where."""
         self._put(_record(DATA_END, struct.pack("<I", 0)))
         summary = self._put(self._definitions)
-        counts = {self._channels[topic]: count for topic, count in self.counts.items()}
+        # By channel, so that a run makes the same file in every process.
+        counts = dict(sorted((self._channels[topic], n) for topic, n in self.counts.items()))
         begins = min((chunk.begins for chunk in self._chunks), default=0)
         ends = max((chunk.ends for chunk in self._chunks), default=0)
         channels, chunks = len(self._channels), len(self._chunks)
