@@ -338,9 +338,9 @@ class Blocking(Metric):
         steps_aside = {f"steps aside for {robot}": robot for robot in state.robots}
         for event in history.events:
             if event.event == "reacts" and event.detail in steps_aside:
-                counts = self.counts.get((steps_aside[event.detail], event.entity))
-                if counts is not None:  # else a robot stepped aside, by a behavior of its own
-                    counts["asides"] = counts.get("asides", 0) + 1
+                met = self.counts.get((steps_aside[event.detail], event.entity))
+                if met is not None:  # else a robot stepped aside, by a behavior of its own
+                    met["asides"] = met.get("asides", 0) + 1
         self.days += len(history) * history.step_s / DAY_S
 
     def result(self) -> dict[str, Any]:
