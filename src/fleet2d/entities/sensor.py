@@ -78,7 +78,7 @@ class Sensor(HomeObject):
         raise NotImplementedError
 
     def hold_us(self) -> int:
-        """Return how long it stays on after the last step that triggers it [us]."""
+        """Return how long it stays on after the last step that triggers it [us]: its `hold`."""
         return micros(getattr(self, "hold", timedelta(0)))
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:

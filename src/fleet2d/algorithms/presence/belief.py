@@ -207,10 +207,10 @@ def check_distributions(home: F64, away: F64, names: Sequence[str], source: str 
     """
     is_valid = are_distributions(home, away)
     if not is_valid.all():
-        at = *bins, row = tuple(np.argwhere(~is_valid)[0].tolist())
-        in_bin = f" in bin {bins[0]} of {len(home)}" if bins else ""
+        at = tuple(np.argwhere(~is_valid)[0].tolist())
+        in_bin = f" in bin {at[0]} of {len(home)}" if len(at) == 2 else ""
         raise ComponentError(
-            f"{source}presence of {names[row]!r}{in_bin} is not a distribution: shares"
+            f"{source}presence of {names[at[-1]]!r}{in_bin} is not a distribution: shares"
             f" {home[at].tolist()}, which sum to {home[at].sum():g}, away {away[at]:g}"
         )
 
