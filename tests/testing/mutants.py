@@ -83,7 +83,7 @@ class FindOther(Find):
     def decide(self, now: Situation) -> Plan | None:
         plan = super().decide(now)
         if self.search is not None:
-            self.search = self.search._replace(user="ben")
+            self.search.user = "ben"
         return plan
 
 
