@@ -10,7 +10,7 @@ from shapely import Polygon, affinity
 from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.rooms.division import MAX_CORNERS
+from fleet2d.floorplan.rooms.division import MAX_CORNERS, _without_islands
 from fleet2d.kernels import label_parts
 
 # Two rooms of 3 x 3 m with a wall of 0.1 m and a door between them.
@@ -219,6 +219,21 @@ def test_piece_of_a_slanted_wall_bounds_rooms_between_two_doorways() -> None:
 
 def test_short_slanted_chain_of_pixels_is_furniture() -> None:
     assert 1 == len(slanted_wall((0, 70), (86, 160)).rooms)
+
+
+@pytest.mark.parametrize(("pixels_long", "kept"), [(2, 0), (10, 1)], ids=["noise", "wall"])
+def test_what_touches_a_wall_at_a_corner_belongs_to_it_unless_it_is_noise(
+    pixels_long: int, kept: int
+) -> None:
+    """Two pixels beside a wall parted the corridor of a real building."""
+    pixels = np.ones((60, 100), np.bool_)
+    pixels[:20, 50] = False
+    pixels[20 : 20 + pixels_long, 51] = False
+    outlined = shapely.transform(outline(pixels), lambda corners: corners * 64)
+
+    walls = _without_islands(outlined, 1280, 320)
+
+    assert (1, kept) == (len(outlined.interiors), len(walls.interiors))
 
 
 MAPS = {
