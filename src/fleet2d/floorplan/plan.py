@@ -233,7 +233,6 @@ class FloorPlan:
         glass: Sequence[Polygon] = (),
         notes: Sequence[str] = (),
         scale: float | None = None,
-        pixel: float = 0.0,
     ) -> Self:
         """Make a floor plan of free space and labels, both in metres.
 
@@ -248,14 +247,13 @@ class FloorPlan:
                 out. None to search the walls for doorways.
             regions_are: `exact`: the rooms themselves. `segments`: the same, with doorways where
                 they meet at a narrow place. `boxes`: rough boxes that label what walls bound.
-                `none`: there are none, and rooms are segmented from the walls alone.
+                `none`: there are none, and rooms are found from the walls. `vacuum`: the same, in
+                the map of a vacuum.
             objects: Furniture and devices [m].
             no_go: Areas that robots keep out of [m].
             glass: Areas of glass in walls, which may reach into the free space on both sides [m].
             notes: Sentences on anomalies in the source.
             scale: What all lengths but the cell and heights are multiplied by; None for 1.
-            pixel: Side of a pixel of the map that the free space was traced from [m]; 0 if from
-                none. Walls of coarse maps are thicker.
 
         Raises:
             FloorPlanError: There is no free space at this cell size, it would lose more area than
@@ -277,7 +275,7 @@ class FloorPlan:
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
         passages: Passages | None = None
         if doorways is None or regions_are != "exact":
-            polygons, passages = search_passages(lattice, polygons, regions_are, pixel)
+            polygons, passages = search_passages(lattice, polygons, regions_are)
         polygons = canonical_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         cells: Bool = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0

@@ -164,32 +164,24 @@ def test_niche_behind_a_narrow_gap_is_no_room() -> None:
 
 @pytest.mark.parametrize("degrees", [0, 30])
 @pytest.mark.parametrize(
-    ("furniture", "rooms"),
-    [((4.1, 2.6, 4.9, 3.6), 2), ((3.4, 2.6, 4.7, 5.0), 1)],
+    ("walls", "furniture", "rooms"),
+    [
+        ([(4, 1, 4.1, 1.6), (4, 2.6, 4.1, 5), (4, 6, 4.1, 7)], (4.1, 2.6, 4.9, 3.6), 2),
+        ([], (3.4, 2.6, 4.7, 5.0), 1),
+    ],
     ids=["wall with a cupboard", "table"],
 )
 def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
-    furniture: Box, rooms: int, degrees: float
+    walls: list[Box], furniture: Box, rooms: int, degrees: float
 ) -> None:
     """A table of about the same size stands in the middle of a single room."""
-    stubs = [shapely.box(4, 1, 4.1, 1.6), shapely.box(4, 6, 4.1, 7)]
-    walls = [shapely.box(4, 2.6, 4.1, 5.0)] if rooms == 2 else []
-    free = shapely.box(1, 1, 7, 7) - shapely.union_all([*stubs, *walls, shapely.box(*furniture)])
+    free = shapely.box(1, 1, 7, 7) - shapely.union_all(
+        [shapely.box(*box) for box in (*walls, furniture)]
+    )
 
     plan = FloorPlan.build(
         "home", affinity.rotate(free, degrees, origin=(4, 4)), doorways=None, regions_are="none"
     )
-
-    assert rooms == len(plan.rooms)
-
-
-@pytest.mark.parametrize(("pixel", "rooms"), [(0.05, 1), (0.1, 2)])
-def test_free_standing_wall_may_be_thicker_in_a_coarse_map(pixel: float, rooms: int) -> None:
-    """It is drawn so; in a fine map, an obstacle as thick is a sideboard."""
-    walls = [shapely.box(4, 1, 4.3, 1.6), shapely.box(4, 2.6, 4.3, 5), shapely.box(4, 6, 4.3, 7)]
-    free = shapely.box(1, 1, 7, 7) - shapely.union_all(walls)
-
-    plan = FloorPlan.build("map", free, doorways=None, regions_are="none", pixel=pixel)
 
     assert rooms == len(plan.rooms)
 
@@ -200,7 +192,7 @@ def slanted_wall(*gaps: tuple[int, int]) -> FloorPlan:
     for column in set(range(160)).difference(*(range(*gap) for gap in gaps)):
         pixels[30 + column // 4, column] = False
     free = shapely.transform(outline(pixels), lambda corners: corners * 0.05)
-    return FloorPlan.build("map", free, doorways=None, regions_are="none", pixel=0.05)
+    return FloorPlan.build("map", free, doorways=None, regions_are="none")
 
 
 def test_thin_slanted_wall_of_a_map_bounds_rooms() -> None:
@@ -231,15 +223,15 @@ def test_what_touches_a_wall_at_a_corner_belongs_to_it_unless_it_is_noise(
     pixels[20 : 20 + pixels_long, 51] = False
     outlined = shapely.transform(outline(pixels), lambda corners: corners * 64)
 
-    walls = _without_islands(outlined, 1280, 320)
+    walls = _without_islands(outlined, 1280)
 
     assert (1, kept) == (len(outlined.interiors), len(walls.interiors))
 
 
 MAPS = {
     "ros_maps/turtlebot3_house/map.yaml": (1, 0),
-    "ros_maps/aws_small_house/map.yaml": (3, 1),
-    "valetudo/dreame_d9_no_segments.json": (2, 1),
+    "ros_maps/aws_small_house/map.yaml": (4, 1),
+    "valetudo/dreame_d9_no_segments.json": (4, 3),
 }
 
 

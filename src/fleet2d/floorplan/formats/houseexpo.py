@@ -88,7 +88,7 @@ def read_houseexpo(path: Path, cell: float = 0.05, scale: float | None = None) -
             cell,
             source=f"HouseExpo, {path.name}",
             doorways=None,
-            regions_are="boxes",
+            regions_are="boxes" if regions else "none",
             notes=[*notes, *box_notes],
             scale=scale,
         )

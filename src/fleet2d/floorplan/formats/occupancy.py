@@ -95,7 +95,6 @@ class OccupancySource(PixelSource):
             doorways=None,
             regions_are="none",
             notes=notes,
-            pixel=pixel,
         )
 
 

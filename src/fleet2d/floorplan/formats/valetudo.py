@@ -340,7 +340,7 @@ class Valetudo(PixelSource):
                 pixel_m * (self.scale or 1.0) if self.cell is None else self.cell,
                 source=f"Valetudo map, {self.path.name}",
                 doorways=None,
-                regions_are=self.borders if regions else "none",
+                regions_are=self.borders if regions else "vacuum",
                 objects=_charger(content, free, box),
                 no_go=areas,
                 scale=self.scale,

@@ -37,12 +37,17 @@ from fleet2d.floorplan.rooms.room import (
 from fleet2d.floorplan.rooms.segmentation import (
     MAX_DOOR_M,
     MIN_DOOR_M,
-    USUAL_PIXEL_M,
     Chambers,
     WallDirections,
     cut_chambers,
     find_passages,
     segment_rooms,
+)
+from fleet2d.floorplan.rooms.shape import (
+    IN_RAGGED_WALLS,
+    IN_STRAIGHT_WALLS,
+    OF_VACUUMS,
+    divide_by_shape,
 )
 from fleet2d.kernels import (
     F64,
@@ -306,10 +311,11 @@ def _number_rests(labels: I32, inside: Bool, boxes: int, cell: float, next_room:
     return next_room
 
 
-RegionKind = Literal["exact", "segments", "boxes", "none"]
+RegionKind = Literal["exact", "segments", "boxes", "none", "vacuum"]
 """The regions of a source are the rooms themselves (`exact`), the same and doorways where they meet
 at a narrow place (`segments`), boxes that label what walls bound (`boxes`), or absent, so that
-rooms are segmented from the walls (`none`)."""
+rooms are found from the walls (`none`) or, in what a vacuum has reached, from where it narrows
+(`vacuum`)."""
 
 ROOM = "room"
 HALLWAY = "hallway"
@@ -337,40 +343,40 @@ class Passages:
     Attributes:
         segments: Where they are [lattice], exactly from wall to wall.
         is_opening: Whether each is an opening, which is wider than a doorway.
-        directions: Main directions of the walls, if rooms are found by them.
+        between_straight_walls: Whether rooms can be found by them, as walls are straight.
     """
 
     segments: list[Segment]
     is_opening: list[bool]
-    directions: WallDirections | None
+    between_straight_walls: bool
 
 
 def search_passages(
-    lattice: Lattice, polygons: list[Polygon], kind: RegionKind, pixel: float = 0.0
+    lattice: Lattice, polygons: list[Polygon], kind: RegionKind
 ) -> tuple[list[Polygon], Passages]:
-    """Find the passages of free space, traced from a map of pixels [m] or, if 0, from none.
+    """Find the passages of free space.
 
     Returns:
         The free space [lattice], with corners added where passages meet slanted walls; and the
         passages.
     """
-    thick = (THICK_M + 2 * max(pixel - USUAL_PIXEL_M, 0)) * lattice.units_per_m
-    walls = [_without_islands(polygon, lattice.units_per_m, thick) for polygon in polygons]
+    walls = [_without_islands(polygon, lattice.units_per_m) for polygon in polygons]
     if len(walls) > 1:  # one may lie inside a former island of another
         walls = shapely.orient_polygons(shapely.get_parts(shapely.union_all(walls))).tolist()
     directions = WallDirections.of(walls, lattice.units_per_m) if kind == "none" else None
+    straight = directions is not None and directions.straight
     walls = _with_few_corners(walls, lattice.units_per_m)
     mesh = build_mesh(walls, lattice.columns, lattice.rows)
-    narrow = find_passages(mesh, walls, lattice.units_per_m, directions, pixel)
+    narrow = find_passages(mesh, walls, lattice.units_per_m, directions if straight else None)
     lines = [_line(lattice, segment) for segment in narrow]
     polygons, fitted, _ = fit_lines(lattice, polygons, lines)
     segments = [segment for segment in fitted if segment is not None]
     limit2 = (MAX_DOOR_M * lattice.units_per_m) ** 2
     is_opening = [(x1 - x0) ** 2 + (y1 - y0) ** 2 > limit2 for (x0, y0), (x1, y1) in segments]
-    return polygons, Passages(segments, is_opening, directions)
+    return polygons, Passages(segments, is_opening, straight)
 
 
-def _without_islands(polygon: Polygon, units_per_m: float, thick: float) -> Polygon:
+def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
     """Return the polygon without its small holes: furniture and columns are not where rooms end.
 
     Holes that touch at corners are one obstacle: in a map of pixels, a thin slanted wall is a
@@ -389,20 +395,18 @@ def _without_islands(polygon: Polygon, units_per_m: float, thick: float) -> Poly
         island = MultiPolygon(holes[links].tolist())
         length = 2 * shapely.minimum_bounding_radius(island) / units_per_m
         is_outer = at_outer_wall[links].any() and length > BUMP_M
-        if is_outer or (length >= WALL_M and _is_wall(island, units_per_m, thick)):
+        if is_outer or (length >= WALL_M and _is_wall(island, units_per_m)):
             kept += shapely.get_exterior_ring(holes[links]).tolist()
     return Polygon(polygon.exterior, kept)
 
 
-def _is_wall(island: MultiPolygon, units_per_m: float, thick: float) -> bool:
-    """Return whether a free-standing obstacle is a wall, or furniture with a wall.
-
-    A wall is at most as thick as given [lattice].
-    """
+def _is_wall(island: MultiPolygon, units_per_m: float) -> bool:
+    """Return whether a free-standing obstacle is a wall, or furniture with a wall."""
     box = shapely.get_coordinates(shapely.oriented_envelope(island)) / units_per_m
     length = max(math.dist(box[0], box[1]), math.dist(box[1], box[2]))
     if length >= ISLAND_M or length < WALL_M:
         return length >= ISLAND_M
+    thick = THICK_M * units_per_m
     if 2 * island.area <= thick * island.length:
         return True
     core = island.buffer(-thick / 2, join_style="mitre").buffer(0.505 * thick, join_style="mitre")
@@ -433,19 +437,16 @@ def divide(
     """Divide the free cells among rooms; see `assign_rooms`, `label_rooms`, `segment_rooms`."""
     if kind in ("exact", "segments") or passages is None:
         return assign_rooms(lattice, free, regions)
-    chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
-    if not regions:
-        widths = [math.dist(*segment) / lattice.units_per_m for segment in passages.segments]
-        rooms = segment_rooms(
-            chambers,
-            passages.is_opening,
-            widths,
-            lattice.cell,
-            passages.directions,
-            passages.segments,
-        )
+    if kind == "vacuum" or (kind == "none" and not passages.between_straight_walls):
+        limits = OF_VACUUMS if kind == "vacuum" else IN_RAGGED_WALLS
+        rooms = divide_by_shape(np.where(free, 0, -1), lattice.cell, *limits)
         return number_rooms(lattice, rooms)
-    return label_rooms(lattice, free, regions, chambers, passages)
+    chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
+    if kind == "boxes":
+        return label_rooms(lattice, free, regions, chambers, passages)
+    widths = [math.dist(*segment) / lattice.units_per_m for segment in passages.segments]
+    rooms = segment_rooms(chambers, passages.is_opening, widths, lattice.cell)
+    return number_rooms(lattice, divide_by_shape(rooms, lattice.cell, *IN_STRAIGHT_WALLS))
 
 
 def select_doorways(
@@ -457,8 +458,8 @@ def select_doorways(
 ) -> tuple[list[tuple[DoorLine, Segment]], list[Polygon]]:
     """Return the passages that are doorways: narrow, and between two different rooms.
 
-    For rooms that are `segments`, so are narrow borders. The free space is returned, too, with
-    corners added on straight walls where these end.
+    Except for rooms that are `exact` or have `boxes`, so are narrow borders. The free space is
+    returned, too, with corners added on straight walls where these end.
     """
     segments = []
     for segment, is_opening in zip(passages.segments, passages.is_opening, strict=True):
@@ -466,7 +467,8 @@ def select_doorways(
         if not is_opening and left != right:
             segments.append(segment)
     lines = [_line(lattice, segment) for segment in segments]
-    if kind == "segments":
+    narrows = kind not in ("exact", "boxes")
+    if narrows:
         borders = narrow_borders(lattice, room_of_cell, segments, (MIN_DOOR_M, MAX_DOOR_M))
         _, fitted, _ = fit_lines(lattice, polygons, [*lines, *borders])
         segments += [
@@ -481,7 +483,7 @@ def select_doorways(
         (line, segment)
         for line, segment, same in zip(lines, segments, refitted, strict=True)
         if segment == same
-    ], fitted_polygons if kind == "segments" else list(polygons)
+    ], fitted_polygons if narrows else list(polygons)
 
 
 def _line(lattice: Lattice, segment: Segment) -> DoorLine:

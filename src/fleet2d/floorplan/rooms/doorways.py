@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.placed_objects import Point
+from fleet2d.floorplan.rooms.segmentation import MIN_APART_M
 from fleet2d.kernels import F64, I16, I64, Bool
 
 # How far beyond the end of a door line its wall may be [m].
@@ -362,7 +363,8 @@ def narrow_borders(
     Args:
         lattice: Of the plan.
         room_of_cell: Room index of each cell, -1 where not free.
-        passages: Doorways [lattice]; borders across them don't count.
+        passages: Doorways [lattice]; borders across them, or close to one between the same rooms,
+            don't count.
         widths_m: Least and largest width of a doorway [m].
     """
     places: dict[tuple[int, int], list[I64]] = {}
@@ -372,8 +374,12 @@ def narrow_borders(
         first = cells[:, ::-1] * UNITS_PER_CELL + _CENTRE
         for place, pair in zip(first + step // 2, np.sort(pairs, axis=1).tolist(), strict=True):
             places.setdefault((pair[0], pair[1]), []).append(place)
+    apart = MIN_APART_M * lattice.units_per_m
+    known = [
+        (LineString(p), tuple(sorted(rooms_beside(lattice, room_of_cell, p)))) for p in passages
+    ]
     lines = []
-    for _, points in sorted(places.items(), key=lambda item: item[0]):
+    for pair, points in sorted(places.items(), key=lambda item: item[0]):
         spots = shapely.points(np.array(points, np.float64))
         reach = shapely.union_all(shapely.buffer(spots, UNITS_PER_CELL * 0.75))
         for border in shapely.get_parts(reach).tolist():
@@ -382,8 +388,12 @@ def narrow_borders(
             start, end = np.unravel_index(int(away.argmax()), away.shape)
             line = LineString([ends[start], ends[end]])
             width = (line.length + UNITS_PER_CELL) / lattice.units_per_m
-            crosses = any(line.distance(LineString(p)) < UNITS_PER_CELL for p in passages)
-            if widths_m[0] <= width <= widths_m[1] and not crosses and line.length > 0:
+            is_known = any(
+                line.distance(passage) < UNITS_PER_CELL
+                or (rooms == pair and line.centroid.distance(passage.centroid) < apart)
+                for passage, rooms in known
+            )
+            if widths_m[0] <= width <= widths_m[1] and not is_known and line.length > 0:
                 (x0, y0), (x1, y1) = lattice.to_metres(ends[[start, end]]).tolist()
                 lines.append(DoorLine((x0, y0), (x1, y1), leaf=False))
     return lines

@@ -22,6 +22,7 @@ from shapely import Polygon
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
+from fleet2d.floorplan.rooms.shape import by_size, without_furniture
 from fleet2d.kernels import (
     F64,
     I32,
@@ -30,7 +31,6 @@ from fleet2d.kernels import (
     Bool,
     Mesh,
     label_frames,
-    label_parts,
     label_triangles,
     pairs_in_sight,
     rasterize_cells,
@@ -48,9 +48,7 @@ MAX_OPENING_M = 2.8
 MAX_LEAN = 0.2
 """Largest sine of the angle between a passage and the shortest line, since traced walls lean."""
 OFFSETS_M = (0.15, 0.3, 0.45, 0.6)
-"""Distances behind a passage at which the space is checked; the last is the thickest wall …"""
-USUAL_PIXEL_M = 0.05
-"""… in a map of such pixels. Walls of a coarser map are up to a pixel thicker on either side."""
+"""Distances behind a passage at which the space is checked; the last is the thickest wall."""
 WIDENINGS_M = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 """Amounts of widening, on either side of a passage, that are checked behind it."""
 MIN_WIDENING_M, WIDENING_SHARE = 0.3, 0.2
@@ -73,10 +71,8 @@ NOISE_M = 0.12
 """Walls are straightened within this before their directions are compared."""
 SPREAD_DEG = 8
 """Walls whose directions differ by less than this add to each other's."""
-STRAIGHT_SHARE = 0.7
+STRAIGHT_SHARE = 0.75
 """Walls are straight if at least this share of their length runs in main directions."""
-END_M, AROUND, AROUND_FREE = 0.5, 24, 21
-"""A wall ends at a corner if so many of as many places at this distance round it are free."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +147,6 @@ def find_passages(
     polygons: Sequence[Polygon],
     units_per_m: float,
     directions: WallDirections | None = None,
-    pixel: float = 0.0,
 ) -> list[Segment]:
     """Return the lines at which free space narrows and opens out on both sides, likeliest first.
 
@@ -159,10 +154,9 @@ def find_passages(
         mesh: The free space.
         polygons: The same, outer rings counter-clockwise [lattice].
         units_per_m: Lattice units to a metre.
-        directions: Main directions of the walls. In straight walls, openings wider than a doorway
-            must run in these or between the ends of two walls, and passages in main directions rank
-            before others. None if such openings must be gaps in a wall.
-        pixel: Side of a pixel of the map that the walls were traced from [m]; 0 if from none.
+        directions: Main directions of straight walls: openings wider than a doorway must run in
+            these, and passages in main directions rank before others. None if such openings
+            must be gaps in a wall.
 
     Returns:
         Lines that don't touch each other [lattice]; their ends have even coordinates, and are on
@@ -171,39 +165,23 @@ def find_passages(
     walls = _walls(polygons)
     corners = np.flatnonzero(walls.reflex)
     batches = np.array_split(corners, -(-len(corners) // BATCH) or 1)
-    straight = directions if directions is not None and directions.straight else None
-    wall_ends = np.zeros(0, np.int64)
-    if straight is not None:
-        wall_ends = _wall_ends(mesh, walls.start[corners], units_per_m)
     lines = _shortest_of_each_corner(
         np.concatenate([
-            _shortest_of_each_corner(_of_width(lines, units_per_m, straight, wall_ends), straight)
+            _shortest_of_each_corner(_of_width(lines, units_per_m, directions), directions)
             for lines in chain(
                 _corner_to_corner(walls, corners, batches, units_per_m),
                 _to_walls(walls, batches, units_per_m),
             )
         ]),
-        straight,
+        directions,
     )  # fmt: skip
     lines = lines[_all_free(mesh, lines)]
-    offsets: tuple[float, ...] = OFFSETS_M
-    if pixel > USUAL_PIXEL_M:
-        offsets += (OFFSETS_M[-1] + 2 * (pixel - USUAL_PIXEL_M),)
     for side in (1, -1):
-        lines = lines[_opens(mesh, lines, side, offsets, units_per_m)]
+        lines = lines[_opens(mesh, lines, side, units_per_m)]
     if directions is None:
         lines = lines[_in_a_wall(mesh, walls, lines, units_per_m)]
     apart = lines[_one_of_each(lines, units_per_m)].tolist()
     return [((x0, y0), (x1, y1)) for x0, y0, x1, y1 in apart]
-
-
-def _wall_ends(mesh: Mesh, corners: F64, units_per_m: float) -> I64:
-    """Return the keys of those corners (n, 2) at which a wall ends: nearly all round is free."""
-    turns = np.arange(AROUND) * (2 * np.pi / AROUND)
-    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1).round(9) * (END_M * units_per_m)
-    places = np.rint(corners[:, None] + circle).astype(np.int64).reshape(-1, 2)
-    free = pairs_in_sight(mesh, places, places).reshape(-1, AROUND)
-    return _keys(corners[free.sum(axis=1) >= AROUND_FREE].astype(np.int64))
 
 
 def _walls(polygons: Sequence[Polygon]) -> _Walls:
@@ -276,16 +254,13 @@ def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> Bool:
     return is_shortest
 
 
-def _of_width(
-    lines: I64, units_per_m: float, directions: WallDirections | None, wall_ends: I64
-) -> I64:
+def _of_width(lines: I64, units_per_m: float, directions: WallDirections | None) -> I64:
     """Return the lines as wide as a passage; those wider than a doorway run in main directions."""
     length2 = _length2(lines)
     low, door, high = ((w * units_per_m) ** 2 for w in (MIN_DOOR_M, MAX_DOOR_M, MAX_OPENING_M))
     fits = (length2 >= low) & (length2 <= high)
     if directions is not None:
-        both_end = np.isin(_keys(lines[:, :2]), wall_ends) & np.isin(_keys(lines[:, 2:]), wall_ends)
-        fits &= directions.are_main(lines) | (length2 <= door) | both_end
+        fits &= directions.are_main(lines) | (length2 <= door)
     return lines[fits]
 
 
@@ -322,7 +297,7 @@ def _all_free(mesh: Mesh, lines: I64) -> Bool:
     return free
 
 
-def _opens(mesh: Mesh, lines: I64, side: int, offsets: Sequence[float], units_per_m: float) -> Bool:
+def _opens(mesh: Mesh, lines: I64, side: int, units_per_m: float) -> Bool:
     """Return which lines have wider space behind them on a side (1: left, -1: right)."""
     span = (lines[:, 2:] - lines[:, :2]).astype(np.float64)
     length = np.sqrt((span * span).sum(axis=1))
@@ -332,7 +307,7 @@ def _opens(mesh: Mesh, lines: I64, side: int, offsets: Sequence[float], units_pe
     needed = np.maximum(MIN_WIDENING_M, WIDENING_SHARE * length / units_per_m)
     opens = np.zeros(len(lines), np.bool_)
     undecided = np.arange(len(lines))
-    for offset in offsets:
+    for offset in OFFSETS_M:
         behind = middle + np.rint(away * (offset * units_per_m)).astype(np.int64)
         undecided = undecided[pairs_in_sight(mesh, middle[undecided], behind[undecided])]
         targets = [
@@ -540,22 +515,13 @@ def _number_chambers(
 
 
 MIN_ROOM_M2 = 1.2
-"""Least area of a room behind a doorway, such as a toilet."""
-NARROW_ROOM_M2, NARROW_ROOM_M = 3.0, 0.8
-"""Least area of a room in which no disc of this diameter has a place; smaller ones are gaps among
-furniture."""
-MIN_OPEN_ROOM_M2 = 4.0
-"""Least area of a room behind an opening, or in ragged walls behind a doorway that runs in no main
-direction; a smaller space is an alcove, or lies among furniture."""
-
+"""Least area of a room, such as a toilet."""
 WIDE_SHARE = 1.1
 """An opening that is wider than this share of the narrower space beside it separates no rooms: what
 is behind it is the same corridor or hall, past a column, a niche or a cupboard."""
-ACROSS_SHARE, ACROSS_DOOR_SHARE = 0.85, 0.95
-"""In straight walls, an opening or a doorway that is wider than this share of the wider space
-beside it lies across a corridor, between the doors on either side."""
-LEG_M = 0.3
-"""Free-standing obstacles up to this size, such as legs of chairs, make no space narrower [m]."""
+ACROSS_SHARE = 0.85
+"""A passage that is wider than this share of the wider space beside it lies across a corridor,
+between the doors on either side."""
 
 
 def segment_rooms(
@@ -563,8 +529,6 @@ def segment_rooms(
     is_opening: Sequence[bool],
     widths_m: Sequence[float],
     cell: float,
-    directions: WallDirections | None = None,
-    lines: Sequence[Segment] = (),
 ) -> I64:
     """Join chambers into rooms.
 
@@ -573,20 +537,13 @@ def segment_rooms(
         is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
         widths_m: The length of each such line [m].
         cell: Side of a cell [m].
-        directions: Main directions of the walls, or None if they don't matter.
-        lines: Each such line [lattice], with `directions`.
 
     Returns:
         The room of each cell, by decreasing size; -1 where not free. int64 (rows, columns).
     """
     sizes = np.bincount(chambers.of_cell[chambers.of_cell >= 0], minlength=chambers.count)
     areas = sizes * cell**2
-    is_main = np.ones(len(widths_m), np.bool_)
-    if directions is not None:
-        is_main = directions.are_main(np.reshape(np.array(lines, np.int64), (-1, 4)))
-    straight = directions is not None and directions.straight
-    # In ragged walls, what looks like a leg may be all that was seen of a wall.
-    of_cell = _without_legs(chambers.of_cell, cell) if straight else chambers.of_cell
+    of_cell = without_furniture(chambers.of_cell, cell)
     across = _clear_widths(of_cell, chambers.count, cell)
     owner = np.arange(chambers.count)
     while True:
@@ -596,37 +553,18 @@ def segment_rooms(
             opening, width = is_opening[link.line], widths_m[link.line]
             narrow, wide = sorted((across[one], across[other]))
             is_wide = opening and width > WIDE_SHARE * narrow
-            if straight:
-                is_wide |= width > (ACROSS_SHARE if opening else ACROSS_DOOR_SHARE) * wide
-            is_door = not opening and (straight or is_main[link.line])
-            least = MIN_ROOM_M2 if is_door else MIN_OPEN_ROOM_M2
+            is_wide |= width > ACROSS_SHARE * wide
             for room, into in ((one, other), (other, one)):
-                is_gap = areas[room] < NARROW_ROOM_M2 and across[room] < NARROW_ROOM_M
-                if room != into and (areas[room] < least or is_gap or is_wide):
-                    later = not (straight and opening and is_wide) or bool(is_main[link.line])
-                    candidates.append((later, areas[room], not opening, link.line, room, into))
+                if room != into and (areas[room] < MIN_ROOM_M2 or is_wide):
+                    candidates.append((areas[room], not opening, link.line, room, into))
         if not candidates:
             break
-        # What a slanted opening cuts off goes first, lest it seem a corridor; then the smallest,
-        # across an opening rather than a doorway.
+        # The smallest first, across an opening rather than a doorway.
         *_, smallest, into = min(candidates)
         areas[into] += areas[smallest]
         across[into] = max(across[into], across[smallest])
         owner[owner == smallest] = into
-    roots = sorted(set(owner.tolist()), key=lambda root: (-areas[root], root))
-    number = np.full(chambers.count + 1, -1, np.int64)  # its last entry serves -1
-    number[:-1] = [roots.index(root) for root in owner.tolist()]
-    return number[chambers.of_cell]
-
-
-def _without_legs(of_cell: I32, cell: float) -> I32:
-    """Return the chamber of each cell, of legs of furniture too."""
-    # A margin around the plan joins all that reaches its edge.
-    part = label_parts(np.pad(of_cell, 1, constant_values=-1) < 0, True)
-    frames = label_frames(part, int(part.max()) + 1)
-    is_leg = (frames[:, 2:] - frames[:, :2]).max(axis=1) * cell <= LEG_M + TINY
-    is_leg = np.append(is_leg, False)  # its last entry serves -1
-    return spread_labels(of_cell, (of_cell >= 0) | is_leg[part[1:-1, 1:-1]])
+    return by_size(np.append(owner, -1)[chambers.of_cell])
 
 
 def _clear_widths(of_cell: I32, count: int, cell: float) -> F64:

@@ -1,0 +1,185 @@
+"""Divide space by its shape: a room ends where the space narrows.
+
+The distance to the nearest wall is a landscape. Each of its hills is the middle of a part of the
+space, and the pass between two hills is the higher, the wider the space is between them. Hills that
+a high pass connects are one room.
+
+This is the segmentation by distance transform of Bormann, Jordan, Li, Hampp and Hägele, "Room
+Segmentation: Survey, Implementation, and Analysis" (ICRA 2016). Parts are joined by the ratio of
+their widths, as in Mielle, Magnusson and Lilienthal, "A Method to Segment Maps from Different
+Modalities Using Free Space Layout — MAORIS" (ICRA 2018).
+"""
+
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from fleet2d.kernels import I32, I64, label_parts, spread_labels, squared_distance
+
+IN_STRAIGHT_WALLS, IN_RAGGED_WALLS, OF_VACUUMS = (0.75, 4.0), (0.65, 4.0), (0.8, 1.2)
+"""How much narrower a place that divides a room is, and the least area of a part [m²]. Among the
+clutter of ragged walls much is narrow. A vacuum gets close to furniture, which narrows rooms as
+walls do, and it knows of a small room only what is free in it."""
+FURNITURE_M2 = 0.3
+"""Free-standing obstacles up to this size, such as chairs, make no space narrower."""
+SMOOTHED_M = 0.2
+"""Heights are averaged twice over squares that reach this far to all sides."""
+FINE = 64
+"""Distances are rounded down to this fraction of a cell's side."""
+
+
+def divide_by_shape(room_of_cell: I64, cell: float, pass_share: float, least_m2: float) -> I64:
+    """Divide rooms where they narrow.
+
+    Args:
+        room_of_cell: The room of each cell, -1 where not free, (rows, columns).
+        cell: Side of a cell [m].
+        pass_share: A room is divided where it is at most this share as wide as on either side.
+        least_m2: A part smaller than this belongs to the one that it is most open to [m²].
+
+    Returns:
+        The room of each cell, by decreasing size; -1 where not free. int64 (rows, columns).
+
+    >>> wide = [-1, 0, 0, 0, 0, -1, -1, 0, 0, 0, 0, 0, -1]
+    >>> narrow = [-1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    >>> divide_by_shape(np.array([wide, narrow, wide, wide]), 1.0, 0.7, 4.0)[1].tolist()
+    [-1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0]
+    """
+    space = without_furniture(room_of_cell.astype(np.int32), cell)
+    height = _heights(space, round(SMOOTHED_M / cell))
+    hill = _hills(room_of_cell, height)
+    hills = _Hills.of(hill, room_of_cell, height)
+    return by_size(_join(hills, pass_share, least_m2 / cell**2)[hill])
+
+
+def without_furniture(room_of_cell: I32, cell: float) -> I32:
+    """Return the room of each cell, of small free-standing obstacles too."""
+    # A margin around the plan joins all that reaches its edge.
+    part = label_parts(np.pad(room_of_cell, 1, constant_values=-1) < 0, True)
+    is_small = np.bincount(part[part >= 0]) * cell**2 <= FURNITURE_M2
+    is_small[part[0, 0]] = False
+    is_small = np.append(is_small, False)  # its last entry serves -1
+    return spread_labels(room_of_cell, (room_of_cell >= 0) | is_small[part[1:-1, 1:-1]])
+
+
+def by_size(room_of_cell: I64) -> I64:
+    """Return the rooms numbered by decreasing size, those of one size in the order they have."""
+    sizes = np.bincount(room_of_cell[room_of_cell >= 0])
+    number = np.full(len(sizes) + 1, -1)  # its last entry serves -1
+    number[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
+    return number[room_of_cell]
+
+
+def _heights(space: I32, reach: int) -> I64:
+    """Return the distance of cells to walls and other rooms, averaged over their surroundings."""
+    inside = np.pad(space >= 0, 1)
+    inside[1:-1, 1:-2] &= (space[:, :-1] == space[:, 1:]) | (space[:, 1:] < 0)
+    inside[1:-2, 1:-1] &= (space[:-1] == space[1:]) | (space[1:] < 0)
+    distance = np.sqrt(squared_distance(inside))[1:-1, 1:-1]
+    height = np.pad(np.floor(FINE * distance).astype(np.int64), 2 * reach)
+    width = 2 * reach + 1
+    for axis in (0, 1, 0, 1):
+        height = sliding_window_view(height, width, axis).sum(axis=-1)
+    return height // width**2
+
+
+def _hills(room_of_cell: I64, height: I64) -> I64:
+    """Return the hill of each cell, to whose top the steepest way up leads; -1 where not free.
+
+    Ways lead across sides and don't leave a room. Of equally high cells, later ones count as
+    higher.
+    """
+    rank = height * height.size + np.arange(height.size).reshape(height.shape)
+    ranks = sliding_window_view(np.pad(rank, 1), height.shape)
+    around = sliding_window_view(np.pad(room_of_cell, 1, constant_values=-1), height.shape)
+    for beside in ((0, 1), (1, 0), (1, 2), (2, 1)):
+        np.maximum(rank, ranks[beside], out=rank, where=around[beside] == room_of_cell)
+    up = (rank % height.size).ravel()
+    while ((further := up[up]) != up).any():
+        up = further
+    free = room_of_cell >= 0
+    hill = np.full(height.shape, -1)
+    hill[free] = np.unique(up.reshape(height.shape)[free], return_inverse=True)[1]
+    return hill
+
+
+@dataclass
+class _Hills:
+    """Hills and the passes between them.
+
+    Attributes:
+        tops: Height of each.
+        sizes: Cells of each.
+        passes: For each hill, the hills beside it and how high the pass to each is.
+    """
+
+    tops: list[int]
+    sizes: list[int]
+    passes: list[dict[int, int]]
+
+    @classmethod
+    def of(cls, hill: I64, room_of_cell: I64, height: I64) -> "_Hills":
+        """Return the hills of cells; there are passes only within rooms."""
+        free = hill >= 0
+        sizes = np.bincount(hill[free])
+        count = len(sizes)
+        tops = np.ones(count, np.int64)
+        np.maximum.at(tops, hill[free], height[free])
+        hills = cls(tops.tolist(), sizes.tolist(), [{} for _ in range(count)])
+        for low, high in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+            meet = (hill[low] != hill[high]) & (room_of_cell[low] == room_of_cell[high])
+            pairs = hill[low][meet] * count + hill[high][meet]
+            unique, at = np.unique(pairs, return_inverse=True)
+            heights = np.zeros(len(unique), np.int64)
+            np.maximum.at(heights, at, np.minimum(height[low], height[high])[meet])
+            for pair, top in zip(unique.tolist(), heights.tolist(), strict=True):
+                hills.connect(pair // count, pair % count, top)
+        return hills
+
+    def connect(self, one: int, other: int, height: int) -> None:
+        """Note a pass between two hills; the highest counts."""
+        highest = max(height, self.passes[one].get(other, 0))
+        self.passes[one][other] = self.passes[other][one] = highest
+
+    def openness(self, one: int, other: int) -> float:
+        """Return how high the pass between two hills is, as a share of the lower one."""
+        return self.passes[one][other] / min(self.tops[one], self.tops[other])
+
+    def join(self, one: int, other: int) -> None:
+        """Make one hill of two."""
+        self.tops[one] = max(self.tops[one], self.tops[other])
+        self.sizes[one] += self.sizes[other]
+        for third, height in self.passes[other].items():
+            del self.passes[third][other]
+            if third != one:
+                self.connect(one, third, height)
+        self.passes[other] = {}
+
+
+def _join(hills: _Hills, pass_share: float, least_cells: float) -> I64:
+    """Join hills, those with the highest pass first; return the part of each, and -1 for -1."""
+    part = np.arange(len(hills.tops) + 1)
+    part[-1] = -1
+    waiting = [
+        (-hills.openness(one, other), one, other)
+        for one, others in enumerate(hills.passes)
+        for other in others
+        if one < other
+    ]
+    heapify(waiting)
+    while waiting:
+        openness, one, other = heappop(waiting)
+        if other not in hills.passes[one] or -openness != hills.openness(one, other):
+            continue  # one of the two has become part of another since
+        is_small = min(hills.sizes[one], hills.sizes[other]) < least_cells
+        if -openness > pass_share or is_small:
+            hills.join(one, other)
+            part[other] = one
+            for third in hills.passes[one]:
+                low, high = sorted((one, third))
+                heappush(waiting, (-hills.openness(low, high), low, high))
+    while ((further := part[part]) != part).any():
+        part = further
+    return part

@@ -1,0 +1,82 @@
+"""Slow, obvious twin of `fleet2d.floorplan.rooms.shape`."""
+
+import math
+from itertools import product
+
+import numpy as np
+
+from fleet2d.floorplan.rooms.shape import FINE, SMOOTHED_M, without_furniture
+from fleet2d.kernels import I64
+
+Cell = tuple[int, int]
+
+
+def parts_by_shape(
+    room_of_cell: I64, cell: float, pass_share: float, least_m2: float
+) -> set[frozenset[Cell]]:
+    """Walk up from every cell, then join the parts most open to each other, pair by pair."""
+    rooms = cells_of(room_of_cell)
+    space = cells_of(without_furniture(room_of_cell.astype(np.int32), cell).astype(np.int64))
+    height = heights(space, rooms, round(SMOOTHED_M / cell))
+    part = {at: top_above(at, rooms, height) for at in rooms}
+    while True:
+        passes: dict[tuple[Cell, Cell], int] = {}
+        for (row, column), top in part.items():
+            for beside in ((row, column + 1), (row + 1, column)):
+                if part.get(beside, top) != top and rooms[beside] == rooms[row, column]:
+                    pair = (min(top, part[beside]), max(top, part[beside]))
+                    lower = min(height[row, column], height[beside])
+                    passes[pair] = max(passes.get(pair, 0), lower)
+        joined = []
+        for pair, highest in passes.items():
+            sides = [[at for at in part if part[at] == top] for top in pair]
+            openness = highest / min(max(1, *(height[at] for at in side)) for side in sides)
+            if openness > pass_share or min(map(len, sides)) < least_m2 / cell**2:
+                joined.append((-openness, *pair))
+        if not joined:
+            return {frozenset(at for at in part if part[at] == top) for top in part.values()}
+        _, kept, lost = min(joined)
+        part = {at: kept if top == lost else top for at, top in part.items()}
+
+
+def cells_of(labels: I64) -> dict[Cell, int]:
+    return {
+        (row, column): int(label) for (row, column), label in np.ndenumerate(labels) if label >= 0
+    }
+
+
+def heights(space: dict[Cell, int], rooms: dict[Cell, int], reach: int) -> dict[Cell, int]:
+    """Measure the distance to each place outside, and weigh what lies around each cell."""
+    inside = {
+        (row, column)
+        for (row, column), room in space.items()
+        if all(space.get(beside, room) == room for beside in ((row, column + 1), (row + 1, column)))
+    }
+    limit = range(-1, 2 + max(max(at) for at in space))
+    outside = [at for at in product(limit, limit) if at not in inside]
+    distance = {
+        at: math.floor(FINE * min(math.dist(at, other) for other in outside)) for at in inside
+    }
+    width = 2 * reach + 1
+    around = list(product(range(1 - width, width), repeat=2))
+    return {
+        (row, column): sum(
+            (width - abs(down))
+            * (width - abs(right))
+            * distance.get((row + down, column + right), 0)
+            for down, right in around
+        )
+        // width**2
+        for row, column in rooms
+    }
+
+
+def top_above(at: Cell, rooms: dict[Cell, int], height: dict[Cell, int]) -> Cell:
+    while True:
+        row, column = at
+        sides = ((row, column + 1), (row + 1, column), (row, column - 1), (row - 1, column))
+        near = [at, *(side for side in sides if rooms.get(side) == rooms[at])]
+        higher = max(near, key=lambda cell: (height[cell], cell))
+        if higher == at:
+            return at
+        at = higher
