@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
 from tools import package_map
 
 ROOT = Path(package_map.ROOT)
@@ -13,6 +14,7 @@ MODULES = dict(package_map.modules())
 LONGEST_CIRCLE = 2
 
 
+@pytest.mark.slow
 def test_modules_form_no_circle_longer_than_two() -> None:
     graph = {name: set(imports(name, path)) for name, path in MODULES.items()}
 

@@ -28,6 +28,7 @@ def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
     assert ["log_loss - routine"] == list(_difference(one, "mine"))
 
 
+@pytest.mark.slow
 def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path: Path) -> None:
     people = {"train": ["retired"], "test": ["student"], "nobody": []}
     splits = {

@@ -253,6 +253,7 @@ def forks() -> Any:
     return context
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, forks: Any) -> None:
     found, rng = content("2 h"), random.Random(14)
     own = [f"{OWN}.py"]

@@ -148,6 +148,7 @@ def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene: str) -> None:
     assert undisturbed(scene) == result(simulation)
 
 
+@pytest.mark.slow
 def test_copies_can_be_changed_without_the_other_noticing() -> None:
     simulation = Simulation(house())
     simulation.advance(350)

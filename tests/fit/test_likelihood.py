@@ -73,6 +73,7 @@ def test_large_logs_give_the_true_parameters() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "repeats", "most"), some([(600, 50, 8), (600, 250, 25)], 2))
 def test_intervals_cover_the_truth_as_often_as_they_claim(
     rows: int, repeats: int, most: int

@@ -237,6 +237,7 @@ def test_home_that_no_body_fits_into_is_unlivable() -> None:
     assert ("unlivable", "space") == (findings[0].severity, findings[0].kind)
 
 
+@pytest.mark.slow
 def test_every_plan_has_a_check_up(shared_data: Path) -> None:
     paths = plan_files(shared_data)
     paths += [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]

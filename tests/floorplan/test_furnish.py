@@ -100,6 +100,7 @@ def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data: Path) ->
     assert pieces > 14 * len(paths)
 
 
+@pytest.mark.slow
 def test_maps_of_robots_are_furnished_without_harm(shared_data: Path) -> None:
     paths = [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]
     assert 6 == len(paths)
@@ -244,6 +245,7 @@ def test_room_that_holds_something_is_left_alone() -> None:
     assert ["chair_0"] == [thing.name for thing in furnish(plan).objects]
 
 
+@pytest.mark.slow
 def test_nothing_stands_before_a_doorway() -> None:
     rooms = [shapely.box(0, 0, 4, 4), shapely.box(4.15, 0, 8, 4)]
     gap = shapely.box(4, 1.5, 4.15, 2.4)

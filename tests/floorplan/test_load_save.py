@@ -212,6 +212,7 @@ def test_what_the_reader_refuses_does_not_fit_the_schema(
 # --- fleet2d convert --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_convert_writes_a_plan_of_any_format_and_says_its_notes(
     fleet2d: Cli, shared_data: Path
 ) -> None:

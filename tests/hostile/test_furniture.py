@@ -109,6 +109,7 @@ def turned_home(plan: FloorPlan, degrees: float, cell: float) -> FloorPlan:
     return FloorPlan.build(plan.name, turned(plan.free_space), regions, cell, doorways=None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("degrees", "cell"), some([(61, 0.2), (7, 0.05), (30, 0.1), (45, 0.05)], 4)
 )
@@ -161,6 +162,7 @@ def captured(folder: Path) -> Iterator[FloorPlan]:
         yield replace(plan, rooms=tuple(replace(r, type=t, labels=(t,)) for r, t in rooms))
 
 
+@pytest.mark.slow
 def test_captured_homes_stay_connected(shared_data: Path) -> None:
     pieces = [check(plan) for plan in captured(shared_data / "captured")]
 

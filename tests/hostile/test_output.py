@@ -75,6 +75,7 @@ def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
     assert "stored in out" in result.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("redirect", some([">/dev/full", ">&-"], 2))
 @pytest.mark.parametrize(
     "arguments",

@@ -61,6 +61,7 @@ def test_both_panels_show_what_is_in_view_and_only_that(plan: FloorPlan) -> None
         assert colors[0][1:] == panel_colors[1:]
 
 
+@pytest.mark.slow
 def test_pictures_are_written_the_same_twice(plan: FloorPlan, tmp_path: Path) -> None:
     for ending in (".png", ".svg"):
         files = [tmp_path / f"{n}{ending}" for n in "ab"]

@@ -72,6 +72,7 @@ def words_drawn(run: Run, tmp_path: Path) -> str:
     return words_in(tmp_path / "run.svg")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", some(["png", "svg"], 2))
 def test_same_run_gives_same_bytes(tmp_path: Path, ending: str) -> None:
     run = base(out=tmp_path / "run")
@@ -291,6 +292,7 @@ def test_each_user_has_a_line_in_the_legend() -> None:
     assert "ways walked" in words_of(two_days())
 
 
+@pytest.mark.slow
 def test_too_many_rings_are_left_out_with_a_note() -> None:
     few = words_of(two_days())
     assert "seen here by a robot" in few

@@ -64,6 +64,7 @@ def test_what_is_not_drawn_stays_so() -> None:
     assert 0 == box.get_facecolor()[3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", some([".png", ".svg", ".pdf"], 3))
 def test_dark_picture_is_written_the_same_each_time(tmp_path: Path, ending: str) -> None:
     plan = fleet2d.load_floorplan()

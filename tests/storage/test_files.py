@@ -102,6 +102,7 @@ def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path: Path) -> None:
     assert [] == list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
     code = (
         "import sys, time; from pathlib import Path; from fleet2d.storage.files import FolderLock\n"

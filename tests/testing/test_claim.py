@@ -133,6 +133,7 @@ def test_so_many_seeds_would_do_and_one_less_would_not(holds: float, other: floa
     assert rate_test(needed - 1, holds).alternative < other
 
 
+@pytest.mark.slow
 def test_a_claim_that_shows_nothing_is_refused_with_the_seeds_that_would_do() -> None:
     with pytest.raises(
         SetUpError,

@@ -209,6 +209,7 @@ def test_errors_of_a_test_are_reported(suite: pytest.Pytester, code: str, words:
     assert "plugin.py" not in result.text
 
 
+@pytest.mark.slow
 def test_a_trial_without_expectation_or_assertion_is_untested(suite: Suite) -> None:
     result = suite("""
 def helps(trial):

@@ -290,6 +290,7 @@ class Tasks:
         self.page.wait_for_selector(".live[data-paused=true]", timeout=20_000)
 
 
+@pytest.mark.slow
 def test_each_task_takes_one_or_two_actions(browser: Any) -> None:
     run = fleet2d.run(
         "bundled:base",
@@ -322,6 +323,7 @@ def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
         until(page, lambda: second_page.url.split("#")[1] == page.url.split("#")[1])
 
 
+@pytest.mark.slow
 def test_note_at_a_moment_is_kept_and_found_again(
     browser: Any, run_dir: Path, tmp_path: Path
 ) -> None:
@@ -344,6 +346,7 @@ def test_note_at_a_moment_is_kept_and_found_again(
             page.wait_for_selector("ol[data-count='0']", state="attached")
 
 
+@pytest.mark.slow
 def test_link_to_a_moment_is_copied(browser: Any, address: str) -> None:
     permissions = ["clipboard-read", "clipboard-write"]
     with page_at(browser, address, permissions=permissions) as page:
@@ -357,6 +360,7 @@ def test_link_to_a_moment_is_copied(browser: Any, address: str) -> None:
         shows_moment(page, 5 * 3600)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zone", ["Pacific/Auckland", "America/Los_Angeles", "Asia/Kathmandu"])
 def test_times_are_the_home_s_in_every_time_zone(browser: Any, address: str, zone: str) -> None:
     with page_at(browser, f"{address}#panel=metrics", timezone_id=zone) as page:
@@ -468,6 +472,7 @@ def test_decision_behind_what_a_robot_does_is_shown(page: Any, run_dir: Path) ->
     page.wait_for_selector(".label >> text=astro: behavior")
 
 
+@pytest.mark.slow
 def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
     area = [[11.0, 1.0], [14.0, 1.0], [14.0, 4.0], [11.0, 4.0]]
     run = fleet2d.run(
@@ -492,6 +497,7 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
             add_new_picture(page, pictures)
 
 
+@pytest.mark.slow
 def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="PyAV is not installed")
     run = fleet2d.run(
@@ -511,6 +517,7 @@ def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_
         assert 15.0 == pytest.approx(film.duration / 1e6, abs=1.0)
 
 
+@pytest.mark.slow
 def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: Path) -> None:
     with served(run_dir, other_dir) as address, page_at(browser, address) as page:
         until(page, lambda: page.locator(".plan canvas").count() == 2)
@@ -541,6 +548,7 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
         shows_step(page, 3600)
 
 
+@pytest.mark.slow
 def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
     people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
     run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=4, users=people)
@@ -551,6 +559,7 @@ def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
         page.wait_for_selector("[data-inspected=u49]")
 
 
+@pytest.mark.slow
 def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
     turns = [2 * math.pi * i / 4000 for i in range(4000)]
     far = [5 + 0.2 * (i * 7919 % 5) / 5 + math.sin(3 * turn) for i, turn in enumerate(turns)]
@@ -580,6 +589,7 @@ def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> N
         assert "later Fleet2D" in page.inner_text(".failure")
 
 
+@pytest.mark.slow
 def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     simulation = fleet2d.Simulation(
         "bundled:base",
@@ -621,6 +631,7 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     assert ("bath_door", "shut") in [(row["entity"], row["event"]) for row in events]
 
 
+@pytest.mark.slow
 def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
     browser: Any, run_dir: Path, tmp_path: Path
 ) -> None:

@@ -23,6 +23,7 @@ def test_moment_is_drawn_in_each_format(run_dir: Path, tmp_path: Path, ending: s
     assert target.read_bytes().startswith(MAGIC[ending])
 
 
+@pytest.mark.slow
 def test_same_moment_gives_the_same_bytes_and_another_others(run_dir: Path, tmp_path: Path) -> None:
     run = fleet2d.open_run(run_dir)
     contents = []
@@ -70,6 +71,7 @@ def test_film_of_pictures_is_written(run_dir: Path, tmp_path: Path, ending: str)
     assert [target] == list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir: Path, tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="PyAV is not installed")
     target = tmp_path / "film.mp4"

@@ -21,6 +21,7 @@ def test_run_draws_itself_and_its_moments(run_dir: Path) -> None:
     assert len(axes.patches) > 2
 
 
+@pytest.mark.slow
 def test_run_and_home_show_themselves_in_a_notebook(run_dir: Path) -> None:
     run = fleet2d.open_run(run_dir)
     assert str(run.digest)[:12] in run._repr_html_()

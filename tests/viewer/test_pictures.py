@@ -60,6 +60,7 @@ def picture_of(page: Any) -> np.ndarray:
         return np.asarray(small)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("view", "scheme"),
     [

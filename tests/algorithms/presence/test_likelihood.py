@@ -96,6 +96,7 @@ def test_sighting_share_fails_under_hangout_but_likelihood_does_not() -> None:
     assert (np.array(errors)[:, 0] > np.array(errors)[:, 2]).all()
 
 
+@pytest.mark.slow
 def test_following_biases_exposure_ratio_but_not_likelihood() -> None:
     """Robots that stay while they see the person: rooms left at once are watched too little."""
     errors = []
@@ -155,6 +156,7 @@ def test_pieces_of_a_day_join_to_the_whole() -> None:
         assert np.array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_intervals_contain_the_truth_at_least_as_often_as_stated() -> None:
     """Ten days of a patrol, 20 runs of 4 rooms and away: 90 % intervals hold 96 %.
 

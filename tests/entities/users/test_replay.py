@@ -320,6 +320,7 @@ CASAS_ROOMS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_casas_at_each_second_that_a_sensor_switches_on_the_user_is_there(
     shared_data: Path,
 ) -> None:
@@ -337,6 +338,7 @@ def test_casas_at_each_second_that_a_sensor_switches_on_the_user_is_there(
     assert checked > 8000
 
 
+@pytest.mark.slow
 def test_uci_adl_at_each_begin_the_user_is_there_and_out_while_out(shared_data: Path) -> None:
     folder = shared_data / "activity" / "uci_adl_a"
     content = replay(folder, "14 d", start="2011-11-28")

@@ -88,6 +88,7 @@ def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: 
     assert odd(minutes_still({"type": "houseexpo", "path": str(plan)})) == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floorplan", some(SYNTHETIC, 72), ids=lambda plan: plan["seed"])
 def test_nothing_is_done_in_an_odd_room_of_a_synthetic_home(floorplan: dict[str, Any]) -> None:
     assert odd(minutes_still(floorplan)) == {}

@@ -209,6 +209,7 @@ def test_scanned_floor_with_gaps_is_whole(shared_data: Path, name: str) -> None:
         read_image(folder / f"{name}.png", scale, close_gaps=0)
 
 
+@pytest.mark.slow
 def test_building_whose_ground_has_several_shades_of_grey_is_whole(shared_data: Path) -> None:
     path = shared_data / "captured" / "clutter" / "photo_2020-01-08_09-53-31.png"
     if not path.exists():

@@ -91,6 +91,7 @@ def test_gap_with_a_line_through_it_is_a_window_and_others_are_doors() -> None:
     assert gaps[0].window == find_gaps(walls.T.copy(), dark.T.copy(), 0.05)[0].window[::-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", ["solid", "outlined"])
 def test_picture_without_a_scale_is_answered_with_that_of_its_doors(
     tmp_path: Path, style: str

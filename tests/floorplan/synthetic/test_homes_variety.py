@@ -22,6 +22,7 @@ def room_graph(plan: FloorPlan) -> object:
     return tuple(sorted(kinds)), tuple(sorted(links))
 
 
+@pytest.mark.slow
 def test_small_flats_of_one_size_differ_in_rooms_and_links() -> None:
     usual = {room_graph(Synthetic(seed=seed, area_m2=50).load()) for seed in range(12)}
     varied = [Synthetic(seed=seed, area_m2=50, variety=1).load() for seed in range(12)]
@@ -122,11 +123,13 @@ def test_home_of_edition_2_has_the_area_and_rooms_that_are_requested(
         assert (bedrooms, bathrooms) == (kinds.count("bedroom"), kinds.count("bathroom"))
 
 
+@pytest.mark.slow
 def test_small_flats_of_edition_2_rarely_have_the_same_rooms_and_links() -> None:
     graphs = {room_graph(second(seed, area_m2=50, variety=1)) for seed in range(15)}
     assert len(graphs) >= 11
 
 
+@pytest.mark.slow
 def test_large_homes_of_edition_2_are_more_compact() -> None:
     def longest(plan: FloorPlan) -> float:
         x0, y0, x1, y1 = plan.bounds
