@@ -204,7 +204,9 @@ def _find_gaps(
             before, after = along[: -length - 1], along[length + 1 :]
             between = [slice(k, k + len(before)) for k in range(1, length + 1)]
             is_gap = (before >= 0) & (after >= 0) & (before != after)
-            is_gap &= roomy[before] & roomy[after]
+            is_gap[is_gap] = roomy[before[is_gap]] & roomy[after[is_gap]]
+            if not is_gap.any():
+                continue
             for window in between:
                 is_gap &= ~np.moveaxis(free, axis, 0)[window]
                 if length > widest:

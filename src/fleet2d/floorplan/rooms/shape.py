@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from fleet2d.kernels import I32, I64, label_parts, spread_labels, squared_distance
 
@@ -60,6 +59,8 @@ def without_furniture(room_of_cell: I32, cell: float) -> I32:
     part = label_parts(np.pad(room_of_cell, 1, constant_values=-1) < 0, True)
     is_small = np.bincount(part[part >= 0]) * cell**2 <= FURNITURE_M2
     is_small[part[0, 0]] = False
+    if not is_small.any():
+        return room_of_cell
     is_small = np.append(is_small, False)  # its last entry serves -1
     return spread_labels(room_of_cell, (room_of_cell >= 0) | is_small[part[1:-1, 1:-1]])
 
@@ -80,8 +81,9 @@ def _heights(space: I32, reach: int) -> I64:
     distance = np.sqrt(squared_distance(inside))[1:-1, 1:-1]
     height = np.pad(np.floor(FINE * distance).astype(np.int64), 2 * reach)
     width = 2 * reach + 1
-    for axis in (0, 1, 0, 1):
-        height = sliding_window_view(height, width, axis).sum(axis=-1)
+    for _ in range(4):  # down, across, down and across
+        total = np.cumsum(np.pad(height, ((1, 0), (0, 0))), axis=0)
+        height = (total[width:] - total[:-width]).T
     return height // width**2
 
 
@@ -91,17 +93,23 @@ def _hills(room_of_cell: I64, height: I64) -> I64:
     Ways lead across sides and don't leave a room. Of equally high cells, later ones count as
     higher.
     """
-    rank = height * height.size + np.arange(height.size).reshape(height.shape)
-    ranks = sliding_window_view(np.pad(rank, 1), height.shape)
-    around = sliding_window_view(np.pad(room_of_cell, 1, constant_values=-1), height.shape)
-    for beside in ((0, 1), (1, 0), (1, 2), (2, 1)):
-        np.maximum(rank, ranks[beside], out=rank, where=around[beside] == room_of_cell)
-    up = (rank % height.size).ravel()
-    while ((further := up[up]) != up).any():
-        up = further
     free = room_of_cell >= 0
-    hill = np.full(height.shape, -1)
-    hill[free] = np.unique(up.reshape(height.shape)[free], return_inverse=True)[1]
+    number = np.arange(np.count_nonzero(free))
+    row = free.shape[1] + 2
+    rooms = np.pad(room_of_cell, 1, constant_values=-1).ravel()
+    rank = np.zeros(len(rooms), np.int64)
+    rank[rooms >= 0] = height[free] * len(number) + number
+    highest = rank.copy()
+    inner = slice(row, -row)  # all but the first row and the last
+    for step in (1, -1, row, -row):
+        beside = slice(row + step, len(rooms) - row + step)
+        is_same = rooms[inner] == rooms[beside]
+        np.maximum(highest[inner], rank[beside], out=highest[inner], where=is_same)
+    up = highest[rooms >= 0] % len(number)
+    while not np.array_equal(further := up[up], up):
+        up = further
+    hill = np.full(room_of_cell.shape, -1)
+    hill[free] = (np.cumsum(up == number) - 1)[up]
     return hill
 
 
