@@ -267,7 +267,7 @@ def pictures() -> Iterator[tuple[str, Path, Callable[[], Labels]]]:
 
 
 def vacuum_rooms(path: Path) -> tuple[Labels, Labels]:
-    """Return the rooms of a vacuum's floor found from its walls alone, and its segments."""
+    """Return the rooms of a vacuum's floor found from its shape, and its segments."""
     segments = fleet2d.load_floorplan(path)
     plan = FloorPlan.build("walls", segments.free_space, doorways=None, regions_are="vacuum")
     rows, columns = segments.room_of_cell.shape
