@@ -434,7 +434,10 @@ def divide(
     kind: RegionKind,
     passages: Passages | None,
 ) -> tuple[I16, tuple[Room, ...], list[str]]:
-    """Divide the free cells among rooms; see `assign_rooms`, `label_rooms`, `segment_rooms`."""
+    """Divide the free cells among rooms.
+
+    See `assign_rooms`, `label_rooms`, `segment_rooms` and `divide_by_shape`.
+    """
     if kind in ("exact", "segments") or passages is None:
         return assign_rooms(lattice, free, regions)
     if kind == "vacuum" or (kind == "none" and not passages.between_straight_walls):
