@@ -31,7 +31,7 @@ Array<i64, 2> column_gaps(View<const bool, 2> mask, i64 endless) {
 }
 
 // The squared distances of the cells of a row, from the gaps of its columns: the lower envelope of
-// one parabola for each column.
+// one parabola for each column. A gap of 0 hides what is beyond it.
 class Envelope {
 public:
     explicit Envelope(i64 columns) : apex_(Array<i64>::empty({columns})), start_(Array<i64>::empty({columns})) {}
@@ -179,6 +179,23 @@ bool is_open(View<const i32, 2> cost, GridCell from, GridCell to) {
            cost(to.row, from.column) >= 0;
 }
 
+constexpr i32 NO_PEAK = -1;  // the peak of a cell without a label
+
+// The highest of a cell and the cells beside it that have its label, of equally high ones the last.
+GridCell steepest(View<const i32, 2> labels, View<const i64, 2> height, GridCell cell) {
+    constexpr std::array<GridCell, 5> IN_ORDER{{{-1, 0}, {0, -1}, {0, 0}, {0, 1}, {1, 0}}};
+    GridCell highest = cell;
+    i64 most = std::numeric_limits<i64>::min();
+    for (const GridCell step : IN_ORDER) {
+        const GridCell there = cell + step;
+        if (!is_inside(labels.shape, there) || at(labels, there) != at(labels, cell)) continue;
+        if (at(height, there) < most) continue;
+        most = at(height, there);
+        highest = there;
+    }
+    return highest;
+}
+
 }  // namespace
 
 Array<i64, 2> squared_distance(View<const bool, 2> mask) {
@@ -186,10 +203,71 @@ Array<i64, 2> squared_distance(View<const bool, 2> mask) {
     auto squared = Array<i64, 2>::empty(mask.shape);
     if (columns == 0) return squared;
     const i64 endless = rows + columns;
-    const auto gap = column_gaps(mask, endless);
+    const auto gaps = column_gaps(mask, endless);
     Envelope envelope(columns);
-    for (i64 row = 0; row < rows; ++row) envelope.measure(gap[row], endless * endless, squared[row]);
+    for (i64 row = 0; row < rows; ++row) {
+        const auto gap = gaps[row];
+        const auto in_row = squared[row];
+        for (i64 first = 0, next = 0; first < columns; first = next) {
+            // From one gap of 0 to the next: nothing beyond them is nearer.
+            for (next = first + 1; next < columns && gap[next] != 0;) ++next;
+            if (gap[first] == 0 && next == first + 1) {
+                in_row[first] = 0;
+            } else {
+                const i64 end = std::min(next + 1, columns);
+                envelope.measure(gap.slice(first, end), endless * endless, in_row.slice(first, end));
+            }
+        }
+    }
     return squared;
+}
+
+Array<i64, 2> box_sums(View<const i64, 2> values, i64 reach) {
+    const auto [rows, columns] = values.shape;
+    auto result = Array<i64, 2>::empty(values.shape);
+    const View<i64, 2> sums = result;
+    auto down = Array<i64>::zeros({columns});  // the sums of what is in reach in each column
+    const auto add_row = [&](i64 row, i64 sign) {
+        if (row < 0 || row >= rows) return;
+        for (i64 column = 0; column < columns; ++column) down[column] += sign * values(row, column);
+    };
+    for (i64 row = 0; row < std::min(reach, rows); ++row) add_row(row, 1);
+    for (i64 row = 0; row < rows; ++row) {
+        add_row(row + reach, 1);
+        i64 sum = 0;
+        for (i64 column = 0; column < std::min(reach, columns); ++column) sum += down[column];
+        for (i64 column = 0; column < columns; ++column) {
+            if (column + reach < columns) sum += down[column + reach];
+            sums(row, column) = sum;
+            if (column >= reach) sum -= down[column - reach];
+        }
+        add_row(row - reach, -1);
+    }
+    return result;
+}
+
+Array<i32, 2> climb(View<const i32, 2> labels, View<const i64, 2> height) {
+    const auto [rows, columns] = labels.shape;
+    auto result = Array<i32, 2>::filled(labels.shape, NO_PEAK);
+    const View<i32, 2> peak = result;
+    i32 peaks = 0;
+    for (i64 row = 0; row < rows; ++row) {
+        for (i64 column = 0; column < columns; ++column) {
+            const GridCell cell{row, column};
+            if (at(labels, cell) >= 0 && steepest(labels, height, cell) == cell) at(peak, cell) = peaks++;
+        }
+    }
+    std::vector<GridCell> way;
+    for (i64 row = 0; row < rows; ++row) {
+        for (i64 column = 0; column < columns; ++column) {
+            if (labels(row, column) < 0) continue;
+            GridCell cell{row, column};
+            for (; at(peak, cell) == NO_PEAK; cell = steepest(labels, height, cell)) way.push_back(cell);
+            for (const GridCell passed : way) at(peak, passed) = at(peak, cell);
+            way.clear();
+        }
+    }
+    return result;
 }
 
 Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goals) {
@@ -217,7 +295,7 @@ Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell sta
     for (i64 now = 0; !waiting.empty(); ++now) {
         while (const auto cell = waiting.pop(now)) {
             if (at(distance, *cell) != now) continue;  // a cheaper path was found since
-            if (cell->row == start.row && cell->column == start.column) return result;
+            if (*cell == start) return result;
             for (const GridCell step : NEIGHBORS) {
                 const GridCell beside = *cell + step;
                 if (!is_open(cost, *cell, beside)) continue;

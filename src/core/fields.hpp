@@ -15,6 +15,15 @@ inline constexpr i64 MAX_COST = 1000;  // the highest cost of a cell [percent]
 // surround the mask by one line of false where the border is a wall.
 Array<i64, 2> squared_distance(View<const bool, 2> mask);
 
+// The sum of the values in the square of cells that reaches so far to all sides of each, (rows,
+// columns); outside the array they are 0.
+Array<i64, 2> box_sums(View<const i64, 2> values, i64 reach);
+
+// The peak of each cell, to which the steepest way up leads, (rows, columns): peaks are numbered
+// row by row; -1 for cells without a label. Ways lead across sides, from label to equal label; of
+// equally high cells, later ones count as higher.
+Array<i32, 2> climb(View<const i32, 2> labels, View<const i64, 2> height);
+
 // The walking distance from each cell to the nearest goal, in fifths of a cell's side, (rows,
 // columns); -1 where no goal can be reached.
 //

@@ -10,6 +10,8 @@ namespace fleet2d {
 // A cell of a grid, or the step from one to another.
 struct GridCell {
     i64 row, column;
+
+    constexpr bool operator==(const GridCell&) const = default;
 };
 
 constexpr GridCell operator+(GridCell a, GridCell b) { return {a.row + b.row, a.column + b.column}; }

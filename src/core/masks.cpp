@@ -1,5 +1,6 @@
 #include "masks.hpp"
 
+#include <algorithm>
 #include <queue>
 #include <vector>
 
@@ -36,7 +37,7 @@ Array<u8, 2> border_sides(View<const bool, 2> mask) {
 // Append the corners of the ring that starts with the side to the east of `corner`, and remove its
 // sides; returns the new number of corners.
 i64 follow_ring(View<u8, 2> sides, GridCell corner, Array<i32, 2>& corners, i64 count) {
-    const i64 first_row = corner.row, first_column = corner.column;
+    const GridCell start = corner;
     int direction = EAST, before = SOUTH;  // any but EAST: the ring bends where it starts
     do {
         if (direction != before) {
@@ -50,39 +51,78 @@ i64 follow_ring(View<u8, 2> sides, GridCell corner, Array<i32, 2>& corners, i64 
         direction = (before + 3) % 4;  // right first, then straight on, then left
         while ((at(sides, corner) & bit(direction)) == 0) direction = (direction + 1) % 4;
         at(sides, corner) ^= bit(direction);  // its first side is the last one to go
-    } while (corner.row != first_row || corner.column != first_column || direction != EAST);
+    } while (corner != start || direction != EAST);
     return count;
 }
+
+// Runs of the pixels of a mask in its rows, and which of them are connected.
+class Runs {
+public:
+    struct Run {
+        i64 row, begin, end;
+        std::size_t earlier;  // a run that this one is connected to; itself if it is the first of its part
+        i32 part = NOWHERE;
+    };
+
+    std::size_t size() const { return runs_.size(); }
+    const Run& operator[](std::size_t run) const { return runs_[run]; }
+
+    std::size_t add(i64 row, i64 begin, i64 end) {
+        runs_.push_back({row, begin, end, size()});
+        return size() - 1;
+    }
+
+    void connect(std::size_t one, std::size_t other) {
+        const auto [earlier, later] = std::minmax({first_of(one), first_of(other)});
+        runs_[later].earlier = earlier;
+    }
+
+    // The number of the part of each pixel, NOWHERE between the runs.
+    Array<i32, 2> number_parts(std::array<i64, 2> shape) {
+        auto result = Array<i32, 2>::filled(shape, NOWHERE);
+        const View<i32, 2> part = result;
+        i32 parts = 0;
+        for (Run& run : runs_) {
+            const Run& earlier = runs_[run.earlier];
+            run.part = &earlier == &run ? parts++ : earlier.part;
+            const auto pixels = part[run.row].slice(run.begin, run.end);
+            std::fill(pixels.begin(), pixels.end(), run.part);
+        }
+        return result;
+    }
+
+private:
+    // The first run of a run's part, as far as is known.
+    std::size_t first_of(std::size_t run) {
+        while (runs_[run].earlier != run) run = runs_[run].earlier = runs_[runs_[run].earlier].earlier;
+        return run;
+    }
+
+    std::vector<Run> runs_;
+};
 
 }  // namespace
 
 Array<i32, 2> label_parts(View<const bool, 2> mask, bool diagonal) {
     const auto [rows, columns] = mask.shape;
-    auto result = Array<i32, 2>::filled(mask.shape, NOWHERE);
-    const View<i32, 2> part = result;
-    std::vector<GridCell> stack;
-    i32 parts = 0;
-    const auto reach = [&](GridCell pixel) {
-        if (is_inside(mask.shape, pixel) && at(mask, pixel) && at(part, pixel) == NOWHERE) {
-            at(part, pixel) = parts;
-            stack.push_back(pixel);
-        }
-    };
+    const i64 reach = diagonal ? 1 : 0;
+    Runs runs;
+    std::size_t below = 0;  // the first run of the row below that may touch the next one
     for (i64 row = 0; row < rows; ++row) {
+        const std::size_t first = runs.size();
         for (i64 column = 0; column < columns; ++column) {
-            reach({row, column});
-            if (stack.empty()) continue;
-            while (!stack.empty()) {
-                const GridCell pixel = stack.back();
-                stack.pop_back();
-                for (const GridCell step : SIDES) reach(pixel + step);
-                if (!diagonal) continue;
-                for (const GridCell step : CORNERS) reach(pixel + step);
+            if (!mask(row, column)) continue;
+            const i64 begin = column;
+            while (column < columns && mask(row, column)) ++column;
+            const std::size_t run = runs.add(row, begin, column);
+            while (below < first && runs[below].end + reach <= begin) ++below;
+            for (std::size_t each = below; each < first && runs[each].begin < column + reach; ++each) {
+                runs.connect(each, run);
             }
-            ++parts;
         }
+        below = first;
     }
-    return result;
+    return runs.number_parts(mask.shape);
 }
 
 Array<i32, 2> count_steps(View<const bool, 2> start, View<const bool, 2> mask) {

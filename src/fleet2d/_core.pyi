@@ -393,6 +393,32 @@ def squared_distance(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.ND
         (rows + columns)² everywhere in a mask that has no outside.
     """
 
+def box_sums(values: numpy.typing.NDArray[numpy.int64], reach: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the sum of the values in the square of cells that reaches so far to all sides of each.
+
+    Args:
+        values: int64 (rows, columns); outside the array they are 0.
+        reach: Cells to each side.
+
+    Returns:
+        int64 (rows, columns).
+    """
+
+def climb(labels: numpy.typing.NDArray[numpy.int32], height: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Return the peak of each cell, to which the steepest way up leads.
+
+    Ways lead across sides, from label to equal label. Of equally high cells, later ones count as higher.
+
+    Args:
+        labels: int32 (rows, columns), -1 for none.
+        height: int64 (rows, columns).
+
+    Returns:
+        Peaks, numbered row by row, int32 (rows, columns); -1 for cells without a label.
+    """
+
 def walking_distance(mask: numpy.typing.NDArray[numpy.bool_], goals: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int32]:
     """
     Return the walking distance from each cell to the nearest goal.

@@ -473,6 +473,8 @@ CALLS: dict[str, Args] = {
     "count_steps": lambda: (MASK.copy(), MASK.copy()),
     "trace_rings": lambda: (MASK.copy(),),
     "squared_distance": lambda: (MASK.copy(),),
+    "box_sums": lambda: (COSTS.astype(np.int64), 1),
+    "climb": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.astype(np.int64)),
     "walking_distance": lambda: (MASK.copy(), np.array([[0, 0], [2, 3]])),
     "cost_distance": lambda: (COSTS.copy(), (0, 0), (2, 3)),
     "step_cost": lambda: (COSTS.copy(), 0, 0, 0, 1),

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from tests.reference.fields import box_sums as slow_box_sums
+from tests.reference.fields import climb as slow_climb
 from tests.reference.fields import squared_distance as slow_squared_distance
 from tests.reference.fields import walking_distance as slow_walking_distance
 
-from fleet2d.kernels import squared_distance, walking_distance
+from fleet2d.kernels import box_sums, climb, squared_distance, walking_distance
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 17), (17, 1), (2, 2), (13, 29), (40, 25)])
@@ -76,3 +78,28 @@ def test_walking_distance_counts_a_goal_named_twice_once() -> None:
         walking_distance(mask, np.array([[1, 1]])),
         walking_distance(mask, np.array([[1, 1], [1, 1], [9, 9]])),
     )
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (1, 1), (1, 9), (9, 1), (2, 2), (7, 11)])
+@pytest.mark.parametrize("reach", [0, 1, 2, 8, 30])
+def test_sums_of_squares_equal_adding_them_up(shape: tuple[int, int], reach: int) -> None:
+    values = np.random.default_rng([*shape, reach]).integers(-100, 100, shape)
+
+    assert np.array_equal(slow_box_sums(values, reach), box_sums(values, reach))
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (1, 1), (1, 9), (9, 1), (2, 2), (12, 17)])
+@pytest.mark.parametrize("heights", [1, 3, 1000])
+def test_cells_lead_to_the_peaks_that_walking_up_does(shape: tuple[int, int], heights: int) -> None:
+    rng = np.random.default_rng([*shape, heights])
+    for labels in (1, 3):
+        label = rng.integers(-1, labels, shape).astype(np.int32)
+        height = rng.integers(0, heights, shape)
+
+        assert np.array_equal(slow_climb(label, height), climb(label, height))
+
+
+def test_of_level_cells_the_last_is_the_peak() -> None:
+    peak = climb(np.zeros((2, 3), np.int32), np.zeros((2, 3), np.int64))
+
+    assert [[0, 0, 0]] * 2 == peak.tolist()

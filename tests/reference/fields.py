@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from fleet2d.kernels import I64, Bool
+from fleet2d.kernels import I32, I64, Bool
 
 
 def squared_distance(mask: Bool) -> I64:
@@ -16,6 +16,35 @@ def squared_distance(mask: Bool) -> I64:
         for column in range(columns):
             squares = ((outside - (row, column)) ** 2).sum(axis=1)
             out[row, column] = squares.min() if len(squares) else (rows + columns) ** 2
+    return out
+
+
+def box_sums(values: I64, reach: int) -> I64:
+    """Add up the square around every cell."""
+    out = np.empty_like(values)
+    for row, column in np.ndindex(values.shape):
+        around = values[max(row - reach, 0) : row + reach + 1, max(column - reach, 0) :]
+        out[row, column] = around[:, : min(column, reach) + reach + 1].sum()
+    return out
+
+
+def climb(labels: I32, height: I64) -> I32:
+    """Walk up from every cell."""
+    cells = {(int(row), int(column)) for row, column in np.argwhere(labels >= 0)}
+
+    def higher(cell: tuple[int, int]) -> tuple[int, int]:
+        row, column = cell
+        sides = [(row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)]
+        near = [cell, *(side for side in sides if side in cells and labels[side] == labels[cell])]
+        return max(near, key=lambda each: (height[each], each))
+
+    number = {peak: k for k, peak in enumerate(sorted(c for c in cells if higher(c) == c))}
+    out = np.full(labels.shape, -1, np.int32)
+    for start in cells:
+        cell = start
+        while higher(cell) != cell:
+            cell = higher(cell)
+        out[start] = number[cell]
     return out
 
 

@@ -38,6 +38,41 @@ Returns:
     Squared distances in cells, int64 (rows, columns); 0 outside the mask, and
     (rows + columns)² everywhere in a mask that has no outside.)");
     m.def(
+        "box_sums",
+        [](View<const i64, 2> values, i64 reach) {
+            const i64 cells = std::max(values.shape[0] * values.shape[1], i64{1});
+            require(0 <= reach && reach < i64{1} << 31, "reach must be in 0 to 2**31 - 1");
+            const i64 most = (i64{1} << 62) / cells;
+            require(all_in_range(values, -most, most + 1), "values must be within 2**62 / (rows * columns)");
+            return box_sums(values, reach);
+        },
+        "values"_a, "reach"_a, Unlocked(),
+        R"(Return the sum of the values in the square of cells that reaches so far to all sides of each.
+
+Args:
+    values: int64 (rows, columns); outside the array they are 0.
+    reach: Cells to each side.
+
+Returns:
+    int64 (rows, columns).)");
+    m.def(
+        "climb",
+        [](View<const i32, 2> labels, View<const i64, 2> height) {
+            require(labels.shape == height.shape, "labels and height must have one shape");
+            return climb(labels, height);
+        },
+        "labels"_a, "height"_a, Unlocked(),
+        R"(Return the peak of each cell, to which the steepest way up leads.
+
+Ways lead across sides, from label to equal label. Of equally high cells, later ones count as higher.
+
+Args:
+    labels: int32 (rows, columns), -1 for none.
+    height: int64 (rows, columns).
+
+Returns:
+    Peaks, numbered row by row, int32 (rows, columns); -1 for cells without a label.)");
+    m.def(
         "walking_distance",
         [](View<const bool, 2> mask, View<const i64, 2> goals) {
             require(goals.shape[1] == 2, "goals must be (n, 2)");

@@ -197,7 +197,7 @@ def _find_gaps(
     """
     gap = np.zeros(part.shape, np.int8)
     first, second = (np.full(part.shape, -1, np.int32) for _ in range(2))
-    to_side2 = squared_distance(~free)
+    to_side2: I64 | None = None
     for length in range(1, math.ceil(widest * math.sqrt(2)) + 1):
         for axis in (0, 1):
             along = np.moveaxis(part, axis, 0)
@@ -210,6 +210,7 @@ def _find_gaps(
             for window in between:
                 is_gap &= ~np.moveaxis(free, axis, 0)[window]
                 if length > widest:
+                    to_side2 = squared_distance(~free) if to_side2 is None else to_side2
                     is_gap &= np.moveaxis(to_side2, axis, 0)[window] < ((length + 1) // 2) ** 2
             low, high = np.minimum(before, after), np.maximum(before, after)
             for window in between:

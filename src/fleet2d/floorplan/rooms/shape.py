@@ -15,7 +15,7 @@ from heapq import heapify, heappop, heappush
 
 import numpy as np
 
-from fleet2d.kernels import I32, I64, label_parts, spread_labels, squared_distance
+from fleet2d.kernels import I32, I64, box_sums, climb, label_parts, spread_labels, squared_distance
 
 IN_STRAIGHT_WALLS, IN_RAGGED_WALLS, OF_VACUUMS = (0.75, 4.0), (0.65, 4.0), (0.8, 1.2)
 """How much narrower a place that divides a room is, and the least area of a part [m²]. Among the
@@ -46,10 +46,10 @@ def divide_by_shape(room_of_cell: I64, cell: float, pass_share: float, least_m2:
     >>> divide_by_shape(np.array([wide, narrow, wide, wide]), 1.0, 0.7, 4.0)[1].tolist()
     [-1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0]
     """
-    space = without_furniture(room_of_cell.astype(np.int32), cell)
-    height = _heights(space, round(SMOOTHED_M / cell))
-    hill = _hills(room_of_cell, height)
-    hills = _Hills.of(hill, room_of_cell, height)
+    rooms = room_of_cell.astype(np.int32)
+    height = _heights(without_furniture(rooms, cell), round(SMOOTHED_M / cell))
+    hill = climb(rooms, height)
+    hills = _Hills.of(hill, rooms, height)
     return by_size(_join(hills, pass_share, least_m2 / cell**2)[hill])
 
 
@@ -79,38 +79,10 @@ def _heights(space: I32, reach: int) -> I64:
     inside[1:-1, 1:-2] &= (space[:, :-1] == space[:, 1:]) | (space[:, 1:] < 0)
     inside[1:-2, 1:-1] &= (space[:-1] == space[1:]) | (space[1:] < 0)
     distance = np.sqrt(squared_distance(inside))[1:-1, 1:-1]
-    height = np.pad(np.floor(FINE * distance).astype(np.int64), 2 * reach)
-    width = 2 * reach + 1
-    for _ in range(4):  # down, across, down and across
-        total = np.cumsum(np.pad(height, ((1, 0), (0, 0))), axis=0)
-        height = (total[width:] - total[:-width]).T
-    return height // width**2
-
-
-def _hills(room_of_cell: I64, height: I64) -> I64:
-    """Return the hill of each cell, to whose top the steepest way up leads; -1 where not free.
-
-    Ways lead across sides and don't leave a room. Of equally high cells, later ones count as
-    higher.
-    """
-    free = room_of_cell >= 0
-    number = np.arange(np.count_nonzero(free))
-    row = free.shape[1] + 2
-    rooms = np.pad(room_of_cell, 1, constant_values=-1).ravel()
-    rank = np.zeros(len(rooms), np.int64)
-    rank[rooms >= 0] = height[free] * len(number) + number
-    highest = rank.copy()
-    inner = slice(row, -row)  # all but the first row and the last
-    for step in (1, -1, row, -row):
-        beside = slice(row + step, len(rooms) - row + step)
-        is_same = rooms[inner] == rooms[beside]
-        np.maximum(highest[inner], rank[beside], out=highest[inner], where=is_same)
-    up = highest[rooms >= 0] % len(number)
-    while not np.array_equal(further := up[up], up):
-        up = further
-    hill = np.full(room_of_cell.shape, -1)
-    hill[free] = (np.cumsum(up == number) - 1)[up]
-    return hill
+    height = np.pad(np.floor(FINE * distance).astype(np.int64), reach)
+    height = box_sums(box_sums(height, reach), reach)
+    rows, columns = space.shape
+    return height[reach : reach + rows, reach : reach + columns] // (2 * reach + 1) ** 2
 
 
 @dataclass
@@ -128,7 +100,7 @@ class _Hills:
     passes: list[dict[int, int]]
 
     @classmethod
-    def of(cls, hill: I64, room_of_cell: I64, height: I64) -> "_Hills":
+    def of(cls, hill: I32, rooms: I32, height: I64) -> "_Hills":
         """Return the hills of cells; there are passes only within rooms."""
         free = hill >= 0
         sizes = np.bincount(hill[free])
@@ -137,8 +109,8 @@ class _Hills:
         np.maximum.at(tops, hill[free], height[free])
         hills = cls(tops.tolist(), sizes.tolist(), [{} for _ in range(count)])
         for low, high in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-            meet = (hill[low] != hill[high]) & (room_of_cell[low] == room_of_cell[high])
-            pairs = hill[low][meet] * count + hill[high][meet]
+            meet = (hill[low] != hill[high]) & (rooms[low] == rooms[high])
+            pairs = hill[low][meet].astype(np.int64) * count + hill[high][meet]
             unique, at = np.unique(pairs, return_inverse=True)
             heights = np.zeros(len(unique), np.int64)
             np.maximum.at(heights, at, np.minimum(height[low], height[high])[meet])
