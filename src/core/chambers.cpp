@@ -1,7 +1,6 @@
 #include "chambers.hpp"
 
 #include <algorithm>
-#include <queue>
 
 #include "grid.hpp"
 
@@ -68,14 +67,12 @@ Array<i32, 2> spread_labels(View<const i32, 2> labels, View<const bool, 2> mask)
     const View<i32, 2> spread = result;
     auto step_counts = Array<i32, 2>::zeros(labels.shape);
     const View<i32, 2> steps = step_counts;
-    std::queue<GridCell> waiting;
     for (i64 row = 0; row < labels.shape[0]; ++row) {
         for (i64 column = 0; column < labels.shape[1]; ++column) {
-            if (!mask(row, column) || labels(row, column) == NO_LABEL) continue;
-            spread(row, column) = labels(row, column);
-            waiting.push({row, column});
+            if (mask(row, column)) spread(row, column) = labels(row, column);
         }
     }
+    std::queue<GridCell> waiting = front_of(spread, mask);
     while (!waiting.empty()) {
         const GridCell cell = waiting.front();
         waiting.pop();

@@ -1,7 +1,9 @@
 // Grids of cells: rows and columns, and the cells beside one.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <queue>
 
 #include "array.hpp"
 
@@ -30,6 +32,22 @@ constexpr bool is_inside(std::array<i64, 2> shape, GridCell cell) {
 template <class T>
 constexpr T& at(View<T, 2> grid, GridCell cell) {
     return grid(cell.row, cell.column);
+}
+
+// The cells, row by row, that have a number and are beside one of the mask that has none, -1: from them numbers spread.
+inline std::queue<GridCell> front_of(View<const i32, 2> numbers, View<const bool, 2> mask) {
+    std::queue<GridCell> front;
+    const auto is_open = [&](GridCell cell) {
+        return is_inside(mask.shape, cell) && at(mask, cell) && at(numbers, cell) == -1;
+    };
+    for (i64 row = 0; row < mask.shape[0]; ++row) {
+        for (i64 column = 0; column < mask.shape[1]; ++column) {
+            const GridCell cell{row, column};
+            if (at(numbers, cell) == -1) continue;
+            if (std::ranges::any_of(SIDES, [&](GridCell side) { return is_open(cell + side); })) front.push(cell);
+        }
+    }
+    return front;
 }
 
 }  // namespace fleet2d

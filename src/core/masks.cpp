@@ -1,7 +1,6 @@
 #include "masks.hpp"
 
 #include <algorithm>
-#include <queue>
 #include <vector>
 
 #include "grid.hpp"
@@ -129,22 +128,20 @@ Array<i32, 2> count_steps(View<const bool, 2> start, View<const bool, 2> mask) {
     const auto [rows, columns] = mask.shape;
     auto result = Array<i32, 2>::filled(mask.shape, NOWHERE);
     const View<i32, 2> steps = result;
-    std::queue<GridCell> waiting;
-    const auto reach = [&](GridCell pixel, i32 step) {
-        if (is_inside(mask.shape, pixel) && at(mask, pixel) && at(steps, pixel) == NOWHERE) {
-            at(steps, pixel) = step;
-            waiting.push(pixel);
-        }
-    };
     for (i64 row = 0; row < rows; ++row) {
         for (i64 column = 0; column < columns; ++column) {
-            if (start(row, column)) reach({row, column}, 0);
+            if (start(row, column) && mask(row, column)) steps(row, column) = 0;
         }
     }
-    while (!waiting.empty()) {
+    std::queue<GridCell> waiting = front_of(steps, mask);
+    for (; !waiting.empty(); waiting.pop()) {
         const GridCell pixel = waiting.front();
-        waiting.pop();
-        for (const GridCell side : SIDES) reach(pixel + side, at(steps, pixel) + 1);
+        for (const GridCell side : SIDES) {
+            const GridCell beside = pixel + side;
+            if (!is_inside(mask.shape, beside) || !at(mask, beside) || at(steps, beside) != NOWHERE) continue;
+            at(steps, beside) = at(steps, pixel) + 1;
+            waiting.push(beside);
+        }
     }
     return result;
 }
