@@ -9,6 +9,7 @@ from tests.thorough import some
 import fleet2d
 
 
+@pytest.mark.slow
 def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
     plans = plan_files(shared_data)
     for plan in plans:

@@ -147,6 +147,7 @@ def test_known_failure_02_no_direction_falls_into_a_gap(place: tuple[float, floa
     assert region.contains(plan.lattice.to_metres(eye + np.array(ring))).all()
 
 
+@pytest.mark.slow
 def test_known_failure_02_ten_days_run_to_their_end() -> None:
     """The shipped 30-day example dies on day 8.75."""
     stored = fleet2d.run(None, "simulation.duration.days=10", users={"ben": {"type": "meander"}})
@@ -438,6 +439,7 @@ def test_known_failure_05_detection_and_ranges_change_what_they_say() -> None:
     assert set() == seen["never"]
 
 
+@pytest.mark.slow
 def test_known_failure_05_a_color_is_drawn(tmp_path: Path) -> None:
     """The one key that only pictures show."""
     drawn = []
@@ -457,6 +459,7 @@ def test_known_failure_05_a_color_is_drawn(tmp_path: Path) -> None:
 # --- 6 -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_known_failure_06_rooms_cover_the_space_are_disjoint_and_never_empty(
     plan_paths: list[Path],
 ) -> None:

@@ -108,6 +108,7 @@ def test_files_that_contributing_names_are_there() -> None:
     assert [] == [name for name in names if not any((place / name).exists() for place in places)]
 
 
+@pytest.mark.slow
 def test_no_two_classes_have_the_same_name() -> None:
     places: dict[str, list[str]] = {}
     for module, path in MODULES.items():

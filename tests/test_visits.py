@@ -89,6 +89,7 @@ def test_an_outing_a_night_and_meals_are_measured() -> None:
     assert ([3.0], [0.0]) == (found.transitions, found.short)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", bundled_names() if THOROUGH else ["works_outside"])
 def test_with_short_stays_rooms_are_left_as_soon_as_in_a_real_home(
     name: str, shared_data: Path

@@ -68,6 +68,7 @@ def test_a_program_in_another_language_learns_the_same(compiled: Path) -> None:
     assert fleet2d.run(scenario(compiled)).tables["share"].to_pylist() == expected()
 
 
+@pytest.mark.slow
 def test_copies_and_checkpoints_continue_from_its_state(compiled: Path) -> None:
     for command in (PROGRAMS / "share.py", compiled):
         simulation = fleet2d.Simulation(scenario(command))
@@ -79,6 +80,7 @@ def test_copies_and_checkpoints_continue_from_its_state(compiled: Path) -> None:
         assert digests == {fleet2d.run(scenario(command)).digest}
 
 
+@pytest.mark.slow
 def test_every_span_length_gives_the_same_run() -> None:
     content = scenario(PROGRAMS / "share.py", sends=["observations", "evidence", "poses"])
     content["simulation"]["duration"] = "2 h"
@@ -143,6 +145,7 @@ def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: s
     assert message in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_program_that_stops_reading_is_blamed(tmp_path: Path) -> None:
     """More than a pipe holds was written to it without a limit of time."""
     path = tmp_path / "alg.py"

@@ -49,6 +49,7 @@ def test_whole_rooms_are_patches_by_themselves(shared_data: Path) -> None:
         assert [room.cells for room in plan.rooms] == patches.cells.tolist()
 
 
+@pytest.mark.slow
 def test_rooms_that_nothing_joins_are_on_islands_of_their_own(shared_data: Path) -> None:
     expo = shared_data / "houseexpo"
     plan = fleet2d.load_floorplan(next(expo.glob("69c2ebf7*.json")))

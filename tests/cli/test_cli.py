@@ -165,6 +165,7 @@ def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:
     assert digests[0] == digests[1] != digests[2]
 
 
+@pytest.mark.slow
 def test_any_plan_goes_under_the_base_scenario(fleet2d: Cli, shared_data: Path) -> None:
     for plan in sorted((shared_data / "houseexpo").glob("*.json"))[:6]:
         arguments = ["floorplan.type=he", f"floorplan.path={plan}", "simulation.duration=3 h"]
@@ -232,6 +233,7 @@ def test_what_is_wrong_does_not_fit_the_schema(
     assert list(validator.iter_errors(small() | wrong))
 
 
+@pytest.mark.slow
 def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components")
     assert 0 == code
@@ -273,6 +275,7 @@ def test_show_without_a_plan_draws_the_bundled_home(fleet2d: Cli) -> None:
     assert Path("family_home.png").read_bytes().startswith(PNG)
 
 
+@pytest.mark.slow
 def test_show_draws_a_run_in_its_home(fleet2d: Cli) -> None:
     assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
     code, out, err = fleet2d("show", "run")
@@ -476,6 +479,7 @@ def test_file_that_can_not_be_written_is_one_line(
     assert capsys.readouterr().err.startswith(expected)
 
 
+@pytest.mark.slow
 def test_run_imports_only_what_its_scenario_needs(tmp_path: Path) -> None:
     script = """
 import json, sys
@@ -501,6 +505,7 @@ except SystemExit:
     assert not {"typer", "pydantic", "numpy"} & before  # `main` sets what they read first
 
 
+@pytest.mark.slow
 def test_modules_are_imported_with_few_collections_of_garbage(tmp_path: Path) -> None:
     """They were a tenth of the time until the first step."""
     script = """

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
+import pytest
 import yaml
 from tests.scenes import Cli, scenario
 
@@ -35,6 +36,7 @@ def test_what_holds_exits_with_0(fleet2d: Cli) -> None:
     assert "all held: 3 runs" in out
 
 
+@pytest.mark.slow
 def test_what_fails_is_told_kept_and_drawn(fleet2d: Cli) -> None:
     code, out, _ = fleet2d(
         "test", written(apart=HOLDS, still=FAILS), "--seeds", "2", "--junit", "out/results.xml",

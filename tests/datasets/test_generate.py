@@ -144,6 +144,7 @@ def test_damaged_shards_are_found(data: Dataset, tmp_path: Path, damage: str) ->
             again.arrow("labels", "train")
 
 
+@pytest.mark.slow
 def test_a_deleted_file_is_made_again_with_its_shard_only(data: Dataset, tmp_path: Path) -> None:
     root = tmp_path / "copy"
     shutil.copytree(data.root, root)
@@ -170,6 +171,7 @@ def test_a_deleted_file_of_another_version_is_not_made_again(data: Dataset, tmp_
         make(root)
 
 
+@pytest.mark.slow
 def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(
     data: Dataset, tmp_path: Path
 ) -> None:
@@ -238,6 +240,7 @@ def test_unknown_tables_and_splits_are_named(data: Dataset, table: str, split: s
         data.arrow(table, split)
 
 
+@pytest.mark.slow
 def test_a_failed_run_keeps_the_others(tmp_path: Path) -> None:
     """A household that can't live in a home: the message names the scenario, and nothing is lost."""
     bad: dict[str, Any] = json.loads(json.dumps(SOURCE))

@@ -47,6 +47,7 @@ def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path:
     assert leaderboard(data, split="nobody") == []
 
 
+@pytest.mark.slow
 def test_beliefs_without_a_label_of_their_time_are_not_scored(tmp_path: Path) -> None:
     people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
     base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}

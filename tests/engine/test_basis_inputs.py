@@ -94,6 +94,7 @@ def test_a_component_of_a_file_beside_is_named_by_its_folder(tmp_path: Path) -> 
     assert f"{tmp_path.as_posix()}/waits:Waits" == behavior["type"]
 
 
+@pytest.mark.slow
 def test_a_class_without_a_file_is_no_input() -> None:
     """One typed at a prompt; its run ended in a traceback."""
     code = (

@@ -124,6 +124,7 @@ def test_run_by_flashlight_is_nearly_the_same_where_users_walk() -> None:
     assert seen[0] == pytest.approx(seen[1], rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("span", [1, 50])
 def test_spans_do_not_show_in_a_run_by_another_method(span: int) -> None:
     content = {**with_odd_cameras(), "sight": {"method": {"type": "flashlight"}}}

@@ -80,6 +80,7 @@ def test_users_walk_where_robots_may_not(tmp_path: Path) -> None:
     assert on_the_rug(run(content), "ana").any()
 
 
+@pytest.mark.slow
 def test_robot_follows_costs_that_an_algorithm_changes(tmp_path: Path) -> None:
     bar = {"bar": {"type": f"{HERE}:Bar", "period": "5 min"}}
     content = flat_with_a_rug(tmp_path, {}, algorithms=bar)

@@ -152,6 +152,7 @@ def test_who_waits_for_events_changes_nothing_else(whole: Any) -> None:
             assert digest == with_them[name], name
 
 
+@pytest.mark.slow
 def test_a_copy_goes_on_hearing(whole: Any) -> None:
     simulation = fleet2d.Simulation(content(algorithms=ALL, metrics=METRICS, objects=SENSORS))
     simulation.advance(877)

@@ -118,6 +118,7 @@ def stored() -> Any:
     return run(watched("3 min"), metrics={})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "camera"), [("astro", CAMERA), ("drift", {"range": [0, 2], "angle_deg": 200})]
 )

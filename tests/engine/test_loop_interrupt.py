@@ -25,6 +25,7 @@ def interrupt_after(seconds: float) -> threading.Timer:
     return timer
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_is_whole_until_where_it_stopped(tmp_path: Path) -> None:
     simulation = fleet2d.Simulation(endless(), out=tmp_path / "run")
     timer = interrupt_after(0.5)

@@ -123,6 +123,7 @@ class Prints(fleet2d.Algorithm):
 """
 
 
+@pytest.mark.slow
 def test_what_components_print_goes_to_stderr_with_json(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MODULE)
     override = "algorithms.own.type=mine:Prints"
@@ -132,6 +133,7 @@ def test_what_components_print_goes_to_stderr_with_json(tmp_path: Path) -> None:
     assert ["imported", "started", "updated", "updated"] == done.stderr.splitlines()
 
 
+@pytest.mark.slow
 def test_an_exit_in_an_update_is_exit_code_1(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(MODULE)
     override = "algorithms.own={type: mine:Prints, how: exit}"
@@ -163,6 +165,7 @@ def test_a_component_that_ends_the_process_leaves_the_run(tmp_path: Path, how: s
     assert "starting again from the first step: there is no checkpoint yet" in resumed.stderr
 
 
+@pytest.mark.slow
 def test_a_child_process_of_a_component_may_end(tmp_path: Path) -> None:
     assert 0 == run_prints(tmp_path, "forks").returncode
 
@@ -296,6 +299,7 @@ def test_no_exception_at_import_ends_the_program(tmp_path: Path, code: str) -> N
     assert "can't import 'mine:Odd': mine.py:" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_at_import", some([True, False], 2))
 def test_a_run_is_stored_where_it_was_begun(tmp_path: Path, is_at_import: bool) -> None:
     """A component that changes the current folder had its run stored, and then not found."""
@@ -393,6 +397,7 @@ def test_a_stay_of_millions_of_years_is_refused() -> None:
         fleet2d.run(small(users={"ana": {"type": name(Stays)}}), seed=4)
 
 
+@pytest.mark.slow
 def test_a_component_that_keeps_the_run_waiting_is_named(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

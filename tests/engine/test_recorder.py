@@ -22,6 +22,7 @@ def small(**artifacts: Any) -> dict[str, Any]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("span", some([1, None, 13], 3))
 def test_tables_do_not_depend_on_when_rows_are_handed_over(
     monkeypatch: pytest.MonkeyPatch, span: int | None
@@ -33,6 +34,7 @@ def test_tables_do_not_depend_on_when_rows_are_handed_over(
     assert expected == digests(run(content, max_span=span))
 
 
+@pytest.mark.slow
 def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_early(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -42,6 +42,7 @@ def reactions(stored: Run) -> list[Any]:
     return [row for row in rows if row["event"] in ("user_seen", "user_lost", "reacts")]
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_for_every_max_span() -> None:
     content = unsure(blinking={"type": "Blinking"})
     content["simulation"]["duration"] = "5 min"
@@ -174,6 +175,7 @@ def test_a_wrong_error_is_named_with_its_step(returns: str, message: str) -> Non
     assert "own_errors.py" in text or returns in ("nothing", "rows")
 
 
+@pytest.mark.slow
 def test_a_copied_a_saved_and_a_repeated_run_are_the_same(tmp_path: Path) -> None:
     content = unsure(blinking={"type": "Blinking"})
     whole = run(content, out=tmp_path / "run")

@@ -80,6 +80,7 @@ def test_a_table_that_was_changed_is_not_reproduced(stored: Path, tmp_path: Path
     assert "changed" in cause
 
 
+@pytest.mark.slow
 def test_a_paced_run_is_reproduced_as_fast_as_possible(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

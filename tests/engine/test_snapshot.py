@@ -297,6 +297,7 @@ print(simulation.run().digest)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", some(["from the folder", "imported before"], 2))
 def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_other(
     module: str, tmp_path: Path

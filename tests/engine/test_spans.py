@@ -46,6 +46,7 @@ def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
     assert all(rows.num_rows for rows in whole.tables.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("span", some(SPANS[1:], 2))
 def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> None:
     other = run(everything(), max_span=span)
@@ -76,6 +77,7 @@ def test_an_algorithm_after_every_step_sees_the_same_for_every_max_span() -> Non
         assert first == other
 
 
+@pytest.mark.slow
 def test_steps_longer_and_shorter_than_a_second_give_the_same_for_every_max_span() -> None:
     for step, duration in (("250 ms", "8 min"), ("7 s", "1 h 10 min"), ("1 min", "3 h")):
         content = everything(duration)
@@ -149,6 +151,7 @@ def digest_elsewhere(content: dict[str, Any], folder: Path, **environment: str) 
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "environment",
     some(
@@ -171,6 +174,7 @@ def test_another_process_gets_the_same_run(
     assert whole.digest == digest_elsewhere(everything(), tmp_path, **environment)
 
 
+@pytest.mark.slow
 def test_numpy_for_an_older_processor_gives_the_same_run(whole: Run, tmp_path: Path) -> None:
     # What NumPy doesn't know, or has built in, it warns about; and NumPy on other machines has others.
     features = "AVX2 FMA3 AVX512F AVX512_SKX AVX512CD AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V3 X86_V4"

@@ -72,6 +72,7 @@ def test_each_entry_is_done_at_its_step(lively: fleet2d.Run) -> None:
     assert closed.tolist() == [step for step, _, by in done if by == "script.5"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_span", [1, 7])
 def test_spans_are_invisible(lively: fleet2d.Run, max_span: int) -> None:
     again = fleet2d.run(home(LIVELY), max_span=max_span)

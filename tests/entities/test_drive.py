@@ -97,6 +97,7 @@ def busy(drive: Any) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", some(list(OTHERS), 2))
 def test_a_run_is_the_same_for_every_span_and_continues_from_a_copy_and_from_a_file(
     drive: str, tmp_path: Path

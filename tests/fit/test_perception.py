@@ -38,6 +38,7 @@ def test_a_model_that_fits_says_so_and_one_that_does_not_too() -> None:
     assert any("the model misses something" in line for line in report(calibration))
 
 
+@pytest.mark.slow
 def test_the_goodness_of_fit_of_true_models_is_uniform() -> None:
     """Ten groups of fitted rows: p values below 0.1 in about a tenth of the logs."""
     logs = examples(120)
@@ -131,6 +132,7 @@ def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
     assert agree(hits, detected.mean())
 
 
+@pytest.mark.slow
 def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path: Path) -> None:
     log = simulated(13, 2000, bearing=True, turned=True)
     path = write(

@@ -250,6 +250,7 @@ def test_every_plan_has_a_check_up(shared_data: Path) -> None:
 # --- The command ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_command_prints_findings_and_draws_them(tmp_path: Path) -> None:
     picture = tmp_path / "home.png"
     result = CliRunner().invoke(app, ["validate", "family_home", "--out", str(picture)])
@@ -273,6 +274,7 @@ def test_command_does_not_deny_what_its_notes_say(tmp_path: Path) -> None:
     assert "ok: nothing wrong; the notes tell what is odd in the file\nnote: small" in result.output
 
 
+@pytest.mark.slow
 def test_command_says_what_a_large_robot_cannot_do(tmp_path: Path) -> None:
     picture = str(tmp_path / "home.svg")
     words = ["validate", "family_home", "--out", picture, "--radius"]

@@ -178,6 +178,7 @@ def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
     return sorted(parts, key=lambda part: (-len(part), min(part)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_costed_space_equals_a_search_over_its_cells(seed: int) -> None:
     plan = fleet2d.load_floorplan(flat_path())

@@ -249,6 +249,7 @@ def test_tiny_coordinate_is_zero(tmp_path: Path, kind: str) -> None:
     assert 6 == pytest.approx(read(path).area_m2, abs=0.01)
 
 
+@pytest.mark.slow
 @vector_format
 def test_outline_of_9_000_m2_is_read(tmp_path: Path, kind: str) -> None:
     name, _, read = FORMATS[kind]

@@ -90,6 +90,7 @@ def plan_of(path: Path) -> FloorPlan:
     return load_floorplan(path)
 
 
+@pytest.mark.slow
 def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data: Path) -> None:
     paths = plan_files(shared_data)
     pieces = 0
@@ -108,6 +109,7 @@ def test_maps_of_robots_are_furnished_without_harm(shared_data: Path) -> None:
         check_all(plan_of(path), furnish(plan_of(path)))
 
 
+@pytest.mark.slow
 @quick
 @given(homes(), st.sampled_from(sorted(RULES)), st.integers(0, 3))
 def test_furniture_never_disconnects_a_home(polygons: list[Polygon], kind: str, seed: int) -> None:
@@ -124,6 +126,7 @@ def test_furniture_never_disconnects_a_home(polygons: list[Polygon], kind: str, 
     check_all(plan, furnished)
 
 
+@pytest.mark.slow
 def test_same_seed_gives_the_same_furniture_and_another_one_other() -> None:
     plan = load_floorplan()
     bare = FloorPlan.build("bare", plan.free_space, plan.regions)

@@ -122,6 +122,7 @@ def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(
     assert {"bedroom_0"} <= set(seen.room[seen.robot == "bella"])
 
 
+@pytest.mark.slow
 def test_steps_and_spans_of_a_house_with_stairs_are_the_same(tmp_path: Path) -> None:
     assert (
         fleet2d.run(scenario(tmp_path)).digest == fleet2d.run(scenario(tmp_path, max_span=1)).digest

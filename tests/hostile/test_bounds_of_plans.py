@@ -137,6 +137,7 @@ ATTACKS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "answer"), ATTACKS if THOROUGH else ATTACKS[:2])
 def test_no_plan_takes_long_or_much(
     tmp_path: Path, make: Callable[[Path], Path], answer: str

@@ -68,6 +68,7 @@ def test_a_run_needs_no_output(
     assert [] == run.verify()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", some(["ascii", "utf-8"], 2))
 def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
     result = shell(tmp_path, "", *RUN, PYTHONIOENCODING=encoding)
@@ -126,6 +127,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 def test_no_message_is_written_into_a_file_of_the_run(tmp_path: Path) -> None:
     """In a program without stderr, the journal may have the number 2, and got the message of Ctrl-C."""
     source = Path(fleet2d.__file__).parents[1]

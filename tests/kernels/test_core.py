@@ -59,6 +59,7 @@ CLASSES = {name for name, value in PUBLIC.items() if isinstance(value, type)}
 # --- What is written about it ------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_stub_equals_the_output_of_nanobind() -> None:
     """Of spaces and line breaks, other versions of nanobind think otherwise."""
     stubs = pytest.importorskip("nanobind.stubgen", reason="nanobind isn't installed")
@@ -1177,6 +1178,7 @@ def test_a_state_of_something_else_is_refused(name: str) -> None:
             restored(name, other)
 
 
+@pytest.mark.slow
 @settings(
     max_examples=600, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )

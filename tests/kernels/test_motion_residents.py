@@ -56,6 +56,7 @@ def venue_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) ->
     return Venue(activity, own, list(seats), stores, tuple(moves), uniform(*takes))
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(400), deadline=None)
 @given(
     st.data(),

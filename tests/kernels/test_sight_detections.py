@@ -559,6 +559,7 @@ def test_look_over_furniture_and_bodies_equals_the_reference(
     assert looked_slowly(home, cameras, scene, FIRST) == looked(home, cameras, scene, FIRST)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thickness", [0, 60])
 def test_look_over_furniture_in_one_room_equals_the_reference(thickness: int) -> None:
     """Where furniture hides people often, and parts of them."""

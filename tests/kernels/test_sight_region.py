@@ -126,6 +126,7 @@ def test_area_is_exact(polygons: list[Polygon], seed: int) -> None:
             assert expected == pytest.approx(area_of(home.mesh, x, y)[0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_area_is_exact_and_equals_the_outline_in_a_real_home(shared_data: Path) -> None:
     home = houseexpo(shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json")
 

@@ -23,6 +23,7 @@ def place(tmp_path: Path) -> Workspace:
     return workspace
 
 
+@pytest.mark.slow
 def test_a_scenario_is_written_checked_run_and_asked(place: Workspace) -> None:
     assert place.check("home.yaml")["users"] == ["ana"]
 

@@ -192,6 +192,7 @@ def test_only_the_last_pose_of_a_step_counts() -> None:
     assert peer.frames[0].bodies["ana"]["x"] == pytest.approx(place()[0] + 0.49, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_body_stands_when_poses_stop_and_moves_when_they_arrive_again() -> None:
     told: list[str] = []
 
@@ -221,6 +222,7 @@ def test_a_body_that_decides_itself_refuses_poses() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_steps_begin_in_time() -> None:
     simulation = fleet2d.Simulation(LIVE, "simulation.step=50 ms", "simulation.duration=1 s")
     began = time.monotonic()

@@ -29,6 +29,7 @@ def in_background(bridge: Bridge) -> tuple[threading.Thread, list[Any]]:
     return thread, runs
 
 
+@pytest.mark.slow
 def test_datagrams_move_a_body() -> None:
     peer: Any = open_peer("udp://127.0.0.1:0")
     port, simulation = peer.port, fleet2d.Simulation(LIVE)  # it is closed when the run ends

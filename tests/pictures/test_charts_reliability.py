@@ -55,6 +55,7 @@ def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run:
             assert place == [*rooms, "away"][truth[36 * number + k]]
 
 
+@pytest.mark.slow
 def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Path) -> None:
     for name in ("one.png", "two.png", "three.svg"):
         draw_reliability(forecast_run, "rtp", tmp_path / name)

@@ -70,6 +70,7 @@ def test_larger_values_have_another_colour() -> None:
     assert left != right
 
 
+@pytest.mark.slow
 def test_png_and_svg_are_written_the_same_twice(layer_run: Any, tmp_path: Path) -> None:
     cases = [
         (name, ending)

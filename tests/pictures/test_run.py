@@ -160,6 +160,7 @@ def test_of_many_users_four_are_shown_and_the_rest_counted() -> None:
     assert "person_04" not in words
 
 
+@pytest.mark.slow
 def test_interrupted_run_is_drawn_and_marked(tmp_path: Path) -> None:
     simulation = Simulation(None, "simulation.duration=2 d")
     simulation.advance(100_000)
@@ -284,6 +285,7 @@ def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot() -> None:
     assert 0 == opacity(np.zeros((3, 3)), np.ones((3, 3), np.bool_)).max()
 
 
+@pytest.mark.slow
 def test_each_user_has_a_line_in_the_legend() -> None:
     scenario = fleet2d.load_scenario(None, "simulation.duration=3 h").resolved()
     scenario["users"] = dict.fromkeys(("ana", "bo", "cleo"), MEANDER)
@@ -340,6 +342,7 @@ def test_words_of_the_scale_are_above_the_legend(
     assert scale.y0 > boxes["ways walked"].y1 + 3
 
 
+@pytest.mark.slow
 def test_picture_of_a_narrow_home_is_narrower(tmp_path: Path) -> None:
     widths = []
     for number, size in enumerate([(10.0, 9.0), (5.0, 20.0)]):

@@ -33,6 +33,7 @@ def proof() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "doors"), some([*PLANS.items()], 2))
 def test_sight_agrees_with_every_wall_however_a_home_lies_and_its_doors_stand(
     proof: ModuleType, shared_data: Path, name: str, doors: int

@@ -45,12 +45,14 @@ def test_a_study_is_run_and_opened(tmp_path: Path) -> None:
     assert [0.3, 0.6] == study.variants[SPEED].to_list()
 
 
+@pytest.mark.slow
 def test_a_study_of_ones_own_components_runs_in_workers(tmp_path: Path) -> None:
     own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
     study = fleet2d.study(small(base=base(algorithms=own), replicates=1), tmp_path / "s", workers=1)
     assert 2 == study.counts.complete
 
 
+@pytest.mark.slow
 def test_a_map_returns_results_in_the_order_of_the_scenarios() -> None:
     expected = [fleet2d.run(scenario).digest for scenario in SEEDED]
     assert expected == map_runs(digest_of, SEEDED, workers=2)
@@ -80,11 +82,13 @@ def test_a_worker_reads_the_function_once() -> None:
     assert 1 == len(set(reads))
 
 
+@pytest.mark.slow
 def test_a_lambda_can_be_mapped() -> None:
     pytest.importorskip("cloudpickle")
     assert [0, 1, 2, 3] == map_runs(lambda run: run.manifest["seed"], SEEDED, workers=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", ["local", "serial"])
 def test_what_a_function_raises_is_raised_with_its_scenario(executor: str) -> None:
     with pytest.raises(ValueError, match="two") as caught:
@@ -98,6 +102,7 @@ def test_a_function_that_ends_its_process_is_given_up() -> None:
         map_runs(end_the_process, SEEDED[:1], workers=1)
 
 
+@pytest.mark.slow
 def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(

@@ -34,6 +34,7 @@ def test_json_is_one_object(fleet2d: Cli) -> None:
     assert (0, out, "") == fleet2d("study", "status", "here", "--json")
 
 
+@pytest.mark.slow
 def test_a_dry_run_prints_axes_variants_and_time_and_writes_nothing(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("study", "run", "speeds.yaml", "--dry-run", "--workers", "2")
     assert 0 == code
@@ -44,6 +45,7 @@ def test_a_dry_run_prints_axes_variants_and_time_and_writes_nothing(fleet2d: Cli
     assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
 
 
+@pytest.mark.slow
 def test_a_dry_run_tells_the_line_of_a_number_that_no_run_has(fleet2d: Cli) -> None:
     study = small(replicates=1, keep={"metrics": ["sightings.*", "room_share.ana.kitchn"]})
     text = yaml.safe_dump(study, sort_keys=False)

@@ -66,6 +66,7 @@ def world(number: int) -> tuple[LoggedOpportunities, np.ndarray[Any, Any]]:
     return log, kinds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method", some(["robust with a wrong model", "weights", "normalized", "robust"], 2)
 )

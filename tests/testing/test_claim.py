@@ -113,6 +113,7 @@ def test_wrong_numbers_are_refused(settings: dict[str, float], words: str) -> No
         rate_test(**settings)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.5, 0.8, 0.97])
 def test_the_interval_of_a_rate_holds_it_in_95_of_100_cases(rate: float) -> None:
     held = np.random.Generator(np.random.Philox(5)).binomial(40, rate, 2000)

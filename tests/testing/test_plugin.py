@@ -275,6 +275,7 @@ def test_many(trial, number):
     assert 4 == done.stdout.count("held in 5 of 5 seeds")
 
 
+@pytest.mark.slow
 def test_nothing_else_imports_pytest_and_the_plugin_is_light() -> None:
     code = (
         "import sys, fleet2d, fleet2d.testing; fleet2d.testing.trial; assert 'pytest' not in sys.modules;"

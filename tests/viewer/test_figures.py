@@ -34,6 +34,7 @@ def test_same_moment_gives_the_same_bytes_and_another_others(run_dir: Path, tmp_
     assert contents[0] == contents[1] != contents[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["life", "heat", "strip"])
 def test_stretch_is_drawn_as_each_figure(run_dir: Path, tmp_path: Path, kind: str) -> None:
     target = tmp_path / f"{kind}.png"

@@ -42,6 +42,7 @@ def order(action: str, target: str = "", value: float = 0, **more: str) -> LiveO
     return LiveOrder(**{**blank, "action": action, "target": target, "value": value, **more})  # type: ignore[typeddict-item]
 
 
+@pytest.mark.slow
 def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(
     lives: LiveRuns, served: ServedRuns, parent: Path
 ) -> None:

@@ -135,6 +135,7 @@ class Sure(Model):
     assert {"bedroom_0"} == set(rows["room"])
 
 
+@pytest.mark.slow
 def test_a_longer_step_than_a_minute_makes_bins_of_a_step() -> None:
     slow = content("2 d", ltp={"type": "ltp", "estimator": "likelihood"}, rtp={"type": "rtp"})
     slow["simulation"] |= {"step": "5 min"}
@@ -160,6 +161,7 @@ def test_a_run_can_start_from_the_learned_state_of_another(tmp_path: Path) -> No
         run({**content("1 h", **algorithms), "users": {"ana": USERS["ana"]}})
 
 
+@pytest.mark.slow
 def test_every_estimator_has_all_variants_for_everybody() -> None:
     """Over all time with intervals and by hour of the week, both also with forgetting."""
     algorithms: dict[str, Any] = {}

@@ -54,6 +54,7 @@ def learn(estimator, collected, rooms: int, users: int = 1):
     return estimator.presence([f"u{i}" for i in range(users)], MONDAY)
 
 
+@pytest.mark.slow
 def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
     """60 days and independent looks: the model is right, so only sampling is left.
 
@@ -138,6 +139,7 @@ def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between()
         assert all_looks > 2 * audited
 
 
+@pytest.mark.slow
 def test_independent_patrol_is_fair_to_all() -> None:
     for seed in range(2):
         where = person(30 * DAY, 5, seed)

@@ -209,6 +209,7 @@ def test_a_forecast_does_not_change_with_later_evidence() -> None:
     assert before.tolist() == now.at(soon).with_away("u0").tolist()
 
 
+@pytest.mark.slow
 def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
     """Log loss of the last 10 of 20 days of a Markov person, 4 runs; gaps are over 10 % of it."""
     scores = {cls: [] for cls in (LastSeen, LongTerm, MarkovDecay, Filter)}
@@ -252,6 +253,7 @@ def sleeper(days: int, seed: int) -> np.ndarray:
     return where
 
 
+@pytest.mark.slow
 def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
     """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
     scores = {cls: [] for cls in (SemiMarkov, RoutineModel)}

@@ -143,6 +143,7 @@ def test_all_at_once_is_the_same_for_every_max_span_and_for_copies() -> None:
         assert digests(stored) == digests(copy.deepcopy(simulation).run()), simulation.step
 
 
+@pytest.mark.slow
 def test_without_its_behaviors_a_robot_leaves_everybody_the_same_life() -> None:
     with_it, without = run(product()), product()
     without["robots"]["astro"]["behaviors"] = []

@@ -121,6 +121,7 @@ def family(**manners: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_every_table_is_the_same_for_every_max_span() -> None:
     lively = family(turns=1, steps_aside=1, leaves=1, comes=1, stops=0.5, patience="5 s")
     stored = run(lively)

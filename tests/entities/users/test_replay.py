@@ -371,6 +371,7 @@ def test_uci_adl_at_each_begin_the_user_is_there_and_out_while_out(shared_data: 
     assert len(begun) > 350
 
 
+@pytest.mark.slow
 def test_homer_in_each_activity_the_user_is_in_the_room_it_walked_to(shared_data: Path) -> None:
     folder = shared_data / "activity" / "homer_plus_a"
     content = replay(

@@ -47,6 +47,7 @@ def test_time_in_each_room_tends_to_its_share_ways_included(
         assert share == pytest.approx(realised[room], abs=error), room
 
 
+@pytest.mark.slow
 def test_the_error_shrinks_with_time() -> None:
     def error(duration: str) -> float:
         measured = stay("5 min", duration)

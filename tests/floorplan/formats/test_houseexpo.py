@@ -225,6 +225,7 @@ def test_plan_without_categories_is_one_unknown_room(plans: list[Path]) -> None:
     assert (404, 804) == (plan.lattice.columns, plan.lattice.rows)
 
 
+@pytest.mark.slow
 def test_plan_that_touches_itself_is_read_with_a_note(plans: list[Path]) -> None:
     plan = read(plans, "69c2ebf7")
 

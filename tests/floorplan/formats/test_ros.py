@@ -110,6 +110,7 @@ def test_real_maps_have_their_walls_on_the_sides_of_the_pixels(
     assert round(plan.area_m2 / 0.05**2) == np.count_nonzero(plan.free)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["aws_small_house", "turtlebot3_house"])
 def test_real_maps_have_the_same_area_turned_and_mirrored(
     shared_data: Path, tmp_path: Path, folder: str

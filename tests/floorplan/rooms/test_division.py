@@ -261,6 +261,7 @@ def test_segments_of_a_robot_keep_their_rooms_and_get_doorways(shared_data: Path
     }
 
 
+@pytest.mark.slow
 def test_rooms_of_walls_with_very_many_corners_are_those_of_the_plain_walls() -> None:
     free = space(LEFT, RIGHT, DOOR)
     dense = shapely.segmentize(free, 0.002)

@@ -36,6 +36,7 @@ def test_no_variety_is_the_same_home_as_without_the_key() -> None:
     assert Synthetic(seed=5, area_m2=50).load() == Synthetic(seed=5, area_m2=50, variety=0).load()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("area", [18, 22, 26, 29.9])
 def test_studios_are_one_room_to_live_and_sleep_in_and_a_bathroom(area: float) -> None:
     kinds = set()
