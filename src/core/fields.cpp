@@ -31,7 +31,7 @@ Array<i64, 2> column_gaps(View<const bool, 2> mask, i64 endless) {
 }
 
 // The squared distances of the cells of a row, from the gaps of its columns: the lower envelope of
-// one parabola for each column. A gap of 0 hides what is beyond it.
+// one parabola for each column.
 class Envelope {
 public:
     explicit Envelope(i64 columns) : apex_(Array<i64>::empty({columns})), start_(Array<i64>::empty({columns})) {}

@@ -20,8 +20,6 @@ constexpr GridCell operator+(GridCell a, GridCell b) { return {a.row + b.row, a.
 
 // The steps across the sides of a cell: to the east, north, west and south.
 inline constexpr std::array<GridCell, 4> SIDES{{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
-// The steps across its corners: to the southwest, southeast, northwest and northeast.
-inline constexpr std::array<GridCell, 4> CORNERS{{{-1, -1}, {-1, 1}, {1, -1}, {1, 1}}};
 
 // Whether a grid of this shape, (rows, columns), has such a cell.
 constexpr bool is_inside(std::array<i64, 2> shape, GridCell cell) {
