@@ -372,7 +372,8 @@ def changed_table() -> None:
                 print(f"{path.name}, {name}, is refused: {error}")
                 found = np.full(original.shape, -1)
             agreement = score(found, original)["iou"] if found.max() >= 0 else 0.0
-            scores[f"{kind}: {name}"].append(agreement)
+            for maps in (kind, "all"):
+                scores[f"{maps}: {name}"].append(agreement)
     for name, values in sorted(scores.items()):
         print(f"{name:<45} IoU {np.mean(values):.2f}, least {min(values):.2f}")
 
