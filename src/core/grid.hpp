@@ -32,7 +32,8 @@ constexpr T& at(View<T, 2> grid, GridCell cell) {
     return grid(cell.row, cell.column);
 }
 
-// The cells, row by row, that have a number and are beside one of the mask that has none, -1: from them numbers spread.
+// The cells, row by row, from which numbers spread over a mask: those that have one, beside a cell of the mask that has
+// none (-1).
 inline std::queue<GridCell> front_of(View<const i32, 2> numbers, View<const bool, 2> mask) {
     std::queue<GridCell> front;
     const auto is_open = [&](GridCell cell) {

@@ -19,10 +19,12 @@ from fleet2d.kernels import (
 
 @st.composite
 def labelled(draw: st.DrawFn) -> tuple[I32, Bool]:
+    """Draw labels and a mask; some labels are outside the mask."""
     rows, columns = draw(st.integers(1, 9)), draw(st.integers(1, 9))
-    cells = st.lists(st.integers(-6, 3), min_size=rows * columns, max_size=rows * columns)
+    cells = st.lists(st.integers(-6, 4), min_size=rows * columns, max_size=rows * columns)
     drawn = np.array(draw(cells)).reshape(rows, columns)
-    return np.maximum(drawn, -1).astype(np.int32), drawn > -5
+    is_outside = (drawn <= -5) | (drawn == 4)
+    return np.clip(drawn, -1, 3).astype(np.int32), ~is_outside
 
 
 @given(labelled())
