@@ -4,6 +4,7 @@ import logging
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections import deque
 from collections.abc import Generator, Iterator, Mapping, Sequence
@@ -216,7 +217,10 @@ class SlurmExecutor:
         self._attempts: dict[int, int] = {}
         wrong = (RuntimeError, NameError, TypeError, ValueError)
         with errors_as(InputError, "jobs of Slurm can't be submitted", of=wrong):
-            self._executor = submitit.AutoExecutor(folder=str(folder), cluster=cluster)
+            # Results come as pickles: into a folder in which nobody else can have put any.
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            jobs = tempfile.mkdtemp(prefix="jobs-", dir=folder)
+            self._executor = submitit.AutoExecutor(folder=jobs, cluster=cluster)
             self._executor.update_parameters(
                 **{"name": "fleet2d", "slurm_array_parallelism": self.workers, **(parameters or {})}
             )
