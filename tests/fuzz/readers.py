@@ -45,7 +45,6 @@ class Reader:
         read: Reads the file; what is wrong is a `Fleet2DError`.
         beside: Puts other files into the folder before.
         cost: How many times as long as others it takes.
-        is_apart: Whether it is read in a process of its own, which may crash.
     """
 
     name: str
@@ -54,7 +53,6 @@ class Reader:
     read: Callable[[Path], Any]
     beside: Callable[[Path], Any] = lambda _: None
     cost: int = 1
-    is_apart: bool = False
 
 
 def _yaml(*seeds: Any) -> st.SearchStrategy[bytes]:
