@@ -122,8 +122,6 @@ def code_of(content: object) -> dict[str, list[str]]:
     Example:
         >>> code_of({"algorithms": {"share": {"type": "/home/ana/mine:Share"}}})
         {'/home/ana/mine.py': ['algorithms.share.type']}
-        >>> code_of({"algorithms": {"p": {"command": "/bin/sh", "arguments": ["-c", "rm -r /"]}}})
-        {"/bin/sh -c 'rm -r /'": ['algorithms.p.command']}
     """
     code: dict[str, list[str]] = {}
     for key, each in _code_in(content, ()):
