@@ -2,6 +2,7 @@
 
 import os
 import sys
+import tempfile
 from importlib.util import find_spec
 
 import pytest
@@ -12,10 +13,14 @@ collect_ignore = [path for package, path in EXTRAS.items() if find_spec(package)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep bytecode in pytest's cache if it isn't written beside the sources.
+    """Use secrets of the tests only; keep bytecode in pytest's cache if it has no other place.
 
     Else every process that a test starts compiles all that it imports.
     """
+    if "PYTEST_XDIST_WORKER" not in os.environ:  # which has that of its parent, as all processes
+        folder = tempfile.TemporaryDirectory(prefix="fleet2d-state-")
+        config.add_cleanup(folder.cleanup)
+        os.environ["XDG_STATE_HOME"] = folder.name
     cache = getattr(config, "cache", None)
     if sys.dont_write_bytecode and cache is not None:
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

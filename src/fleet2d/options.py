@@ -1,15 +1,14 @@
 """Options and arguments that several commands share."""
 
 import re
-from contextlib import AbstractContextManager
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from fleet2d.configuration.trust import Trust, restrict
-from fleet2d.errors import InputError
+from fleet2d.configuration.trust import code_lines, content_of_run
 
 Resolution = Annotated[
     float | None,
@@ -53,37 +52,13 @@ def file_name(name: str) -> str:
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Processes at a time; left out: one per core.")
 ]
-TrustFiles = Annotated[
-    list[Path] | None,
-    typer.Option("--trust", metavar="FILE", help="Code of the scenario that may run."),
-]
-TrustFolders = Annotated[
-    list[Path] | None,
-    typer.Option("--trust-dir", metavar="DIR", help="A folder all of whose code may run."),
+Trust = Annotated[
+    bool,
+    typer.Option("--trust", help="Run its own code and programs, which are listed."),
 ]
 
 
-def trust_of(files: list[Path] | None, folders: list[Path] | None) -> Trust:
-    """Return the trust in the files of `--trust` and the folders of `--trust-dir`.
-
-    Raises:
-        InputError: A path doesn't exist, or is a folder instead of a file or vice versa.
-    """
-    for path in files or ():
-        if path.is_dir():
-            raise InputError(f"--trust {path} is a folder: name it by --trust-dir")
-    for path in folders or ():
-        if path.is_file():
-            raise InputError(f"--trust-dir {path} is a file: name it by --trust")
-    return Trust.of([*(files or ()), *(folders or ())])
-
-
-def restrict_to(
-    files: list[Path] | None, folders: list[Path] | None
-) -> AbstractContextManager[None]:
-    """Return a context in which only code that `--trust` and `--trust-dir` name may run.
-
-    Raises:
-        InputError: See `trust_of`.
-    """
-    return restrict(trust_of(files, folders))
+def show_code(manifest: Mapping[str, Any]) -> None:
+    """Print the code and the programs of a stored run that the user trusts, by its manifest."""
+    if lines := code_lines(content_of_run(manifest)):
+        typer.echo("\n".join(["trusted, with all files in these folders:", *lines]), err=True)

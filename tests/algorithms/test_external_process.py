@@ -11,7 +11,7 @@ import pytest
 
 import fleet2d
 from fleet2d import Algorithm, RoomDistribution
-from fleet2d.configuration.trust import Trust, restrict
+from fleet2d.configuration.trust import running_code
 from fleet2d.errors import ComponentError, InputError
 
 PROGRAMS = Path(__file__).parents[2] / "examples" / "programs"
@@ -203,11 +203,14 @@ def test_a_program_ends_with_its_simulation(tmp_path: Path) -> None:
 
 
 def test_a_program_that_is_not_trusted_does_not_run() -> None:
-    with (
-        restrict(Trust()),
-        pytest.raises(InputError, match=r"would run .*share\.py: name it by --trust"),
-    ):
-        fleet2d.Simulation(scenario(PROGRAMS / "share.py"))
+    for content in (scenario(PROGRAMS / "share.py"), robots(PROGRAMS / "rounds.py")):
+        with (
+            running_code(allowed=False),
+            pytest.raises(
+                InputError, match=r"would run .*(share|rounds)\.py, which is not trusted"
+            ),
+        ):
+            fleet2d.Simulation(content)
 
 
 # Behaviors

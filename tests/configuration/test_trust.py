@@ -1,4 +1,4 @@
-"""The files that a user's module imports, found in its text."""
+"""Which code of a scenario runs: one's own always, that of stored runs and studies if trusted."""
 
 import json
 import socket
@@ -13,58 +13,15 @@ from tests.studies.scenes import base
 
 import fleet2d as package
 from fleet2d import cli
-from fleet2d.configuration.trust import Trust, check_code, code_of, restrict, with_imports
+from fleet2d.configuration.trust import (
+    UntrustedCodeError,
+    code_lines,
+    code_of,
+    running_code,
+    stored_code,
+)
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.studies.reader import open_study
-
-
-def names(folder: Path, *files: str) -> list[str]:
-    paths = with_imports([folder / name for name in files], folder)
-    return [path.relative_to(folder).as_posix() for path in paths]
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A folder with `a.py`, `b.py` and the package `p` of `p.c` and `p.q.d`."""
-    for name in ("a", "b", "p/__init__", "p/c", "p/q/__init__", "p/q/d"):
-        path = tmp_path / f"{name}.py"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    return tmp_path
-
-
-@pytest.mark.parametrize(
-    ("text", "imported"),
-    [
-        ("import numpy, os.path, b", ["b.py"]),
-        ("from b import speed as s", ["b.py"]),
-        ("def late():\n    if True:\n        import b", ["b.py"]),
-        ("import p.c", ["p/__init__.py", "p/c.py"]),
-        ("from p import c", ["p/__init__.py", "p/c.py"]),
-        ("from .p.q import d", ["p/__init__.py", "p/q/__init__.py", "p/q/d.py"]),
-        ("from . import b", ["b.py"]),
-        ("from p import *", ["p/__init__.py"]),
-        ("import a", []),
-        ("from ................................. import x", []),
-        ("import b as", []),  # it can't be imported
-        ("x = '\\d'", []),  # without a warning
-        ("(" * 10_000, []),
-        ("\0", []),
-    ],
-)
-def test_each_file_beside_a_module_is_found(folder: Path, text: str, imported: list[str]) -> None:
-    (folder / "a.py").write_text(text)
-    assert ["a.py", *imported] == names(folder, "a.py")
-
-
-def test_files_that_import_each_other_are_found_once(folder: Path) -> None:
-    (folder / "a.py").write_text("import b")
-    (folder / "b.py").write_text("import a, p.q.d")
-    (folder / "p/q/d.py").write_text("from .. import c")
-    every = {"a.py", "b.py", "p/__init__.py", "p/c.py", "p/q/__init__.py", "p/q/d.py"}
-    found = names(folder, "a.py", "b.py")
-    assert (every, len(every)) == (set(found), len(found))
-
 
 Result = tuple[int, str, str]
 Cli = Callable[..., Result]
@@ -116,79 +73,79 @@ def fleet2d(
     return call
 
 
-def stored_elsewhere(folder: Path) -> Path:
-    """A run of the scenario whose code this process hasn't loaded, as another machine sends it."""
-    other = folder / "other"
-    other.mkdir()
-    (other / "mine.py").write_text(CODE)
-    run = folder / "run"
-    package.run("home.yaml", seed=4, out=run)
-    path = run / "manifest.json"
-    text = path.read_text().replace(f"{folder}/mine:", f"{other}/mine:")
-    path.write_text(text)
-    (folder / "ran").unlink()
-    return other / "mine.py"
-
-
 SERIAL = ("--executor", "serial")
 
 
 @pytest.mark.parametrize(
-    ("command", "words"),
+    "command",
     [
-        (("study", "run", "study.yaml", *SERIAL), "study.yaml has components of its own"),
-        (("study", "run", "study.yaml", "--dry-run"), "study.yaml has components of its own"),
-        (("tune", "search.yaml", *SERIAL), "search.yaml has components of its own"),
-        (("view", "home.yaml", "--no-browser"), "the scenario has components of its own"),
+        ("study", "run", "study.yaml", *SERIAL),
+        ("study", "run", "study.yaml", "--workers", "1"),
+        ("study", "run", "study.yaml", "--dry-run"),
+        pytest.param(("tune", "search.yaml", *SERIAL), marks=pytest.mark.slow),
+        ("run", "home.yaml", "--quiet"),
+        ("validate", "home.yaml"),
     ],
 )
-def test_code_of_a_scenario_is_listed_and_not_run(
-    fleet2d: Cli, tmp_path: Path, command: tuple[str, ...], words: str
-) -> None:
+def test_own_files_run_what_they_name(fleet2d: Cli, command: tuple[str, ...]) -> None:
+    """`study run` refused one's own file while `run` had just executed its components."""
     code, _, err = fleet2d(*command)
-    assert (2, False) == (code, Path("ran").exists())
-    assert words in err
-    assert f"{tmp_path}/mine.py (" in err
-    assert "algorithms.count.type" in err
-    assert "users.ana.type" in err
-    assert f"--trust {tmp_path}/mine.py" in err
+    assert (0, True) == (code, Path("ran").exists()), err
 
 
-def test_a_study_whose_code_is_named_runs(fleet2d: Cli) -> None:
-    code, out, err = fleet2d("study", "run", "study.yaml", *SERIAL, "--trust", "mine.py")
-    assert (0, "1 of 1 variants complete in studies/study\n", "") == (code, out, err)
+def test_an_own_scenario_that_is_watched_runs_what_it_names(fleet2d: Cli) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = str(taken.getsockname()[1])
+        _, _, err = fleet2d("view", "home.yaml", "--no-browser", "--port", port)
+    assert f"port {port} can't be used" in err  # all but that is well
     assert Path("ran").exists()
 
 
-@pytest.mark.slow
-def test_a_study_of_a_bundled_scenario_has_no_code(fleet2d: Cli) -> None:
-    """Its name has the form of a component's, `bundled.py` and the class `base`."""
-    study = {"base": "bundled:base", "axes": {"robots.astro.speed": [0.3]}, "replicates": 1}
-    Path("study.yaml").write_text(yaml.safe_dump(study))
-    assert 0 == fleet2d("study", "run", "study.yaml", "--dry-run")[0]
-    Path("bundled.py").touch()
-    assert "bundled.py" in fleet2d("study", "run", "study.yaml", "--dry-run")[2]
-
-
-def test_workers_trust_what_the_command_line_trusts(fleet2d: Cli) -> None:
-    command = ("study", "run", "study.yaml", "--workers", "1", "--trust-dir", ".")
-    assert (0, "1 of 1 variants complete in studies/study\n", "") == fleet2d(*command)
-
-
-def test_a_variant_of_a_stored_study_asks_for_trust(fleet2d: Cli, tmp_path: Path) -> None:
-    assert 0 == fleet2d("study", "run", "study.yaml", *SERIAL, "--trust", "mine.py")[0]
-    other = tmp_path / "other"
+def elsewhere(folder: Path, store: Path, name: str) -> Path:
+    """Let a stored file name code that this process hasn't loaded, as from another machine."""
+    other = folder / "other"
     other.mkdir()
     (other / "mine.py").write_text(CODE)
-    study = open_study("studies/study")
-    scenario = json.loads(
-        json.dumps(study.scenario(0)).replace(f"{tmp_path}/mine:", f"{other}/mine:")
-    )
-    Path("ran").unlink()
-    with pytest.raises(ScenarioError, match="which would run"), restrict(Trust()):
-        package.run(scenario)
-    assert not Path("ran").exists()
+    path = store / name
+    path.write_text(path.read_text().replace(f"{folder}/mine:", f"{other}/mine:"))
+    (folder / "ran").unlink()
+    return other / "mine.py"
+
+
+def test_a_variant_of_a_stored_study_asks_for_trust(
+    fleet2d: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert 0 == fleet2d("study", "run", "study.yaml", *SERIAL)[0]
     assert 0 == fleet2d("study", "rerun", "studies/study", "0")[0]  # loaded already: its own code
+    (tmp_path / "other").mkdir()
+    theirs = tmp_path / "other" / "mine.py"
+    theirs.write_text(CODE)
+    study = open_study("studies/study")
+    text = json.dumps(study.scenario(0)).replace(f"{tmp_path}/mine:", f"{tmp_path}/other/mine:")
+    monkeypatch.setattr(type(study), "scenario", lambda *_: json.loads(text))
+    Path("ran").unlink()
+
+    code, _, err = fleet2d("study", "rerun", "studies/study", "0")
+    assert (2, False) == (code, Path("ran").exists())
+    assert "variant 0 of studies/study has code of its own, which would run:" in err
+    assert f"  {theirs} (" in err
+    with pytest.raises(UntrustedCodeError):
+        study.rerun(0)
+    assert study.rerun(0, trust=True).digest
+    assert Path("ran").exists()
+
+    (tmp_path / "third").mkdir()
+    theirs.rename(tmp_path / "third" / "mine.py")
+    text = text.replace("/other/", "/third/")
+    _, _, err = fleet2d("study", "rerun", "studies/study", "0", "--trust")
+    assert f"trusted, with all files in these folders:\n  {tmp_path}/third/mine.py (" in err
+
+
+def stored(folder: Path) -> Path:
+    """Store a run, as of another machine; return the file of its code."""
+    package.run("home.yaml", seed=4, out=folder / "run")
+    return elsewhere(folder, folder / "run", "manifest.json")
 
 
 @pytest.mark.slow
@@ -204,36 +161,34 @@ def test_a_variant_of_a_stored_study_asks_for_trust(fleet2d: Cli, tmp_path: Path
 def test_a_stored_run_is_shown_without_code_unless_a_body_needs_it(
     fleet2d: Cli, tmp_path: Path, command: tuple[str, ...], made: str
 ) -> None:
-    theirs = stored_elsewhere(tmp_path)
+    theirs = stored(tmp_path)
     code, _, err = fleet2d(*command)
     assert not Path("ran").exists()
     if code:
         assert 2 == code
         assert f"{theirs} (users.ana" in err
         assert "algorithms" not in err
-        code, _, err = fleet2d(*command, "--trust", str(theirs))
+        code, _, err = fleet2d(*command, "--trust")
+        assert f"  {theirs} (" in err
+        assert "algorithms.count.type" in err  # it is asked once, for all of the run
     assert 0 == code, err
     assert Path(made).exists()
 
 
 def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d: Cli, tmp_path: Path) -> None:
-    theirs = stored_elsewhere(tmp_path)
+    stored(tmp_path)
     run = package.open_run("run")
-    with pytest.raises(ScenarioError, match="which would run"):
-        run.path("ana")
+    for use in (lambda: run.path("ana"), lambda: run.judge("always(room(ana) != bath)")):
+        with pytest.raises(UntrustedCodeError, match="which would run"):
+            use()
     assert not Path("ran").exists()
-    with restrict(Trust.of([theirs])):
-        assert 0 < len(run.path("ana").x)
+    assert 0 < len(package.open_run("run", trust=True).path("ana").x)
 
 
-def test_a_scenario_whose_code_is_named_is_watched(fleet2d: Cli) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = str(taken.getsockname()[1])
-        view = ("view", "home.yaml", "--no-browser", "--port", port, "--trust", "mine.py")
-        _, _, err = fleet2d(*view)
-    assert f"port {port} can't be used" in err  # all but that is well
-    assert Path("ran").exists()
+def test_a_run_of_this_process_needs_no_trust(fleet2d: Cli, tmp_path: Path) -> None:
+    run = package.run("home.yaml", seed=4, out="run")
+    assert run.trust
+    assert 0 < len(run.path("ana").x)
 
 
 INTERRUPT = """
@@ -283,38 +238,75 @@ def test_an_interrupt_that_only_a_checkpoint_names_asks_for_trust(
     half_a_run(f"{tmp_path}/theirs:Never").finish()
     code, _, err = fleet2d("resume", "half")
     assert (1, False) == (code, Path("ran").exists())
-    assert f"would run {tmp_path}/theirs.py: name it by --trust if you trust it" in err
+    assert f"would run {tmp_path}/theirs.py, which is not trusted" in err
 
 
 def test_a_simulation_takes_its_trust_into_threads(fleet2d: Cli, tmp_path: Path) -> None:
     """`view` simulates in a thread, which has no command line that it could ask."""
-    with restrict(Trust()):
+    with running_code(allowed=False):
         simulation = half_a_run(f"{tmp_path}/theirs:Never")
     with ThreadPoolExecutor() as threads, pytest.raises(ComponentError, match="would run"):
         threads.submit(simulation.advance, 200).result()
     assert not Path("ran").exists()
 
 
-def test_a_file_that_a_component_imports_is_listed_and_must_be_named(
+def test_files_that_a_component_imports_from_beside_it_are_listed(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("import theirs")
+    (tmp_path / "theirs.py").write_text("")
+    code = code_of({"type": f"{tmp_path}/mine:Own"})
+    assert {f"{tmp_path}/mine.py": ["type"], f"{tmp_path}/theirs.py": ["type"]} == code
+
+
+def test_all_of_a_program_is_listed(tmp_path: Path) -> None:
+    """Arguments weren't shown: `/bin/sh -c …` read as `/bin/sh`."""
+    program = tmp_path / "my program"
+    program.touch()
+    long = "x" * 3000
+    arguments = ["-c", f"id > ~/it; {long}", "\nNone of it has run\x1b[2J"]
+    content = {"algorithms": {"p": {"command": str(program), "arguments": arguments}}}
+    with pytest.raises(UntrustedCodeError) as caught, stored_code("it", content, trust=False):
+        pass
+    line = f"  '{program}' -c 'id > ~/it; {long}' '\\nNone of it has run\\x1b[2J'"
+    assert f"{line} (algorithms.p.command)" in str(caught.value).splitlines()
+
+
+def test_all_files_are_listed_however_many_they_are(tmp_path: Path) -> None:
+    content = {f"a{i}": {"type": f"{tmp_path}/mine{i}:Own"} for i in range(500)}
+    with pytest.raises(UntrustedCodeError) as caught, stored_code("it", content, trust=False):
+        pass
+    assert all(f"{tmp_path}/mine{i}.py" in str(caught.value) for i in range(500))
+
+
+@pytest.mark.parametrize("word", ["fetch", "", "a\0b", "x" * 5000, "/"])
+def test_other_commands_are_no_programs(tmp_path: Path, word: str) -> None:
+    assert {} == code_of({"script": [{"call": "astro", "command": word}]})
+
+
+def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(
     fleet2d: Cli, tmp_path: Path
 ) -> None:
-    """`--trust mine.py` ran what lay beside it, which nobody was asked to read."""
-    Path("theirs.py").write_text(INTERRUPT)
-    Path("mine.py").write_text(f"{CODE}\nimport theirs\n".replace('Path("ran").touch()', ""))
-    run = ("study", "run", "study.yaml", *SERIAL, "--trust", "mine.py")
-    code, _, err = fleet2d(*run)
-    assert (2, False) == (code, Path("ran").exists())
-    assert f"--trust {tmp_path}/theirs.py" in err
-    assert f"--trust {tmp_path}/mine.py" not in err
-    assert 0 == fleet2d(*run, "--trust", "theirs.py")[0]
-    assert Path("ran").exists()
+    """A forged manifest may extend a file that names the code."""
+    package.run("bundled:base", "simulation.duration=1 min", seed=4, out="run")
+    path = Path("run/manifest.json")
+    manifest = json.loads(path.read_text())
+    manifest["scenario"]["extends"] = f"{tmp_path}/home.yaml"
+    path.write_text(json.dumps({**manifest, "inputs": []}))
+    assert [f"  {tmp_path}/home.yaml (extends)"] == code_lines(manifest["scenario"])
+    assert 2 == fleet2d("reproduce", "run")[0]
+    with running_code(allowed=False), pytest.raises(ScenarioError, match="would run"):
+        package.load_scenario(manifest["scenario"])
+    assert not Path("ran").exists()
 
 
 @pytest.mark.parametrize("name", ["mine:Über", "a/b/mine.py:C", "mine:A.B", "../x:Y", "ü.ö:ä"])
 def test_no_name_of_code_hides_from_the_list(name: str) -> None:
     assert [["a.0.type"]] == list(code_of({"a": [{"type": name}]}).values())
-    with restrict(Trust()), pytest.raises(ScenarioError, match=r"a\.0\.type"):
-        check_code("it", {"a": [{"type": name}]})
+    content = {"a": [{"type": name}]}
+    with (
+        pytest.raises(UntrustedCodeError, match=r"a\.0\.type"),
+        stored_code("it", content, trust=False),
+    ):
+        pass
 
 
 @pytest.mark.parametrize("text", ["08:00-22:00", "12:30", "a b:C", "mine:", ":C", "09:00"])

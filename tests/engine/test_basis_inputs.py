@@ -88,7 +88,7 @@ def test_a_component_of_a_file_beside_is_named_by_its_folder(tmp_path: Path) -> 
     (tmp_path / "waits.py").write_text(WAITS.format(imports="", crowded="'home_empty'"))
     waits = {"type": f"{tmp_path.as_posix()}/mine:Mine"}
     fleet2d.run(scenario("1 min", robots={"astro": {"behaviors": [waits]}}), out=tmp_path / "run")
-    assert fleet2d.reproduce(tmp_path / "run", trust=[tmp_path]).same
+    assert fleet2d.reproduce(tmp_path / "run", trust=True).same
     content = json.loads((tmp_path / "run" / "manifest.json").read_text())["scenario"]
     (behavior,) = content["robots"]["astro"]["behaviors"]
     assert f"{tmp_path.as_posix()}/waits:Waits" == behavior["type"]

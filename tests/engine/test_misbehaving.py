@@ -16,7 +16,7 @@ from tests.thorough import some
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
 from fleet2d.cli.run import watched
-from fleet2d.configuration.trust import import_class
+from fleet2d.configuration.importing import import_class
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
 from fleet2d.runs.run import open_run
 
@@ -161,7 +161,7 @@ def test_a_component_that_ends_the_process_leaves_the_run(tmp_path: Path, how: s
     assert "running" == stored.status
     assert 86_400 == stored.manifest["steps"]
     assert any("fleet2d resume" in note for note in stored.notes)
-    resumed = fleet2d_process("resume", "a", "--trust", "mine.py", cwd=tmp_path)
+    resumed = fleet2d_process("resume", "a", "--trust", cwd=tmp_path)
     assert "starting again from the first step: there is no checkpoint yet" in resumed.stderr
 
 
@@ -261,14 +261,8 @@ class Stops(fleet2d.Algorithm):
     some(
         [
             ("SIGINT", ("run", "algorithms.own.type=mine:Stops")),
-            (
-                "SIGINT",
-                ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py"),
-            ),
-            (
-                "SIGTERM",
-                ("study", "run", "study.yaml", "--executor", "serial", "--trust", "mine.py"),
-            ),
+            ("SIGINT", ("study", "run", "study.yaml", "--executor", "serial")),
+            ("SIGTERM", ("study", "run", "study.yaml", "--executor", "serial")),
         ],
         3,
     ),

@@ -71,10 +71,9 @@ def test_a_run_may_be_cut_off_many_times(tmp_path: Path) -> None:
     for minute in (12, 25, 31, 44, 58):
         simulation.run_until(60 * minute)
         directory = cut_off(simulation)
-        from fleet2d.configuration.trust import Trust
         from fleet2d.engine.repeat import reopen
 
-        simulation, remark = reopen(directory, Trust())
+        simulation, remark = reopen(directory)
         assert f"step {600 * (minute // 10)}" in remark
     assert undisturbed() == digests(simulation.run())
     assert [600, 1200, 1800, 2400, 3000] == fleet2d.open_run(directory).manifest["resumed"]

@@ -1,6 +1,5 @@
 """What must hold whatever a reader is given: an error of Fleet2D at most, soon, in little memory."""
 
-import os
 import resource
 import signal
 import tempfile
@@ -27,27 +26,6 @@ class HangError(BaseException):
 
 def judge(reader: Reader, content: bytes) -> str:
     """Return what is wrong with how a reader takes a content; empty if nothing is."""
-    return _apart(reader, content) if reader.is_apart else _judge(reader, content)
-
-
-def _apart(reader: Reader, content: bytes) -> str:
-    """Judge in a process of its own, and see how that ends."""
-    out, into = os.pipe()
-    child = os.fork()
-    if not child:
-        os.close(out)
-        try:
-            os.write(into, _judge(reader, content).encode()[:4000])
-        finally:
-            os._exit(0)
-    os.close(into)
-    with os.fdopen(out, "rb") as answer:
-        text = answer.read().decode()
-    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    return f"the process ends by signal {-status}" if status < 0 else text
-
-
-def _judge(reader: Reader, content: bytes) -> str:
     before = _peak()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "here" / reader.file

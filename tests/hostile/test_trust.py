@@ -1,10 +1,10 @@
-"""Attacks on `--trust`: files beside the code that is listed, and checkpoints that name other code.
+"""Attacks by code in somebody else's folder: forged checkpoints, and more than what is listed.
 
 Each planted file leaves the file `ran` if its code runs.
 """
 
 import importlib
-import io
+import json
 import os
 import pickle
 import py_compile
@@ -12,20 +12,26 @@ import shutil
 import sys
 from collections.abc import Callable
 from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scenes import fleet2d_process
+from tests.scenes import Cli, fleet2d_process
 
-from fleet2d import _core
-from fleet2d.configuration.trust import Trust, check_code, import_class, restrict
-from fleet2d.engine.snapshot import read_state
-from fleet2d.errors import ArtifactError, ScenarioError
-from fleet2d.scenario.model import load_scenario
+import fleet2d as package
+from fleet2d import Simulation, _core
+from fleet2d.algorithms.external import Process
+from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
+from fleet2d.configuration.importing import import_class
+from fleet2d.configuration.trust import UntrustedCodeError, running_code, stored_code
+from fleet2d.engine import checkpoint
+from fleet2d.engine.repeat import reopen
+from fleet2d.errors import ScenarioError
+from fleet2d.runtime.program import ExternalProgram
+from fleet2d.storage.secret_files import KEY_NAME, SECRET_BYTES, signature, state_folder
 
 OWN = "import fleet2d\nclass Own(fleet2d.Algorithm):\n    def update(self, history, state):\n        return {'n': 1.0}\n"
+SETTINGS = ("simulation.duration=2 h", "artifacts.checkpoint=30 min")
 
 
 @pytest.fixture
@@ -40,127 +46,305 @@ def evil(folder: Path) -> str:
     return f"from pathlib import Path\nPath({str(folder / 'ran')!r}).touch()\n{OWN}"
 
 
-def compiled(folder: Path, target: Path, *, like: Path | None = None) -> None:
-    """Write bytecode that leaves a file; with the size and time of a source, as Python checks."""
+# Checkpoints
+
+
+def cut_off(simulation: Simulation) -> Path:
+    """Leave a run as the end of its process would."""
+    unfinished = simulation._store._unfinished
+    assert unfinished is not None
+    unfinished.journal.close()
+    assert unfinished._lock is not None
+    os.close(unfinished._lock._handle)
+    assert simulation.directory is not None
+    return simulation.directory
+
+
+def cut_run(out: Path, seed: int = 4, **more: Any) -> Path:
+    """Return an unfinished run with a checkpoint of its first hour."""
+    simulation = Simulation(None, *SETTINGS, seed=seed, out=out, **more)
+    simulation.run_until(4000)
+    return cut_off(simulation)
+
+
+def undisturbed(directory: Path) -> str | None:
+    """Return the digest of the run that a manifest describes."""
+    scenario = json.loads((directory / "manifest.json").read_text())["scenario"]
+    return package.run(scenario, "artifacts.checkpoint=off").digest
+
+
+def as_another_user(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(folder / "another user"))
+
+
+def forged(out: Path, command: str) -> Path:
+    """Return a run of built-in components only, whose checkpoint starts a shell."""
+    period = "algorithms.ltp.period=30 min"
+    simulation = Simulation(None, *SETTINGS, period, seed=4, out=out)
+    simulation.run_until(4000)
+    learners = simulation._state.learners.all
+    learner = next(each for each in learners if each.path.startswith("algorithms."))
+    shell = Process.model_construct(command=Path("/bin/sh"), period=learner.component.period)
+    shell.__dict__["program"] = ExternalProgram(Path("/bin/sh"), ["-c", command], 10, {})
+    shell.__dict__["_rooms"] = []
+    learner.component = shell
+    assert simulation._keeper is not None
+    simulation._keeper.checkpoint(simulation._state)
+    assert simulation._keeper.is_storable
+    return cut_off(simulation)
+
+
+def test_a_forged_checkpoint_runs_no_command(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, fleet2d: Cli
+) -> None:
+    """All classes in it were allowed ones; `resume` without `--trust` ran the command."""
+    with monkeypatch.context() as attacker:
+        as_another_user(attacker, folder)
+        run = forged(folder / "evil", f"touch {folder}/ran; exec sleep 1")
+
+    code, out, err = fleet2d("resume", run, "--json")
+
+    assert not (folder / "ran").exists()
+    assert 0 == code, err
+    assert "starting again from the first step: " in err
+    assert f"{run}/{FOLDER}/{CHECKPOINT_NAME} is not signed by this user" in err
+    assert undisturbed(run) == json.loads(out)["digest"]
+
+
+def test_the_forgery_would_run_its_command_with_the_key_of_the_user(folder: Path) -> None:
+    """So that the test above tests something."""
+    run = forged(folder / "evil", f"touch {folder}/ran; exec sleep 1")
+    simulation, _ = reopen(run)
+    with pytest.raises(package.Fleet2DError, match="/bin/sh"):
+        simulation.run()
+    assert (folder / "ran").exists()
+
+
+def test_a_pickle_in_place_of_a_checkpoint_is_not_read(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Calls:
+        def __reduce__(self) -> Any:
+            return os.system, (f"touch {folder}/ran",)
+
+    run = cut_run(folder / "run")
+    path = run / FOLDER / CHECKPOINT_NAME
+    magic, header, _ = path.read_bytes().split(b"\n", 2)
+    content = b"\n".join((magic, header, pickle.dumps(Calls())))
+    with monkeypatch.context() as attacker:
+        as_another_user(attacker, folder)
+        seal = signature(checkpoint.PURPOSE)
+    seal.update(content)
+    path.write_bytes(content + seal.hexdigest().encode())
+    assert undisturbed(run) == package.resume(run).digest
+    assert not (folder / "ran").exists()
+
+
+def test_a_checkpoint_of_this_user_is_continued(folder: Path) -> None:
+    run = cut_run(folder / "run")
+    moved = run.rename(folder / "moved")
+    simulation, remark = reopen(moved)
+    assert remark.startswith("continuing from 2026-01-05 01:0")
+    assert 3600 <= simulation.step < 4000
+    assert undisturbed(moved) == simulation.run().digest
+
+
+def change_byte(run: Path) -> None:
+    path = run / FOLDER / CHECKPOINT_NAME
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def change_seal(run: Path) -> None:
+    path = run / FOLDER / CHECKPOINT_NAME
+    path.write_bytes(path.read_bytes()[:-64] + b"0" * 64)
+
+
+def change_scenario(run: Path) -> None:
+    path = run / "manifest.json"
+    manifest = json.loads(path.read_text())
+    (name,) = manifest["entities"]["robots"][:1]
+    manifest["scenario"]["robots"][name]["speed"] = 0.123
+    path.write_text(json.dumps(manifest))
+
+
+def change_seed(run: Path) -> None:
+    path = run / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["seed"] = manifest["scenario"]["simulation"]["seed"] = 5
+    path.write_text(json.dumps(manifest))
+
+
+def copy_of_another_seed(run: Path) -> None:
+    other = cut_run(run.with_name("other"), seed=9)
+    shutil.copy(other / FOLDER / CHECKPOINT_NAME, run / FOLDER / CHECKPOINT_NAME)
+
+
+def copy_of_another_course(run: Path) -> None:
+    """The same scenario and seed, but something was done to that run."""
+    simulation = Simulation(None, *SETTINGS, seed=4, out=run.with_name("other"))
+    simulation.run_until(1000)
+    simulation.put("ana", "kitchen")
+    simulation.run_until(4000)
+    other = cut_off(simulation)
+    for name in (CHECKPOINT_NAME, JOURNAL_NAME):
+        shutil.copy(other / FOLDER / name, run / FOLDER / name)
+
+
+def copy_of_a_saved_simulation(run: Path) -> None:
+    simulation = Simulation(None, *SETTINGS, seed=4)
+    simulation.advance(100)
+    simulation.save(run / FOLDER / CHECKPOINT_NAME)
+
+
+def change_journal(run: Path) -> None:
+    path = run / FOLDER / JOURNAL_NAME
+    content = bytearray(path.read_bytes())
+    content[200] ^= 1
+    path.write_bytes(content)
+
+
+CHANGES: dict[Callable[[Path], None], str] = {
+    change_byte: "is not signed by this user",
+    change_seal: "is not signed by this user",
+    change_scenario: "was written by another run",
+    change_seed: "was written by another run",
+    copy_of_another_seed: "was written by another run",
+    copy_of_another_course: "was written by another run",
+    copy_of_a_saved_simulation: "is not signed by this user",
+    change_journal: "the journal has changed since the checkpoint",
+    lambda run: (run / FOLDER / JOURNAL_NAME).unlink(): "the journal can't be read",
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_is_not_as_it_was_signed_is_simulated_again(
+    folder: Path, change: Callable[[Path], None]
+) -> None:
+    run = cut_run(folder / "run")
+    change(run)
+    simulation, remark = reopen(run)
+    assert remark.startswith("starting again from the first step: ")
+    assert CHANGES[change] in remark
+    assert 0 == simulation.step
+    assert undisturbed(run) == simulation.run().digest
+
+
+@pytest.mark.parametrize("fault", ["readable by others", "another", "link", "short"])
+def test_a_key_that_is_not_this_user_s_alone_is_not_used(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    as_another_user(monkeypatch, folder)
+    run, key = cut_run(folder / "run"), state_folder() / KEY_NAME
+    if fault == "readable by others":
+        key.chmod(0o644)
+    elif fault == "another":
+        key.write_bytes(b"x" * SECRET_BYTES)
+    elif fault == "link":
+        key.rename(key.with_name("other"))
+        key.symlink_to("other")
+    else:
+        key.write_bytes(b"x")
+    simulation, remark = reopen(run)
+    words = {
+        "readable by others": f"{key} may be read by others (mode 0644): delete it",
+        "another": "is not signed by this user",
+        "link": f"{key} is a link",
+        "short": f"{key} has 1 bytes",
+    }
+    assert remark.startswith("starting again from the first step: ")
+    assert words[fault] in remark
+    assert undisturbed(run) == simulation.run().digest
+
+
+@pytest.mark.parametrize("obstacle", ["a file", "a readable key"])
+def test_without_a_key_no_checkpoint_is_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, obstacle: str, fleet2d: Cli
+) -> None:
+    as_another_user(monkeypatch, folder)
+    if obstacle == "a file":
+        (folder / "another user").touch()
+    else:
+        signature("anything")
+        (state_folder() / KEY_NAME).chmod(0o644)
+    run = cut_run(folder / "run")
+    assert not (run / FOLDER / CHECKPOINT_NAME).exists()
+    simulation, remark = reopen(run)
+    assert remark == "starting again from the first step: there is no checkpoint yet"
+    done = simulation.run()
+    notes = [note for note in done.notes if note.startswith("no checkpoint from step ")]
+    assert 1 == len(notes)
+    assert undisturbed(run) == done.digest
+    code, out, _ = fleet2d("reproduce", run)
+    assert (0, True) == (code, "reproduced: digest" in out)
+    _, out, _ = fleet2d("run", *SETTINGS, "--seed", "4", "--out", "second")
+    assert 1 == out.count(f"note: {notes[0]}")
+
+
+# Code beside what is listed
+
+
+def compiled(folder: Path, target: Path) -> None:
+    """Write bytecode that leaves a file."""
     source = folder / "evil.txt"
-    text = evil(folder)
-    if like is not None:
-        size = like.stat().st_size
-        if len(text) > size:
-            like.write_text(like.read_text() + "#" * (len(text) - size))
-        text += "#" * (like.stat().st_size - len(text))
-    source.write_text(text)
-    if like is not None:
-        os.utime(source, ns=(like.stat().st_atime_ns, like.stat().st_mtime_ns))
+    source.write_text(evil(folder))
     target.parent.mkdir(exist_ok=True, parents=True)
     py_compile.compile(str(source), str(target), doraise=True)
     source.unlink()
 
 
-def plant_cached_bytecode(folder: Path) -> None:
-    compiled(folder, Path(cache_from_source(str(folder / "mine.py"))), like=folder / "mine.py")
+PLANTS: dict[str, Callable[[Path], object]] = {
+    "source": lambda folder: (folder / "theirs.py").write_text(evil(folder)),
+    "package": lambda folder: (
+        (folder / "theirs").mkdir(),
+        (folder / "theirs" / "__init__.py").write_text(evil(folder)),
+    ),
+    "bytecode": lambda folder: compiled(folder, folder / "theirs.pyc"),
+    "extension": lambda folder: shutil.copy(
+        _core.__file__, folder / f"theirs{EXTENSION_SUFFIXES[0]}"
+    ),
+    "nothing": lambda _: None,
+}
 
 
-def plant_unchecked_bytecode(folder: Path) -> None:
-    source = folder / "evil.txt"
-    source.write_text(evil(folder))
-    mode = py_compile.PycInvalidationMode.UNCHECKED_HASH
-    target = cache_from_source(str(folder / "mine.py"))
-    py_compile.compile(str(source), target, doraise=True, invalidation_mode=mode)
-
-
-def plant_extension(folder: Path) -> None:
-    shutil.copy(_core.__file__, folder / f"mine{EXTENSION_SUFFIXES[0]}")
-
-
-@pytest.mark.parametrize(
-    "plant", [plant_cached_bytecode, plant_unchecked_bytecode, plant_extension]
-)
-def test_listed_source_is_what_runs(folder: Path, plant: Callable[[Path], None]) -> None:
-    """`--trust mine.py` ran bytecode or a library of the same name, which nobody was shown."""
-    plant(folder)
-
-    with restrict(Trust.of(["mine.py"])):
-        cls = import_class(f"{folder}/mine:Own")
-
-    assert cls.__name__ == "Own"  # type: ignore[attr-defined]
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", ["theirs:Own", "{folder}/theirs:Own", "{folder}/theirs.py:Own"])
+def test_no_code_of_a_stored_run_is_imported_without_trust(
+    folder: Path, plant: str, name: str
+) -> None:
+    PLANTS[plant](folder)
+    name = name.format(folder=folder)
+    with running_code(allowed=False), pytest.raises(ScenarioError, match="which is not trusted"):
+        import_class(name)
+    content = {"algorithms": {"own": {"type": name}}}
+    with pytest.raises(UntrustedCodeError) as caught, stored_code("it", content, trust=False):
+        pass
+    assert f"{folder}/theirs" in str(caught.value)
     assert not (folder / "ran").exists()
 
 
-IMPORTS = [
-    "import helpers",
-    "from helpers import Own as Other",
-    "import importlib; importlib.import_module('help' + 'ers')",
-    "from . import helpers",
-    "import parts.helpers",
-    "from .parts import helpers",
-]
-
-
-@pytest.mark.parametrize("kind", ["bytecode", "packed bytecode", "extension", "computed"])
-@pytest.mark.parametrize("text", IMPORTS)
-def test_nothing_else_of_the_folder_is_importable(folder: Path, text: str, kind: str) -> None:
-    """A sourceless `helpers.pyc` beside the trusted file was neither listed nor asked for."""
-    for place in (folder, folder / "parts"):
-        place.mkdir(exist_ok=True)
-        if kind == "bytecode":
-            compiled(folder, place / "helpers.pyc")
-        elif kind == "packed bytecode":
-            compiled(folder, place / "helpers" / "__init__.pyc")
-        elif kind == "extension":
-            shutil.copy(_core.__file__, place / f"helpers{EXTENSION_SUFFIXES[0]}")
-        else:
-            (place / "helpers.py").write_text(evil(folder))
-    (folder / "mine.py").write_text(f"{text}\n{OWN}")
-
-    with restrict(Trust.of(["mine.py"])), pytest.raises(ScenarioError) as caught:
-        import_class(f"{folder}/mine:Own")
-    with restrict(Trust.of(["mine.py"])), pytest.raises(ScenarioError):
-        import_class(f"{folder}/helpers:Own")
-
-    assert not (folder / "ran").exists()
-    assert "helpers" in str(caught.value) or "cannot import" in str(caught.value)
-    assert "fleet2d_scenario_" not in str(caught.value)
-
-
-def test_import_at_run_time_is_refused_too(folder: Path) -> None:
-    """A trusted module may import another when it is called, long after it was checked."""
-    compiled(folder, folder / "helpers.pyc")
-    (folder / "mine.py").write_text(f"{OWN}def late():\n    from . import helpers\n")
-
-    with restrict(Trust.of(["mine.py"])):
-        cls: Any = import_class(f"{folder}/mine:Own")
-        with pytest.raises(ImportError):
-            sys.modules[cls.__module__].late()
-
+def test_an_installed_module_that_is_not_loaded_asks_too(folder: Path) -> None:
+    (folder / "installed").mkdir()
+    (folder / "installed" / "theirs.py").write_text(evil(folder))
+    sys.path.append(str(folder / "installed"))
+    importlib.invalidate_caches()
+    try:
+        with (
+            running_code(allowed=False),
+            pytest.raises(ScenarioError, match=r"installed/theirs\.py"),
+        ):
+            import_class("theirs:Own")
+    finally:
+        sys.path.remove(str(folder / "installed"))
     assert not (folder / "ran").exists()
 
 
-def test_source_that_has_changed_since_it_was_named_is_refused(folder: Path) -> None:
-    trust = Trust.of(["mine.py"])
-    (folder / "mine.py").write_text(evil(folder))
-
-    with restrict(trust), pytest.raises(ScenarioError, match="changed since it was named"):
-        import_class(f"{folder}/mine:Own")
-
-    assert not (folder / "ran").exists()
-
-
-def test_list_shows_the_hash_of_each_file(folder: Path) -> None:
-    with restrict(Trust()), pytest.raises(ScenarioError) as caught:
-        check_code("it", {"algorithms": {"own": {"type": f"{folder}/mine:Own"}}})
-
-    (digest,) = Trust.of(["mine.py"]).files.values()
-    assert f"{folder}/mine.py (algorithms.own.type) SHA-256 {digest}" in str(caught.value)
-
-
-def test_named_files_of_a_package_without_init_are_importable(folder: Path) -> None:
-    (folder / "parts").mkdir()
-    (folder / "parts" / "helpers.py").write_text("SIZE = 3")
-    (folder / "mine.py").write_text(f"import parts.helpers\nfrom .parts.helpers import SIZE\n{OWN}")
-
-    with restrict(Trust.of(["mine.py", "parts/helpers.py"])):
-        assert import_class(f"{folder}/mine:Own")
+def test_what_is_loaded_already_is_usable(folder: Path) -> None:
+    own = import_class(f"{folder}/mine:Own")
+    content = {"algorithms": {"own": {"type": f"{folder}/mine:Own"}}}
+    with stored_code("it", content, trust=False):
+        assert own is import_class(f"{folder}/mine:Own")
 
 
 def test_own_code_keeps_its_extension_modules_and_leaves_no_bytecode(folder: Path) -> None:
@@ -173,103 +357,44 @@ def test_own_code_keeps_its_extension_modules_and_leaves_no_bytecode(folder: Pat
     assert not (folder / "__pycache__").exists()
 
 
-class Named:
-    """Pickled, it is the name of a class."""
-
-    def __init__(self, module: str, name: str) -> None:
-        self.module, self.name = module, name
-
-    def content(self) -> bytes:
-        return (
-            b"\x80\x04"
-            + b"".join(
-                b"\x8c" + bytes([len(word)]) + word.encode() for word in (self.module, self.name)
-            )
-            + b"\x93."
-        )
-
-
-def test_checkpoint_imports_no_other_module_of_a_trusted_folder(folder: Path) -> None:
-    """`--trust-dir` or a trusted package let a pickle import any module there, listed or not."""
-    (folder / "other.py").write_text(evil(folder))
-    package = folder / "installed"
-    (package / "pack").mkdir(parents=True)
-    (package / "pack" / "__init__.py").write_text(OWN)
-    (package / "pack" / "other.py").write_text(evil(folder))
-    sys.path.append(str(package))
-    try:
-        with restrict(Trust.of([folder])):
-            types = {"one": f"{folder}/mine:Own", "two": "pack:Own"}
-            scenario = load_scenario(
-                None, *(f"algorithms.{name}.type={value!r}" for name, value in types.items())
-            )
-            top = type(scenario.algorithms["one"]).__module__.partition(".")[0]
-            for module in (f"{top}.other", "other", "pack.other", "mine.other"):
-                content = Named(module, "Own").content()
-                with pytest.raises(ArtifactError, match="can't be part of a state"):
-                    read_state(io.BytesIO(content), {"scenario": scenario})
-                assert not (folder / "ran").exists()
-            for module in (f"{top}.mine", "mine", "pack"):  # a name, which is no state
-                with pytest.raises(ArtifactError, match="holds no state of a run"):
-                    read_state(io.BytesIO(Named(module, "Own").content()), {"scenario": scenario})
-    finally:
-        sys.path.remove(str(package))
-        sys.modules.pop("pack", None)
-
-
-def test_checkpoint_names_only_classes_of_listed_files(folder: Path) -> None:
-    """A loaded module of another scenario, or of an installed package, was nameable unlisted."""
-    (folder / "other.py").write_text(OWN)
-    (folder / "parts.py").write_text("class Part:\n    pass\n")
-    (folder / "mine.py").write_text(f"from .parts import Part\n{OWN}")
-    package = folder / "installed" / "pack"
-    package.mkdir(parents=True)
-    (package / "__init__.py").write_text(f"from pack.used import Used\n{OWN}")
-    (package / "used.py").write_text("class Used:\n    pass\n")
-    (package / "unused.py").write_text(OWN)
-    sys.path.append(str(package.parent))
-    try:
-        importlib.import_module("pack.unused")
-        other: Any = import_class(f"{folder}/other:Own")
-        with restrict(Trust.of(["mine.py", "parts.py", package / "__init__.py"])):
-            scenario = load_scenario(
-                None, f"algorithms.a.type='{folder}/mine:Own'", "algorithms.b.type='pack:Own'"
-            )
-            top = other.__module__.partition(".")[0]
-            for module, name, is_nameable in (
-                (other.__module__, "Own", False),
-                ("other", "Own", False),
-                ("pack.unused", "Own", False),
-                ("mine", "Own", True),
-                (f"{top}.parts", "Part", True),
-                ("pack", "Own", True),
-                ("pack.used", "Used", True),
-            ):
-                expected = "holds no state" if is_nameable else "can't be part of a state"
-                with pytest.raises(ArtifactError, match=expected):
-                    read_state(io.BytesIO(Named(module, name).content()), {"scenario": scenario})
-    finally:
-        sys.path.remove(str(package.parent))
-        for name in ("pack", "pack.used", "pack.unused"):
-            sys.modules.pop(name, None)
+PROGRAM = """
+import json, sys
+import beside
+for line in sys.stdin.buffer:
+    message = json.loads(line)
+    [sys.stdin.buffer.read(size) for _, size in message.get("blocks", [])]
+    answer = {"type": "ready"}
+    if message["type"] == "start":
+        share = [float(room["type"] == "kitchen") for room in message["rooms"]]
+    elif message["type"] == "update":
+        answer = {"type": "output", "share": share}
+    print(json.dumps(answer), flush=True)
+"""
 
 
 @pytest.mark.slow
-def test_command_line_runs_the_listed_source(tmp_path: Path) -> None:
-    """The whole way: a run with planted files beside its code, resumed in another process."""
-    (tmp_path / "mine.py").write_text(OWN)
+def test_a_program_of_a_stored_run_is_listed_with_its_arguments(folder: Path) -> None:
+    """`--trust belief.py` ran `beside.py`, too: trust means the whole folder, and says so."""
+    (folder / "belief.py").write_text(PROGRAM)
+    (folder / "beside.py").write_text(evil(folder))
+    settings = "{type: process, command: belief.py, arguments: ['-c', 'a b'], period: 30 min}"
     done = fleet2d_process(
-        "run", "simulation.duration=1 h", "algorithms.own.type=mine:Own", "--seed", "4",
-        "--out", "run", "--quiet", cwd=tmp_path,
+        "run", "simulation.duration=2 h", f"algorithms.p={settings}", "--out", "run", "--quiet",
+        cwd=folder,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    plant_unchecked_bytecode(tmp_path)
+    assert 0 == done.returncode, done.stderr
+    (folder / "ran").unlink()
+    line = f"  {folder}/belief.py -c 'a b' (algorithms.p.command)"
 
-    done = fleet2d_process("reproduce", "run", "--trust", "mine.py", cwd=tmp_path)
+    done = fleet2d_process("reproduce", "run", cwd=folder)
 
-    assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "ran").exists()
+    assert 2 == done.returncode
+    assert line in done.stderr.splitlines()
+    assert "so could any file in its folders" in done.stderr
+    assert not (folder / "ran").exists()
 
+    done = fleet2d_process("reproduce", "run", "--trust", cwd=folder)
 
-def test_pickle_of_the_names_is_what_python_reads() -> None:
-    assert pickle.loads(Named("pathlib", "Path").content()) is Path
+    assert 0 == done.returncode, done.stderr
+    assert ["trusted, with all files in these folders:", line] == done.stderr.splitlines()
+    assert (folder / "ran").exists()

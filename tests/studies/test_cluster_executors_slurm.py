@@ -82,6 +82,15 @@ def test_a_task_whose_job_always_dies_is_lost_and_the_others_are_not(
     assert {0, 2} == {event.task.number for event in events if isinstance(event, FinishedTask)}
 
 
+def test_results_are_read_from_a_folder_that_nobody_knew_before(tmp_path: Path) -> None:
+    """They are pickles: in a folder that somebody sent, some could wait for the number of a job."""
+    one, other = (SlurmExecutor(1, folder=tmp_path, cluster="local") for _ in range(2))
+    folders = {Path(each._executor.folder) for each in (one, other)}
+    assert 2 == len(folders)
+    assert {tmp_path} == {folder.parent for folder in folders}
+    assert not any(path for folder in folders for path in folder.glob("*"))
+
+
 def test_closing_cancels_what_runs(executor: SlurmExecutor, tmp_path: Path) -> None:
     events = executor.run(Square(tmp_path), tasks(3))
     next(events)

@@ -89,7 +89,7 @@ def test_failures_are_printed_and_end_in_one(fleet2d: Cli) -> None:
     content = small(base=base(), replicates=1)
     content["base"]["algorithms"] = {"own": {"type": "mine:Fails", "period": "1 min"}}
     Path("speeds.yaml").write_text(yaml.safe_dump(content))
-    code, out, err = fleet2d("study", "run", "speeds.yaml", *SERIAL, "--trust", "mine.py")
+    code, out, err = fleet2d("study", "run", "speeds.yaml", *SERIAL)
     assert 1 == code
     assert "0 of 2 variants complete" in out
     assert "variant 0 failed" in err

@@ -15,7 +15,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known
-from fleet2d.configuration.trust import check_trust
+from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PositiveDuration, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
@@ -66,7 +66,7 @@ class Process(Algorithm):
 
     def start(self, home: Home) -> None:
         """Check that the program may run; it starts at the first update."""
-        check_trust("process", [self.command])
+        check_may_run("process", [self.command])
         self._rooms = [{"name": room.name, "type": room.type} for room in home.rooms]
         self.program: ExternalProgram | None = None
 

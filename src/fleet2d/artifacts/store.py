@@ -279,6 +279,15 @@ class RunStore:
         with self._writing(name):
             write_atomically(self.root / name, content.encode())
 
+    def journal_digest(self) -> str:
+        """Return the SHA-256 of the journal up to the last commit.
+
+        Raises:
+            ArtifactError: It can't be read; the run is marked as failed.
+        """
+        with self._writing("the checkpoint"):
+            return self._unfinished_run().journal_digest()
+
     def keep_checkpoint(self, write: Callable[[int], None]) -> None:
         """Replace the checkpoint of the run; see `UnfinishedRun.keep_checkpoint`.
 

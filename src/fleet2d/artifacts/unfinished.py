@@ -7,6 +7,7 @@ together: readers ignore what follows the last commit.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import struct
 import sys
@@ -419,6 +420,19 @@ class UnfinishedRun:
             self.journal.sync()
             self._synced = now
         return Commit(step, rows, self.journal.end)
+
+    def journal_digest(self, end: int | None = None) -> str:
+        """Return the SHA-256 of the journal up to a commit; None: up to the last one.
+
+        Raises:
+            OSError: It can't be read.
+        """
+        digest, rest = hashlib.sha256(), self.journal.end if end is None else end
+        with (self.folder / JOURNAL_NAME).open("rb") as file:
+            while part := file.read(min(rest, 1 << 20)):
+                digest.update(part)
+                rest -= len(part)
+        return digest.hexdigest()
 
     def keep_checkpoint(self, write: Callable[[int], None]) -> None:
         """Replace the checkpoint atomically; the rows that it refers to must be synced before.

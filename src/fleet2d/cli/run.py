@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, blame, os_errors_as, own_frames
-from fleet2d.options import TrustFiles, TrustFolders, file_name, resume_hint, split, trust_of
+from fleet2d.options import Trust, file_name, resume_hint, show_code, split
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
 if TYPE_CHECKING:
@@ -268,16 +268,18 @@ def _fresh_directory(name: str) -> Path:
 
 def resume(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="An unfinished run.")],
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Continue an interrupted or killed run; the result equals that of an undisturbed run."""
+    from fleet2d.artifacts.manifest import Manifest
     from fleet2d.engine.repeat import reopen
 
+    if trust:
+        show_code(Manifest.read(directory).content())
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
-        simulation, note = reopen(directory, trust_of(trust, trust_dir))
+        simulation, note = reopen(directory, trust=trust)
         if not quiet:
             typer.echo(note, err=True)
         run = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
@@ -286,13 +288,15 @@ def resume(
 
 def reproduce(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Run a stored run again from its manifest, and compare."""
-    from fleet2d.engine.repeat import reproduce_trusting
+    from fleet2d.artifacts.manifest import Manifest
+    from fleet2d.engine.repeat import reproduce as repeat
 
-    result = reproduce_trusting(directory, trust_of(trust, trust_dir))
+    if trust:
+        show_code(Manifest.read(directory).content())
+    result = repeat(directory, trust=trust)
     for cause in result.causes:
         typer.echo(f"note: {cause}")
     typer.echo(f"not compared: {', '.join(result.not_compared)}")

@@ -11,10 +11,9 @@ from fleet2d.options import (
     Resolution,
     Scale,
     ThemeChoice,
-    TrustFiles,
-    TrustFolders,
+    Trust,
     file_name,
-    restrict_to,
+    show_code,
 )
 from fleet2d.runs import exporters
 
@@ -102,19 +101,20 @@ def show(  # noqa: PLR0913 - options of the command line
     end: Annotated[str | None, typer.Option("--to", help="Of a run: where it ends.")] = None,
     figure: Figure = "life",
     theme: ThemeChoice = "light",
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
     from fleet2d.pictures.theme import themed
 
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
-    with themed(theme), restrict_to(trust, trust_dir):
+    with themed(theme):
         if diary:
             for line in show_diary(None if source is None else str(source), out, days, seed):
                 typer.echo(line)
         else:
-            typer.echo(_draw(source, out, picture, fov, resolution=resolution, scale=scale))
+            typer.echo(
+                _draw(source, out, picture, fov, trust=trust, resolution=resolution, scale=scale)
+            )
 
 
 class RunPicture(NamedTuple):
@@ -147,6 +147,8 @@ def _draw(
     out: Path | None,
     picture: RunPicture,
     fov: str | None,
+    *,
+    trust: bool,
     **lengths: float | None,
 ) -> Path:
     """Draw a run or a floor plan; return the path of the picture."""
@@ -159,7 +161,7 @@ def _draw(
             " directory, --fov for a floor plan"
         )
     if source is not None and is_run:
-        return _draw_run(source, out, picture)
+        return _draw_run(source, out, picture, trust=trust)
     if source is not None and source.is_dir():
         raise RunDirectoryError(
             f"{source} holds no run: give a run directory or a floor plan's file"
@@ -172,12 +174,14 @@ def _draw(
     return _draw_floorplan(source, out, fov, **lengths)
 
 
-def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
+def _draw_run(directory: Path, out: Path | None, picture: RunPicture, *, trust: bool) -> Path:
     """Draw a picture of a stored run; return its path."""
     from fleet2d.runs.run import open_run
 
     picture.check()
-    run = open_run(directory)
+    run = open_run(directory, trust=trust)
+    if trust:
+        show_code(run.manifest)
     if picture.layer is not None:
         from fleet2d.pictures.layers import draw_layer
 
@@ -235,7 +239,7 @@ def _format_help() -> str:
     return f"Its format; by default that of the suffix of FILE. {' '.join(described)}"
 
 
-def export(  # noqa: PLR0913 - the options of the command
+def export(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
     out: Annotated[
         Path | None, typer.Argument(help="The file to write, for other programs.")
@@ -251,8 +255,7 @@ def export(  # noqa: PLR0913 - the options of the command
     every: Annotated[
         str | None, typer.Option(help="Time between two poses, such as '10 s'; default: the step.")
     ] = None,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Write a run for others: a file for other programs, or a web page in one file."""
     from fleet2d.runs.run import open_run
@@ -264,13 +267,14 @@ def export(  # noqa: PLR0913 - the options of the command
         )
     if html is not None and every is not None:
         raise InputError("--every is for FILE: a page has the exact poses at all times")
-    run = open_run(directory)
+    run = open_run(directory, trust=trust)
+    if trust:
+        show_code(run.manifest)
     first, last = steps_of(run, begin, end)
-    with restrict_to(trust, trust_dir):
-        if out is not None:
-            typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
-        elif html is not None:
-            from fleet2d.viewer.page_data import export_html
+    if out is not None:
+        typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
+    elif html is not None:
+        from fleet2d.viewer.page_data import export_html
 
-            export_html(run, html, first, last)
-            typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
+        export_html(run, html, first, last)
+        typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")

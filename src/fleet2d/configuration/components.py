@@ -39,6 +39,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from fleet2d.bounds import ENTRIES, ITEMS, Bound, one_line
+from fleet2d.configuration.importing import BrokenModule, class_path, import_class
 from fleet2d.configuration.problems import (
     Location,
     did_you_mean,
@@ -48,7 +49,6 @@ from fleet2d.configuration.problems import (
     shown,
     unknown_key,
 )
-from fleet2d.configuration.trust import BrokenModule, class_path, import_class
 from fleet2d.errors import (
     Fleet2DError,
     InputError,

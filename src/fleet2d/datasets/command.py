@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.options import TrustFiles, TrustFolders, Workers, restrict_to
+from fleet2d.options import Workers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,14 +30,12 @@ def dataset(
     verify: Annotated[
         bool, typer.Option("--verify", help="Compare the files of a made one with its manifest.")
     ] = False,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
 ) -> None:
     """Make a data set of labelled evidence, the rest of an interrupted one, or lacking files."""
     from fleet2d.datasets.reader import open_dataset
 
     if not verify:
-        _make(source, out, workers, trust, trust_dir)
+        _make(source, out, workers)
         return
     made = open_dataset(out)
     differing = made.verify()
@@ -52,14 +50,11 @@ def dataset(
     _print_size(made)
 
 
-def _make(
-    source: Path, out: Path, workers: int | None, trust: TrustFiles, trust_dir: TrustFolders
-) -> None:
+def _make(source: Path, out: Path, workers: int | None) -> None:
     """Make a data set, or what it lacks."""
     from fleet2d.datasets.generate import dataset as make
 
-    with restrict_to(trust, trust_dir):
-        _print_size(make(source, out, workers=workers))
+    _print_size(make(source, out, workers=workers))
 
 
 def _print_size(made: "Dataset") -> None:
@@ -84,8 +79,6 @@ def rtp(
     hidden: Annotated[int, typer.Option(min=1, max=256, help="Width of the layers.")] = 32,
     epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 10,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights.")] = 0,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
 ) -> None:
     """Train the network of `model: learned`, or fit one to the days of a run.
 
@@ -101,7 +94,7 @@ def rtp(
         raise InputError(f"--out {out}: there is no folder {out.absolute().parent}")
     if on.is_file():
         file, on = on, out.with_name(f"{out.stem}_data")
-        _make(file, on, None, trust, trust_dir)
+        _make(file, on, None)
     began = time.process_time()
     train_on, check_on = _windows(on)
     weights: Weights | None = None

@@ -18,7 +18,6 @@ from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import problem, shown
-from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, micros, parse_duration
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.routines.persona import origins_of
@@ -250,7 +249,6 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
         file = DatasetFile.model_validate(document.data)
     except ValidationError as error:
         raise explain(error, document) from None
-    check_code("the data set", [document.data])
     with errors_as(ScenarioError, "base", of=ScenarioError):
         base = load_scenario(file.base).resolved()
     base["users"] = {}

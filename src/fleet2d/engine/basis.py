@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from fleet2d.artifacts.manifest import Manifest, input_record
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.components import Component
-from fleet2d.configuration.trust import source_files
+from fleet2d.configuration.importing import source_files
 from fleet2d.entities.behavior import SightEvent
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor

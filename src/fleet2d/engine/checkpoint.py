@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
-from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 from fleet2d.artifacts.manifest import Manifest
 from fleet2d.artifacts.store import ArtifactSettings, RunStore
-from fleet2d.artifacts.unfinished import Commit
+from fleet2d.artifacts.unfinished import Commit, UnfinishedRun
 from fleet2d.configuration.units import micros
+from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.snapshot import (
     Constants,
     UnstorableStateError,
@@ -21,10 +21,14 @@ from fleet2d.engine.snapshot import (
 )
 from fleet2d.engine.state import State
 from fleet2d.entities.body import NEVER
-from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as
+from fleet2d.errors import ArtifactError, errors_as, os_errors_as
 from fleet2d.runtime.clock import DAY_US, Clock
 from fleet2d.runtime.memory import release_memory
 from fleet2d.storage import files
+from fleet2d.storage.secret_files import UnusableSecretError, signature
+
+NO_CHECKPOINT = "no checkpoint from step"
+"""Beginning of the note that a run can't be continued from a later step."""
 
 # Longest wall time between commits of rows [s]; they are also committed every simulated day.
 COMMIT_S = 2.0
@@ -33,6 +37,7 @@ COMMIT_S = 2.0
 COMPUTING_S = 10.0
 WAITING_S = 60.0
 SHARE = 40
+PURPOSE = "checkpoint of a run"  # of its signature
 
 
 class UnusableCheckpointError(ArtifactError):
@@ -56,27 +61,31 @@ class Checkpoint:
     body: BinaryIO
 
     @classmethod
-    def open(cls, path: Path, manifest: Manifest) -> Self:
-        """Open a checkpoint of the run that a manifest describes.
+    def open(cls, unfinished: UnfinishedRun, manifest: Manifest) -> Self:
+        """Open the checkpoint of a run, if this user wrote it, for just this run.
+
+        Its signature covers the whole file: the state, the manifest of that time, and the digest of
+        the journal before it. With that manifest the present one is compared in all that doesn't
+        change while a run goes on, and with that digest the present journal.
 
         Raises:
-            UnusableCheckpointError: There is none, it is damaged, or of another run.
+            UnusableCheckpointError: There is none, or it is another user's, damaged, or of another
+                run.
         """
+        path = unfinished.checkpoint
         if not path.is_file():
             raise UnusableCheckpointError("there is no checkpoint yet")
-        try:
-            header, body = open_snapshot(path)
-            commit = Commit(**header["commit"])
-            stored = Manifest.of_content(path, header["manifest"])
-            setup_s, simulate_s, save_s = map(float, header["wall_s"])
-        except ArtifactError as error:
-            raise UnusableCheckpointError(str(error)) from error
-        except (KeyError, TypeError, ValueError, RunDirectoryError) as error:
-            raise UnusableCheckpointError(f"{path} is not a checkpoint of a run") from error
-        if (stored.scenario, stored.seed) != (manifest.scenario, manifest.seed):
-            raise UnusableCheckpointError(
-                f"{path} was written by a run of another scenario or seed"
-            )
+        with errors_as(UnusableCheckpointError, of=ArtifactError):
+            header, body = open_snapshot(path, PURPOSE)
+        commit = Commit(**header["commit"])
+        stored = Manifest.of_content(path, header["manifest"])
+        if _fixed_part(stored) != _fixed_part(manifest, like=stored):
+            raise UnusableCheckpointError(f"{path} was written by another run than this manifest's")
+        with os_errors_as(UnusableCheckpointError, "the journal can't be read"):
+            journal = unfinished.journal_digest(commit.end)
+        if journal != header["journal"]:
+            raise UnusableCheckpointError("the journal has changed since the checkpoint")
+        setup_s, simulate_s, save_s = header["wall_s"]
         return cls(commit, stored, (setup_s, simulate_s, save_s), body)
 
     def read(self, constants: Constants) -> State:
@@ -87,6 +96,27 @@ class Checkpoint:
         """
         with errors_as(UnusableCheckpointError, of=ArtifactError):
             return read_state(self.body, constants)
+
+
+def _fixed_part(manifest: Manifest, like: Manifest | None = None) -> tuple[object, ...]:
+    """Return what doesn't change in the manifest while a run goes on.
+
+    Args:
+        manifest: The manifest.
+        like: An earlier one: of what only grows, the part that it has; None: all.
+    """
+    earlier = like or manifest
+    outside = [record for record in manifest.interventions if is_from_outside(record)]
+    count = sum(map(is_from_outside, earlier.interventions))
+    return (
+        manifest.scenario,
+        manifest.seed,
+        (manifest.step_us, manifest.start),
+        manifest.entities,
+        manifest.versions,
+        manifest.inputs[: len(earlier.inputs)],
+        outside[:count],
+    )
 
 
 class CheckpointWriter:
@@ -171,17 +201,19 @@ class CheckpointWriter:
         began = time.perf_counter()
         if self.is_storable:
             constants, header = self._describe()
-            header = {**header, "commit": commit}
-
-            def write(handle: int) -> None:
-                write_snapshot(partial(files.write_all, handle), state, constants, header)
-
+            journal = self._store.journal_digest()
+            header = {**header, "commit": commit, "journal": journal}
             try:
+                seal = signature(PURPOSE)  # before there is a file
+
+                def write(handle: int) -> None:
+                    write_snapshot(partial(files.write_all, handle), state, constants, header, seal)
+
                 self._store.keep_checkpoint(write)
-            except UnstorableStateError as error:
+            except (UnstorableStateError, UnusableSecretError) as error:
                 self.is_storable = False
                 self._store.manifest.notes.append(
-                    f"no checkpoint from step {state.bodies.step} on: {error}"
+                    f"{NO_CHECKPOINT} {state.bodies.step} on: {error}"
                 )
         if not self._every:  # rarely
             release_memory()

@@ -12,7 +12,7 @@ from typing import ClassVar, cast
 import numpy as np
 
 from fleet2d.configuration.components import Component, lookup, register
-from fleet2d.configuration.trust import source_files
+from fleet2d.configuration.importing import source_files
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.body import Bodies

@@ -11,13 +11,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
 from fleet2d.algorithms.history import Log
-from fleet2d.configuration.trust import current_trust, restrict
+from fleet2d.configuration.trust import may_run_code, running_code
 from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
@@ -237,6 +237,7 @@ class Loop:
     Attributes:
         pace: Slows the run down; None: it runs as fast as it can.
         has_failed: Whether a span failed in the middle, so that the run can't be continued.
+        runs_code: Whether code and programs that the scenario names may run.
         simulate_s: Wall time of simulating so far [s].
         save_s: Wall time of storing so far [s].
     """
@@ -248,7 +249,7 @@ class Loop:
         self.has_failed = self._is_stopping = False
         self.simulate_s = self.save_s = 0.0
         self._step_us, self._keeper = clock.step_us, keeper
-        self._trust = current_trust()  # a plan may name code that is imported only when it begins
+        self.runs_code = may_run_code()  # also what a plan names, which is imported when it begins
         self._began: float | None = None  # set while it simulates
 
     @property
@@ -273,7 +274,7 @@ class Loop:
         if self.pace is not None:
             self.pace.resume(self._simulated_s(state))
         with ExitStack() as stack:
-            stack.enter_context(restrict(self._trust))
+            stack.enter_context(running_code(allowed=self.runs_code))
             if end - state.bodies.step >= SHORT:
                 stack.enter_context(rare_collections())
                 stack.enter_context(deferred_interrupt(self._stop))
@@ -295,8 +296,7 @@ class Loop:
             Whether the condition holds. The present step has begun then: its interventions and
             changes of the home are made, and the next call continues with its decisions.
         """
-        trusted = nullcontext() if current_trust() is self._trust else restrict(self._trust)
-        with self._timed(state), trusted:
+        with self._timed(state), running_code(allowed=self.runs_code):
             while state.bodies.step < end:
                 span = Span(state.bodies.step, end)
                 intervene(state, span)

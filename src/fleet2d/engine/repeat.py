@@ -5,7 +5,6 @@ from __future__ import annotations
 import filecmp
 import tempfile
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
@@ -16,16 +15,10 @@ import numpy as np
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, LEARNED_NAME, SLOW, Manifest
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.store import RunStore, cannot_write
-from fleet2d.artifacts.unfinished import (
-    FOLDER,
-    JOURNAL_NAME,
-    UnfinishedRun,
-    last_commit,
-    remove_leftovers,
-)
-from fleet2d.configuration.trust import Trust, refuse_untrusted, restrict, restrict_stored
+from fleet2d.artifacts.unfinished import FOLDER, UnfinishedRun, remove_leftovers
+from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.engine.basis import changed_inputs
-from fleet2d.engine.checkpoint import Checkpoint, UnusableCheckpointError
+from fleet2d.engine.checkpoint import NO_CHECKPOINT, Checkpoint, UnusableCheckpointError
 from fleet2d.engine.expectations import TABLE
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
@@ -73,40 +66,38 @@ class Reproduction:
         return self.stored == self.digest and not self.differing
 
 
-def reproduce(directory: str | Path, trust: Iterable[str | Path] = ()) -> Reproduction:
+def reproduce(directory: str | Path, *, trust: bool = False) -> Reproduction:
     """Repeat a stored run from its manifest, and compare all that both stored.
 
     Args:
         directory: The run directory.
-        trust: Files and folders of code that may run, if the scenario has components of its own
-            that aren't loaded yet.
+        trust: Whether its own code and programs may run, if it has some.
 
     Raises:
-        RunDirectoryError: There is no such run, it was not completed, or its code isn't trusted.
+        RunDirectoryError: There is no such run, it was not completed, or it has code of its own and
+            isn't trusted.
     """
-    return reproduce_trusting(directory, Trust.of(trust))
-
-
-def reproduce_trusting(directory: str | Path, trust: Trust) -> Reproduction:
-    """See `reproduce`."""
-    old = open_run(directory)
+    old = open_run(directory, trust=trust)
     if old.status != "complete":
         raise RunDirectoryError(
             f"{directory} holds a run that is {old.status}: only a complete run can be compared"
         )
-    root, content = Path(directory), old.manifest
+    with old.running_code():
+        return _reproduce(old, Path(directory))
+
+
+def _reproduce(old: Run, root: Path) -> Reproduction:
+    content = old.manifest
     manifest = Manifest.read(root)
     causes = [f"{path} has changed since" for path in changed_inputs(manifest)]
-    refuse_untrusted(root, content["scenario"], content["interventions"], trust)
     refuse_links(path_in(root, LEARNED_NAME))
     seal = verify_run(root)
     changes = seal.differing.items()
-    causes += [f"{name} in {directory} {change} after the run" for name, change in changes]
+    causes += [f"{name} in {root} {change} after the run" for name, change in changes]
     causes += seal.notes
-    causes += [f"{name} in {directory} is not part of the run" for name in seal.foreign]
+    causes += [f"{name} in {root} is not part of the run" for name in seal.foreign]
     with tempfile.TemporaryDirectory() as folder:
-        with restrict(trust):
-            new = _simulation(content, Path(folder) / "run").run()
+        new = _simulation(content, Path(folder) / "run").run()
         causes += _other_versions(content["versions"], new.manifest["versions"])
         differing = {_short(name) for name in seal.differing}
         differing |= set(_tables(content["tables"], new.manifest["tables"]))
@@ -127,10 +118,8 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
             f"the run is {run.status}: only a complete run can be judged; the verdicts on its own"
             " expectations are in manifest['expectations']"
         )
-    content, trust = run.manifest, Trust.of(())
-    if run.directory is not None:
-        refuse_untrusted(run.directory, content["scenario"], content["interventions"], trust)
-    with restrict(trust) if run.directory is not None else nullcontext():
+    content = run.manifest
+    with run.running_code():
         simulation = _simulation(content, None)
         label = simulation.expect(expectation, JUDGED_NAME)
         new = simulation.run()
@@ -172,7 +161,8 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
         raise InputError(f"the run can't be continued from step {step}: its last is {steps - 1}")
     if run.directory is not None:
         _refuse_changed_inputs(run.directory)
-    simulation = repeat_until(run.manifest, step, out)
+    with run.running_code():
+        simulation = repeat_until(run.manifest, step, out)
     interval = timedelta(microseconds=step * run.manifest["step_us"])
     for name in simulation.actors if step and "key_frames" in run.tables else ():
         path, state = run.path(name, interval), simulation.state[name]
@@ -188,8 +178,7 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
 def repeat_until(content: Mapping[str, Any], step: int, out: Path | None) -> Simulation:
     """Return a simulation that has repeated the run of a manifest up to a step; see `branch`."""
     earlier = [record for record in content["interventions"] if record["step"] < step]
-    with restrict_stored():
-        simulation = _simulation({**content, "interventions": earlier}, out)
+    simulation = _simulation({**content, "interventions": earlier}, out)
     simulation.advance(step)
     return simulation
 
@@ -204,7 +193,7 @@ def decisions_of(run: Run) -> Any:
     """
     if run.directory is not None:
         _refuse_changed_inputs(run.directory)
-    with restrict_stored():
+    with run.running_code():
         simulation = _simulation(run.manifest, None, ONLY_DECISIONS)
     simulation.advance(int(run.manifest["steps"]))
     new = simulation.finish()
@@ -275,7 +264,7 @@ def _fields(old: Mapping[str, Any], new: Mapping[str, Any], stored: Iterable[str
 
 def _repeatable(notes: list[str]) -> list[str]:
     """Return the notes that depend neither on the speed of a machine nor on what arrived live."""
-    return [note for note in notes if not note.startswith((SLOW, LIVE))]
+    return [note for note in notes if not note.startswith((SLOW, LIVE, NO_CHECKPOINT))]
 
 
 def _files(old: Path, new: Path) -> list[str]:
@@ -299,17 +288,18 @@ def _other_versions(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]
     ]
 
 
-def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:
+def resume(directory: str | Path, *, trust: bool = False) -> Run:
     """Continue an unfinished run to its end; its digest is that of an uninterrupted run.
+
+    It continues from its last checkpoint if this user wrote that, else from its first step.
 
     Args:
         directory: The run directory.
-        trust: Files and folders of code that may run, if the scenario has components of its own
-            that aren't loaded yet.
+        trust: Whether its own code and programs may run, if it has some.
 
     Raises:
         RunDirectoryError: There is no run, it is complete, another process writes it, an input
-            file has changed, or code isn't trusted.
+            file has changed, or it has code of its own and isn't trusted.
         ArtifactError: Its journal is damaged, or it can't be written.
 
     Example:
@@ -322,10 +312,10 @@ def resume(directory: str | Path, trust: Iterable[str | Path] = ()) -> Run:
         >>> resume(folder).digest == fleet2d.run(None, "simulation.duration=2 h", seed=4).digest
         True
     """
-    return reopen(directory, Trust.of(trust))[0].run()
+    return reopen(directory, trust=trust)[0].run()
 
 
-def reopen(directory: str | Path, trust: Trust) -> tuple[Simulation, str]:
+def reopen(directory: str | Path, *, trust: bool = False) -> tuple[Simulation, str]:
     """Return an unfinished run at its last checkpoint or its first step, and a remark about it.
 
     Raises:
@@ -341,13 +331,13 @@ def reopen(directory: str | Path, trust: Trust) -> tuple[Simulation, str]:
     except OSError as error:
         raise cannot_write(root, error) from error
     try:
-        return _reopen(root, unfinished, trust)
+        return _reopen(root, unfinished, trust=trust)
     except BaseException:
         unfinished.release()
         raise
 
 
-def _reopen(root: Path, unfinished: UnfinishedRun, trust: Trust) -> tuple[Simulation, str]:
+def _reopen(root: Path, unfinished: UnfinishedRun, *, trust: bool) -> tuple[Simulation, str]:
     manifest = Manifest.read(root)
     if manifest.status == "complete":
         remove_leftovers(root)
@@ -359,14 +349,10 @@ def _reopen(root: Path, unfinished: UnfinishedRun, trust: Trust) -> tuple[Simula
             f"{paths[0]} has changed since the run began: put it back as it was, or run the"
             " scenario again"
         )
-    refuse_untrusted(root, manifest.scenario, manifest.interventions, trust)
-    with restrict(trust):
+    with stored_code(root, content_of_run(manifest.content()), trust=trust):
         scenario = load_scenario(manifest.scenario)
         try:
-            checkpoint = Checkpoint.open(unfinished.checkpoint, manifest)
-            last = last_commit(unfinished.folder / JOURNAL_NAME)
-            if last is None or last.end < checkpoint.commit.end:
-                raise UnusableCheckpointError("the journal is shorter than the checkpoint says")
+            checkpoint = Checkpoint.open(unfinished, manifest)
             run = Simulation.reopened(scenario, RunStore(root), unfinished, checkpoint)
         except UnusableCheckpointError as error:
             remark = f"starting again from the first step: {error}"

@@ -36,7 +36,14 @@ from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import Constants, copy_state, open_snapshot, read_state, save_snapshot
+from fleet2d.engine.snapshot import (
+    Constants,
+    copy_state,
+    open_snapshot,
+    read_state,
+    save_snapshot,
+    write_state,
+)
 from fleet2d.engine.state import Listener, State
 from fleet2d.engine.world import repeat, request
 from fleet2d.entities.behavior import Situation
@@ -58,6 +65,8 @@ from fleet2d.scenario.model import Scenario, load_scenario
 if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
     from fleet2d.expectations.verdict import Verdict, VerdictEvidence
+
+PURPOSE = "saved simulation"  # of the signature of a file
 
 
 class Simulation(InterventionMethods):
@@ -246,6 +255,11 @@ class Simulation(InterventionMethods):
     def done(self) -> bool:
         """Whether all steps are simulated."""
         return self.step >= self.clock.steps
+
+    @property
+    def runs_code(self) -> bool:
+        """Whether code and programs that its scenario names may run."""
+        return self._loop.runs_code
 
     @property
     def directory(self) -> Path | None:
@@ -795,21 +809,25 @@ class Simulation(InterventionMethods):
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the content of a file that `load` reads."""
+        """Return the simulation for `pickle`, as another process of this user reads it."""
+        self._check_savable()
         file = io.BytesIO()
-        self.save(file)
-        return {"saved": file.getvalue()}
+        write_state(file, self._state, self._constants)
+        return {"header": self._header(), "state": file.getvalue()}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, content: dict[str, Any]) -> None:
         """Restore the simulation of another process."""
-        self.__dict__.update(self.load(io.BytesIO(state["saved"])).__dict__)
+        restored = self._restored(content["header"], io.BytesIO(content["state"]))
+        self.__dict__.update(restored.__dict__)
 
     def save(self, path: str | Path | BinaryIO) -> None:
         """Write the simulation to a file that `load` reads.
 
+        The file is signed: only this user can load it, since it can run any code.
+
         Raises:
-            ArtifactError: The run is stored in a directory, or a component holds something that
-                can't be written, such as an open file.
+            ArtifactError: The run is stored in a directory, a component holds something that can't
+                be written, such as an open file, or this user has no key.
             InputError: The run is finished or has failed.
 
         Example:
@@ -822,6 +840,10 @@ class Simulation(InterventionMethods):
             >>> Simulation.load(file).run().digest == simulation.run().digest
             True
         """
+        self._check_savable()
+        save_snapshot(path, self._state, self._constants, self._header(), PURPOSE)
+
+    def _check_savable(self) -> None:
         if self.directory is not None:
             raise ArtifactError(
                 f"a simulation that stores in {self.directory} can't be saved as a file, too: it"
@@ -829,16 +851,19 @@ class Simulation(InterventionMethods):
                 " `fleet2d resume`"
             )
         self._check_not_over()
-        save_snapshot(path, self._state, self._constants, self._header())
 
     @classmethod
     def load(cls, path: str | Path | BinaryIO) -> Self:
         """Return the simulation that `save` wrote, at its step.
 
         Raises:
-            ArtifactError: The file is damaged, or of another version of Fleet2D.
+            ArtifactError: Another user saved the file, it is damaged, or of another version of
+                Fleet2D.
         """
-        header, body = open_snapshot(path)
+        return cls._restored(*open_snapshot(path, PURPOSE))
+
+    @classmethod
+    def _restored(cls, header: Mapping[str, Any], body: BinaryIO) -> Self:
         simulation = cls(header["scenario"], seed=header["seed"])
         simulation._take(read_state(body, simulation._constants))
         loop = simulation._loop

@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.options import TrustFiles, TrustFolders, restrict_to, split
+from fleet2d.options import split
 
 
-def live(  # noqa: PLR0913 - options of the command line
+def live(
     arguments: Annotated[
         list[str] | None,
         typer.Argument(
@@ -39,8 +39,6 @@ def live(  # noqa: PLR0913 - options of the command line
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of messages, and end.")
     ] = False,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
 ) -> None:
     """Run a scenario in real time among other programs, which may move its bodies."""
     if schema:
@@ -55,23 +53,20 @@ def live(  # noqa: PLR0913 - options of the command line
 
     scenario, overrides = split(arguments)
     changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]
-    with restrict_to(trust, trust_dir):
-        checked = load_scenario(scenario, *changes)
-        opened = open_peers(checked, *peers or ())
-        if not opened:
-            raise InputError(
-                "name at least one other program by --with, like --with ws://127.0.0.1:8765, or as"
-                " the source of something live"
-            )
-        simulation = Simulation(checked, out=out)
-        tell = partial(typer.echo, err=True)
-        for address, peer in opened.items():
-            port = getattr(peer, "port", None)
-            tell(f"{address}: {'connected' if port is None else f'listens at {port}'}")
-        bridge = Bridge(
-            simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell
+    checked = load_scenario(scenario, *changes)
+    opened = open_peers(checked, *peers or ())
+    if not opened:
+        raise InputError(
+            "name at least one other program by --with, like --with ws://127.0.0.1:8765, or as"
+            " the source of something live"
         )
-        run = bridge.run()
+    simulation = Simulation(checked, out=out)
+    tell = partial(typer.echo, err=True)
+    for address, peer in opened.items():
+        port = getattr(peer, "port", None)
+        tell(f"{address}: {'connected' if port is None else f'listens at {port}'}")
+    bridge = Bridge(simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell)
+    run = bridge.run()
     for note in bridge.notes():
         tell(note)
     place = f", stored in {out}" if out else ""

@@ -16,7 +16,6 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from fleet2d.configuration.trust import current_trust
 from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
@@ -261,13 +260,13 @@ def open_peers(scenario: Scenario, *addresses: str) -> dict[str, Peer]:
     """Return the peers of a live run by their addresses: those given, and the scenario's sources.
 
     Raises:
-        InputError: as `open_peer`; or the scenario names a source on another machine, as scenarios
-            of others may, and `addresses` doesn't.
+        InputError: as `open_peer`; or the scenario names a source on another machine, and
+            `addresses` doesn't.
     """
     sources = dict.fromkeys(sources_of(scenario).values())
     for source in sources:
         is_here = parse_peer_address(source).hostname in THIS_MACHINE
-        if source not in addresses and not is_here and current_trust() is not None:
+        if source not in addresses and not is_here:
             raise InputError(
                 f"the scenario would talk to {source}, another machine: name it by --with, too"
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
 from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
 from fleet2d.floorplan.layers import Layer
 from fleet2d.runtime.clock import Clock
@@ -86,6 +88,7 @@ class Run:
         manifest: The content of `manifest.json`.
         tables: The tables by name, each read when it is first used.
         notes: Remarks for the user, such as what is missing after a crash.
+        trust: Whether code and programs that its scenario names may run.
     """
 
     def __init__(
@@ -95,12 +98,15 @@ class Run:
         names: Sequence[str],
         read: Callable[[str], pa.Table],
         notes: Sequence[str] = (),
+        *,
+        trust: bool = False,
     ) -> None:
         """Read nothing yet; `open_run` and `open_store` create runs."""
         self.directory = directory
         self.manifest: dict[str, Any] = manifest.content()
         self.tables = Tables(names, read)
         self.notes = [*manifest.notes, *notes]
+        self.trust = trust
         self._plan: FloorPlan | None = None
 
     def __repr__(self) -> str:
@@ -156,6 +162,15 @@ class Run:
     @plan.setter
     def plan(self, plan: FloorPlan) -> None:
         self._plan = plan
+
+    def running_code(self) -> AbstractContextManager[None]:
+        """Return a context in which its code may run if it is trusted, as to repeat the run.
+
+        Raises:
+            UntrustedCodeError: It has code of its own, and isn't trusted.
+        """
+        title = self.directory or "the run"
+        return stored_code(title, content_of_run(self.manifest), trust=self.trust)
 
     def path(self, entity: str, every: timedelta = timedelta(minutes=1)) -> Trajectory:
         """Return the poses of a user or robot at regular times, rebuilt exactly from key frames.
@@ -282,11 +297,16 @@ class Run:
             return None
 
 
-def open_run(directory: Path | str) -> Run:
+def open_run(directory: Path | str, *, trust: bool = False) -> Run:
     """Open a stored run for reading.
 
     A run that crashed or failed can be opened, too, with the tables that are complete; `Run.notes`
     lists the others.
+
+    Args:
+        directory: The run directory.
+        trust: Whether its own code and programs may run when it is repeated, as by `Run.judge`;
+            to read it, none is needed.
 
     Raises:
         RunDirectoryError: There is no run in that directory, or its manifest is damaged.
@@ -306,7 +326,7 @@ def open_run(directory: Path | str) -> Run:
         if commit is not None:
             read = partial(read_committed, journal, commit.end)
             notes = _end_at_commit(root, manifest, commit.step)
-            return Run(root, manifest, sorted(commit.rows), read, notes)
+            return Run(root, manifest, sorted(commit.rows), read, notes, trust=trust)
     notes = _state_notes(root, manifest)
     on_disk = {path.name.removesuffix(".parquet") for path in root.glob("*.parquet")}
     if manifest.digest is not None:
@@ -326,7 +346,7 @@ def open_run(directory: Path | str) -> Run:
             if rows != stored_rows:
                 notes.append(f"table {name!r} has {rows} rows, but {stored_rows} were stored")
         names.append(name)
-    return Run(root, manifest, names, partial(_read_table, root, manifest), notes)
+    return Run(root, manifest, names, partial(_read_table, root, manifest), notes, trust=trust)
 
 
 def _read_table(root: Path, manifest: Manifest, name: str) -> pa.Table:
@@ -338,7 +358,7 @@ def _read_table(root: Path, manifest: Manifest, name: str) -> pa.Table:
 
 
 def open_store(store: RunStore) -> Run:
-    """Open the run in a store for reading.
+    """Open the run in a store for reading; its code has run already.
 
     Raises:
         ArtifactError: The store is not closed yet.
@@ -346,8 +366,9 @@ def open_store(store: RunStore) -> Run:
     if not store.is_closed:
         raise ArtifactError("the run is not closed yet: close() it before reading it")
     if store.directory is None or store.root is None:
-        return Run(None, store.manifest, store.names, store.arrow)
-    return open_run(store.directory if _is_at(store.directory, store.root) else store.root)
+        return Run(None, store.manifest, store.names, store.arrow, trust=True)
+    is_there = _is_at(store.directory, store.root)
+    return open_run(store.directory if is_there else store.root, trust=True)
 
 
 def _is_at(path: Path, root: Path) -> bool:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fleet2d.artifacts.arrow import values_of
 from fleet2d.artifacts.table import KEY_KINDS, PLANNED, WALK
 from fleet2d.bounds import one_line
-from fleet2d.configuration.trust import restrict_stored
+from fleet2d.configuration.trust import stored_code
 from fleet2d.configuration.units import whole_steps
 from fleet2d.entities.body import Pose
 from fleet2d.errors import ArtifactError
@@ -245,8 +245,9 @@ def _walker(
     from fleet2d.floorplan.home import Home
     from fleet2d.scenario.model import load_scenario
 
-    with restrict_stored():
-        scenario = load_scenario({key: sections[key] for key in _BODIES if key in sections})
+    bodies = {key: sections[key] for key in _BODIES if key in sections}
+    with stored_code(run.directory or "the run", bodies, trust=run.trust):
+        scenario = load_scenario(bodies)
     bucket = "users" if entity in scenario.users else "robots"
     body = {**scenario.users, **scenario.robots}[entity]
     home = Home(plan)

@@ -40,7 +40,6 @@ from fleet2d.configuration.problems import (
     shown,
     suggest,
 )
-from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import (
     Duration,
     PositiveDuration,
@@ -348,7 +347,6 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
     Raises:
         ScenarioError: as `load_scenario`.
     """
-    check_code("the scenario", document.data)
     try:
         scenario = Scenario.model_validate(document.data, context={})
     except ValidationError as error:

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import secrets
 import subprocess
 import sys
 import time
@@ -201,7 +202,7 @@ class SlurmExecutor:
         Args:
             workers: The largest number of jobs at a time; None: 16.
             parameters: submitit's parameters of a job: timeout_min, mem_gb, slurm_partition, …
-            folder: The folder of logs and results, on a disk that all nodes share.
+            folder: Where to put a new folder of logs and results, on a disk that all nodes share.
             cluster: `slurm`; or `local`, for processes on this machine, to try things out.
 
         Raises:
@@ -216,7 +217,9 @@ class SlurmExecutor:
         self._attempts: dict[int, int] = {}
         wrong = (RuntimeError, NameError, TypeError, ValueError)
         with errors_as(InputError, "jobs of Slurm can't be submitted", of=wrong):
-            self._executor = submitit.AutoExecutor(folder=str(folder), cluster=cluster)
+            # Results come as pickles: in a folder in which nobody can have put any before.
+            jobs = Path(folder) / secrets.token_hex(8)
+            self._executor = submitit.AutoExecutor(folder=jobs, cluster=cluster)
             self._executor.update_parameters(
                 **{"name": "fleet2d", "slurm_array_parallelism": self.workers, **(parameters or {})}
             )

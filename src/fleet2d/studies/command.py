@@ -15,7 +15,7 @@ import typer
 
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, end_by_signal, printable
-from fleet2d.options import TrustFiles, TrustFolders, Workers, restrict_to
+from fleet2d.options import Trust, Workers, show_code
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy
@@ -70,8 +70,6 @@ def run(  # noqa: PLR0913 - options of the command line
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
 ) -> None:
     """Run the variants of a study that have no results yet."""
     from fleet2d.studies.api import default_location, make_executor
@@ -79,18 +77,13 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.progress import observing
 
     begin_s = time.perf_counter()
-    with restrict_to(trust, trust_dir):
-        checked = check_study(source, _print_size)
-        if dry_run:
-            _print_plan(checked, workers, begin_s)
-            return
+    checked = check_study(source, _print_size)
+    if dry_run:
+        _print_plan(checked, workers, begin_s)
+        return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    with (
-        _interruptible(location),
-        restrict_to(trust, trust_dir),
-        observing(quiet=quiet) as observer,
-    ):
+    with _interruptible(location), observing(quiet=quiet) as observer:
         where = make_executor(executor, workers, slurm_parameters(slurm))
         counts = run_study(
             checked, location, where, fail_fast=fail_fast, changed=changed, observer=observer
@@ -153,8 +146,7 @@ def rerun(
         str, typer.Argument(metavar="VARIANT", help="Its number, or the start of its identity.")
     ],
     out: Annotated[Path | None, typer.Option(help="Store the run in this directory.")] = None,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Run one variant again, and compare its digest with the stored one."""
     from fleet2d.studies.reader import open_study
@@ -164,8 +156,9 @@ def rerun(
     number = row["variant"]
     labels = ", ".join(f"{c} = {row[c]}" for c in study.columns if row[c] is not None)
     _print(f"variant {number}: {labels}")
-    with restrict_to(trust, trust_dir):
-        repeated = study.rerun(number, out)
+    if trust:
+        show_code({"scenario": study.scenario(number)})
+    repeated = study.rerun(number, out, trust=trust)
     if out is not None:
         _print(f"stored in {out}")
     if row["digest"] is None:
@@ -366,7 +359,7 @@ def _interruptible(location: str | Path) -> Iterator[None]:
         signal.signal(signal.SIGTERM, handler)
 
 
-def tune(  # noqa: PLR0913 - options of the command line
+def tune(
     source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="A study that tunes.")],
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
@@ -380,8 +373,6 @@ def tune(  # noqa: PLR0913 - options of the command line
         str | None, typer.Option(help="A database for the trials: sqlite:///trials.db.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
 ) -> None:
     """Search parameters on training homes, and judge the best on other homes."""
     from fleet2d.studies.api import default_location, make_executor
@@ -389,12 +380,11 @@ def tune(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.specification import read_specification
     from fleet2d.studies.tuning import tune as search
 
-    with restrict_to(trust, trust_dir):
-        specification = read_specification(source)
+    specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
     show = sys.stderr.isatty() and not quiet
     runner = make_executor(executor, workers, slurm_parameters(slurm))
-    with _interruptible(folder), restrict_to(trust, trust_dir), observing_trials(show=show) as bar:
+    with _interruptible(folder), observing_trials(show=show) as bar:
         result = search(specification, folder, runner, bar, changed=changed, storage=storage)
     if quiet:
         return

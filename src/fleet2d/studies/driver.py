@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import (
@@ -170,24 +169,21 @@ class StudyJob:
         design: The design.
         metrics: Patterns of the numbers to keep.
         tables: Names of the tables to keep.
-        trust: The code that workers may run; None: any.
     """
 
     design: Design
     metrics: tuple[str, ...]
     tables: tuple[str, ...]
-    trust: Trust | None = field(default_factory=current_trust)
 
     def __call__(self, task: WorkerTask) -> VariantRecord:
         """Run a variant; return its record, with the error if it fails."""
-        with restrict(self.trust):
-            try:
-                scenario = self.scenario(task)
-            except Fleet2DError as error:  # a file changed after the study was planned
-                outcome = VariantOutcome("failed", error=describe_error(error))
-            else:
-                outcome = execute(scenario, self.metrics, self.tables)
-            return record_of(task, outcome)
+        try:
+            scenario = self.scenario(task)
+        except Fleet2DError as error:  # a file changed after the study was planned
+            outcome = VariantOutcome("failed", error=describe_error(error))
+        else:
+            outcome = execute(scenario, self.metrics, self.tables)
+        return record_of(task, outcome)
 
     def scenario(self, task: WorkerTask) -> Scenario:
         """Return the scenario of a variant.

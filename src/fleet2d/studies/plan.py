@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.configuration.problems import did_you_mean, suggest
-from fleet2d.configuration.trust import Trust, current_trust, restrict
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError, ScenarioError
 from fleet2d.kernels import F64, I32, Bool
@@ -360,17 +359,15 @@ def _covering(design: Design, numbers: NDArray[np.integer[Any]]) -> Iterator[int
         yield int(numbers[0])
 
 
-def setup_problem(design: Design, trust: Trust | None, task: WorkerTask) -> str:
+def setup_problem(design: Design, task: WorkerTask) -> str:
     """Set a variant up without running it; return the error, empty if there is none.
 
     Args:
         design: The design.
-        trust: The code that may run; None: any.
         task: The variant.
     """
     try:
-        with restrict(trust):
-            check_setup(design.scenario(task.index))
+        check_setup(design.scenario(task.index))
     except Fleet2DError as error:
         return str(error)
     return ""
@@ -387,7 +384,7 @@ def check_setups(
     problems: dict[int, str] = {}
     tasks = list(map(plan.variants.task, setups_to_check(plan)))
     runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
-    job = partial(setup_problem, plan.design, current_trust())
+    job = partial(setup_problem, plan.design)
     with closing(runner.run(job, TaskSchedule(tasks))) as events:
         for done, event in enumerate(events):
             on_progress(done + 1, len(tasks))

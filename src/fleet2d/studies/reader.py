@@ -1,6 +1,6 @@
 """Reading a study: its variants and its tables as one data set that needn't fit into memory."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -220,7 +220,7 @@ class Study(StudyAnswers):
         variant: int,
         out: str | Path | None = None,
         *,
-        trust: Iterable[str | Path] = (),
+        trust: bool = False,
         **settings: Any,
     ) -> "Run":
         """Run one variant again.
@@ -228,19 +228,19 @@ class Study(StudyAnswers):
         Args:
             variant: Its number.
             out: Where to store the run; None: in memory.
-            trust: Files and folders of code that may run, for scenarios with components of the
-                user.
+            trust: Whether its own code and programs may run, if it has some.
             settings: Changes of the scenario, as of `fleet2d.run`, such as more `artifacts`.
 
         Raises:
             RunDirectoryError: There is no such variant, or the directory can't be used.
-            ScenarioError: Its code isn't trusted.
+            UntrustedCodeError: It has code of its own, and isn't trusted.
         """
-        from fleet2d.configuration.trust import Trust, restrict_stored
+        from fleet2d.configuration.trust import stored_code
         from fleet2d.studies.simulator import run_scenario
 
-        with restrict_stored(Trust.of(trust)):
-            return run_scenario(self.scenario(variant), out=out, **settings)
+        scenario = self.scenario(variant)
+        with stored_code(f"variant {variant} of {self._directory.location}", scenario, trust=trust):
+            return run_scenario(scenario, out=out, **settings)
 
     @property
     def complete(self) -> "pl.DataFrame":

@@ -12,7 +12,6 @@ from fleet2d.bounds import one_line
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import Location, problem, problem_at, suggest
-from fleet2d.configuration.trust import check_code
 from fleet2d.configuration.units import PositiveDuration, folder_of
 from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
@@ -327,7 +326,6 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
     except ValidationError as error:
         raise explain(error, document) from None
     base = _base(file.base, document)
-    check_code(str(path or "the study"), [document.data, base.data])
     return Specification(file, document, base, folder, path)
 
 

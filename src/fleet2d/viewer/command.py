@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.options import ThemeChoice, TrustFiles, TrustFolders, restrict_to, resume_hint, split
+from fleet2d.options import ThemeChoice, Trust, resume_hint, show_code, split
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -29,8 +29,7 @@ def view(
     browser: Annotated[bool, typer.Option(help="Whether to open the browser.")] = True,
     seed: Annotated[int | None, typer.Option(help="Of a scenario: its seed.")] = None,
     out: Annotated[Path | None, typer.Option(help="Of a scenario: directory of the run.")] = None,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Show runs in the browser, on this machine only; Ctrl-C ends it."""
     names = list(arguments or [])
@@ -38,10 +37,7 @@ def view(
     if names and all(path.is_dir() for path in directories):
         if seed is not None or out is not None:
             raise InputError("--seed and --out are for a scenario, not for stored runs")
-        with restrict_to(trust, trust_dir):
-            if trust or trust_dir:
-                _import_code(directories)
-            _view_runs(directories, port, seen_at or "", browser=browser)
+        _view_runs(directories, port, seen_at or "", browser=browser, trust=trust)
         return
     scenario, overrides = split(names)
     if scenario is not None and scenario.endswith("/"):
@@ -51,15 +47,14 @@ def view(
     from fleet2d.viewer.page_server import PageServer
 
     settings: dict[str, Any] = {} if seed is None else {"seed": seed}
-    with restrict_to(trust, trust_dir):
-        live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
-        server = PageServer([], port=port, live=live, seen_at=seen_at or "")
-        live.start()
-        try:
-            server.show(open_browser=browser, announce=_announce)
-        finally:
-            live.end()
-            server.end_branches()
+    live = LiveRun(Simulation(scenario, *overrides, out=out, **settings), paused=True)
+    server = PageServer([], port=port, live=live, seen_at=seen_at or "")
+    live.start()
+    try:
+        server.show(open_browser=browser, announce=_announce)
+    finally:
+        live.end()
+        server.end_branches()
     if live.failure is not None:
         raise live.failure
     assert live.run is not None
@@ -77,8 +72,12 @@ def _where(run: "Run") -> str:
     return resume_hint(time, run.directory)
 
 
-def _view_runs(directories: list[Path], port: int, seen_at: str, *, browser: bool) -> None:
+def _view_runs(
+    directories: list[Path], port: int, seen_at: str, *, browser: bool, trust: bool
+) -> None:
     from fleet2d.artifacts.manifest import FILE_NAME
+    from fleet2d.runs.run import open_run
+    from fleet2d.viewer.page_data import PageData
     from fleet2d.viewer.page_server import MAX_RUNS, PageServer
 
     if len(directories) > MAX_RUNS:
@@ -86,27 +85,22 @@ def _view_runs(directories: list[Path], port: int, seen_at: str, *, browser: boo
     for path in directories:
         if not (path / FILE_NAME).exists():
             raise RunDirectoryError(f"{path} holds no run: give what `fleet2d run --out` wrote")
-    server = PageServer(directories, port=port, seen_at=seen_at)
+    trusted = [open_run(path, trust=True) for path in directories if trust]
+    for run in trusted:
+        show_code(run.manifest)
+    sources = [PageData(run) for run in trusted] or directories
+    server = PageServer(sources, port=port, seen_at=seen_at)
     server.show(open_browser=browser, announce=_announce)
     for run in server.end_branches():
         typer.echo(_where(run), err=True)
     raise typer.Exit(130)
 
 
-def _import_code(directories: list[Path]) -> None:
-    """Import the trusted code of runs; later, in the threads of the server, no code is trusted."""
-    from fleet2d.runs.run import open_run
-    from fleet2d.scenario.model import load_scenario
-
-    for directory in directories:
-        load_scenario(open_run(directory).manifest["scenario"])
-
-
 def _announce(address: str) -> None:
     typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")
 
 
-def film(  # noqa: PLR0913 - options of the command line
+def film(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
     out: Annotated[Path | None, typer.Option(help="Film to write: .mp4, .gif or .webp.")] = None,
     begin: Annotated[
@@ -116,8 +110,7 @@ def film(  # noqa: PLR0913 - options of the command line
     speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
     height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
     theme: ThemeChoice = "light",
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Make a film of a stretch of a stored run."""
     from fleet2d.pictures.theme import themed
@@ -125,10 +118,12 @@ def film(  # noqa: PLR0913 - options of the command line
     from fleet2d.viewer.film import write_film
     from fleet2d.viewer.moments import steps_of
 
-    run = open_run(directory)
+    run = open_run(directory, trust=trust)
+    if trust:
+        show_code(run.manifest)
     first, last = steps_of(run, begin, end)
     target = out or directory / "film.mp4"
-    with themed(theme), restrict_to(trust, trust_dir):
+    with themed(theme):
         frames = write_film(run, target, first, last, speed=speed, height=height)
     typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
 
@@ -136,14 +131,15 @@ def film(  # noqa: PLR0913 - options of the command line
 def report(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
     out: Annotated[Path | None, typer.Option(help="HTML file to write.")] = None,
-    trust: TrustFiles = None,
-    trust_dir: TrustFolders = None,
+    trust: Trust = False,
 ) -> None:
     """Write a report of a stored run: what ran, metrics, figures, how to run it again."""
     from fleet2d.runs.run import open_run
     from fleet2d.viewer.report import write_report
 
     target = out or directory / "report.html"
-    with restrict_to(trust, trust_dir):
-        write_report(open_run(directory), target)
+    run = open_run(directory, trust=trust)
+    if trust:
+        show_code(run.manifest)
+    write_report(run, target)
     typer.echo(target)

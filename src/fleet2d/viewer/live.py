@@ -8,14 +8,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from contextvars import copy_context
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fleet2d.configuration.documents import parse_yaml
+from fleet2d.configuration.trust import running_code
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor
@@ -229,9 +228,7 @@ class LiveRun:
         self._lock = threading.Lock()
         self._is_ending = self._streams_end = False
         self._frame = self._state()
-        # In the present context: what code is trusted there, is in the thread.
-        run_loop = partial(copy_context().run, self._run_loop)
-        self._thread = threading.Thread(target=run_loop, daemon=True, name="fleet2d-live")
+        self._thread = threading.Thread(target=self._run_loop, daemon=True, name="fleet2d-live")
 
     def start(self) -> None:
         """Start the simulation."""
@@ -323,7 +320,8 @@ class LiveRun:
             self._paused = True
             self.engine.simulation.advance(max(1, min(DAY_S, round(order["value"]))))
         else:
-            self.engine.apply(order)
+            with running_code(allowed=self.engine.simulation.runs_code):
+                self.engine.apply(order)
 
     def _state(self) -> LiveFrame:
         """Return the frame of the current step; events and marks since the last one."""

@@ -10,7 +10,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
 from fleet2d.artifacts.manifest import plain
-from fleet2d.configuration.trust import restrict_stored
+from fleet2d.configuration.trust import running_code
 from fleet2d.engine.repeat import branch, repeat_until
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
@@ -70,8 +70,7 @@ class LiveRuns:
             if sum(live.run is None for live in self._branches) >= MAX_BRANCHES:
                 raise InputError(f"{MAX_BRANCHES} branches are under way: run one to its end first")
             simulation = self._branch(order["of"], order["step"])
-            with restrict_stored():  # no code but the user's trusted one runs in its thread
-                live = LiveRun(simulation, paused=True)
+            live = LiveRun(simulation, paused=True)
             directory = simulation.directory
             title = directory.name if directory else f"branch of {order['of']}"
             session = self._add(live, title, order["of"], order["step"])
@@ -91,7 +90,8 @@ class LiveRuns:
         scenario["simulation"]["seed"] = simulation.seed
         content = {"scenario": scenario, "interventions": simulation.interventions}
         directory = free_directory(simulation.directory)
-        return repeat_until({**content, "expectations": {}}, step, directory)
+        with running_code(allowed=simulation.runs_code):
+            return repeat_until({**content, "expectations": {}}, step, directory)
 
     def _live(self, number: int) -> LiveRun:
         if not 0 <= number < len(self._lives):

@@ -1,7 +1,6 @@
 """The server of the page: it serves the page and some runs on this machine, and nothing else."""
 
 import asyncio
-import os
 import re
 import secrets
 import signal
@@ -26,13 +25,13 @@ from fleet2d import __version__
 from fleet2d.bounds import one_line
 from fleet2d.errors import InputError, end_by_signal, extra
 from fleet2d.runs.run import Run
+from fleet2d.storage.secret_files import UnusableSecretError, user_secret
 from fleet2d.viewer.contract import SessionFacts
 from fleet2d.viewer.live import LiveRun
 from fleet2d.viewer.live_runs import LiveRuns
 from fleet2d.viewer.page_data import PageData
 from fleet2d.viewer.served_runs import ServedRuns, json_answer, problem
 
-TOKEN = re.compile(r"[\w-]{32,64}", re.ASCII)
 HOSTS = ("127.0.0.1", "localhost", "[::1]")
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:;"
@@ -55,22 +54,9 @@ def new_token() -> str:
 
 
 def kept_token() -> str:
-    """Return the token of this user, so that links stay valid; a new one where none can be kept.
-
-    It is in `fleet2d/view-token` of the user's state folder, which nobody else may read.
-    """
-    default = Path("~/.local/state")
-    folder = Path(os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA") or default)
-    path = folder.expanduser() / "fleet2d" / "view-token"
-    with suppress(OSError, RuntimeError, ValueError):
-        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with suppress(FileExistsError):
-            path.touch(0o600, exist_ok=False)
-            path.write_text(new_token())
-        kept, mode = path.read_text(), path.stat().st_mode
-        is_private = os.name == "nt" or not mode & 0o077
-        if is_private and not path.is_symlink() and TOKEN.fullmatch(kept):
-            return kept
+    """Return the token of this user, so that links stay valid; a new one where none can be kept."""
+    with suppress(UnusableSecretError):
+        return user_secret("view-token").decode()
     return new_token()
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fleet2d.configuration.components import register
-from fleet2d.configuration.trust import check_trust
+from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
@@ -90,7 +90,7 @@ class ProcessBehavior(Behavior):
 
     def start(self, actor: Actor) -> None:
         """Check that the program may run; it starts at the first decision."""
-        check_trust("process", [self.command])
+        check_may_run("process", [self.command])
         about = {
             "name": actor.name,
             "start": actor.clock.start.isoformat(),
