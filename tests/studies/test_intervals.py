@@ -81,9 +81,12 @@ def test_one_value_has_no_interval() -> None:
     assert math.isnan(estimate([]).mean)
 
 
-def test_equal_values_have_an_interval_of_no_width() -> None:
-    mean = estimate([0.5, 0.5, 0.5])
-    assert (0.5, 0.5) == (mean.low, mean.high)
+def test_equal_values_do_not_tell_how_much_others_differ() -> None:
+    for values in ([0.5, 0.5, 0.5], [0.1 + 0.2, 0.3, 0.3]):
+        mean = estimate(values)
+        assert math.isnan(mean.low)
+        assert math.isnan(mean.high)
+        assert "all 3 values are equal" in mean.doubt
 
 
 def test_levels_with_a_single_unit_do_not_count() -> None:
@@ -117,7 +120,7 @@ def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five() -> None:
 @pytest.mark.parametrize("homes", [8, 15, 30])
 def test_they_hold_the_mean_of_homes_with_a_long_tail(homes: int) -> None:
     generator = np.random.default_rng(homes)
-    samples = np.exp(generator.normal(0, 1, (STUDIES, homes)))
+    samples = np.exp(generator.normal(0, 1, (5 * STUDIES, homes)))
     means = [estimate(values) for values in samples]
     hits = [mean.low <= np.exp(0.5) <= mean.high for mean in means]
     by_student = [
@@ -137,7 +140,9 @@ def test_p_values_are_below_five_percent_where_intervals_exclude_zero() -> None:
 
 def test_p_values_of_one_value_or_of_equal_ones() -> None:
     assert math.isnan(estimate([0.5]).p_value)
-    assert (0.0, 1.0) == (estimate([0.5, 0.5]).p_value, estimate([0.0, 0.0]).p_value)
+    equal = [0.5] * 6
+    # Of the sign test: 2 of the 64 patterns of signs are as extreme as six of the same.
+    assert (2 / 64, 1.0) == (estimate(equal).p_value, estimate([0.0, 0.0]).p_value)
 
 
 def test_a_study_of_the_size_that_is_needed_detects_the_effect() -> None:
