@@ -254,6 +254,8 @@ class Study(StudyAnswers):
         Raises:
             InputError: There is no such metric.
         """
+        if not self.counts.complete:
+            raise InputError(f"{self.location} has no complete variant, and so no {metric!r}")
         if metric not in self.metrics:
             hint = did_you_mean(metric, self.metrics)
             raise InputError(
