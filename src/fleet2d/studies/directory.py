@@ -149,8 +149,8 @@ class Meta:
 
     def _facts(self, metric: str) -> tuple[MetricFacts, str]:
         """Return what readers should know of a metric, and the last part of its name."""
-        entry, *_, last = metric.split(".")
-        return self.metrics.get(entry, MetricFacts()), last
+        names = metric.split(".")
+        return self.metrics.get(names[0], MetricFacts()), names[-1]
 
 
 class StudyDirectory:
