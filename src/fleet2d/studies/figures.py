@@ -55,7 +55,7 @@ def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
     day = (pl.col("time") - start).dt.total_microseconds() / DAY_US
     return (
         rows.with_columns(day.alias(DAY), pl.col(column).alias(VALUE))
-        .group_by(VARIANT, DAY, *study.columns)
+        .group_by(VARIANT, DAY, *study.columns, maintain_order=True)
         .agg(pl.col(VALUE).mean())
         .sort(VARIANT, DAY)
         .collect()
@@ -201,7 +201,8 @@ def draw_course(
         group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(value))
         points = []
         for day in moments:
-            rows = group.filter(pl.col(DAY) == day).group_by(list(units) or ["variant"])
+            rows = group.filter(pl.col(DAY) == day)
+            rows = rows.group_by(list(units) or [VARIANT], maintain_order=True)
             cells = rows.agg(pl.col(VALUE).mean()).drop_nulls()
             if len(cells):
                 levels = {unit: cells[unit].to_list() for unit in units}
