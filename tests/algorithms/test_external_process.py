@@ -129,6 +129,11 @@ def test_a_program_that_is_not_ready_is_quoted(tmp_path: Path) -> None:
             "returned 2 shares, but the home has 14 rooms",
         ),
         ("say({'type': 'output', 'blocks': [['x', 10**12]]})", "a block is too large"),
+        ("say({'type': 'output', 'blocks': [['x', -1]]})", "a block is too large"),
+        (  # A block may be empty: what is wrong comes after it.
+            "say({'type': 'output', 'share': [1, 2], 'blocks': [['x', 0]]})",
+            "returned 2 shares, but the home has 14 rooms",
+        ),
         (
             "[say({'type': 'none'}) for _ in range(2)]; time.sleep(0.1)",
             """wrote b'{"type": "none"}\\n' without being asked""",

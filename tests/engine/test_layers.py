@@ -4,6 +4,7 @@ import copy
 import json
 from collections.abc import Mapping, Set
 from datetime import timedelta
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -190,6 +191,15 @@ def test_layer_is_stored_when_it_is_due_and_at_the_end() -> None:
         read_layer(stored, "dust", 5)
     with pytest.raises(ArtifactError, match="no layer 'dusk': did you mean 'dust'"):
         read_layer(stored, "dusk")
+
+
+def test_layer_without_rows_was_never_stored() -> None:
+    content = scenario("1 min", algorithms={"dirt": {"type": f"{HERE}:Dirt", "period": "1 min"}})
+    rows = run(content).tables["layer.dust"]
+    empty: Any = SimpleNamespace(tables={"layer.dust": rows.slice(0, 0)})
+
+    with pytest.raises(ArtifactError, match="the layer 'dust' was never stored"):
+        read_layer(empty, "dust")
 
 
 def test_entities_and_algorithms_write_to_one_layer_and_spans_do_not_show() -> None:

@@ -77,6 +77,18 @@ def test_a_failed_write_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert ["one", "three"] == texts_of(tmp_path / "journal")
 
 
+def test_frames_end_at_a_kind_that_the_journal_does_not_have(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    written(path, ["one"]).close()
+    first = next(read_frames(path, NOTES))
+    later = JournalFormat(NOTES.magic, (*NOTES.kinds, "of a later version"))
+    writer = FrameWriter(path, later, first.end)
+    writer.add("of a later version", '"two"')
+    writer.commit()
+    writer.close()
+    assert ["one"] == texts_of(path)
+
+
 def test_other_files_have_no_frames(tmp_path: Path) -> None:
     assert [] == texts_of(tmp_path / "nothing")
     (tmp_path / "text").write_text("hello")

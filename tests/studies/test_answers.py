@@ -10,7 +10,7 @@ import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.studies.answers import StudyAnswers, holm, variance_ratio
+from fleet2d.studies.answers import StudyAnswers, holm, judged, variance_ratio
 
 COLUMNS = ("method", "robot", "home", "seed")
 
@@ -245,3 +245,117 @@ def test_an_effect_needs_the_more_homes_the_smaller_it_is() -> None:
 def test_the_power_of_one_pair_is_unknown() -> None:
     with pytest.raises(InputError, match="run a small study"):
         power(variants(homes=1, seeds=1).filter(pl.col("robot") == "patrol"), 0.5)
+
+
+class Shares(Answers):
+    """The answers of a study whose metric is a share, the higher the better."""
+
+    def limits(self, metric: str) -> tuple[float, float]:
+        return 0.0, 1.0
+
+    def better(self, metric: str) -> str:
+        return "higher"
+
+
+def by_method(*values: list[float]) -> pl.DataFrame:
+    """Variants of methods `old`, `m1`, `m2` …, with a value for each home."""
+    names = ["old", *(f"m{n}" for n in range(1, len(values)))]
+    return pl.DataFrame(
+        {"method": name, "robot": "patrol", "home": home, "seed": 0, "score": score}
+        for name, scores in zip(names, values, strict=True)
+        for home, score in enumerate(scores)
+    )
+
+
+def test_intervals_of_shares_and_of_their_differences_stay_within_what_is_possible() -> None:
+    answers = Shares(by_method([0.0, 0.0, 0.9, 0.0], [1.0, 0.9, 1.0, 0.0]))
+    table = answers.paired("score", {"method": "old"}, ["home"])
+    assert 1 == table["high"][0]
+    means = answers.summary("score", ["method"])
+    assert means["low"].min() == 0  # type: ignore[comparison-overlap]
+    assert means["high"].max() == 1  # type: ignore[comparison-overlap]
+    assert (-1, 1) <= tuple(answers.effects("score").select("low", "high").row(0))
+
+
+def test_a_verdict_follows_the_corrected_p() -> None:
+    generator = np.random.default_rng(4)
+    old = generator.normal(0, 1, 30)
+    noise = generator.normal(0, 1, 30)
+    noise = (noise - noise.mean()) / noise.std()
+    methods = [old + noise + effect for effect in np.linspace(0.1, 1, 8)]
+    rows = compare(by_method(old.tolist(), *(scores.tolist() for scores in methods)))
+    assert any(row["p"] < 0.05 <= row["p_holm"] for row in rows)
+    assert any(row["p_holm"] < 0.05 for row in rows)
+    for row in rows:
+        assert row["clear"] == (row["p_holm"] < 0.05) == ("above old" in row["verdict"])
+        assert row["clear"] != ("too few replicates to tell" in row["verdict"])
+
+
+def test_tables_that_are_read_together_are_corrected_together() -> None:
+    generator = np.random.default_rng(4)
+    old = generator.normal(0, 1, 30)
+    new = old + 0.5 + generator.normal(0, 1, 30)
+    answers = Answers(by_method(old.tolist(), new.tolist()))
+    alone = answers.paired("score", {"method": "old"})
+    assert alone["clear"].all()
+    together = judged([alone] * 30)
+    assert 30 == len(together)
+    assert not any(table["clear"].any() for table in together)
+    assert all("for so many comparisons" in table["verdict"][0] for table in together)
+
+
+def test_a_clear_difference_of_few_homes_is_told_without_its_amount() -> None:
+    (row,) = compare(variants())
+    assert row["clear"]
+    assert "above old in 64 of 64 pairs; how much can't be told" in row["verdict"]
+    assert "8 values of home miss a kind" in row["doubt"]
+
+
+def test_enough_homes_have_an_interval_that_is_told() -> None:
+    (row,) = compare(variants(homes=30))
+    assert "" == row["doubt"]
+    assert "above old in 240 of 240 pairs" == row["verdict"]
+
+
+def test_a_verdict_says_what_is_better() -> None:
+    generator = np.random.default_rng(4)
+    old = generator.uniform(0.3, 0.5, 30)
+    worse = (old - generator.uniform(0.1, 0.2, 30)).tolist()
+    answers = Shares(by_method(old.tolist(), worse))
+    (row,) = answers.paired("score", {"method": "old"}).to_dicts()
+    assert "below old in 30 of 30 pairs, which is worse" == row["verdict"]
+
+
+def test_a_mean_against_most_pairs_tells_nothing_from_few_homes() -> None:
+    few = [-0.02, -0.01, -0.03, -0.02, 4.0, 4.2, 4.1]
+    (row,) = compare(by_method([0.0] * 7, few))
+    assert not row["clear"]
+
+
+@pytest.mark.parametrize(
+    ("difference", "p", "words"),
+    [(0.0, 1.0, "the same as old in every pair"), (0.5, 0.25, "too few replicates to tell")],
+)
+def test_equal_differences_of_three_homes_show_nothing(
+    difference: float, p: float, words: str
+) -> None:
+    (row,) = compare(by_method([1.0, 2.0, 4.0], [1.0 + difference, 2 + difference, 4 + difference]))
+    assert (p, False) == (row["p"], row["clear"])
+    assert words in row["verdict"]
+    assert math.isnan(row["low"])
+    assert "all 3 values are equal" in row["doubt"]
+
+
+def test_equal_differences_of_eight_homes_are_clear() -> None:
+    (row,) = compare(by_method([1.0] * 8, [1.5] * 8))
+    assert row["clear"]
+    assert 2 / 2**8 == row["p"]
+    assert "above old in 8 of 8 pairs" in row["verdict"]
+
+
+def test_one_home_and_one_seed_have_no_interval() -> None:
+    answers = Answers(by_method([1.0], [2.0]))
+    (row,) = answers.paired("score", {"method": "old"}).to_dicts()
+    assert (False, True) == (row["clear"], math.isnan(row["low"]))
+    assert "one pair only" in row["verdict"]
+    assert "one value alone" in answers.summary("score", ["method"])["doubt"][0]

@@ -1,6 +1,7 @@
 """Reading studies with polars, pandas, DuckDB and Arrow, and answers from them."""
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 from tests.studies.scenes import SPEED, run, small
 
-from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
+from fleet2d.errors import ArtifactError, ComponentError, InputError, RunDirectoryError
+from fleet2d.metrics.sightings import Sightings
 from fleet2d.studies.reader import Study, open_study
 
 SIGHTINGS = "sightings.ana"
@@ -100,6 +102,28 @@ def test_a_metric_or_axis_that_is_not_there_is_named(study: Study) -> None:
         study.paired(SIGHTINGS, {SPEED: 0.4})
     with pytest.raises(InputError, match="no axis 'sped'"):
         study.paired(SIGHTINGS, {"sped": 0.4})
+
+
+def test_what_numbers_can_be_and_which_are_better_is_known(study: Study) -> None:
+    assert (0, 1) == study.limits("sightings.ana")
+    assert (0, math.inf) == study.limits("distance.astro")
+    assert (-math.inf, math.inf) == study.limits("unknown")
+    assert ["higher", "", ""] == [
+        study.better(metric) for metric in ("sightings.ana", "distance.astro", "unknown")
+    ]
+
+
+def test_a_study_whose_variants_all_failed_has_no_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any) -> None:
+        raise ComponentError("no more memory")
+
+    monkeypatch.setattr(Sightings, "update", fails)
+    counts, failed = run(small(), tmp_path / "study")
+    assert (6, 6) == (counts.total, counts.failed)
+    with pytest.raises(InputError, match=r"has no complete variant, and so no 'sightings\.ana'"):
+        failed.paired("sightings.ana", {SPEED: 0.3})
 
 
 def test_a_scenario_of_a_study_runs_as_any_other(study: Study) -> None:

@@ -1,5 +1,6 @@
 """The report of a study: one page that explains its numbers, its figures, and its tables as files."""
 
+import html
 import re
 from pathlib import Path
 
@@ -108,6 +109,19 @@ def test_p_values_are_corrected_over_all_comparisons(study: Study, page: Path) -
     smallest = min(table["p"].min() for table in tables)  # type: ignore[type-var]
     corrected = min(table["p_holm"].min() for table in tables)  # type: ignore[type-var]
     assert corrected == pytest.approx(min(1, 3 * smallest))  # type: ignore[operator]
+
+
+def test_only_differences_that_are_clear_after_correction_are_bold(
+    study: Study, page: Path
+) -> None:
+    text = page.read_text()
+    tables = [pl.read_csv(page.parent / f"tables/compare-{n}.csv") for n in (1, 2)]
+    rows = [row for table in tables for row in table.to_dicts()]
+    bold = re.findall("<b>(.*?)</b>", text)
+    assert [html.escape(row["verdict"]) for row in rows if row["p_holm"] < 0.05] == bold
+    # Two homes leave out too much to tell by how much.
+    assert not re.search(r"<td>[^<]* to [^<]*</td>", text)
+    assert "<td>can&#x27;t tell</td>" in text
 
 
 def test_short_names_are_unique() -> None:

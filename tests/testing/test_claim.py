@@ -11,6 +11,7 @@ from fleet2d.testing.claim import (
     Claim,
     RateTest,
     SetUpError,
+    nested_rate_interval,
     rate_interval,
     rate_test,
     seeds_for,
@@ -123,6 +124,43 @@ def test_the_interval_of_a_rate_holds_it_in_95_of_100_cases(rate: float) -> None
     assert rate_interval(0, 10)[0] == 0.0
     assert rate_interval(10, 10)[1] == 1.0
     assert rate_interval(10, 10)[0] == pytest.approx(0.025 ** (1 / 10))
+
+
+@pytest.mark.parametrize("held", [0, 1, 19, 20])
+def test_the_interval_of_a_rate_is_within_0_and_1(held: int) -> None:
+    low, high = rate_interval(held, 20)
+    assert 0 <= low <= held / 20 <= high <= 1
+    assert 0 < high - low < 1
+
+
+def test_trials_that_share_no_home_are_independent() -> None:
+    outcomes = [True] * 9 + [False]
+    assert rate_interval(9, 10) == nested_rate_interval([[held] for held in outcomes])
+    assert rate_interval(9, 10) == nested_rate_interval([outcomes])  # seeds of one scenario
+
+
+def test_trials_that_share_homes_tell_less_the_more_homes_differ() -> None:
+    alike = nested_rate_interval([[True] * 3 + [False]] * 5)
+    different = nested_rate_interval([[True] * 4] * 3 + [[True] * 3 + [False]] + [[False] * 4])
+    assert alike == rate_interval(15, 20)
+    assert different[1] - different[0] > 1.3 * (alike[1] - alike[0])
+    # Whether homes differ isn't known if nothing ever failed, or nothing ever held.
+    assert rate_interval(4, 4) == nested_rate_interval([[True] * 10] * 4)
+    assert rate_interval(0, 4) == nested_rate_interval([[False] * 10] * 4)
+
+
+def test_the_interval_of_a_rate_holds_it_where_homes_differ() -> None:
+    generator = np.random.Generator(np.random.Philox(6))
+    inside = alone = 0
+    for _ in range(300):
+        rates = generator.beta(3, 1, 10)  # of homes; the mean is 0.75
+        held = generator.random((10, 8)) < rates[:, None]
+        low, high = nested_rate_interval(held.tolist())
+        inside += low <= 0.75 <= high
+        low, high = rate_interval(int(held.sum()), held.size)
+        alone += low <= 0.75 <= high
+    assert inside >= 0.9 * 300
+    assert alone < 0.9 * 300
 
 
 @pytest.mark.parametrize(("holds", "other"), [(1.0, 0.9), (0.9, 0.7), (0.95, 0.8)])

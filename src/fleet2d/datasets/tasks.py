@@ -178,7 +178,8 @@ def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
     homes, number = np.unique(made.home, return_inverse=True)
     by_home = np.bincount(number, loss - prior) / np.bincount(number)
     difference = estimate(by_home, {"home": homes.tolist()})
-    ends = {"lower end": difference.low, "upper end": difference.high}
+    low, high = (0.0, 0.0) if name == PRIOR else (difference.low, difference.high)
+    ends = {"lower end": low, "upper end": high}
     scores = {"": difference.mean, **(ends if len(homes) > 1 else {})}
     return {f"log_loss - {PRIOR} {words}".rstrip(): value for words, value in scores.items()}
 

@@ -28,6 +28,7 @@ class Distance(Metric):
     """Metres that each body covers per day, as the sum of its moves from step to step."""
 
     unit: ClassVar[str] = "m a day"
+    least: ClassVar[Mapping[str, float]] = {"": 0}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -63,6 +64,7 @@ class Travel(Metric):
     """
 
     units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
+    least: ClassVar[Mapping[str, float]] = {"": 0}
 
     rest: PositiveDuration = timedelta(minutes=1)
     apart: Length = Field(default=0.5, ge=0)
@@ -117,6 +119,7 @@ class BatteryUse(Metric):
 
     unit: ClassVar[str] = "share of time"
     units: ClassVar[Mapping[str, str]] = {"lowest": "share of a full charge", "dockings": "a day"}
+    least: ClassVar[Mapping[str, float]] = {"": 0}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

@@ -3,6 +3,7 @@
 import copy
 from bisect import bisect_right
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, ClassVar
@@ -15,7 +16,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.metrics.metric import Metric, columns_of, nested
+from fleet2d.metrics.metric import BetterValues, Metric, columns_of, nested
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
@@ -43,6 +44,12 @@ class Interactions(Metric):
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset({"interrupted", "wait_s", "trust", "asked"})
+    least: ClassVar[Mapping[str, float]] = {"": 0}
+    largest: ClassVar[Mapping[str, float]] = dict.fromkeys(("answered", "accepted", "kept"), 1)
+    better: ClassVar[BetterValues] = {
+        **dict.fromkeys(("answered", "accepted", "kept", "value", "trust"), "higher"),
+        **dict.fromkeys(("missed", "wait_s", "woke", "annoyance", "mean_annoyance"), "lower"),
+    }
 
     def start(self, home: Home) -> None:
         """Begin without any interaction."""
@@ -163,6 +170,7 @@ class TimingRegret(Metric):
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset({"requests", "value"})
+    better: ClassVar[BetterValues] = {"value": "higher", "regret": "lower"}
 
     every: PositiveDuration = timedelta(minutes=5)
 

@@ -20,7 +20,7 @@ from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB
 from fleet2d.kernels import earth_mover as minimal_cost
-from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.metric import BetterValues, Metric
 from fleet2d.runtime.clock import DAY_S, HOUR_US
 
 # Clearance that a person needs to walk from room to room [m].
@@ -279,6 +279,9 @@ class LtpError(LongTermMetric):
         "inside": "share of rooms in interval",
         "burn_in_day": "day from which tv is small",
     }
+    least: ClassVar[Mapping[str, float]] = {"": 0, "tau": -1}
+    largest: ClassVar[Mapping[str, float]] = {"js": 1, "tau": 1}
+    better: ClassVar[BetterValues] = {"": "lower", "inside": "higher", "tau": "higher"}
 
     given: Literal["home", "away", "hour_of_week"] = "home"
     alpha: float = Field(default=1e-3, gt=0, le=1)
@@ -382,6 +385,7 @@ class LtpGap(LongTermMetric):
     """
 
     unit: ClassVar[str] = "share of time, gap at the end"
+    better: ClassVar[BetterValues] = {"": "lower"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from datetime import timedelta
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I64, Bool, pairs_in_sight
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
+
+BetterValues = Mapping[str, Literal["higher", "lower"]]
+"""Which of two values is better, by the name of the number, "" for all others."""
 
 
 class Metric(Component):
@@ -35,6 +38,11 @@ class Metric(Component):
     needs: ClassVar[Set[str]] = frozenset()
     unit: ClassVar[str] = ""  # unit of its result, for readers
     units: ClassVar[Mapping[str, str]] = {}  # units of single numbers, by name, where they differ
+    # Limits of its numbers by name, "" for all others; those whose unit is a share are 0 to 1.
+    least: ClassVar[Mapping[str, float]] = {}
+    largest: ClassVar[Mapping[str, float]] = {}
+    # Of the numbers that neither name nor "" names, no value is better.
+    better: ClassVar[BetterValues] = {}
     hidden: ClassVar[Set[str]] = frozenset()  # numbers that the closing table leaves out
 
     period: PositiveDuration = timedelta(days=1)

@@ -15,6 +15,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.space import PointXY, Space
 from fleet2d.kernels import F64, I64, points_in_sight
 from fleet2d.metrics.metric import (
+    BetterValues,
     Metric,
     columns_of,
     in_sight,
@@ -50,6 +51,8 @@ class ReachTime(Metric):
     hidden: ClassVar[frozenset[str]] = frozenset({"calls"})
     unit: ClassVar[str] = "s"
     units: ClassVar[Mapping[str, str]] = {"calls": "calls", "unreached": "calls"}
+    least: ClassVar[Mapping[str, float]] = {"": 0}
+    better: ClassVar[BetterValues] = {"": "lower"}
 
     every: PositiveDuration = timedelta(minutes=10)
     speed: Speed = Field(default=0.6, gt=0)
@@ -173,6 +176,11 @@ class TimeToFind(Metric):
         **dict.fromkeys(("success", "spl", "out_told"), "share of searches"),
         "ratio": "times the way",
         **dict.fromkeys(("false", "false_out"), "searches"),
+    }
+    least: ClassVar[Mapping[str, float]] = {"": 0}
+    better: ClassVar[BetterValues] = {
+        **dict.fromkeys(("success", "spl", "out_told"), "higher"),
+        **dict.fromkeys(("mean", "median", "p90", "ratio", "false", "false_out"), "lower"),
     }
 
     deadline: PositiveDuration = timedelta(minutes=10)
@@ -310,6 +318,8 @@ class Blocking(Metric):
 
     unit: ClassVar[str] = "a day"
     units: ClassVar[Mapping[str, str]] = {"seconds": "s a day"}
+    least: ClassVar[Mapping[str, float]] = {"": 0}
+    better: ClassVar[BetterValues] = {"": "lower"}
 
     clearance: Length = Field(default=0.4, gt=0, le=3)
 
@@ -364,6 +374,8 @@ class Intrusion(Metric):
 
     hidden: ClassVar[frozenset[str]] = frozenset({"social"})
     unit: ClassVar[str] = "min a day"
+    least: ClassVar[Mapping[str, float]] = {"": 0}
+    better: ClassVar[BetterValues] = {"": "lower"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

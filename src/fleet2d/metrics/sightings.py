@@ -10,7 +10,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, UNKNOWN_TRUTH
-from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.metric import BetterValues, Metric
 from fleet2d.runtime.clock import HOUR_S
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized
@@ -26,6 +26,7 @@ class Sightings(Metric):
     """
 
     unit: ClassVar[str] = "share of time at home"
+    better: ClassVar[BetterValues] = {"": "higher"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -74,6 +75,7 @@ class Detections(Metric):
     """
 
     unit: ClassVar[str] = "share"
+    better: ClassVar[BetterValues] = dict.fromkeys(("recall", "precision", "recognized"), "higher")
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -172,6 +174,8 @@ class Coverage(Metric):
     needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
     unit: ClassVar[str] = "h"
     units: ClassVar[Mapping[str, str]] = {"share": "share of the floor"}
+    least: ClassVar[Mapping[str, float]] = {"": 0}
+    better: ClassVar[BetterValues] = {"share": "higher"}
 
     def start(self, home: Home) -> None:
         """Begin without any cells seen."""

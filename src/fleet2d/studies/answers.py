@@ -10,14 +10,15 @@ import numpy as np
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.studies.intervals import POWER, MeanEstimate, estimate
+from fleet2d.studies.intervals import LEVEL, POWER, UNLIMITED, Limits, MeanEstimate, estimate
 from fleet2d.studies.records import VARIANT
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-FEW_UNITS = 5  # below which intervals are called uncertain
+MAX_P = 1 - LEVEL  # below which a difference is clear
+FEW_UNITS = 5  # the smallest size of a study whose power is told
 NOISE = 1e-9  # shares of the variance up to here are rounding errors
 RESIDUAL = "residual"
 SIZES = (2, 3, 5, 8, 10, 15, 20, 30, 50, 100)  # of studies, in units of a kind
@@ -53,6 +54,14 @@ class StudyAnswers:
         """
         raise NotImplementedError
 
+    def limits(self, metric: str) -> Limits:
+        """Return the least and the largest value that a metric can have."""
+        return UNLIMITED
+
+    def better(self, metric: str) -> str:
+        """Return which values of a metric are better: `higher`, `lower`, or empty: neither is."""
+        return ""
+
     def paired(
         self,
         metric: str,
@@ -76,10 +85,12 @@ class StudyAnswers:
             variants: Numbers of the variants to compare; None: all.
 
         Returns:
-            A row for each other value: mean, reference, difference, low and high (95 %), relative
-            (to the size of the reference), effect_size (in standard deviations of the units'
-            differences), p, p_holm (corrected for the rows of this table), pairs, n_UNIT,
-            variance_ratio (of unpaired to paired differences), and a verdict in words.
+            A row for each other value: mean, reference, difference, low and high (95 %), doubt (why
+            the interval can't be trusted), relative (to the size of the reference), effect_size (in
+            standard deviations of the units' differences), p, p_holm (corrected for the rows of
+            this table), pairs, and how many are above and below the reference, n_UNIT,
+            variance_ratio (of unpaired to paired differences), needed (replicates for a difference
+            of this size to show), clear (whether `p_holm` shows one), and a verdict in words.
 
         Raises:
             InputError: There is no such metric, axis or value, or no pair.
@@ -87,6 +98,7 @@ class StudyAnswers:
         import polars as pl
 
         frame, units = self.with_metric(metric, variants), self._units(by, against)
+        limits, better = difference_limits(self.limits(metric)), self.better(metric)
         ((axis, reference),) = against.items()
         check_axes((axis, *within), self.columns)
         if axis in (*units, *within):
@@ -97,15 +109,16 @@ class StudyAnswers:
             for key, group in groups.items():
                 if len(group):
                     labels = dict(zip(within, key, strict=True))
-                    rows.append({axis: value, **labels, **_difference(group, units, reference)})
+                    facts = {"to": str(reference), "better": better}
+                    row = _difference(group, units, limits)
+                    rows.append({axis: value, **labels, **row, **facts})
         if not rows:
             raise InputError(
                 f"no two variants differ by {axis} alone, one of them with {axis} = {reference!r}:"
                 " a paired comparison needs the same homes and seeds on both sides"
             )
-        table = pl.DataFrame(rows, infer_schema_length=None)
-        corrected = pl.Series("p_holm", holm(table["p"].to_list()))
-        return table.insert_column(table.get_column_index("p") + 1, corrected)
+        (table,) = judged([pl.DataFrame(rows, infer_schema_length=None)])
+        return table
 
     def differences(
         self, metric: str, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
@@ -221,7 +234,7 @@ class StudyAnswers:
         """
         frame = self.with_metric(metric)
         check_axes(axes, frame.columns)
-        return group_means(frame, metric, axes, self._units(by))
+        return group_means(frame, metric, axes, self._units(by), self.limits(metric))
 
     def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
         """Return the main effect of each value of each axis: its mean minus the mean of all.
@@ -234,6 +247,7 @@ class StudyAnswers:
         import polars as pl
 
         frame, units = self.with_metric(metric), self._units(by)
+        limits = difference_limits(self.limits(metric))
         rows = []
         for axis in (column for column in self.columns if column not in self.populations):
             applicable = frame.filter(pl.col(axis).is_not_null())
@@ -244,11 +258,13 @@ class StudyAnswers:
             value = pl.col(metric)
             cells = cells.with_columns(value - value.mean().over(list(units) or [pl.lit(0)]))
             for label in labels:
-                effect = estimate_units(cells.filter(pl.col(axis) == label), units, metric)
-                rows.append((axis, str(label), effect.mean, effect.low, effect.high))
-        schema = {"axis": pl.String, "value": pl.String}
+                of_value = cells.filter(pl.col(axis) == label)
+                effect = estimate_units(of_value, units, metric, limits)
+                row = (axis, str(label), effect.mean, effect.low, effect.high, effect.doubt)
+                rows.append(row)
+        texts = dict.fromkeys(("axis", "value"), pl.String)
         floats = dict.fromkeys(("effect", "low", "high"), pl.Float64)
-        return pl.DataFrame(rows, schema={**schema, **floats}, orient="row")
+        return pl.DataFrame(rows, schema={**texts, **floats, "doubt": pl.String}, orient="row")
 
     def shares(self, metric: str) -> "pl.DataFrame":
         """Return the share of a metric's variance by axis, and by pairs of axes beyond both.
@@ -289,7 +305,11 @@ class StudyAnswers:
 
 
 def group_means(
-    frame: "pl.DataFrame", column: str, axes: Sequence[str], by: Sequence[str]
+    frame: "pl.DataFrame",
+    column: str,
+    axes: Sequence[str],
+    by: Sequence[str],
+    limits: Limits = UNLIMITED,
 ) -> "pl.DataFrame":
     """Return the mean of a column for each combination of values of axes, with intervals."""
     import polars as pl
@@ -298,11 +318,11 @@ def group_means(
     groups = frame.partition_by(list(axes), as_dict=True) if axes else {(): frame}
     rows = []
     for key, group in groups.items():
-        mean = estimate_units(group, units, column)
+        mean = estimate_units(group, units, column, limits)
         labels = dict(zip(axes, key, strict=True))
         spread = float(group[column].std() or 0.0)
         rows.append(
-            {**labels, "mean": mean.mean, "low": mean.low, "high": mean.high,
+            {**labels, "mean": mean.mean, "low": mean.low, "high": mean.high, "doubt": mean.doubt,
              "deviation": spread, "variants": len(group)}
         )  # fmt: skip
     return pl.DataFrame(rows, infer_schema_length=None)
@@ -332,26 +352,39 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return corrected
 
 
-def _difference(pairs: "pl.DataFrame", by: Sequence[str], reference: Any) -> dict[str, Any]:
+def difference_limits(limits: Limits) -> Limits:
+    """Return the limits of a difference of two values from their limits."""
+    least, largest = limits
+    return least - largest, largest - least
+
+
+def _difference(pairs: "pl.DataFrame", by: Sequence[str], limits: Limits) -> dict[str, Any]:
     """Return the columns of a comparison."""
     units = by_units(pairs, by, "metric", "reference_metric", "difference")
-    difference = estimate_units(units, by, "difference")
+    difference = estimate_units(units, by, "difference", limits)
     values, references = units["metric"].to_numpy(), units["reference_metric"].to_numpy()
     reference_mean, differences = float(references.mean()), values - references
     deviation = float(differences.std(ddof=1)) if len(differences) > 1 else math.nan
+    needed = [
+        f"{n} values of {level} (now {difference.spread.units[level]})"
+        for level, n in difference.needed().items()
+    ]
     return {
         "mean": float(values.mean()),
         "reference": reference_mean,
         "difference": difference.mean,
         "low": difference.low,
         "high": difference.high,
+        "doubt": difference.doubt,
         "relative": difference.mean / abs(reference_mean) if reference_mean else math.nan,
         "effect_size": difference.mean / deviation if deviation > 0 else math.nan,
         "p": difference.p_value,
         "pairs": len(pairs),
+        "above": int((pairs["difference"] > 0).sum()),
+        "below": int((pairs["difference"] < 0).sum()),
         **{f"n_{column}": units[column].n_unique() for column in by},
         "variance_ratio": variance_ratio(values, references),
-        "verdict": verdict(difference, str(reference)),
+        "needed": " or ".join(needed) or "many more of " + " and of ".join(difference.spread.units),
     }
 
 
@@ -364,10 +397,13 @@ def by_units(frame: "pl.DataFrame", by: Sequence[str], *columns: str) -> "pl.Dat
     return frame.group_by(list(by), maintain_order=True).agg(pl.col(columns).mean())
 
 
-def estimate_units(frame: "pl.DataFrame", by: Sequence[str], column: str) -> MeanEstimate:
+def estimate_units(
+    frame: "pl.DataFrame", by: Sequence[str], column: str, limits: Limits = UNLIMITED
+) -> MeanEstimate:
     """Return the mean of a column, and its interval over units."""
     means = by_units(frame, by, column)
-    return estimate(means[column].to_numpy(), {unit: means[unit].to_list() for unit in by})
+    levels = {unit: means[unit].to_list() for unit in by}
+    return estimate(means[column].to_numpy(), levels, limits=limits)
 
 
 def variance_ratio(values: Any, references: Any) -> float:
@@ -384,24 +420,59 @@ def variance_ratio(values: Any, references: Any) -> float:
     return unpaired / differences if differences > 0 else math.inf
 
 
-def verdict(difference: MeanEstimate, reference: str) -> str:
-    """Return in words what a difference shows, or how many more replicates are needed."""
-    units = difference.spread.units
-    if math.isnan(difference.low):
+def judged(tables: "Sequence[pl.DataFrame]") -> "list[pl.DataFrame]":
+    """Return tables of comparisons with corrected p values, and the verdicts that follow from them.
+
+    Args:
+        tables: Comparisons that are read together: p values are corrected for all of their rows.
+    """
+    import polars as pl
+
+    p_values = itertools.chain.from_iterable(table["p"].to_list() for table in tables)
+    corrected = iter(holm(list(p_values)))
+    results = []
+    for table in tables:
+        position = table.get_column_index("p") + 1
+        bare = table.drop("p_holm", "clear", "verdict", strict=False)
+        p_holm = pl.Series("p_holm", list(itertools.islice(corrected, len(table))), pl.Float64)
+        result = bare.insert_column(position, p_holm)
+        rows = result.to_dicts()
+        clear = pl.Series("clear", [is_clear(row) for row in rows])
+        verdicts = pl.Series("verdict", [verdict(row) for row in rows])
+        results.append(result.with_columns(clear, verdicts))
+    return results
+
+
+def is_clear(row: Mapping[str, Any]) -> bool:
+    """Whether a comparison shows a difference: all claims of one follow from this.
+
+    The corrected p value must be small enough; and if there are too few units to trust the mean,
+    most pairs must differ in its direction, too.
+    """
+    agreeing = row["above"] if row["difference"] > 0 else row["below"]
+    return row["p_holm"] < MAX_P and (not row["doubt"] or 2 * agreeing > row["pairs"])
+
+
+def verdict(row: Mapping[str, Any]) -> str:
+    """Return in words what a comparison shows, or how many more replicates are needed."""
+    if math.isnan(row["p"]):
         return "one pair only: no interval; run the study with more seeds and homes"
-    scarce = [f"{n} values of {level}" for level, n in units.items() if n < FEW_UNITS]
-    caution = f"; few replicates: {', '.join(scarce)}" if scarce else ""
-    if difference.low == difference.high == 0:
-        return f"the same as {reference} in every pair"
-    if difference.is_clear:
-        side = "above" if difference.mean > 0 else "below"
-        return f"{side} {reference}{caution}"
-    needed = [
-        f"{n} values of {level} (now {units[level]})" for level, n in difference.needed().items()
-    ]
-    if not needed:
-        needed = ["many more of " + " and of ".join(units)]
+    if not row["above"] and not row["below"]:
+        return f"the same as {row['to']} in every pair"
+    side = "above" if row["difference"] > 0 else "below"
+    if is_clear(row):
+        direction = "higher" if side == "above" else "lower"
+        value = "better" if row["better"] == direction else "worse"
+        judgement = f", which is {value}" if row["better"] else ""
+        amount = f"; how much can't be told: {row['doubt']}" if row["doubt"] else ""
+        return f"{side} {row['to']} in {row[side]} of {row['pairs']} pairs{judgement}{amount}"
+    if row["p"] >= MAX_P:
+        return (
+            f"too few replicates to tell: a difference of this size would show with {row['needed']}"
+        )
+    if row["p_holm"] >= MAX_P:
+        return f"too few replicates to tell: p is {row['p_holm']:.2g} for so many comparisons"
     return (
-        "too few replicates to tell: a difference of this size would show with"
-        f" {' or '.join(needed)}"
+        f"too few replicates to tell: the mean is {side} {row['to']}, but only {row[side]} of"
+        f" {row['pairs']} pairs are"
     )

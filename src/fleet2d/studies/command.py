@@ -399,7 +399,7 @@ def tune(
     for metric in specification.file.tune.objectives:
         _print(f"{metric} on the homes held out:")
         for row in result.held_out.paired(metric, {"setting": "base"}).to_dicts():
-            interval = f" ({row['low']:.4g} to {row['high']:.4g})" if row["pairs"] > 1 else ""
+            interval = "" if row["doubt"] else f" ({row['low']:.4g} to {row['high']:.4g})"
             _print(
                 f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
                 f" difference {row['difference']:.4g}{interval}: {row['verdict']}"

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -14,6 +15,7 @@ import numpy as np
 from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as
 from fleet2d.kernels import I32, U8, Bool
 from fleet2d.storage.files import PARTIAL, FolderLock, path_in
+from fleet2d.studies.intervals import Limits
 from fleet2d.studies.parts import (
     Part,
     ResultRows,
@@ -73,6 +75,9 @@ class Counts:
         return self.total - self.complete - self.failed
 
 
+SHARE = "share"  # the unit of numbers from 0 to 1 begins with it
+
+
 @dataclass(frozen=True)
 class MetricFacts:
     """What readers should know of a metric.
@@ -81,11 +86,17 @@ class MetricFacts:
         description: What it measures, in one line.
         unit: The unit of its numbers.
         units: The units of those that differ, by the last part of their names.
+        least: Their least values by the last part of their names, "" for all others.
+        largest: Their largest values, likewise.
+        better: Which of two values is better, `higher` or `lower`, by the same names.
     """
 
     description: str = ""
     unit: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
+    least: Mapping[str, float] = field(default_factory=dict)
+    largest: Mapping[str, float] = field(default_factory=dict)
+    better: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -120,9 +131,26 @@ class Meta:
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric such as `ltp_error.ana.tv`; empty if unknown."""
-        entry, *_, last = metric.split(".")
-        facts = self.metrics.get(entry, MetricFacts())
+        facts, last = self._facts(metric)
         return facts.units.get(last, facts.unit)
+
+    def limits(self, metric: str) -> Limits:
+        """Return the least and the largest value that a metric can have; a share is 0 to 1."""
+        if self.unit(metric).startswith(SHARE):
+            return 0.0, 1.0
+        facts, last = self._facts(metric)
+        least = facts.least.get(last, facts.least.get("", -math.inf))
+        return least, facts.largest.get(last, facts.largest.get("", math.inf))
+
+    def better(self, metric: str) -> str:
+        """Return which values of a metric are better, `higher` or `lower`; empty: neither is."""
+        facts, last = self._facts(metric)
+        return facts.better.get(last, facts.better.get("", ""))
+
+    def _facts(self, metric: str) -> tuple[MetricFacts, str]:
+        """Return what readers should know of a metric, and the last part of its name."""
+        names = metric.split(".")
+        return self.metrics.get(names[0], MetricFacts()), names[-1]
 
 
 class StudyDirectory:

@@ -144,7 +144,8 @@ class AdaptiveSchedule(TaskSchedule):
                 self._dropped.add(row[axis])
                 self._on_note(f"{axis} = {row[axis]} is clearly worse after {seeds} seeds: dropped")
         left = [row for row in open_rows if row[axis] not in self._dropped]
-        width = max((row["high"] - row["low"] for row in left), default=0.0)
+        # NaN, that of an interval which can't be told, is the largest, and never narrow.
+        width = np.max([row["high"] - row["low"] for row in left], initial=0.0)
         if not left or (settings.width is not None and width <= settings.width):
             self._rounds.clear()
             self._on_note(

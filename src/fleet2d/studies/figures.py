@@ -1,11 +1,13 @@
 """The figures of a report: comparisons, means by axis, distributions, and metrics over time."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fleet2d.errors import extra
+from fleet2d.kernels import F64
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.studies.intervals import estimate
 from fleet2d.studies.records import VARIANT
@@ -53,7 +55,7 @@ def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
     day = (pl.col("time") - start).dt.total_microseconds() / DAY_US
     return (
         rows.with_columns(day.alias(DAY), pl.col(column).alias(VALUE))
-        .group_by(VARIANT, DAY, *study.columns)
+        .group_by(VARIANT, DAY, *study.columns, maintain_order=True)
         .agg(pl.col(VALUE).mean())
         .sort(VARIANT, DAY)
         .collect()
@@ -78,6 +80,8 @@ MOMENTS = 60  # maximum number of points of a line over time
 def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, label: str) -> Figure:
     """Draw differences to a reference with their intervals, one row for each value of an axis.
 
+    Clear differences are coloured; intervals that can't be trusted are left out.
+
     Args:
         table: The comparison; its columns before `mean` are the axis and those within it.
         axis: The axis.
@@ -87,9 +91,9 @@ def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, label: str
     rows = table.to_dicts()[::-1]
     figure, axes = _figure(0.42 * len(rows) + 1.1)
     for y, row in enumerate(rows):
-        is_clear = row["low"] > 0 or row["high"] < 0
-        color = COLORS[0] if is_clear else PALE
-        axes.plot([row["low"], row["high"]], [y, y], color=color, lw=2.2, solid_capstyle="butt")
+        color = COLORS[0] if row["clear"] else PALE
+        if not row["doubt"]:
+            axes.plot([row["low"], row["high"]], [y, y], color=color, lw=2.2, solid_capstyle="butt")
         axes.plot(row["difference"], y, "o", color=color, ms=6)
     axes.axvline(0, color=DARK, lw=0.8)
     inner_axes = table.columns[1 : table.get_column_index("mean")]
@@ -133,7 +137,7 @@ def draw_interaction(table: "pl.DataFrame", first: str, second: str, label: str)
         x = np.array([labels.index(value) for value in line[first].to_list()], np.float64)
         x += 0.08 * (number - (len(lines) - 1) / 2)
         mean = line["mean"].to_numpy()
-        ends = np.nan_to_num(np.abs(line.select("low", "high").to_numpy() - mean[:, None])).T
+        ends = _ends(line).T
         axes.errorbar(
             x, mean, yerr=ends, fmt="o-", color=COLORS[number], lw=1.2, ms=4, elinewidth=1,
             label=str(line[second][0]),
@@ -150,12 +154,10 @@ def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
     figure, panels = _panels(2.8, len(tables))
     for panel, (axis, table) in zip(panels, tables.items(), strict=True):
         labels, means = table[axis].to_list(), table["mean"].to_numpy()
-        ends = table.select("low", "high").to_numpy()
+        ends = _ends(table)
         is_numeric = all(isinstance(label, int | float) for label in labels)
         x = np.array(labels, np.float64) if is_numeric else np.arange(len(labels))
-        finite = np.isfinite(ends).all(axis=1)
-        errors = np.abs(ends[finite] - means[finite, None]).T
-        panel.errorbar(x[finite], means[finite], yerr=errors, fmt="none", ecolor=PALE, lw=2)
+        panel.errorbar(x, means, yerr=ends.T, fmt="none", ecolor=PALE, lw=2)
         panel.plot(x, means, "o-" if is_numeric else "o", color=COLORS[0], ms=5, lw=1)
         if not is_numeric:
             _label(panel, [str(label) for label in labels])
@@ -199,12 +201,14 @@ def draw_course(
         group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(value))
         points = []
         for day in moments:
-            rows = group.filter(pl.col(DAY) == day).group_by(list(units) or ["variant"])
+            rows = group.filter(pl.col(DAY) == day)
+            rows = rows.group_by(list(units) or [VARIANT], maintain_order=True)
             cells = rows.agg(pl.col(VALUE).mean()).drop_nulls()
             if len(cells):
                 levels = {unit: cells[unit].to_list() for unit in units}
                 mean = estimate(cells[VALUE].to_numpy(), levels)
-                points.append((day, mean.mean, mean.low, mean.high))
+                ends = (math.nan, math.nan) if mean.doubt else (mean.low, mean.high)
+                points.append((day, mean.mean, *ends))
         x, means, low, high = np.array(points).T
         color = COLORS[number % len(COLORS)]
         axes.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
@@ -214,6 +218,13 @@ def draw_course(
     if axis is not None:
         axes.legend(frameon=False, fontsize=8, title=axis, title_fontsize=8)
     return figure
+
+
+def _ends(table: "pl.DataFrame") -> F64:
+    """Return the lengths of intervals below and above the mean, (n, 2); 0 if they can't be told."""
+    lengths = np.abs(table.select("low", "high").to_numpy() - table["mean"].to_numpy()[:, None])
+    lengths[table["doubt"].to_numpy() != ""] = 0.0
+    return lengths
 
 
 def _panels(height: float, count: int) -> tuple[Figure, list[Axes]]:

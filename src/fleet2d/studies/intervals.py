@@ -1,9 +1,13 @@
 """Means with intervals over units such as homes and seeds, p values, and the power of a study.
 
-At each end an interval is the wider of two: Student's t, and Hall's transformation of it, which
-corrects for skewness (Hall 1992, On the removal of skewness by transformation). The standard error
-is that of a random-effects analysis of variance of crossed units. How often these and other
-intervals contain the true mean is measured by `benchmarks/interval_coverage.py`.
+An interval is that of Student's t after Hall's transformation, which corrects for skewness (Hall
+1992, On the removal of skewness by transformation, Journal of the Royal Statistical Society B 54).
+The standard error is that of a random-effects analysis of variance of crossed units, with the
+degrees of freedom of Satterthwaite (1946, Biometrics Bulletin 2).
+
+Where there are too few units to trust an interval, the estimate has a doubt; as their skewness is
+uncertain, too, each end is then the wider of those with and without the transformation.
+`benchmarks/intervals.py` measures how often intervals contain the true mean.
 """
 
 import math
@@ -21,8 +25,17 @@ from fleet2d.runtime.determinism import sum_in_order
 LEVEL = 0.95
 POWER = 0.8
 MAX_NEEDED_UNITS = 10_000  # units of a level
+RARE = 0.1  # share of a kind of units that a study must not miss
+ENOUGH_UNITS = math.ceil(math.log(1 - LEVEL) / math.log(1 - RARE))  # that 95 % of studies don't
+MINOR = 0.1  # share of the variance of the mean up to which few units of a further level do
+ROUNDING = 1e-9  # differences up to here, relative to the values, are rounding errors
 MIN_FREEDOM = 2.0  # below which the skewness of units can't be estimated
 MIN_SKEWNESS = 1e-6  # below which Hall's transformation is the identity
+
+
+Limits = tuple[float, float]
+"""The least and the largest value of a number."""
+UNLIMITED = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -88,8 +101,9 @@ class MeanEstimate:
 
     Attributes:
         mean: The mean.
-        low: The lower end of the interval; NaN if there is one value only.
+        low: The lower end of the interval; NaN if values don't differ, or there is one only.
         high: The upper end.
+        doubt: Why the interval can't be trusted, or why there is none; empty if it can.
         error: The standard error.
         freedom: Degrees of freedom.
         skewness: The skewness of the mean, estimated from that of the units.
@@ -99,6 +113,7 @@ class MeanEstimate:
     mean: float
     low: float = math.nan
     high: float = math.nan
+    doubt: str = ""
     error: float = math.nan
     freedom: float = math.nan
     skewness: float = 0.0
@@ -111,14 +126,19 @@ class MeanEstimate:
 
     @property
     def p_value(self) -> float:
-        """The p value of a mean of zero: below 5 % exactly if the 95 % interval excludes zero."""
-        if not self.error > 0:
-            return math.nan if math.isnan(self.low) else float(self.mean == 0)
+        """The p value of a mean of zero: below 5 % exactly if the 95 % interval excludes zero.
+
+        If all values are equal, it is that of the sign test; NaN for a single value.
+        """
+        if self.error == 0:
+            return 0.5 ** (min(self.spread.units.values()) - 1) if self.mean else 1.0
         with extra("study", "intervals need scipy"):
             from scipy.special import stdtr
         ratio = self.mean / self.error
-        nearest = min(abs(ratio), abs(_transformed(ratio, self.skewness)))
-        return float(2 * stdtr(self.freedom, -nearest))
+        distance = abs(_transformed(ratio, self.skewness))
+        if self.doubt:
+            distance = min(distance, abs(ratio))
+        return float(2 * stdtr(self.freedom, -distance))
 
     def needed(self) -> dict[str, int]:
         """Return for each level how many units are needed to show that the mean isn't zero.
@@ -138,13 +158,16 @@ def estimate(
     levels: Mapping[str, Sequence[Any]] | None = None,
     *,
     level: float = LEVEL,
+    limits: Limits = UNLIMITED,
 ) -> MeanEstimate:
     """Return the mean of values and its interval over the units that they belong to.
 
     Args:
         values: One for each combination of units, such as home and seed.
-        levels: For each level the unit of each value; None: each value is a unit of its own.
+        levels: For each level the unit of each value, the most important first; None: each value is
+            a unit of its own.
         level: The share of studies whose interval contains the true mean.
+        limits: The least and the largest mean that are possible, which an interval doesn't exceed.
 
     Example:
         >>> score = estimate([1.0, 2.0, 4.0], {"seed": [0, 1, 2]})
@@ -152,21 +175,40 @@ def estimate(
         (2.33, {'seed': 3})
     """
     data: F64 = np.asarray(values, np.float64)
-    if not len(data):
-        return MeanEstimate(math.nan)
+    if not len(data) or not np.isfinite(data).all():
+        return MeanEstimate(math.nan, doubt="there is no value, or one that is no number")
     codes = _codes(levels if levels else {"value": range(len(data))}, len(data))
     mean = float(data.mean())
     if not codes:
-        return MeanEstimate(mean)
+        return MeanEstimate(mean, doubt="one value alone doesn't tell how much others differ")
     spread, variance, freedom, third_moment = _analyse(data, codes)
-    if variance <= 0 or not np.ptp(data):
-        return MeanEstimate(mean, mean, mean, 0.0, freedom, 0.0, spread)
+    if variance <= 0 or np.ptp(data) <= ROUNDING * np.abs(data).max():
+        doubt = f"all {len(data)} values are equal, so how much others differ is unknown"
+        return MeanEstimate(mean, doubt=doubt, error=0.0, freedom=freedom, spread=spread)
     error = math.sqrt(variance)
     skewness = third_moment / (error * variance) if freedom >= MIN_FREEDOM else 0.0
     quantile = student_quantile(freedom, level)
-    low = mean - error * max(quantile, _inverse(quantile, skewness))
-    high = mean - error * min(-quantile, _inverse(-quantile, skewness))
-    return MeanEstimate(mean, low, high, error, freedom, skewness, spread)
+    low = mean - error * _inverse(quantile, skewness)
+    high = mean - error * _inverse(-quantile, skewness)
+    doubt = _doubt(spread, variance)
+    if doubt:
+        low, high = min(low, mean - error * quantile), max(high, mean + error * quantile)
+    least, largest = limits
+    if least <= data.min() and data.max() <= largest:
+        low, high = max(low, least), min(high, largest)
+    return MeanEstimate(mean, low, high, doubt, error, freedom, skewness, spread)
+
+
+def _doubt(spread: Spread, variance: float) -> str:
+    """Return why an interval can't be trusted: a level whose units may lack a kind of them."""
+    for number, (level, count) in enumerate(spread.units.items()):
+        share = spread.components[level] / count / variance
+        if count < ENOUGH_UNITS and (number == 0 or share > MINOR):
+            return (
+                f"{count} values of {level} miss a kind that is one in {1 / RARE:.0f} in"
+                f" {(1 - RARE) ** count:.0%} of studies; {ENOUGH_UNITS - count} more would do"
+            ).replace("%", " %")
+    return ""
 
 
 def _transformed(ratio: float, skewness: float) -> float:

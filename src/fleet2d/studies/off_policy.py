@@ -170,4 +170,5 @@ def _weights(log: LoggedOpportunities, target: ArrayLike) -> F64:
 
 def _mean_of_days(log: LoggedOpportunities, terms: F64) -> MeanEstimate:
     """Return the mean of the days' sums of terms, and its interval."""
-    return estimate(np.bincount(log.day, terms, log.days).astype(np.float64))
+    sums = np.bincount(log.day, terms, log.days).astype(np.float64)
+    return estimate(sums, {"day": range(log.days)})

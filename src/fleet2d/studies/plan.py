@@ -188,7 +188,14 @@ class KnownNames:
             self._metrics[name] = kind.__module__.startswith("fleet2d.")
             if name not in self.facts:
                 description = (kind.__doc__ or "").strip().partition("\n")[0]
-                self.facts[name] = MetricFacts(description, kind.unit, kind.units)
+                self.facts[name] = MetricFacts(
+                    description,
+                    kind.unit,
+                    kind.units,
+                    {name: float(number) for name, number in kind.least.items()},
+                    {name: float(number) for name, number in kind.largest.items()},
+                    kind.better,
+                )
 
     def check(self, specification: Specification) -> None:
         """Check the names in a study file.

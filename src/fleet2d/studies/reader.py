@@ -9,6 +9,7 @@ from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, Counts, StudyDirectory
+from fleet2d.studies.intervals import Limits
 from fleet2d.studies.parts import TABLES, Part, plain_schema, read_parts, with_variant
 from fleet2d.studies.records import RESULT_COLUMNS, VARIANT, VariantRecord, read_journal
 from fleet2d.studies.storage import damaged
@@ -253,6 +254,8 @@ class Study(StudyAnswers):
         Raises:
             InputError: There is no such metric.
         """
+        if not self.counts.complete:
+            raise InputError(f"{self.location} has no complete variant, and so no {metric!r}")
         if metric not in self.metrics:
             hint = did_you_mean(metric, self.metrics)
             raise InputError(
@@ -262,6 +265,14 @@ class Study(StudyAnswers):
         pl = _polars()
         frame = self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
         return frame if variants is None else frame.filter(pl.col(VARIANT).is_in(list(variants)))
+
+    def limits(self, metric: str) -> Limits:
+        """Return the least and the largest value that a metric can have."""
+        return self.meta.limits(metric)
+
+    def better(self, metric: str) -> str:
+        """Return which values of a metric are better: `higher`, `lower`, or empty: neither is."""
+        return self.meta.better(metric)
 
     @cached_property
     def _parts(self) -> list[Part]:

@@ -13,9 +13,9 @@ from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.errors import ArtifactError, InputError, os_errors_as
-from fleet2d.studies.answers import FEW_UNITS, NOISE, RESIDUAL, holm
+from fleet2d.studies.answers import NOISE, RESIDUAL, judged
 from fleet2d.studies.figures import over_time
-from fleet2d.studies.intervals import LEVEL
+from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL
 from fleet2d.studies.specification import PairedComparison
 
 if TYPE_CHECKING:
@@ -32,12 +32,15 @@ MAX_CELLS = 60  # of such a table
 LONG_NAME, SHORT_NAME = 16, 6  # from how many characters on names are shortened, and to how many
 INTERVAL = f"{LEVEL:.0%} interval"
 HEADINGS = {"p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL}
-NOT_SHOWN = ("high", "variance_ratio", "verdict")  # columns that stand elsewhere on the page
+# Columns that stand elsewhere on the page.
+NOT_SHOWN = ("high", "doubt", "variance_ratio", "needed", "to", "better", "clear", "verdict")
 GLOSSARY = {
     "mean": "mean over the units, such as homes and seeds, each of equal weight",
     "reference": "the same of the value that all others are compared with",
     "difference": "mean difference to the reference over pairs with the same home, people and seed",
     INTERVAL: f"contains the true value in about {LEVEL:.0%} of such studies; see Methods",
+    "above": "pairs in which the value is above the reference",
+    "below": "pairs in which the value is below the reference",
     "relative": "difference over the size of the reference",
     "effect size": "difference over the standard deviation of the units' differences (Cohen's d)",
     "p": "probability of such a difference, or a larger one, if there were none",
@@ -136,10 +139,10 @@ class _Page:
         if missing:
             yield _warning(f"{missing} variants have no results: the answers below leave them out.")
         for column in self.units:
-            if (count := self.counts[column]) < FEW_UNITS:
+            if (count := self.counts[column]) < ENOUGH_UNITS:
                 yield _warning(
-                    f"There are only {count} values of {column}: intervals are wide and uncertain."
-                    f" {FEW_UNITS} or more are better."
+                    f"There are only {count} values of {column}: a kind that is rare among all may"
+                    f" be missing. {ENOUGH_UNITS} or more are better."
                 )
         for column in self.meta.populations:
             if column not in self.units:
@@ -156,14 +159,8 @@ class _Page:
                 tables.append(self.study.paired(c.metric, c.against, c.by, c.within))
             except InputError as error:
                 tables.append(error)
-        found = [table for table in tables if isinstance(table, pl.DataFrame)]
-        corrected = iter(holm([p for table in found for p in table["p"].to_list()]))
-        return [
-            table.with_columns(p_holm=pl.Series(list(itertools.islice(corrected, len(table)))))
-            if isinstance(table, pl.DataFrame)
-            else table
-            for table in tables
-        ]
+        found = iter(judged([table for table in tables if isinstance(table, pl.DataFrame)]))
+        return [next(found) if isinstance(table, pl.DataFrame) else table for table in tables]
 
     def _comparison(self, number: int, comparison: PairedComparison) -> Iterator[str]:
         from fleet2d.studies.figures import draw_comparison, draw_unit_differences
@@ -182,7 +179,9 @@ class _Page:
         yield self._frame(table, name, within)
         for row in table.to_dicts():
             labels = ", ".join(_text(row[column]) for column in within)
-            yield f"<p><b>{html.escape(labels)}</b>: {html.escape(row['verdict'])}.</p>"
+            words = html.escape(row["verdict"])
+            words = f"<b>{words}</b>" if row["clear"] else words
+            yield f"<p>{html.escape(labels)}: {words}.</p>"
         ratios = [r for r in table["variance_ratio"].to_list() if r and math.isfinite(r)]
         if ratios:
             yield (
@@ -274,9 +273,10 @@ class _Page:
             text += (
                 f" Means weigh units equally. {INTERVAL}s treat {' and '.join(self.units)} as"
                 " random and crossed: standard errors come from a random-effects analysis of"
-                " variance with Satterthwaite's degrees of freedom, and each end of an interval is"
-                " the wider of Student's t and Hall's (1992) transformation of it, which corrects"
-                " for skewness. p values belong to the same intervals."
+                " variance with Satterthwaite's degrees of freedom, and intervals are those of"
+                " Student's t after Hall's (1992) transformation, which corrects for skewness. p"
+                f" values belong to the same intervals. From fewer than {ENOUGH_UNITS} units an"
+                " interval can't be told: a kind that is one in ten may be missing among them."
             )
         if number:
             text += (
@@ -427,8 +427,7 @@ def _cell(column: str, row: Mapping[str, Any]) -> str:
     """Return a cell of a table of answers as text."""
     value = row[column]
     if column == "low":
-        is_known = math.isfinite(value) and math.isfinite(row["high"])
-        return f"{_number(value)} to {_number(row['high'])}" if is_known else "–"
+        return "can't tell" if row["doubt"] else f"{_number(value)} to {_number(row['high'])}"
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "–"
     if column in ("p", "p_holm"):

@@ -167,6 +167,38 @@ def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, f
     return low, rate_of(held + 1, 1 - error / 2) if held < number else 1.0
 
 
+def nested_rate_interval(
+    outcomes: Sequence[Sequence[bool]], error: float = 0.05
+) -> tuple[float, float]:
+    """Return the interval of rates that trials leave open of which some share a home.
+
+    It is that of the effective number of trials, which is the smaller the more homes differ (Korn
+    and Graubard, 1998, Survey Methodology 24); if all trials of several homes had the same outcome,
+    which doesn't tell how much homes differ, it is the number of homes.
+
+    Args:
+        outcomes: Whether each trial held, by home or other variant.
+        error: The largest probability that the interval doesn't hold the true rate.
+
+    Example:
+        >>> low, high = nested_rate_interval([[True] * 5, [True] * 5, [True] * 4 + [False]])
+        >>> round(low, 2), round(high, 2)
+        (0.64, 1.0)
+    """
+    number, homes = sum(map(len, outcomes)), len(outcomes)
+    rate = sum(map(sum, outcomes)) / number
+    effective = float(number)
+    if 1 < homes < number:
+        squares = sum_in_order((sum(held) - rate * len(held)) ** 2 for held in outcomes)
+        variance = homes / (homes - 1) * squares / number**2
+        independent = rate * (1 - rate) / variance if variance else number
+        effective = max(homes, min(independent, number)) if 0 < rate < 1 else homes
+    count = math.floor(effective)
+    low, _ = rate_interval(math.floor(rate * count), count, error)
+    _, high = rate_interval(math.ceil(rate * count), count, error)
+    return low, high
+
+
 def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
     """Return the test of a claimed rate against another one.
 

@@ -22,7 +22,7 @@ from fleet2d.floorplan.source import PLAN_CACHE
 from fleet2d.interventions.bodies import Decide, TakeControl
 from fleet2d.interventions.intervention import Intervention, dump_intervention
 from fleet2d.scenario.model import Scenario
-from fleet2d.testing.claim import Claim, SetUpError, Variant, percent, rate_interval
+from fleet2d.testing.claim import Claim, SetUpError, Variant, nested_rate_interval, percent
 
 TEST = "test"
 """The name of a test that tests nothing among its expectations."""
@@ -287,7 +287,11 @@ class ClaimResult:
         shown = f"at least {percent(rate.alternative)}"
         if not self.holds:
             shown = f"less than {percent(rate.holds)}"
-        low, high = rate_interval(number - failures, number, rate.error)
+        by_variant: dict[str, list[bool]] = {}
+        for trial in self.trials:
+            labels = {**trial.variant.labels, "seed": None}
+            by_variant.setdefault(repr(labels), []).append(trial.holds)
+        low, high = nested_rate_interval(list(by_variant.values()), rate.error)
         return (
             f"{held}: {percent(rate.holds)} {verb} after {number} of at most {rate.seeds}"
             f" (error {percent(rate.error)}; distinguishes {percent(rate.holds)} from"
