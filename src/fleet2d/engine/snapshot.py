@@ -42,6 +42,7 @@ from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
+from fleet2d.inputs import open_input
 from fleet2d.kernels import Mesh, Timelines
 from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
@@ -308,7 +309,11 @@ def open_snapshot(path: str | Path | BinaryIO) -> tuple[dict[str, Any], BinaryIO
         ArtifactError: It is not a snapshot, is damaged, or is of another version of Fleet2D.
     """
     with os_errors_as(ArtifactError, f"{path} can't be read"):
-        content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()
+        if isinstance(path, str | Path):
+            with open_input(path, ArtifactError) as file:
+                content = file.read()
+        else:
+            content = path.read()
     first, _, body = content.removeprefix(MAGIC + b"\n").partition(b"\n")
     if not content.startswith(MAGIC + b"\n"):
         raise ArtifactError(f"{path} is not a saved simulation")
