@@ -97,7 +97,7 @@ def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) 
     override = f"users.ana={{type: routine, persona: {secret}}}"
 
     for use in (lambda: place.check("bad.yaml"), lambda: place.begin("home.yaml", [override])):
-        with pytest.raises(InputError, match="is a file outside of the folder") as caught:
+        with pytest.raises(InputError, match="is outside of the folder") as caught:
             use()
         assert "1234" not in str(caught.value)
 
@@ -105,9 +105,9 @@ def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a: !!python/object/apply:os.system [x]\n", "could not determine a constructor"),
-        ("a: &a [*a]\n", "nested more than 100 deep, or in themselves"),
-        ("a: [\n", "bad.yaml: "),
+        ("a: !!python/object/apply:os.system [x]\n", "bad.yaml:1: the tag .* can't be used here"),
+        ("a: &a [*a]\n", "bad.yaml:1: a value can't contain itself"),
+        ("a: [\n", "bad.yaml:2: not valid YAML: a value is missing"),
         ("extends: bundled:base\nsimulation: {duration: 100000 d}\n", "would take minutes or more"),
     ],
 )
@@ -121,7 +121,7 @@ def test_a_wrong_file_is_told(place: Workspace, text: str, message: str) -> None
 def test_a_wrong_time_and_name_are_told(place: Workspace) -> None:
     name = place.begin("home.yaml")
 
-    with pytest.raises(InputError, match="is a file outside of the folder"):
+    with pytest.raises(InputError, match="is outside of the folder"):
         place.intervene(name, {"reset": "ltp", "learned": str(place.folder.parent / "secret.yaml")})
     with pytest.raises(InputError, match="nonsense"):
         place.advance(name, "nonsense")
@@ -134,8 +134,8 @@ def test_a_wrong_time_and_name_are_told(place: Workspace) -> None:
     [
         ({"table": "rooms"}, "there is no table 'rooms'"),
         ({"table": "events", "columns": ["who"]}, "there is no column 'who'"),
-        ({"table": "events", "where": "who == ana"}, "expected 'COLUMN OP VALUE'"),
-        ({"table": "events", "where": "step > soon"}, "step > soon"),
+        ({"table": "events", "where": "who == ana"}, "there is no column 'who'"),
+        ({"table": "events", "where": "step > soon"}, "there is no column 'soon'"),
     ],
 )
 def test_a_wrong_question_is_answered_with_what_there_is(

@@ -423,6 +423,22 @@ class Simulation(InterventionMethods):
             )
         self._run_to(min(self.clock.steps, self.step + steps))
 
+    def stop(self) -> None:
+        """End what another thread simulates after the present span, as Ctrl-C does.
+
+        Example:
+            >>> import threading
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.speedup=1", seed=4)
+            >>> threading.Timer(0.1, simulation.stop).start()
+            >>> simulation.advance(1000)
+            Traceback (most recent call last):
+            KeyboardInterrupt
+            >>> simulation.step < 1000
+            True
+        """
+        self._loop.stop()
+
     def run_until(
         self,
         when: "int | str | datetime | timedelta | Callable[[Self], bool] | Expectation" = "",
