@@ -5,12 +5,12 @@ the environment variable that raises the bound.
 """
 
 import os
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.inputs import input_path, open_input
 
 
 @dataclass(frozen=True)
@@ -136,26 +136,23 @@ def read_bytes(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
 
     Raises:
         OSError: It can't be read.
-        Fleet2DError: It is larger than the bound, or a device or a pipe; of the type `error`.
+        Fleet2DError: It is larger than the bound, or `open_input` refuses it; of the type `error`.
     """
     check_file(path, bound, error)
-    with path.open("rb") as file:
+    with open_input(path, error) as file:
         content = file.read(bound.limit + 1)
     bound.check(len(content), path, error)  # it may have grown in the meantime
     return content
 
 
 def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError) -> None:
-    """Refuse a file that is larger than a bound, and devices and pipes, which have no end.
+    """Refuse a file that is larger than a bound, and what `input_path` refuses.
 
     Raises:
         OSError: There is no such file.
         Fleet2DError: It is refused; of the type `error`.
     """
-    state = path.stat()
-    if not (stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)):
-        raise error(f"{path} is a device or a pipe: give a file")
-    bound.check(state.st_size, path, error)
+    bound.check(input_path(path, error).stat().st_size, path, error)
 
 
 def unpacked_bytes(file: Any, group: int | None = None) -> int:

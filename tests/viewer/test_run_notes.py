@@ -1,6 +1,7 @@
 """Notes are stored beside a run, and change neither it nor its seal."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -66,3 +67,28 @@ def test_damaged_file_of_notes_is_named(run_dir: Path, tmp_path: Path) -> None:
     (tmp_path / "day.notes.json").write_text("{")
     with pytest.raises(InputError, match=r"day\.notes\.json can't be read"):
         read_notes(fleet2d.open_run(root))
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link"])
+def test_a_pipe_or_a_link_in_place_of_notes_is_refused_by_the_page(
+    run_dir: Path, tmp_path: Path, kind: str
+) -> None:
+    """The request for notes waited for the pipe for ever."""
+    root = Path(shutil.copytree(run_dir, tmp_path / "day"))
+    (tmp_path / "secret.json").write_text('[{"step": 1, "text": "secret"}]')
+    if kind == "pipe":
+        os.mkfifo(tmp_path / "day.notes.json")
+    else:
+        (tmp_path / "day.notes.json").symlink_to("secret.json")
+    client = TestClient(page_app(ServedRuns([root]), "token", 8765), base_url=f"{OWN}/token/")
+    headers = {"Origin": OWN, "Content-Type": "application/json"}
+
+    for answer in (
+        client.get("run/0/notes.json"),
+        client.post("run/0/notes", content="[]", headers=headers),
+    ):
+        assert answer.status_code == 422
+        message = answer.json()["message"]
+        assert f"day.notes.json is {'a link' if kind == 'link' else 'not a file'}" in message
+        assert "\n" not in message
+    assert "secret" in (tmp_path / "secret.json").read_text()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 import json
 import math
 import os
@@ -22,6 +21,7 @@ from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import RunDirectoryError, printable
+from fleet2d.inputs import sha256_of_file
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in, write_atomically
 
@@ -542,6 +542,4 @@ def input_record(path: Path | str) -> InputRecord:
     Raises:
         OSError: The file can't be read.
     """
-    with Path(path).open("rb") as file:
-        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-    return InputRecord(path=str(path), sha256=sha256)
+    return InputRecord(path=str(path), sha256=sha256_of_file(path))

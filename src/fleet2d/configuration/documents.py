@@ -36,7 +36,9 @@ Pair = tuple[yaml.ScalarNode, yaml.Node]
 
 TAG = "tag:yaml.org,2002:"
 MERGE = f"{TAG}merge"
-_PLAIN = frozenset(TAG + name for name in ("null", "bool", "int", "float", "str", "timestamp"))
+_PLAIN = frozenset(
+    TAG + name for name in ("null", "bool", "int", "float", "str", "timestamp", "seq", "map")
+)
 
 Loader.yaml_implicit_resolvers = {}
 for _name, _pattern, _first in (
@@ -212,12 +214,12 @@ class _Builder:
             YAML_VALUES.check(self._values, "it", prefix="more than ")
         if len(self._parents) >= self._most_depth:
             DEPTH.check(len(self._parents) + 1, "it", prefix="at least ")
+        if node.tag not in _PLAIN:
+            raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
         if node in self._parents:  # nodes are equal only to themselves
             raise NodeError(node, "a value can't contain itself")
 
     def _scalar(self, node: yaml.ScalarNode) -> Any:
-        if node.tag not in _PLAIN:
-            raise NodeError(node, f"the tag {one_line(node.tag)!r} can't be used here")
         if node.tag == f"{TAG}str":
             return node.value
         try:

@@ -21,7 +21,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, Wi
 from pydantic_core import PydanticCustomError
 
 from fleet2d.configuration.problems import did_you_mean, problem, shown
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import InputError, ScenarioError, errors_as
+from fleet2d.inputs import resolved
 from fleet2d.runtime.clock import DAY_S, HOUR_S
 
 
@@ -51,11 +52,24 @@ def folder_of(text: object) -> Path:
     return text.folder if isinstance(text, Text) else Path.cwd()
 
 
+def named_path(name: str | Path) -> Path:
+    """Return the path of an input file; a relative one starts from the folder of its text.
+
+    Raises:
+        PydanticCustomError: It leads out of the root of input files, no file can have such a name,
+            or it begins with the home of an unknown user.
+    """
+    with errors_as(problem, of=(InputError, RuntimeError)):
+        path = folder_of(name) / Path(name).expanduser()
+        resolved(path)
+    return path
+
+
 def _existing(value: object, *, is_folder_allowed: bool = False) -> Path:
     kind = "file or folder" if is_folder_allowed else "file"
     if not isinstance(value, str | Path) or not str(value):
         raise problem(f"expected the path of a {kind}, got {shown(value)}")
-    path = (folder_of(value) / Path(value).expanduser()).resolve()
+    path = named_path(value).resolve()
     if not (path.is_file() or (is_folder_allowed and path.is_dir())):
         reason = "a folder, not a file" if path.is_dir() else f"no such {kind}"
         raise problem(f"{reason}: {path}")

@@ -271,13 +271,14 @@ class Loop:
         Raises:
             KeyboardInterrupt: Ctrl-C, after the present span.
         """
+        self._is_stopping = False
         if self.pace is not None:
             self.pace.resume(self._simulated_s(state))
         with ExitStack() as stack:
             stack.enter_context(running_code(allowed=self.runs_code))
             if end - state.bodies.step >= SHORT:
                 stack.enter_context(rare_collections())
-                stack.enter_context(deferred_interrupt(self._stop))
+                stack.enter_context(deferred_interrupt(self.stop))
             stack.enter_context(self._timed(state))
             self._simulate(state, end, on_progress, spans)
         if self._is_stopping:
@@ -341,8 +342,8 @@ class Loop:
     def _simulated_s(self, state: State) -> float:
         return state.bodies.step * self._step_us / 1e6
 
-    def _stop(self) -> None:
-        """End the run after the present span, so that all tables end at the same step."""
+    def stop(self) -> None:
+        """End the present call of `run` after its span, so that all tables end at the same step."""
         self._is_stopping = True
 
 

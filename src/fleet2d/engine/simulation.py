@@ -437,6 +437,21 @@ class Simulation(InterventionMethods):
             )
         self._run_to(min(self.clock.steps, self.step + steps))
 
+    def stop(self) -> None:
+        """End what another thread simulates after the present span, as Ctrl-C does.
+
+        Example:
+            >>> import contextlib, threading
+            >>> import fleet2d
+            >>> simulation = fleet2d.Simulation(None, "simulation.speedup=1", seed=4)
+            >>> threading.Timer(0.1, simulation.stop).start()
+            >>> with contextlib.suppress(KeyboardInterrupt):
+            ...     simulation.advance(1000)
+            >>> simulation.step < 1000
+            True
+        """
+        self._loop.stop()
+
     def run_until(
         self,
         when: "int | str | datetime | timedelta | Callable[[Self], bool] | Expectation" = "",

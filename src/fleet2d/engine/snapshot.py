@@ -36,6 +36,7 @@ from fleet2d.floorplan.costmap import CostedSpace
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
+from fleet2d.inputs import open_input
 from fleet2d.kernels import Mesh, Timelines
 from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
@@ -213,7 +214,11 @@ def open_snapshot(path: str | Path | BinaryIO, purpose: str) -> tuple[dict[str, 
             Fleet2D.
     """
     with os_errors_as(ArtifactError, f"{path} can't be read"):
-        content = Path(path).read_bytes() if isinstance(path, str | Path) else path.read()
+        if isinstance(path, str | Path):
+            with open_input(path, ArtifactError) as file:
+                content = file.read()
+        else:
+            content = path.read()
     if not content.startswith(MAGIC + b"\n"):
         raise ArtifactError(f"{path} is not a {purpose}")
     seal, view = signature(purpose), memoryview(content)

@@ -5,6 +5,7 @@ import math
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +26,7 @@ from fleet2d.fit.likelihood import (
     ProductLikelihood,
     wilson,
 )
+from fleet2d.inputs import open_input
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -116,7 +118,7 @@ def recognized(log: DetectionLog) -> Bool:
 def _read_table(path: Path) -> "_PerceptionLog":
     try:
         check_file(path, LOG_BYTES)
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with TextIOWrapper(open_input(path), "utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             columns = [name.strip() for name in next(reader, [])]
             _check_columns(path, columns)

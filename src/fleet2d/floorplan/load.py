@@ -12,8 +12,8 @@ from typing import Any
 
 from fleet2d.configuration.components import components, lookup
 from fleet2d.configuration.problems import suggest
-from fleet2d.configuration.units import folder_of
-from fleet2d.errors import FloorPlanError
+from fleet2d.configuration.units import named_path
+from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
 from fleet2d.floorplan.formats.foreign import foreign_document, foreign_file
 from fleet2d.floorplan.formats.native import (
@@ -25,6 +25,7 @@ from fleet2d.floorplan.formats.native import (
 )
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.inputs import open_input
 
 DEFAULT_CELL_M = 0.05
 IMAGES = (".pgm", ".png", ".jpg", ".jpeg")
@@ -132,9 +133,9 @@ def is_floorplan(plan: str | Path) -> bool:
 def _is_foreign(path: Path) -> bool:
     """Return whether a file is one of another program, which may have had a plan in it."""
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             return foreign_file(file.read(65536)) is not None
-    except OSError:
+    except (OSError, InputError):
         return False
 
 
@@ -168,7 +169,7 @@ def advise_type(name: str) -> str:
     >>> advise_type("sketch.png")
     'to read a file write {type: image, path: sketch.png}'
     """
-    path = folder_of(name) / Path(name).expanduser()
+    path = named_path(name)
     is_type = path.suffix == "" or ":" in name  # then the formats needn't be imported
     if is_type or path.suffix.lower() not in (*plan_suffixes(), *IMAGES):
         return ""

@@ -1,6 +1,5 @@
 """Sources of floor plans: the base of their components, with what a scenario adds to each."""
 
-import hashlib
 from abc import abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +22,7 @@ from fleet2d.configuration.units import (
     PositiveDuration,
     PositiveLength,
 )
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
@@ -46,6 +45,7 @@ from fleet2d.floorplan.rooms.room import (
 )
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import BODY_RADIUS, standing_cells, with_approaches
+from fleet2d.inputs import sha256_of_file
 from fleet2d.kernels import I64, TURN, fill_from_neighbors
 
 
@@ -364,8 +364,8 @@ class FloorPlanSource(Component):
         if cls.__module__.partition(".")[0] != "fleet2d":
             return None
         try:
-            files = [(path, hashlib.sha256(path.read_bytes()).digest()) for path in self.files()]
-        except (OSError, FloorPlanError):
+            files = [(path, sha256_of_file(path)) for path in self.files()]
+        except (OSError, InputError):
             return None  # the reader raises it with its reason
         return cls, self.model_dump_json(exclude={"layers", "costmap", "slows"}), tuple(files)
 

@@ -7,29 +7,49 @@ intervene. Code of a scenario's own never runs, and no path leads out of the fol
 import functools
 import itertools
 import tempfile
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
-import yaml
 from pydantic_core import PydanticCustomError
 
+from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import running_code
 from fleet2d.engine.simulation import Simulation
-from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
+from fleet2d.errors import Fleet2DError, InputError, errors_as, extra, os_errors_as
+from fleet2d.inputs import open_input, within
+from fleet2d.live import questions
 from fleet2d.runs.run import Run, open_run
 from fleet2d.scenario.model import load_scenario
+from fleet2d.storage.files import write_atomically
 
 MAX_TEXT = 1 << 20
 """Size of a file that an assistant writes."""
-MAX_ROWS = 200
-"""The number of rows of a table that one question returns."""
-MAX_DEPTH = 100
+MAX_NAME = 255
+"""Size of the name of a file."""
 MAX_BODY_STEPS = 1_000_000_000
 """Steps of a run times its bodies: a few minutes."""
+MAX_S = 60.0
+"""Time that one call simulates [s]."""
 MAX_RUNNING = 8
 """The number of simulations that wait for interventions at the same time."""
+
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def confined(method: Method) -> Method:
+    """Run a method of a workspace within its folder, without a scenario's code, one at a time."""
+
+    @functools.wraps(method)
+    def run(place: "Workspace", *args: Any, **settings: Any) -> Any:
+        with place.lock, within(place.folder), running_code(allowed=False):
+            return method(place, *args, **settings)
+
+    return cast("Method", run)
 
 
 class Workspace:
@@ -53,6 +73,7 @@ class Workspace:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder: create it, or name another")
         self.folder = folder.resolve()
+        self.lock = threading.Lock()
         self._running: dict[str, Simulation] = {}
         self._numbers = itertools.count(1)
 
@@ -62,8 +83,8 @@ class Workspace:
         Raises:
             InputError: It leads out of the folder.
         """
-        if "\0" in name:
-            raise InputError(f"{name!r} can't be the name of a file")
+        if not name.isprintable() or len(name.encode()) > MAX_NAME:
+            raise InputError(f"{one_line(repr(name), 100)} can't be the name of a file")
         path = (self.folder / name).resolve()
         if not path.is_relative_to(self.folder) or path == self.folder:
             raise InputError(f"{name!r} leads out of the folder: give a name like 'home.yaml'")
@@ -78,6 +99,7 @@ class Workspace:
             for path in self.folder.iterdir()
         )
 
+    @confined
     def read(self, name: str) -> str:
         """Return the text of a file.
 
@@ -85,15 +107,16 @@ class Workspace:
             InputError: There is none, it is too large, or no text.
         """
         path = self.path(name)
-        if not path.is_file():
+        if not path.exists():
             raise InputError(f"there is no file {name!r}. There are: {', '.join(self.files())}")
-        if path.stat().st_size > MAX_TEXT:
+        with os_errors_as(InputError, f"{name} can't be read"), open_input(path) as file:
+            content = file.read(MAX_TEXT + 1)
+        if len(content) > MAX_TEXT:
             raise InputError(f"{name} is larger than {MAX_TEXT} bytes")
-        try:
-            return path.read_text(encoding="utf-8")
-        except UnicodeDecodeError:
-            raise InputError(f"{name} is not a text") from None
+        with errors_as(InputError, f"{name} is not a text", UnicodeError):
+            return content.decode()
 
+    @confined
     def write(self, name: str, text: str) -> str:
         """Write a YAML file, such as a scenario or a persona.
 
@@ -105,13 +128,17 @@ class Workspace:
             raise InputError(
                 f"{name!r}: give the name of a .yaml, .csv or .json file in the folder itself"
             )
-        if len(text.encode()) > MAX_TEXT:
+        with errors_as(InputError, f"{name} is not a text", UnicodeError):
+            content = text.encode()
+        if len(content) > MAX_TEXT:
             raise InputError(f"{name} would be larger than {MAX_TEXT} bytes")
-        path.write_text(text, encoding="utf-8")
+        with os_errors_as(InputError, f"{name} can't be written"):
+            write_atomically(path, content)
         return f"wrote {name}"
 
     # Runs
 
+    @confined
     def check(self, scenario: str) -> dict[str, Any]:
         """Check a scenario, with the places of all people and robots.
 
@@ -128,6 +155,7 @@ class Workspace:
             "notes": simulation.notes,
         }
 
+    @confined
     def run(
         self, scenario: str, out: str | None = None, overrides: list[str] | None = None
     ) -> dict[str, Any]:
@@ -136,7 +164,10 @@ class Workspace:
         Raises:
             InputError: The scenario is wrong, or `out` exists.
         """
-        run = self._simulation(scenario, overrides or [], out).run()
+        simulation = self._simulation(scenario, overrides or [], out)
+        kept = f"; {out} holds the run up to there" if out else ""
+        with limited(simulation, f"ask for a shorter simulation.duration or fewer bodies{kept}"):
+            run = simulation.run()
         return {
             "run": out,
             "steps": run.manifest["steps"],
@@ -147,102 +178,68 @@ class Workspace:
         }
 
     def _simulation(self, scenario: str, overrides: list[str], out: str | None) -> Simulation:
-        source: str | Path = scenario
-        if not scenario.startswith("bundled:"):
-            source = self.path(scenario)
-            self._check_file(source, set())
-        for override in overrides:
-            self._check_values(_yaml(override.partition("=")[2], override), Path.cwd(), set())
-        with running_code(allowed=False):
-            checked = load_scenario(source, *overrides)
-            self._check_values(checked.resolved(), self.folder, set())
-            bodies = len(checked.users) + len(checked.robots)
-            if bodies * checked.simulation.steps > MAX_BODY_STEPS:
-                raise InputError(
-                    f"{bodies} bodies in {checked.simulation.steps:,} steps would take minutes or"
-                    f" more: at most {MAX_BODY_STEPS:,} steps of bodies are run: shorten"
-                    " simulation.duration"
-                )
-            return Simulation(checked, out=None if out is None else self.path(out))
+        source = scenario if scenario.startswith("bundled:") else self.path(scenario)
+        checked = load_scenario(source, *overrides)
+        bodies = len(checked.users) + len(checked.robots)
+        if bodies * checked.simulation.steps > MAX_BODY_STEPS:
+            raise InputError(
+                f"{bodies} bodies in {checked.simulation.steps:,} steps would take minutes or"
+                f" more: at most {MAX_BODY_STEPS:,} steps of bodies are run: shorten"
+                " simulation.duration"
+            )
+        if checked.simulation.speedup is not None:
+            raise InputError(
+                "simulation.speedup makes a run wait for somebody who watches: leave it out, or"
+                " override it by simulation.speedup=null"
+            )
+        return Simulation(checked, out=None if out is None else self.path(out))
 
-    def _check_file(self, path: Path, known: set[Path]) -> None:
-        """Refuse a file that refers to one outside of the folder, before anything reads that."""
-        known.add(path)
-        name = str(path.relative_to(self.folder))
-        self._check_values(_yaml(self.read(name), name), path.parent, known)
+    @confined
+    def ask(
+        self,
+        run: str,
+        table: str = "",
+        where: str = "",
+        columns: list[str] | None = None,
+        query: str = "",
+        limit: int = 50,
+    ) -> dict[str, Any]:
+        """Answer a question to the tables of a run, in SQL as DuckDB reads it.
 
-    def _check_values(self, value: Any, base: Path, known: set[Path], depth: int = 0) -> None:
-        """Refuse values that are paths of files outside of the folder, seen from a folder."""
-        if depth > MAX_DEPTH:
-            raise InputError(f"values are nested more than {MAX_DEPTH} deep, or in themselves")
-        if isinstance(value, dict):
-            value = [*value, *value.values()]
-        if isinstance(value, list | tuple):
-            for entry in value:
-                self._check_values(entry, base, known, depth + 1)
-        if not isinstance(value, str):
-            return
-        try:
-            path = (base / Path(value).expanduser()).resolve()
-            is_there = path.exists() and path != self.folder
-        except (OSError, ValueError, RuntimeError):  # no path
-            return
-        if is_there and not path.is_relative_to(self.folder):
-            raise InputError(f"{value!r} is a file outside of the folder: copy it into the folder")
-        if is_there and path.suffix in (".yaml", ".yml") and path not in known:
-            self._check_file(path, known)
+        Give a table, with a condition and columns if you like; or any SELECT as the query, which
+        may group, sum, join and nest. Times are in the column time, and numbers of steps in step.
+        How long each activity of each person lasts in all [s]:
+
+            SELECT entity, detail, sum(epoch(until - time)) AS seconds, min(time), max(until)
+            FROM (SELECT *, lead(time) OVER (PARTITION BY entity ORDER BY step) AS until
+                  FROM events WHERE event = 'activity')
+            GROUP BY ALL
+
+        Args:
+            run: The folder of the run.
+            table: The table, such as events; `run` lists all of them.
+            where: A condition, like event = 'user_seen' AND entity IN ('astro', 'rover').
+            columns: The columns, or other expressions; None: all columns.
+            query: A SELECT in place of the table, the condition and the columns.
+            limit: The number of rows that are shown, 200 at most; all are counted.
+
+        Raises:
+            InputError: There is no such run, table, column or value, or the query takes too much.
+        """
+        tables = self._open(run).tables
+        if query and (table or where or columns):
+            raise InputError("give a query, or a table with a condition and columns, not both")
+        if not query:
+            check_known(table, "table", tables, InputError)
+            condition = f" WHERE {where}" if where else ""
+            what = ", ".join(columns or ["*"])
+            query = f'SELECT {what} FROM "{table}"{condition}'  # noqa: S608 - `answer` checks it
+        return questions.answer(tables, query, limit)
 
     def _open(self, run: str) -> Run:
         return open_run(self.path(run))
 
-    def ask(
-        self,
-        run: str,
-        table: str,
-        columns: list[str] | None = None,
-        where: str = "",
-        limit: int = 50,
-    ) -> dict[str, Any]:
-        """Return rows of a table of a run.
-
-        Args:
-            run: The folder of the run.
-            table: The table.
-            columns: Its columns; None: all.
-            where: A condition, "COLUMN OP VALUE" with ==, !=, <, <=, > or >=, like "user == ana".
-            limit: The number of rows, 200 at most.
-
-        Raises:
-            InputError: There is no such run, table or column.
-        """
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
-        tables = self._open(run).tables
-        check_known(table, "table", tables, InputError)
-        rows = tables[table]
-        if where:
-            parts = where.split(None, 2)
-            if len(parts) != 3 or parts[1] not in _OPERATORS or parts[0] not in rows.column_names:
-                raise InputError(
-                    f"{where!r}: expected 'COLUMN OP VALUE' with a column of"
-                    f" {', '.join(rows.column_names)} and one of {', '.join(_OPERATORS)}"
-                )
-            column, text = rows[parts[0]], parts[2].strip("'\"")
-            if pa.types.is_dictionary(column.type):
-                column = pc.cast(column, pa.string())
-            with errors_as(InputError, repr(where), pa.ArrowException):
-                value = pa.scalar(text).cast(column.type)
-            rows = rows.filter(getattr(pc, _OPERATORS[parts[1]])(column, value))
-        for name in columns or ():
-            check_known(name, "column", rows.column_names, InputError)
-        chosen = rows.select(columns) if columns else rows
-        part = chosen.slice(0, max(0, min(limit, MAX_ROWS))).to_pylist()
-        return {
-            "rows": rows.num_rows,
-            "shown": [{k: _plain(v) for k, v in r.items()} for r in part],
-        }
-
+    @confined
     def picture(self, run: str) -> bytes:
         """Return a PNG of the home and the ways of a run.
 
@@ -258,6 +255,7 @@ class Workspace:
 
     # Interventions
 
+    @confined
     def begin(self, scenario: str, overrides: list[str] | None = None) -> str:
         """Set up a simulation that waits for interventions; return its name.
 
@@ -270,6 +268,7 @@ class Workspace:
         self._running[name] = self._simulation(scenario, overrides or [], None)
         return name
 
+    @confined
     def advance(self, simulation: str, until: str) -> dict[str, Any]:
         """Simulate until a time of day, "19:00", or for a duration, "30 min"; return the state.
 
@@ -280,12 +279,13 @@ class Workspace:
 
         run = self._get(simulation)
         since = run.step
-        if ":" in until:
-            run.run_until(until)
-        else:
-            with errors_as(InputError, of=PydanticCustomError):
-                passed = parse_duration(until)
-            run.advance(round(passed.total_seconds() * 1e6 / run.clock.step_us))
+        with limited(run, "ask for a shorter time; the state is kept"):
+            if ":" in until:
+                run.run_until(until)
+            else:
+                with errors_as(InputError, of=PydanticCustomError):
+                    passed = parse_duration(until)
+                run.advance(round(passed.total_seconds() * 1e6 / run.clock.step_us))
         return {
             "time": run.time.isoformat(),
             "done": run.done,
@@ -293,18 +293,17 @@ class Workspace:
             "events": [[e.step, e.entity, str(e.event), e.detail] for e in run.events(since)][-50:],
         }
 
+    @confined
     def intervene(self, simulation: str, act: dict[str, Any]) -> str:
         """Apply an intervention, as in a scenario's script: {"put": "ana", "to": "kitchen"}.
 
         Raises:
             InputError: There is no such simulation, or the intervention is wrong.
         """
-        run = self._get(simulation)
-        self._check_values(act, Path.cwd(), set())
-        with running_code(allowed=False):
-            run.intervene(act)
+        self._get(simulation).intervene(act)
         return "done"
 
+    @confined
     def finish(self, simulation: str) -> dict[str, Any]:
         """End a simulation, and return its metrics.
 
@@ -321,27 +320,24 @@ class Workspace:
         return self._running[name]
 
 
-_OPERATORS = {
-    "==": "equal",
-    "!=": "not_equal",
-    "<": "less",
-    "<=": "less_equal",
-    ">": "greater",
-    ">=": "greater_equal",
-}
+@contextmanager
+def limited(simulation: Simulation, advice: str) -> Iterator[None]:
+    """Stop a simulation that takes too long.
 
-
-def _yaml(text: str, name: str) -> Any:
-    """Return the content of a YAML text."""
+    Raises:
+        InputError: It was stopped.
+    """
+    timer = threading.Timer(MAX_S, simulation.stop)
+    timer.start()
     try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{name}: {str(error)[:500]}") from None
-
-
-def _plain(value: Any) -> Any:
-    """Return a value that JSON has."""
-    return value if isinstance(value, str | int | float | bool | None) else str(value)
+        yield
+    except KeyboardInterrupt:
+        raise InputError(
+            f"one call simulates for {MAX_S:g} s at most, which ended at"
+            f" {simulation.time.isoformat()}: {advice}"
+        ) from None
+    finally:
+        timer.cancel()
 
 
 def server(folder: Path) -> Any:
@@ -386,7 +382,7 @@ def server(folder: Path) -> Any:
         def answer(*args: Any, **settings: Any) -> Any:
             try:
                 return tool(*args, **settings)
-            except Fleet2DError as error:
+            except (Fleet2DError, OSError) as error:
                 raise ToolError(str(error)) from error
 
         return answer

@@ -1,6 +1,7 @@
 """Commands for other programs: live, mcp."""
 
 import json
+import os
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -83,4 +84,6 @@ def mcp(
     """Serve assistants by the Model Context Protocol, on stdin and stdout, within one folder."""
     from fleet2d.live.assistant import server
 
-    server(folder).run("stdio")
+    app = server(folder)
+    os.chdir(folder)  # where relative paths in overrides and interventions start
+    app.run("stdio")

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date, datetime
+from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -13,6 +14,7 @@ from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
 from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError, os_errors_as
+from fleet2d.inputs import open_input
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US, Clock, midnight_of
 from fleet2d.storage.bags import is_bag
@@ -42,7 +44,7 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
     """
     with os_errors_as(LogError, f"{path} can't be read"):
         check_file(path, LOG_BYTES, LogError)
-        with path.open(encoding="utf-8", errors="replace") as lines:
+        with TextIOWrapper(open_input(path, LogError), "utf-8", "replace") as lines:
             for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
                 if number > LOG_ROWS.limit:
                     LOG_ROWS.check(number, path, LogError, prefix="more than ")

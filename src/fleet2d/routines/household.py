@@ -19,7 +19,7 @@ from fleet2d.bounds import MEMBERS, PERSONA_VALUES
 from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
-from fleet2d.configuration.units import OnDays, PositiveDuration, Share, folder_of
+from fleet2d.configuration.units import OnDays, PositiveDuration, Share, named_path
 from fleet2d.errors import errors_as
 from fleet2d.routines.activity import (
     AnyDurationDistribution,
@@ -241,7 +241,7 @@ def _read_household(
     """Read a household: a mapping, or the path of a YAML file, which is read for all members."""
     if not isinstance(value, str | Path):
         return validate(value)
-    path = folder_of(value) / Path(value).expanduser()
+    path = named_path(value)
     if not str(value) or not path.is_file():
         raise problem(
             f"expected a household (a mapping with 'members', or a YAML file), got {shown(value)}"

@@ -572,7 +572,7 @@ def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
             f"{name!r} is a part of a persona: extend one with it, like"
             f" {{extends: [retired, {name}]}}"
         )
-    path = units.folder_of(value) / Path(value).expanduser()
+    path = units.named_path(value)
     if not path.is_file():
         known = [*bundled_names(), *(part_names() if is_extended else ())]
         raise problem(
@@ -594,7 +594,7 @@ def _validate_persona(
         return validate(data)
 
     if isinstance(value, str | Path) and str(value) not in bundled_names():
-        return once(info, (Persona, units.folder_of(value) / Path(value).expanduser()), read)
+        return once(info, (Persona, units.named_path(value)), read)
     return read()
 
 

@@ -13,6 +13,7 @@ from fleet2d.configuration.components import Component, base_of, lookup
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
+from fleet2d.inputs import resolved
 
 BUNDLED = Path(__file__).parent / "bundled"
 ENTRIES = ("users", "robots", "objects", "interactions", "algorithms", "metrics", "expect")
@@ -97,11 +98,10 @@ def bundled_path(name: str) -> Path:
     Raises:
         ScenarioError: there is no such file; the message lists all names.
     """
-    path = BUNDLED / f"{name}.yaml"
-    if not path.is_file():
-        names = sorted(p.stem for p in BUNDLED.glob("*.yaml"))
+    names = sorted(path.stem for path in BUNDLED.glob("*.yaml"))
+    if name not in names:
         raise ScenarioError(f"no scenario {name!r} is bundled{suggest(name, names)}")
-    return path
+    return BUNDLED / f"{name}.yaml"
 
 
 def _load(
@@ -118,13 +118,15 @@ def _load(
         bundled = str(source).removeprefix("bundled:")
         path = folder / source if bundled == str(source) else bundled_path(bundled)
         title = os.path.normpath(path) if bundled == str(source) else str(source)
-        if path.resolve() in chain:
-            raise ScenarioError(f"{title} extends itself: {_chain(chain, path)}")
+        real = resolved(path, ScenarioError)
+        if real in chain:
+            names = " → ".join(file.name for file in (*chain[chain.index(real) :], path))
+            raise ScenarioError(f"{title} extends itself: {names}")
         EXTENDED_FILES.check(len(sizes) + 1, "the scenario", ScenarioError, prefix="at least ")
         document = read_document(path, title)
         sizes.append(len(document.places))
         YAML_VALUES.check(sum(sizes), "the scenario", ScenarioError, prefix="more than ")
-        folder, chain = path.parent, (*chain, path.resolve())
+        folder, chain = path.parent, (*chain, real)
     extended = document.data.pop("extends", None) or []
     parents = extended if isinstance(extended, list) else [extended]
     result = Document()
@@ -141,11 +143,6 @@ def _load(
     result.data.pop("name", None)
     _refuse_unknown_deletions(result, document)
     return merge(result, document)
-
-
-def _chain(chain: tuple[Path, ...], last: Path) -> str:
-    start = chain.index(last.resolve())
-    return " → ".join(path.name for path in (*chain[start:], last))
 
 
 def _read_override(text: str) -> Document:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from fleet2d.errors import ArtifactError, RunDirectoryError
+from fleet2d.inputs import open_input
 
 try:
     import fcntl
@@ -441,7 +442,7 @@ def read_frames(path: Path, form: JournalFormat, start: int = 0) -> Iterator[Fra
         ArtifactError: The file can't be read.
     """
     try:
-        with path.open("rb") as file:
+        with open_input(path, ArtifactError) as file:
             if file.read(len(form.magic)) != form.magic:
                 return
             file.seek(start or len(form.magic))

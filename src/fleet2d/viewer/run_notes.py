@@ -4,7 +4,9 @@ import json
 from pathlib import Path
 
 from fleet2d.errors import InputError
+from fleet2d.inputs import open_input
 from fleet2d.runs.run import Run
+from fleet2d.storage.files import path_in
 from fleet2d.viewer.contract import NOTES, NoteFacts, read_body
 from fleet2d.viewer.page_data import write_file
 
@@ -16,12 +18,12 @@ def notes_path(run: Run) -> Path:
     """Return the file of the notes of a run: `month.notes.json` beside `month`.
 
     Raises:
-        InputError: The run isn't stored.
+        InputError: The run isn't stored; or a link, a device or a pipe is in the file's place.
     """
     if run.directory is None:
         raise InputError("the run is in memory: notes are stored beside the directory of a run")
     root = Path(run.directory).resolve()
-    return root.with_name(root.name + SUFFIX)
+    return path_in(root.parent, root.name + SUFFIX)
 
 
 def read_notes(run: Run) -> list[NoteFacts]:
@@ -30,12 +32,14 @@ def read_notes(run: Run) -> list[NoteFacts]:
     Raises:
         InputError: Their file can't be read.
     """
-    if run.directory is None or not notes_path(run).exists():
+    if run.directory is None:
         return []
     path = notes_path(run)
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             return checked_notes(file.read(MAX_BYTES + 1))
+    except FileNotFoundError:
+        return []
     except (OSError, InputError) as error:
         raise InputError(f"{path} can't be read: {error}") from None
 

@@ -22,7 +22,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from fleet2d.bounds import FILE_BYTES, JSON_VALUES, one_line, read_bytes
+from fleet2d.bounds import FILE_BYTES, JSON_VALUES, check_file, one_line, read_bytes
 from fleet2d.configuration.components import DescribedModel
 from fleet2d.configuration.problems import Location, problem, suggest
 from fleet2d.errors import FloorPlanError, InputError, errors_as, os_errors_as
@@ -56,7 +56,7 @@ def reading(path: Path, form: str, *failures: type[Exception]) -> Iterator[None]
         os_errors_as(FloorPlanError, f"{path} can't be read"),
         errors_as(FloorPlanError, f"{path} is damaged, or not {form}", failures),
     ):
-        FILE_BYTES.check(path.stat().st_size, path, FloorPlanError)
+        check_file(path, FILE_BYTES, FloorPlanError)
         yield
 
 

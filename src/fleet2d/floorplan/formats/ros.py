@@ -10,13 +10,14 @@ import numpy as np
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
 from fleet2d.floorplan.formats.occupancy import PictureSource
 from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
 from fleet2d.floorplan.lattice import MAX_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.inputs import input_path
 from fleet2d.kernels import Bool
 
 _KEYS = {
@@ -192,8 +193,8 @@ def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
 
 def _is_file(path: Path) -> bool:
     try:
-        return path.is_file()
-    except OSError:  # its name is too long to be one
+        return input_path(path).is_file()
+    except (OSError, InputError):  # there is none, or it may not be opened
         return False
 
 
