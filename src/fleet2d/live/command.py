@@ -1,6 +1,7 @@
 """Commands for other programs: live, mcp."""
 
 import json
+import re
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -50,12 +51,13 @@ def live(  # noqa: PLR0913 - options of the command line
         return
     from fleet2d.engine.simulation import Simulation
     from fleet2d.live.bridge import Bridge
+    from fleet2d.live.library_errors import libraries_told
     from fleet2d.live.peers import open_peers
     from fleet2d.scenario.model import load_scenario
 
     scenario, overrides = split(arguments)
     changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]
-    with restrict_to(trust, trust_dir):
+    with restrict_to(trust, trust_dir), libraries_told(id):  # before and after the run: not told
         checked = load_scenario(scenario, *changes)
         opened = open_peers(checked, *peers or ())
         if not opened:
@@ -67,7 +69,8 @@ def live(  # noqa: PLR0913 - options of the command line
         tell = partial(typer.echo, err=True)
         for address, peer in opened.items():
             port = getattr(peer, "port", None)
-            tell(f"{address}: {'connected' if port is None else f'listens at {port}'}")
+            shown = re.sub(r"//.*@", "//", address)  # without a password
+            tell(f"{shown}: {'connected' if port is None else f'listens at {port}'}")
         bridge = Bridge(
             simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell
         )

@@ -13,6 +13,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+from urllib.parse import unquote
 
 from pydantic_core import PydanticCustomError
 
@@ -21,7 +22,7 @@ from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import InputError, errors_as, extra, os_errors_as
-from fleet2d.live.bridge import LiveStep, Peer, Post, sources_of
+from fleet2d.live.bridge import Fault, LiveStep, Peer, Post, lose, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
@@ -148,6 +149,7 @@ class WebSocketPeer(Peer):
 
         with os_errors_as(InputError, f"ws://{host}:{port}"):
             self._server = serve(self._serve, host, port, max_size=MAX_BYTES, origins=ORIGINS)
+        self._address = f"ws://{host}:{self.port}"
         self._clients: dict[Any, queue.Queue[str | None]] = {}
         self._lock = threading.Lock()
         self._hello, self._numbers = "", itertools.count()
@@ -169,7 +171,7 @@ class WebSocketPeer(Peer):
 
         texts: queue.Queue[str | None] = queue.Queue(MAX_QUEUE)
         number = next(self._numbers)
-        with contextlib.suppress(ConnectionClosed):
+        try:
             texts.put(self._hello)
             with self._lock:
                 self._clients[connection] = texts
@@ -179,6 +181,8 @@ class WebSocketPeer(Peer):
             sender.start()
             for content in connection:
                 self._post(content, number)
+        except ConnectionClosed as error:
+            self._post(Fault("lost connections", f"a client of {self._address}: {error}"))
         self._post(None, number)
         self._forget(connection)
 
@@ -205,6 +209,8 @@ class WebSocketPeer(Peer):
                 for text in texts:
                     waiting.put_nowait(text)
             except queue.Full:  # too slow: it is disconnected, and the run goes on
+                text = f"a client of {self._address} doesn't read: it is disconnected"
+                self._post(Fault("slow clients", text))
                 self._forget(connection)
                 threading.Thread(target=connection.close, daemon=True).start()
 
@@ -231,7 +237,7 @@ def open_peer(address: str) -> Peer:
 
     Args:
         address: `udp://HOST:PORT` and `ws://HOST:PORT` listen there; `rosbridge://HOST:PORT` and
-            `mqtt://HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
+            `mqtt://USER:PASSWORD@HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
 
     Raises:
         InputError: There is no such scheme, the address can't be used, or an extra isn't installed.
@@ -254,7 +260,8 @@ Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT
 
         return RosbridgePeer(host, port or 9090)
 
-    return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d")
+    names = [None if part is None else unquote(part) for part in (parts.username, parts.password)]
+    return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d", *names)
 
 
 def open_peers(scenario: Scenario, *addresses: str) -> dict[str, Peer]:
@@ -281,37 +288,73 @@ class MqttPeer(Peer):
         prefix: The beginning of all topics of the run.
     """
 
-    def __init__(self, host: str, port: int, prefix: str) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        prefix: str,
+        user: str | None = None,
+        password: str | None = None,
+    ) -> None:
         """Connect to a broker.
 
         Raises:
-            InputError: There is no broker at the address, or paho-mqtt isn't installed.
+            InputError: There is no broker at the address, it refuses, or it doesn't answer; or
+                paho-mqtt isn't installed.
         """
         with extra("mqtt", "mqtt:// needs paho-mqtt"):
             from paho.mqtt.client import Client
             from paho.mqtt.enums import CallbackAPIVersion
 
         self.prefix = prefix
+        self._address = f"mqtt://{host}:{port}"
+        self._retained: dict[str, str] = {}  # what a broker that was restarted has lost
+        self._on: dict[str, str] = {}  # the word of each sensor for being on
+        self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # "", or why it refuses
+        self._post: Post | None = None
         self._client: Any = Client(CallbackAPIVersion.VERSION2)
+        self._client.username_pw_set(user, password)
         self._client.will_set(f"{prefix}/status", "offline", retain=True)
-        self._is_on = threading.Event()
-        self._client.on_connect = self._subscribe
-        with os_errors_as(InputError, f"mqtt://{host}:{port}: there is no broker"):
+        self._client.on_connect = self._greet
+        self._client.on_subscribe = self._subscribed
+        with os_errors_as(InputError, f"{self._address}: there is no broker"):
             self._client.connect(host, port)
         self._client.loop_start()
-        if not self._is_on.wait(WAIT_S):
+        try:
+            refusal = self._answers.get(timeout=WAIT_S)
+        except queue.Empty:
+            refusal = f"nothing there answers within {WAIT_S:g} s as a broker does"
+        if refusal:
+            self._client.disconnect()
             self._client.loop_stop()
-            raise InputError(f"mqtt://{host}:{port}: the broker doesn't answer")
-        self._on: dict[str, str] = {}  # the word of each sensor for being on
+            raise InputError(f"{self._address}: {refusal}")
 
-    def _subscribe(self, *_: object) -> None:
-        self._is_on.set()
+    def _greet(self, *arguments: Any) -> None:
+        """Subscribe, and publish what the broker is to keep: at each connection."""
+        if (reason := arguments[3]).is_failure:
+            self._answer(f"the broker refuses the connection: {reason}")
+            return
         self._client.subscribe(f"{self.prefix}/in/#", qos=1)
+        for topic, text in list(self._retained.items()):
+            self._client.publish(topic, text, qos=1, retain=True)
+
+    def _subscribed(self, *arguments: Any) -> None:
+        refused = [reason for reason in arguments[3] if reason.is_failure]
+        text = f"the broker refuses the subscription to {self.prefix}/in/#"
+        self._answer(f"{text}: {refused[0]}" if refused else "")
+
+    def _answer(self, refusal: str) -> None:
+        """Pass on the answer of the broker: to the constructor, or to the run."""
+        if self._post is None:
+            self._answers.put(refusal)
+        elif refusal:
+            self._post(Fault("lost connections", f"{self._address}: {refusal}"))
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Announce the sensors and bodies, and begin to receive."""
+        self._post = post
         self._client.on_message = lambda *args: post(args[-1].payload)
-        self._client.on_disconnect = lambda *_: post(None)
+        self._client.on_disconnect = lambda *_: lose(post, self._address)
         for name, item in simulation.scenario.objects.items():
             if isinstance(item, Sensor):
                 self._on[name] = item.words[0]
@@ -319,11 +362,11 @@ class MqttPeer(Peer):
                 if item.type_name in DEVICE_CLASSES:
                     config["device_class"] = DEVICE_CLASSES[item.type_name]
                 self._announce("binary_sensor", name, f"sensor/{name}", config)
-                self._publish(f"sensor/{name}", "OFF", retain=True)
+                self._retain(f"{self.prefix}/sensor/{name}", "OFF")
         for name in simulation.actors:
             template = {"value_template": "{{ value_json.room or 'away' }}"}
             self._announce("sensor", name, f"pose/{name}", template)
-        self._publish("status", "online", retain=True)
+        self._retain(f"{self.prefix}/status", "online")
 
     def _announce(self, component: str, name: str, topic: str, config: dict[str, Any]) -> None:
         """Publish a configuration of Home Assistant's discovery."""
@@ -336,11 +379,16 @@ class MqttPeer(Peer):
             "device": {"identifiers": [node], "name": "Fleet2D", "manufacturer": "Fleet2D"},
             **config,
         }
-        path = f"{DISCOVERY}/{component}/{node}/{re.sub(r'[^A-Za-z0-9_-]', '_', name)}/config"
-        self._client.publish(path, json.dumps(content), qos=1, retain=True)
+        place = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        self._retain(f"{DISCOVERY}/{component}/{node}/{place}/config", json.dumps(content))
 
-    def _publish(self, topic: str, text: str, *, retain: bool = False) -> None:
-        self._client.publish(f"{self.prefix}/{topic}", text, qos=1 if retain else 0, retain=retain)
+    def _retain(self, topic: str, text: str) -> None:
+        """Publish what the broker is to keep."""
+        self._retained[topic] = text
+        self._client.publish(topic, text, qos=1, retain=True)
+
+    def _publish(self, topic: str, text: str) -> None:
+        self._client.publish(f"{self.prefix}/{topic}", text)
 
     def send(self, frame: LiveStep) -> None:
         """Publish a frame."""
@@ -349,7 +397,7 @@ class MqttPeer(Peer):
         for event in frame.events:
             if event.event == EventKind.SENSOR:
                 state = "ON" if event.detail == self._on.get(event.entity) else "OFF"
-                self._publish(f"sensor/{event.entity}", state, retain=True)
+                self._retain(f"{self.prefix}/sensor/{event.entity}", state)
             self._publish("event", json.dumps({**event._asdict(), "event": str(event.event)}))
         for table, row in frame.rows:
             self._publish(f"row/{table}", json.dumps(row, default=str))
@@ -360,6 +408,7 @@ class MqttPeer(Peer):
 
     def close(self, run: Run) -> None:
         """Publish that the run is over, and disconnect."""
+        self._retained[f"{self.prefix}/status"] = "offline"
         message = self._client.publish(f"{self.prefix}/status", "offline", qos=1, retain=True)
         if self._client.is_connected():
             message.wait_for_publish(WAIT_S)
