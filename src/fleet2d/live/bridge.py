@@ -347,8 +347,10 @@ class Bridge:
             if content is None:
                 gone.append(sender)
                 continue
-            self.counts["received"] += not isinstance(content, Fault) or content.is_message
-            if isinstance(content, Fault):
+            is_fault = isinstance(content, Fault)
+            if not is_fault or content.is_message:
+                self.counts["received"] += 1
+            if is_fault:
                 self._count(content.kind, content.text)
                 continue
             if len(messages) >= self.max_per_step:

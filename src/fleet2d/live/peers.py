@@ -11,17 +11,20 @@ import queue
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
+from http import HTTPStatus
 from typing import Any
 from urllib.parse import unquote
 
 from pydantic_core import PydanticCustomError
 
+from fleet2d.bounds import one_line
 from fleet2d.configuration.trust import current_trust
 from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
-from fleet2d.errors import InputError, errors_as, extra, os_errors_as
+from fleet2d.errors import InputError, errors_as, extra, os_errors_as, printable
 from fleet2d.live.bridge import Fault, LiveStep, Peer, Post, lose, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
@@ -148,7 +151,16 @@ class WebSocketPeer(Peer):
             from websockets.sync.server import serve
 
         with os_errors_as(InputError, f"ws://{host}:{port}"):
-            self._server = serve(self._serve, host, port, max_size=MAX_BYTES, origins=ORIGINS)
+            self._server = serve(
+                self._serve,
+                host,
+                port,
+                max_size=MAX_BYTES,
+                origins=ORIGINS,
+                process_response=self._tell_refusal,
+                open_timeout=WAIT_S,
+                close_timeout=WAIT_S,
+            )
         self._address = f"ws://{host}:{self.port}"
         self._clients: dict[Any, queue.Queue[str | None]] = {}
         self._lock = threading.Lock()
@@ -186,6 +198,11 @@ class WebSocketPeer(Peer):
         self._post(None, number)
         self._forget(connection)
 
+    def _tell_refusal(self, _: Any, request: Any, response: Any) -> None:
+        if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
+            text = printable(one_line(response.body.decode(errors="replace"), 200))
+            self._post(Fault("refused clients", f"{self._address}: {text}"))
+
     def _pass_on(self, connection: Any, texts: "queue.Queue[str | None]") -> None:
         from websockets.exceptions import ConnectionClosed
 
@@ -212,7 +229,7 @@ class WebSocketPeer(Peer):
                 text = f"a client of {self._address} doesn't read: it is disconnected"
                 self._post(Fault("slow clients", text))
                 self._forget(connection)
-                threading.Thread(target=connection.close, daemon=True).start()
+                _cut(connection)
 
     def send(self, frame: LiveStep) -> None:
         """Pass a frame on to all clients."""
@@ -229,7 +246,18 @@ class WebSocketPeer(Peer):
         with self._lock:  # for clients that have just connected, too
             self._end = json.dumps(end), None
         self._put(self._end)
+        until = time.monotonic() + WAIT_S
+        while self._clients and time.monotonic() < until:
+            time.sleep(0.01)
+        for connection in list(self._clients):
+            _cut(connection)
         self._server.shutdown()
+
+
+def _cut(connection: Any) -> None:
+    """End a connection whose client doesn't read: closing it properly would wait for that."""
+    with contextlib.suppress(OSError):
+        connection.socket.shutdown(socket.SHUT_RDWR)
 
 
 def open_peer(address: str) -> Peer:
