@@ -302,7 +302,7 @@ class Bridge:
                 with self._lock:
                     self._dropped += 1
                 return
-            self._inbox.put((time.monotonic(), (number, client), content))
+            self._inbox.put((time.time(), (number, client), content))
 
         return post
 
@@ -347,21 +347,8 @@ class Bridge:
             if content is None:
                 gone.append(sender)
                 continue
-            is_fault = isinstance(content, Fault)
-            if not is_fault or content.is_message:
-                self.counts["received"] += 1
-            if is_fault:
-                self._count(content.kind, content.text)
-                continue
-            if len(messages) >= self.max_per_step:
-                self._count("too many", f"more than {self.max_per_step} messages in a step")
-                continue
-            try:
-                message = parse_message(content)
-            except InputError as error:
-                self._count("wrong", str(error))
-                continue
-            if not self._is_timely(message, arrived, sender):
+            message = self._read(content, len(messages) >= self.max_per_step)
+            if message is None or not self._is_timely(message, arrived, sender):
                 continue
             if isinstance(message, PoseMessage | GoalMessage):
                 key = message.type, message.entity
@@ -373,10 +360,26 @@ class Bridge:
             messages.append((message, sender))
         return messages, gone
 
+    def _read(self, content: Any, is_full: bool) -> LiveMessage | None:
+        """Return a message; None if there is none in the content, or no room for it."""
+        is_fault = isinstance(content, Fault)
+        if not is_fault or content.is_message:
+            self.counts["received"] += 1
+        if is_fault:
+            self._count(content.kind, content.text)
+        elif is_full:
+            self._count("too many", f"more than {self.max_per_step} messages in a step")
+        else:
+            try:
+                return parse_message(content)
+            except InputError as error:
+                self._count("wrong", str(error))
+        return None
+
     def _is_timely(self, message: LiveMessage, arrived: float, sender: Sender) -> bool:
         """Return whether a message is neither late nor out of order, and count lost ones."""
         if message.time is not None:
-            age = time.time() - message.time
+            age = arrived - message.time
             if age > self.max_age_s:
                 self._count("late", f"a message was sent {age:.1f} s ago by its clock")
                 return False
