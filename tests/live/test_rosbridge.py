@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from fleet2d.errors import InputError
-from fleet2d.live.bridge import Content, Fault
+from fleet2d.live.bridge import Content, PeerFault
 from fleet2d.live.messages import parse_message
 from fleet2d.live.rosbridge import contents_of
 
@@ -204,7 +204,7 @@ def test_a_pose_in_the_map_is_a_pose(frame: str) -> None:
 @pytest.mark.parametrize("frame", ["astro/base_link", "odom", "mapped", "/astro/odom"])
 def test_a_pose_in_another_frame_is_left_out_and_told(frame: str) -> None:
     (fault,) = contents(stamped(frame_id=frame))
-    assert isinstance(fault, Fault)
+    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("in other frames", True)
     assert fault.text.startswith(f"/ana/pose is in the frame {frame.lstrip('/')!r}: ")
 
@@ -220,7 +220,7 @@ def test_the_stamp_is_the_time_of_a_pose() -> None:
 def test_the_stamp_0_means_now_and_a_simulated_clock_is_told() -> None:
     assert "time" not in str(contents(stamped(stamp={"sec": 0, "nanosec": 0})))
     fault, content = contents(stamped(stamp={"sec": 12, "nanosec": 0}))
-    assert isinstance(fault, Fault)
+    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("of a simulated clock", False)
     assert "time" not in str(content)
 
@@ -236,7 +236,7 @@ def test_a_quaternion_that_says_nothing_is_no_heading(turn: dict[str, Any]) -> N
     message = stamped(frame_id="map")
     message["pose"]["orientation"] = turn
     fault, content = contents(message)
-    assert isinstance(fault, Fault)
+    assert isinstance(fault, PeerFault)
     assert fault.kind == "without heading"
     assert "heading_deg" not in str(content)
 
@@ -254,7 +254,7 @@ def test_a_quaternion_that_says_nothing_is_no_heading(turn: dict[str, Any]) -> N
 )
 def test_a_message_without_a_pose_is_wrong(message: object, why: str) -> None:
     (fault,) = contents(message)
-    assert isinstance(fault, Fault)
+    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("wrong", True)
     assert fault.text.startswith(f"/ana/pose: {why}")
 
@@ -286,7 +286,7 @@ def test_no_mutation_of_a_message_is_more_than_a_fault() -> None:
         odd = mutated(message, draw)
         odd = mutated(odd, draw) if draw.random() < 0.5 else odd
         for content in contents(odd, draw.choice(["pose", "goal"])):
-            if not isinstance(content, Fault):
+            if not isinstance(content, PeerFault):
                 with contextlib.suppress(InputError):
                     parse_message(content)  # type: ignore[arg-type]
 

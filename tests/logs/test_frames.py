@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from fleet2d.logs.frames import Link, Motions
+from fleet2d.logs.frames import FrameLink, RigidMotions
 
 spatial = pytest.importorskip("scipy.spatial.transform", reason="SciPy is not installed")
 
 
-def drawn(seed: int, count: int = 50) -> Motions:
+def drawn(seed: int, count: int = 50) -> RigidMotions:
     numbers = np.random.default_rng(seed).normal(size=(count, 7))
-    return Motions.of_rows(numbers.tolist())
+    return RigidMotions.of_rows(numbers.tolist())
 
 
-def matrices(motions: Motions) -> np.ndarray:
+def matrices(motions: RigidMotions) -> np.ndarray:
     whole = np.tile(np.eye(4), (len(motions.place), 1, 1))
     whole[:, :3, :3] = spatial.Rotation.from_quat(motions.turn).as_matrix()
     whole[:, :3, 3] = motions.place
@@ -37,7 +37,7 @@ def test_a_motion_and_its_inverse_are_none() -> None:
 def test_turns_between_stamps_are_slerped_and_places_on_a_line(count: int) -> None:
     motions = drawn(count, count)
     stamps = np.arange(count) * 10**9 + 7
-    link = Link(False, {("map", "/tf")}, stamps.tolist(), stamps.tolist())
+    link = FrameLink(False, {("map", "/tf")}, stamps.tolist(), stamps.tolist())
     link.rows = np.hstack([motions.place, motions.turn]).tolist()
     time = np.linspace(stamps[0], stamps[-1], 40).astype(np.int64)
 
@@ -53,7 +53,7 @@ def test_turns_between_stamps_are_slerped_and_places_on_a_line(count: int) -> No
 
 def test_nearly_equal_turns_are_interpolated_too() -> None:
     rows = [[0.0] * 6 + [1.0], [2.0, 0.0, 0.0, 0.0, 0.0, 1e-9, 1.0]]
-    link = Link(False, {("map", "/tf")}, [0, 10], [0, 10], rows)
+    link = FrameLink(False, {("map", "/tf")}, [0, 10], [0, 10], rows)
 
     at = link.at(np.array([5, 10, 99]))
 
@@ -62,5 +62,5 @@ def test_nearly_equal_turns_are_interpolated_too() -> None:
 
 
 def test_a_static_link_holds_at_all_times() -> None:
-    link = Link(True, {("map", "/tf_static")}, [5], [5], [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+    link = FrameLink(True, {("map", "/tf_static")}, [5], [5], [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     assert link.at(np.array([-9, 0, 9])).place[:, 0].tolist() == [1.0, 1.0, 1.0]

@@ -98,7 +98,7 @@ class LiveStep:
         return [json.dumps(message, default=str) for message in self.messages]
 
 
-class Fault(NamedTuple):
+class PeerFault(NamedTuple):
     """What a peer noticed about what arrived, or about a client.
 
     Attributes:
@@ -112,7 +112,7 @@ class Fault(NamedTuple):
     is_message: bool = False
 
 
-Content = str | bytes | Mapping[str, Any] | Fault | None
+Content = str | bytes | Mapping[str, Any] | PeerFault | None
 
 
 class Post(Protocol):
@@ -131,7 +131,7 @@ class Post(Protocol):
 def lose(post: Post, address: str) -> None:
     """Tell a run that a server is gone, and with it all that it was heading for."""
     post(None)
-    post(Fault("lost connections", f"{address}: the connection is tried again"))
+    post(PeerFault("lost connections", f"{address}: the connection is tried again"))
 
 
 class Peer:
@@ -259,7 +259,7 @@ class Bridge:
 
     def run(self) -> Run:
         """Simulate to the end, or to the step of Ctrl-C, and return the run."""
-        with libraries_told(lambda text: self._post_of(-1)(Fault("errors", text))):
+        with libraries_told(lambda text: self._post_of(-1)(PeerFault("errors", text))):
             return self._run()
 
     def _run(self) -> Run:
@@ -362,7 +362,7 @@ class Bridge:
 
     def _read(self, content: Any, is_full: bool) -> LiveMessage | None:
         """Return a message; None if there is none in the content, or no room for it."""
-        is_fault = isinstance(content, Fault)
+        is_fault = isinstance(content, PeerFault)
         if not is_fault or content.is_message:
             self.counts["received"] += 1
         if is_fault:

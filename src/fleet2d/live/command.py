@@ -75,10 +75,10 @@ def live(  # noqa: PLR0913 - options of the command line
             simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell
         )
         run = bridge.run()
-    for note in bridge.notes():
-        tell(note)
-    place = f", stored in {out}" if out else ""
-    typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
+        for note in bridge.notes():
+            tell(note)
+        place = f", stored in {out}" if out else ""
+        typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
     if run.status != "complete":
         raise typer.Exit(130)
 

@@ -25,7 +25,7 @@ from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import InputError, errors_as, extra, os_errors_as, printable
-from fleet2d.live.bridge import Fault, LiveStep, Peer, Post, lose, sources_of
+from fleet2d.live.bridge import LiveStep, Peer, PeerFault, Post, lose, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
@@ -194,14 +194,14 @@ class WebSocketPeer(Peer):
             for content in connection:
                 self._post(content, number)
         except ConnectionClosed as error:
-            self._post(Fault("lost connections", f"a client of {self._address}: {error}"))
+            self._post(PeerFault("lost connections", f"a client of {self._address}: {error}"))
         self._post(None, number)
         self._forget(connection)
 
     def _tell_refusal(self, _: Any, request: Any, response: Any) -> None:
         if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
             text = printable(one_line(response.body.decode(errors="replace"), 200))
-            self._post(Fault("refused clients", f"{self._address}: {text}"))
+            self._post(PeerFault("refused clients", f"{self._address}: {text}"))
 
     def _pass_on(self, connection: Any, texts: "queue.Queue[str | None]") -> None:
         from websockets.exceptions import ConnectionClosed
@@ -227,7 +227,7 @@ class WebSocketPeer(Peer):
                     waiting.put_nowait(text)
             except queue.Full:  # too slow: it is disconnected, and the run goes on
                 text = f"a client of {self._address} doesn't read: it is disconnected"
-                self._post(Fault("slow clients", text))
+                self._post(PeerFault("slow clients", text))
                 self._forget(connection)
                 _cut(connection)
 
@@ -376,7 +376,7 @@ class MqttPeer(Peer):
         if self._post is None:
             self._answers.put(refusal)
         elif refusal:
-            self._post(Fault("lost connections", f"{self._address}: {refusal}"))
+            self._post(PeerFault("lost connections", f"{self._address}: {refusal}"))
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Announce the sensors and bodies, and begin to receive."""

@@ -18,7 +18,7 @@ from fleet2d.bounds import one_line
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
 from fleet2d.kernels import F64, Mesh, region_outline, visible_region
-from fleet2d.live.bridge import Content, Fault, LiveStep, Peer, Post, lose
+from fleet2d.live.bridge import Content, LiveStep, Peer, PeerFault, Post, lose
 from fleet2d.live.messages import first_fault
 from fleet2d.logs.frames import MAP, frame_name, is_named
 from fleet2d.runs.run import Run
@@ -187,7 +187,7 @@ class RosbridgePeer(Peer):
         self._ros.close()
 
 
-class _Stamp(BaseModel):
+class _RosStamp(BaseModel):
     """A time of ROS 2, or of ROS 1."""
 
     sec: int = Field(default=0, ge=0, lt=1 << 32, validation_alias=AliasChoices("sec", "secs"))
@@ -196,17 +196,17 @@ class _Stamp(BaseModel):
     )
 
 
-class _Header(BaseModel):
+class _RosHeader(BaseModel):
     frame_id: str = ""
-    stamp: _Stamp = _Stamp()
+    stamp: _RosStamp = _RosStamp()
 
 
-class _Point(BaseModel):
+class _RosPoint(BaseModel):
     x: float
     y: float
 
 
-class _Quaternion(BaseModel):
+class _RosQuaternion(BaseModel):
     """A turn; rosbridge has null for NaN."""
 
     x: float | None = 0.0
@@ -215,16 +215,16 @@ class _Quaternion(BaseModel):
     w: float | None = 0.0
 
 
-class _Pose(BaseModel):
-    position: _Point
-    orientation: _Quaternion = _Quaternion()
+class _RosPose(BaseModel):
+    position: _RosPoint
+    orientation: _RosQuaternion = _RosQuaternion()
 
 
 class _PoseStamped(BaseModel):
     """A `geometry_msgs/PoseStamped`."""
 
-    header: _Header = _Header()
-    pose: _Pose
+    header: _RosHeader = _RosHeader()
+    pose: _RosPose
 
 
 def contents_of(topic: str, name: str, kind: str, message: object) -> Iterator[Content]:
@@ -239,12 +239,12 @@ def contents_of(topic: str, name: str, kind: str, message: object) -> Iterator[C
     try:
         stamped = _PoseStamped.model_validate(message)
     except ValidationError as error:
-        yield Fault("wrong", f"{topic}: {first_fault(error)}", is_message=True)
+        yield PeerFault("wrong", f"{topic}: {first_fault(error)}", is_message=True)
         return
     frame = frame_name(stamped.header.frame_id)
     if frame and not is_named(frame, MAP):
         text = f"{topic} is in the frame {one_line(frame)!r}: only poses in {MAP!r} count"
-        yield Fault("in other frames", text, is_message=True)
+        yield PeerFault("in other frames", text, is_message=True)
         return
     position, turn = stamped.pose.position, stamped.pose.orientation
     content: dict[str, Any] = {"type": kind, "entity": name}
@@ -253,12 +253,12 @@ def contents_of(topic: str, name: str, kind: str, message: object) -> Iterator[C
     if stamp_ns >= LATEST_SIMULATED_NS:
         content["time"] = stamp_ns / 1e9
     elif stamp_ns:
-        yield Fault("of a simulated clock", f"{topic}: nobody knows which messages are late")
+        yield PeerFault("of a simulated clock", f"{topic}: nobody knows which messages are late")
     (heading,) = headings_of(np.array([[turn.x, turn.y, turn.z, turn.w]], np.float64))
     if math.isfinite(heading):
         content["heading_deg"] = math.degrees(heading)
     else:
-        yield Fault("without heading", f"{topic}: the quaternion is 0 or not a number")
+        yield PeerFault("without heading", f"{topic}: the quaternion is 0 or not a number")
     yield content
 
 

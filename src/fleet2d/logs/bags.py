@@ -8,7 +8,7 @@ import numpy as np
 
 from fleet2d.bounds import FIXES
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.logs.frames import MAP, FrameTree, Motions, StampedPoses, frame_name
+from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes, Stamps, localize
 from fleet2d.storage.bags import headings_of, numbers_of, open_bag, stamp_ns, times_of
@@ -113,7 +113,7 @@ def _of_topic(reader: Any, path: Path, topic: str) -> tuple[StampedPoses, list[s
     notes = [f"{topic}: {_count(len(rows), frames)}"]
     others = [body for body in bodies if body and body.rpartition("/")[2] not in _BASES]
     notes += [f"{topic}: these are poses of {body!r}, not of a base_link" for body in others]
-    return StampedPoses(times, frames, Motions.of_rows(rows)), notes
+    return StampedPoses(times, frames, RigidMotions.of_rows(rows)), notes
 
 
 def _of_frame(tree: FrameTree, frame: str, target: str) -> tuple[StampedPoses, list[str]]:
@@ -124,7 +124,7 @@ def _of_frame(tree: FrameTree, frame: str, target: str) -> tuple[StampedPoses, l
         raise LogError(f"{tree.path}: the frame {frame!r} never moves in {target!r}")
     fastest = max(moving, key=lambda link: len(link.rows))
     time = fastest.time
-    poses = StampedPoses(time, [frame] * len(time), Motions.still(len(time)))
+    poses = StampedPoses(time, [frame] * len(time), RigidMotions.still(len(time)))
     return poses, [f"{frame}: {_count(len(time), [target])}"]
 
 

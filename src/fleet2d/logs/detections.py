@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from fleet2d.bounds import FIXES, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import I64
-from fleet2d.logs.frames import MAP, FrameTree, Motions, StampedPoses, frame_name
+from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import NAMES, LogTable, RawFixes, Stamps
 from fleet2d.storage.bags import headings_of, is_bag, open_bag, stamp_ns, times_of
@@ -160,7 +160,7 @@ def _from_bag(
         x, y, z, heading = np.array(rows, np.float64).T
         level = np.zeros(len(x))
         turns = np.stack([level, level, np.sin(heading / 2), np.cos(heading / 2)], 1)
-        motions = Motions(np.stack([x, y, np.nan_to_num(z)], 1), turns)
+        motions = RigidMotions(np.stack([x, y, np.nan_to_num(z)], 1), turns)
         poses = StampedPoses(times, frames, motions)
         motions, is_known = poses.seen_from(frame, FrameTree(reader, path), topic, notes)
     x, y = np.where(is_known, motions.place[:, :2].T, np.nan)

@@ -24,7 +24,7 @@ _FRESH_NS = 1_000_000_000
 _ALWAYS = np.iinfo(np.int64)
 
 
-class Motions(NamedTuple):
+class RigidMotions(NamedTuple):
     """Poses in space, or rigid motions: turned, then moved.
 
     Attributes:
@@ -46,9 +46,9 @@ class Motions(NamedTuple):
         """Return motions that change nothing."""
         return cls.of_rows([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * count)
 
-    def where(self, kept: Bool | I64) -> "Motions":
+    def where(self, kept: Bool | I64) -> "RigidMotions":
         """Return some of them."""
-        return Motions(self.place[kept], self.turn[kept])
+        return RigidMotions(self.place[kept], self.turn[kept])
 
     def is_steep(self) -> Bool:
         """Return which are tilted by more than 45 degrees, bool (n,)."""
@@ -56,18 +56,18 @@ class Motions(NamedTuple):
         steep: Bool = 1 - 2 * (x * x + y * y) < _STEEPEST
         return steep
 
-    def after(self, first: "Motions") -> "Motions":
+    def after(self, first: "RigidMotions") -> "RigidMotions":
         """Return the motions that do `first`, and then these."""
-        return Motions(
+        return RigidMotions(
             self.place + _turned(self.turn, first.place), _product(self.turn, first.turn)
         )
 
-    def inverse(self) -> "Motions":
+    def inverse(self) -> "RigidMotions":
         """Return the motions back."""
         back = self.turn * (-1, -1, -1, 1)
-        return Motions(-_turned(back, self.place), back)
+        return RigidMotions(-_turned(back, self.place), back)
 
-    def towards(self, end: "Motions", share: F64) -> "Motions":
+    def towards(self, end: "RigidMotions", share: F64) -> "RigidMotions":
         """Return those at a share of the way to others, float64 (n, 1), as tf2: slerp of turns."""
         cosine = (self.turn * end.turn).sum(axis=1, keepdims=True)
         angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
@@ -77,7 +77,7 @@ class Motions(NamedTuple):
         left = np.where(is_near, 1 - share, np.sin((1 - share) * angle)) / scale
         right = np.where(is_near, share, np.sin(share * angle)) / scale
         turn = left * self.turn + np.where(cosine < 0, -right, right) * end.turn
-        return Motions((1 - share) * self.place + share * end.place, unit_turns(turn))
+        return RigidMotions((1 - share) * self.place + share * end.place, unit_turns(turn))
 
 
 def _product(left: F64, right: F64) -> F64:
@@ -95,7 +95,7 @@ def _turned(turn: F64, place: F64) -> F64:
 
 
 @dataclass
-class Link:
+class FrameLink:
     """The transforms from a frame to its parent.
 
     Attributes:
@@ -127,9 +127,9 @@ class Link:
         """The last time [ns]."""
         return _ALWAYS.max if self.is_static else int(self.time.max())
 
-    def at(self, time: I64) -> Motions:
+    def at(self, time: I64) -> RigidMotions:
         """Return the motions at some times, int64 (n,) [ns], between its own interpolated."""
-        motions = Motions.of_rows(self.rows)
+        motions = RigidMotions.of_rows(self.rows)
         if self.is_static:  # the last one counts
             return motions.where(np.full(len(time), len(self.rows) - 1))
         order = np.argsort(self.time, kind="stable")
@@ -153,7 +153,7 @@ class FrameTree:
         self._reader, self.path, self.notes = reader, path, list[str]()
 
     @cached_property
-    def links(self) -> dict[str, Link]:
+    def links(self) -> dict[str, FrameLink]:
         """The link of each frame to its parent.
 
         Raises:
@@ -161,7 +161,7 @@ class FrameTree:
         """
         connections = [c for c in self._reader.connections if c.msgtype in TRANSFORMS]
         FIXES.check(sum(c.msgcount for c in connections), self.path, LogError)
-        links: dict[str, Link] = {}
+        links: dict[str, FrameLink] = {}
         left_out = 0
         for connection, time, data in self._reader.messages(connections) if connections else ():
             for one in self._reader.deserialize(data, connection.msgtype).transforms:
@@ -171,7 +171,7 @@ class FrameTree:
                     continue
                 topic = connection.topic
                 link = links.setdefault(
-                    frame_name(one.child_frame_id), Link(topic.endswith("tf_static"))
+                    frame_name(one.child_frame_id), FrameLink(topic.endswith("tf_static"))
                 )
                 link.parents.add((frame_name(one.header.frame_id), topic))
                 link.stamps.append(stamp_ns(one))
@@ -188,7 +188,7 @@ class FrameTree:
         parents = (parent for link in self.links.values() for parent, _ in sorted(link.parents))
         return list(dict.fromkeys([*self.links, *parents]))
 
-    def way(self, frame: str, target: str) -> tuple[list[Link], list[Link]] | None:
+    def way(self, frame: str, target: str) -> tuple[list[FrameLink], list[FrameLink]] | None:
         """Return the links from two frames up to their common ancestor; None if there is none.
 
         Raises:
@@ -216,7 +216,9 @@ class FrameTree:
             chain.append(parent)
         return chain
 
-    def way_to(self, frame: str, target: str, source: str) -> tuple[list[Link], list[Link]]:
+    def way_to(
+        self, frame: str, target: str, source: str
+    ) -> tuple[list[FrameLink], list[FrameLink]]:
         """Return the links from a frame to another one in any namespace, such as `astro/map`.
 
         Args:
@@ -261,11 +263,11 @@ class StampedPoses(NamedTuple):
 
     time: I64
     frames: Sequence[str]
-    motions: Motions
+    motions: RigidMotions
 
     def seen_from(
         self, target: str, tree: FrameTree, source: str, notes: list[str]
-    ) -> tuple[Motions, Bool]:
+    ) -> tuple[RigidMotions, Bool]:
         """Return the poses in another frame, and which of them are known, bool (n,).
 
         Args:
@@ -295,12 +297,12 @@ class StampedPoses(NamedTuple):
             age = time - min((link.end for link in links), default=_ALWAYS.max)
             notes += _ages(frame, target, age, int((~is_known[at]).sum()))
         notes += tree.notes
-        return Motions(place, turn), is_known
+        return RigidMotions(place, turn), is_known
 
 
-def _through(links: Sequence[Link], time: I64) -> Motions:
+def _through(links: Sequence[FrameLink], time: I64) -> RigidMotions:
     """Return the motions from the first of consecutive frames to the parent of the last one."""
-    motions = Motions.still(len(time))
+    motions = RigidMotions.still(len(time))
     for link in links:
         motions = link.at(time).after(motions)
     return motions
