@@ -140,6 +140,10 @@ class FrameLink:
         return motions.where(before).towards(motions.where(after), share[:, None])
 
 
+_Way = tuple[list[FrameLink], list[FrameLink]]
+"""The links from two frames up to their common ancestor."""
+
+
 class FrameTree:
     """The frames of a bag, and the transforms between them; read when they are needed.
 
@@ -188,7 +192,7 @@ class FrameTree:
         parents = (parent for link in self.links.values() for parent, _ in sorted(link.parents))
         return list(dict.fromkeys([*self.links, *parents]))
 
-    def way(self, frame: str, target: str) -> tuple[list[FrameLink], list[FrameLink]] | None:
+    def way(self, frame: str, target: str) -> _Way | None:
         """Return the links from two frames up to their common ancestor; None if there is none.
 
         Raises:
@@ -216,9 +220,7 @@ class FrameTree:
             chain.append(parent)
         return chain
 
-    def way_to(
-        self, frame: str, target: str, source: str
-    ) -> tuple[list[FrameLink], list[FrameLink]]:
+    def way_to(self, frame: str, target: str, source: str) -> _Way:
         """Return the links from a frame to another one in any namespace, such as `astro/map`.
 
         Args:
