@@ -251,3 +251,23 @@ def test_a_broker_that_was_restarted_gets_all_that_it_keeps() -> None:
     assert len(published) == 2
     assert all(kept <= set(topics) for topics in published)
     assert bridge.counts["lost connections"] == 1
+
+
+def test_messages_before_the_run_begins_are_kept() -> None:
+    """A broker sends what it retains at once, while the simulation is still being made."""
+    reading = b'{"type": "reading", "sensor": "front_door", "on": true}'
+    retained = b"\x00\x08lab/in/x" + reading
+
+    def answer(kind: int, content: bytes) -> bytes:
+        if kind == CONNECT:
+            return ACCEPTED
+        if kind == SUBSCRIBE:
+            return b"\x90\x03" + content[:2] + b"\x01\x31" + bytes([len(retained)]) + retained
+        return b""
+
+    peer = open_peer(f"mqtt://127.0.0.1:{answering(answer)}/lab")
+    time.sleep(0.3)
+    bridge = Bridge(fleet2d.Simulation(LIVE, "simulation.duration=3 s"), [peer], speed=0)
+    bridge.run()
+
+    assert bridge.counts == {"received": 1, "applied": 1}

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, Protocol
 
 import shapely
 
+from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.loop import deferred_interrupt
 from fleet2d.engine.simulation import Simulation
@@ -59,6 +60,7 @@ MAX_WAITING_STEPS = 10
 MAX_LATENESS = 100_000
 # The number of reasons of one kind that are told.
 MAX_TOLD = 20
+MAX_TEXT = 300
 # A pose that is farther from the one before it was not reached on foot or wheels [m, m/s].
 JUMP_M, JUMP_M_PER_S = 1.0, 5.0
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
@@ -516,6 +518,7 @@ class Bridge:
     def _count(self, kind: str, text: str, count: int = 1) -> None:
         """Count what is odd, and tell it once for each reason: numbers in it make no other one."""
         self.counts[kind] += count
+        text = one_line(text, MAX_TEXT)
         reason = kind, _NUMBER.sub("0", text)
         if reason not in self._first:
             if self._told[kind] >= MAX_TOLD:

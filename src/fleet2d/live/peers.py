@@ -12,6 +12,7 @@ import re
 import socket
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from http import HTTPStatus
 from typing import Any
@@ -48,6 +49,8 @@ DEVICE_CLASSES = {
 }
 """Home Assistant's class of each type of sensor."""
 WAIT_S = 5.0
+# Of more messages before a run, the last ones count.
+MAX_EARLY = 1000
 
 
 class FunctionPeer(Peer):
@@ -340,11 +343,13 @@ class MqttPeer(Peer):
         self._on: dict[str, str] = {}  # the word of each sensor for being on
         self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # "", or why it refuses
         self._post: Post | None = None
+        self._early: deque[bytes] = deque(maxlen=MAX_EARLY)  # what arrives before the run begins
         self._client: Any = Client(CallbackAPIVersion.VERSION2)
         self._client.username_pw_set(user, password)
         self._client.will_set(f"{prefix}/status", "offline", retain=True)
         self._client.on_connect = self._greet
         self._client.on_subscribe = self._subscribed
+        self._client.on_message = lambda *args: self._receive(args[-1].payload)
         with os_errors_as(InputError, f"{self._address}: there is no broker"):
             self._client.connect(host, port)
         self._client.loop_start()
@@ -371,6 +376,12 @@ class MqttPeer(Peer):
         text = f"the broker refuses the subscription to {self.prefix}/in/#"
         self._answer(f"{text}: {refused[0]}" if refused else "")
 
+    def _receive(self, content: bytes) -> None:
+        if self._post is None:
+            self._early.append(content)
+        else:
+            self._post(content)
+
     def _answer(self, refusal: str) -> None:
         """Pass on the answer of the broker: to the constructor, or to the run."""
         if self._post is None:
@@ -381,7 +392,8 @@ class MqttPeer(Peer):
     def open(self, simulation: Simulation, post: Post) -> None:
         """Announce the sensors and bodies, and begin to receive."""
         self._post = post
-        self._client.on_message = lambda *args: post(args[-1].payload)
+        while self._early:
+            post(self._early.popleft())
         self._client.on_disconnect = lambda *_: lose(post, self._address)
         for name, item in simulation.scenario.objects.items():
             if isinstance(item, Sensor):
