@@ -148,7 +148,9 @@ def test_what_is_wrong_is_told_and_the_body_stands(message: Any, told: str) -> N
     assert len(peer.told) == 1
     assert peer.told[0].startswith(told)
     assert run.status == "complete"
-    assert "live: 2 messages were received: 1 applied, 1 " in run.manifest["notes"][-1]
+    summary, reason = run.manifest["notes"][-2:]
+    assert "live: 2 messages were received: 1 applied, 1 " in summary
+    assert reason == f"live: 1 {peer.told[0]}"
     assert len({frame.bodies["ana"]["x"] for frame in peer.frames}) == 1
 
 
@@ -157,7 +159,7 @@ def test_lost_and_late_messages_are_counted_by_their_numbers() -> None:
     _, peer, bridge = bridged({k: [pose(k, number=n)] for k, n in enumerate(numbers)})
 
     assert bridge.counts == {"received": 5, "applied": 4, "lost": 2, "late": 1}
-    assert peer.told == ["2 messages before number 4 are lost", "late: message 3 after 4"]
+    assert peer.told == ["lost: 2 messages before number 4", "late: message 3 after 4"]
 
 
 def test_of_a_flood_only_some_is_applied() -> None:
@@ -165,7 +167,7 @@ def test_of_a_flood_only_some_is_applied() -> None:
     _, peer, bridge = bridged({0: flood}, max_per_step=100)
 
     assert bridge.counts == {"received": 5000, "applied": 100, "too many": 4900}
-    assert len(peer.told) == 20
+    assert peer.told == ["too many: more than 100 messages in a step"]
 
 
 def test_a_flood_does_not_fill_the_memory() -> None:
@@ -373,7 +375,7 @@ def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told() -> None:
     (act,) = run.manifest["interventions"]
     assert act["to"][0] == pytest.approx(x, abs=0.05)
     assert bridge.counts["moved"] == 1
-    assert re.fullmatch(r"ana: a pose in or at a wall is moved by 0\.1\d m", peer.told[0])
+    assert re.fullmatch(r"moved: ana: a pose in or at a wall, by 0\.1\d m", peer.told[0])
 
 
 @pytest.mark.slow
@@ -397,5 +399,97 @@ def test_detections_outside_of_the_home_are_left_out_and_told() -> None:
     run, peer, bridge = bridged({0: [message], 1: [message | {"detections": seen[1:]}]})
 
     assert run.tables["observations"]["x"].to_pylist() == [pytest.approx(x, abs=1e-3)]
-    assert re.match(r"astro: 1 detections are outside of the home, by up to \d+", peer.told[0])
+    assert re.match(
+        r"outside: astro: detections are outside of the home, by up to \d+", peer.told[0]
+    )
     assert bridge.counts["outside"] == 2
+
+
+# What is odd
+
+
+def test_each_reason_is_told_once_and_counted_in_the_summary() -> None:
+    away = [pose(0) | {"x": 100.0 + k} for k in range(40)]
+    unknown = [pose(0) | {"entity": "bob"}] * 3
+
+    run, peer, bridge = bridged({k: [message] for k, message in enumerate([*away[:25], *unknown])})
+
+    assert len(peer.told) == 2
+    assert bridge.counts["wrong"] == 28
+    assert run.manifest["notes"][-2:] == [f"live: 25 {peer.told[0]}", f"live: 3 {peer.told[1]}"]
+
+
+def test_a_flood_of_different_reasons_is_bounded() -> None:
+    names = [chr(ord("a") + k // 26) + chr(ord("a") + k % 26) for k in range(200)]
+    run, peer, bridge = bridged({0: [pose(0) | {"entity": f"x{name}"} for name in names]})
+
+    assert bridge.counts["wrong"] == 200
+    assert len(peer.told) == 20
+    assert len([note for note in run.manifest["notes"] if note.startswith("live: ")]) == 21
+
+
+@pytest.mark.parametrize("off_s", [-60.0, 60.0])
+def test_a_message_of_another_time_is_left_out(off_s: float) -> None:
+    _, peer, bridge = bridged({0: [pose(0, time=time.time() + off_s)]})
+
+    assert bridge.counts == {"received": 1, "late": 1}
+    told = r"dated (60|59)\.\d s ahead" if off_s > 0 else r"sent 60\.\d s ago"
+    assert re.search(told, peer.told[0])
+
+
+def test_a_message_before_the_last_one_of_its_body_is_late() -> None:
+    now = time.time()
+    messages = {0: [pose(0, time=now - 0.1)], 1: [pose(5, time=now - 0.2)]}
+    _, peer, bridge = bridged(messages)
+
+    assert bridge.counts == {"received": 2, "applied": 1, "late": 1}
+    assert peer.told == ["late: ana: a message was sent before the last one"]
+
+
+def test_a_pose_in_millimetres_is_told_as_such() -> None:
+    x, y = place()
+    _, peer, bridge = bridged({0: [pose(0) | {"x": 1000 * x % 1e4, "y": 1000 * y}]})
+    assert bridge.counts["wrong"] == 1
+
+    _, peer, _ = bridged({0: [pose(0) | {"x": 9000.0, "y": 4000.0}]})
+    assert peer.told[0].endswith("by its coordinates: in millimetres they would")
+
+
+def test_a_body_that_jumps_is_told() -> None:
+    x, y = place("bedroom_0")
+    elsewhere = pose(0) | {"x": x, "y": y}
+    _, peer, bridge = bridged({k: [elsewhere if k % 2 else pose(0)] for k in range(4)})
+
+    assert bridge.counts == {"received": 4, "applied": 4, "jumps": 3}
+    assert re.fullmatch(r"jumps: ana: a pose is \d+\.\d m from the one 1 s before", peer.told[0])
+
+
+def test_two_programs_that_send_poses_of_one_body_are_told() -> None:
+    first, second = Now({0: [pose(0)]}), Now({1: [pose(1)]})
+    bridge = Bridge(fleet2d.Simulation(LIVE), [first, second], speed=0)
+    bridge.run()
+
+    assert first.told == ["of two senders: ana: poses of two programs arrive: name its source"]
+    assert bridge.counts == {"received": 2, "applied": 2, "of two senders": 1}
+
+
+def test_a_goal_keeps_its_heading() -> None:
+    goal = {"type": "goal", "entity": "astro", "to": list(place()), "heading_deg": 90}
+    run, _, _ = bridged({0: [goal]})
+
+    assert run.manifest["interventions"][0]["heading_deg"] == 90
+
+
+def test_an_iterator_that_fails_is_told_in_a_line(capfd: pytest.CaptureFixture[str]) -> None:
+    def messages() -> Iterator[dict[str, Any]]:
+        yield pose(0)
+        raise ValueError("no more")
+
+    told: list[str] = []
+    simulation = fleet2d.Simulation(LIVE)
+    bridge = Bridge(simulation, [from_iterator(messages())], 20, tell=told.append)
+    bridge.run()
+
+    assert told[0] == "errors: a thread ended: ValueError: no more"
+    assert bridge.counts["errors"] == 1
+    assert "Traceback" not in capfd.readouterr().err

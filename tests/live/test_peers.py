@@ -17,7 +17,7 @@ from tests.viewer.browser import chromium
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.live import Bridge, open_peer
+from fleet2d.live import Bridge, open_peer, peers
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -68,6 +68,8 @@ def test_an_address_in_use_is_refused(scheme: str) -> None:
         ("ws://h:99999", ": Port out of range 0-65535"),
         ("udp://", ": it has no host"),
         ("ws://[::1", ": Invalid IPv6 URL"),
+        ("mqtt://nas/lab/#", ": #, \\+ and \\? have no meaning in it"),
+        ("mqtt://nas/a/+/b", ": #, \\+ and \\? have no meaning in it"),
         ("", ""),
     ],
 )
@@ -115,6 +117,59 @@ def test_a_client_that_leaves_does_not_stop_the_run() -> None:
     assert runs[0].status == "complete"
 
 
+def shaken(port: int) -> socket.socket:
+    """Return a client that never reads what it gets."""
+    client = socket.create_connection(("127.0.0.1", port))
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+    key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13"
+    upgrade = f"Upgrade: websocket\r\nConnection: Upgrade\r\n{key}"
+    client.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n{upgrade}\r\n\r\n".encode())
+    return client
+
+
+def test_a_client_that_never_reads_is_disconnected_and_told(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("websockets", reason="the extra live is not installed")
+    monkeypatch.setattr(peers, "MAX_QUEUE", 20)
+    peer: Any = open_peer("ws://127.0.0.1:0")
+    told: list[str] = []
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=60, tell=told.append)
+    peer.open, own = lambda *a: (own(*a), clients.append(shaken(peer.port))), peer.open
+    clients: list[socket.socket] = []
+    port = peer.port  # it is closed when the run ends
+    huge = {"type": "note", "text": "x" * 1_000_000}
+    send = peer.send
+    peer.send = lambda frame: (send(frame), peer._put([json.dumps(huge)]))
+    run = bridge.run()
+    clients[0].close()
+
+    assert run.status == "complete"
+    assert bridge.counts["slow clients"] == 1
+    assert f"slow clients: a client of ws://127.0.0.1:{port} doesn't read: it is" in told[0]
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_clients_that_speak_no_websocket_leave_no_traceback(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("websockets", reason="the extra live is not installed")
+    peer: Any = open_peer("ws://127.0.0.1:0")
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=15)
+    port = peer.port
+    thread, runs = in_background(bridge)
+    for content in (b"\x16\x03\x01\x02\x00 no HTTP \r\n\r\n", b"GET / HTTP/1.1\r\n\r\n"):
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            client.sendall(content)
+            client.recv(1000)
+    thread.join()
+
+    assert runs[0].status == "complete"
+    assert bridge.counts == {"refused clients": 1}
+    assert "Failed to open a WebSocket connection" in bridge.notes()[1]
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_pages_of_other_sites_are_refused() -> None:
     """Any page that is open in a browser of this machine could send a robot somewhere."""
     pytest.importorskip("websockets", reason="the extra live is not installed")
@@ -122,12 +177,15 @@ def test_pages_of_other_sites_are_refused() -> None:
     from websockets.sync.client import connect
 
     peer: Any = open_peer("ws://127.0.0.1:0")
-    thread, _ = in_background(Bridge(fleet2d.Simulation(LIVE), [peer], speed=60))
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=15)
+    thread, _ = in_background(bridge)
     address = f"ws://127.0.0.1:{peer.port}"
     for origin in ("https://example.com", "null", "http://localhost.example.com"):
         with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin):  # type: ignore[arg-type]
             pass
     thread.join()
+
+    assert bridge.counts == {"refused clients": 3}
 
 
 @pytest.mark.slow

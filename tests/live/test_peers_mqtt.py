@@ -1,20 +1,22 @@
 """MQTT: a real broker and a real client; Home Assistant finds sensors and bodies."""
 
+import contextlib
 import json
 import shutil
 import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.live.scenes import LIVE, place
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.live import Bridge, open_peer
+from fleet2d.live import Bridge, open_peer, peers
 
 pytest.importorskip("paho.mqtt.client", reason="the extra mqtt is not installed")
 BROKER = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
@@ -127,7 +129,10 @@ def test_goals_are_withdrawn_when_the_broker_is_gone(
     thread.join()
     client.close()
 
-    assert told == ["astro: who sent it to kitchen_0 is gone: the goal is withdrawn"]
+    assert told == [
+        f"lost connections: mqtt://127.0.0.1:{port}: the connection is tried again",
+        "astro: who sent it to kitchen_0 is gone: the goal is withdrawn",
+    ]
 
 
 def test_no_broker_is_told() -> None:
@@ -136,3 +141,133 @@ def test_no_broker_is_told() -> None:
         port = free.getsockname()[1]
     with pytest.raises(InputError, match=f"mqtt://127.0.0.1:{port}: there is no broker"):
         open_peer(f"mqtt://127.0.0.1:{port}")
+
+
+# Brokers that misbehave
+
+
+def answering(answer: Callable[[int, bytes], bytes]) -> int:
+    """Return the port of a broker that answers each packet by its type and content."""
+
+    def serve(connection: socket.socket) -> None:
+        with connection, contextlib.suppress(OSError):
+            while head := connection.recv(1):
+                size, factor = 0, 1
+                while (digit := connection.recv(1)[0]) & 128:
+                    size, factor = size + (digit & 127) * factor, factor * 128
+                size += digit * factor
+                content = connection.recv(size, socket.MSG_WAITALL) if size else b""
+                connection.sendall(answer(head[0] >> 4, content))
+
+    def accept() -> None:
+        while True:
+            threading.Thread(target=serve, args=(listener.accept()[0],), daemon=True).start()
+
+    listener = socket.create_server(("127.0.0.1", 0))
+    threading.Thread(target=accept, daemon=True).start()
+    return int(listener.getsockname()[1])
+
+
+CONNECT, PUBLISH, SUBSCRIBE = 1, 3, 8
+ACCEPTED = b"\x20\x02\x00\x00"
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [(1, "Unsupported protocol version"), (4, "Bad user name or password"), (5, "Not authorized")],
+)
+def test_a_broker_that_refuses_is_not_connected(code: int, reason: str) -> None:
+    port = answering(lambda kind, _: bytes([0x20, 2, 0, code]) if kind == CONNECT else b"")
+    with pytest.raises(InputError) as caught:
+        open_peer(f"mqtt://127.0.0.1:{port}/lab")
+    assert str(caught.value) == (
+        f"mqtt://127.0.0.1:{port}: the broker refuses the connection: {reason}"
+    )
+
+
+def test_a_broker_that_refuses_the_subscription_is_not_connected() -> None:
+    def answer(kind: int, content: bytes) -> bytes:
+        return ACCEPTED if kind == CONNECT else b"\x90\x03" + content[:2] + b"\x80"
+
+    with pytest.raises(InputError, match="refuses the subscription to lab/in/#: Unspecified error"):
+        open_peer(f"mqtt://127.0.0.1:{answering(answer)}/lab")
+
+
+@pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 200 OK\r\n\r\nhello", ACCEPTED])
+def test_a_server_that_is_no_broker_is_told(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "WAIT_S", 0.5)
+    port = answering(lambda kind, _: answer if kind == CONNECT else b"")
+    with pytest.raises(InputError, match=r"nothing there answers within 0\.5 s as a broker does"):
+        open_peer(f"mqtt://127.0.0.1:{port}/lab")
+
+
+def test_user_and_password_of_an_address_are_sent() -> None:
+    seen: list[bytes] = []
+
+    def answer(kind: int, content: bytes) -> bytes:
+        seen.append(content)
+        return b"\x20\x02\x00\x05"
+
+    with pytest.raises(InputError, match="Not authorized") as caught:
+        open_peer(f"mqtt://ana:s%40lt@127.0.0.1:{answering(answer)}/lab")
+    assert seen[0].endswith(b"\x00\x03ana\x00\x04s@lt")
+    assert "lt" not in str(caught.value)
+
+
+def test_a_broker_that_was_restarted_gets_all_that_it_keeps() -> None:
+    published: list[list[str]] = []
+
+    def answer(kind: int, content: bytes) -> bytes:
+        if kind == CONNECT:
+            published.append([])
+            return ACCEPTED
+        if kind == SUBSCRIBE:
+            return b"\x90\x03" + content[:2] + b"\x01"
+        if kind != PUBLISH:
+            return b""
+        size = int.from_bytes(content[:2])
+        topic = content[2 : 2 + size].decode()
+        published[-1].append(topic)
+        if topic.endswith("/in/end"):
+            raise OSError
+        return b"\x40\x02" + content[2 + size : 4 + size]
+
+    peer: Any = open_peer(f"mqtt://127.0.0.1:{answering(answer)}/lab")
+    peer._client.reconnect_delay_set(1, 1)
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=5)
+    thread = threading.Thread(target=bridge.run)
+    thread.start()
+    time.sleep(1)
+    peer._client.publish("lab/in/end")
+    thread.join()
+
+    kept = {
+        "lab/status",
+        "lab/sensor/front_door",
+        "homeassistant/binary_sensor/lab/front_door/config",
+        "homeassistant/sensor/lab/ana/config",
+        "homeassistant/sensor/lab/astro/config",
+    }
+    assert len(published) == 2
+    assert all(kept <= set(topics) for topics in published)
+    assert bridge.counts["lost connections"] == 1
+
+
+def test_messages_before_the_run_begins_are_kept() -> None:
+    """A broker sends what it retains at once, while the simulation is still being made."""
+    reading = b'{"type": "reading", "sensor": "front_door", "on": true}'
+    retained = b"\x00\x08lab/in/x" + reading
+
+    def answer(kind: int, content: bytes) -> bytes:
+        if kind == CONNECT:
+            return ACCEPTED
+        if kind == SUBSCRIBE:
+            return b"\x90\x03" + content[:2] + b"\x01\x31" + bytes([len(retained)]) + retained
+        return b""
+
+    peer = open_peer(f"mqtt://127.0.0.1:{answering(answer)}/lab")
+    time.sleep(0.3)
+    bridge = Bridge(fleet2d.Simulation(LIVE, "simulation.duration=3 s"), [peer], speed=0)
+    bridge.run()
+
+    assert bridge.counts == {"received": 1, "applied": 1}

@@ -1,90 +1,17 @@
 """Poses of bags: topics and frames, ROS 1 and ROS 2, and what is wrong in bags of real robots."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.logs.ros import NINE, ODOMETRY, TF, Ros, Row, moved, stamped
 
 import fleet2d
 from fleet2d.logs import LogError, read_log
 
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
-NINE = 1_767_600_000 * 10**9  # 2026-01-05T08:00 UTC, 09:00 in Berlin
-Row = tuple[str, str, int, Any]
-
-
-class Ros:
-    """Messages of ROS, and bags of them."""
-
-    def __init__(self, version: int) -> None:
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-        self.version = version
-        self.types = get_typestore(Stores.ROS2_HUMBLE if version == 2 else Stores.ROS1_NOETIC)
-        if TF not in self.types.types:
-            text = "geometry_msgs/TransformStamped[] transforms"
-            self.types.register(get_types_from_msg(text, TF))
-
-    def new(self, name: str, *values: Any) -> Any:
-        return self.types.types[name](*values)
-
-    def header(self, ns: int, frame: str) -> Any:
-        stamp = self.new("builtin_interfaces/msg/Time", *divmod(ns, 10**9))
-        sequence = () if self.version == 2 else (0,)
-        return self.new("std_msgs/msg/Header", *sequence, stamp, frame)
-
-    def pose(self, x: float, y: float, heading: float) -> Any:
-        turn = (0.0, 0.0, float(np.sin(heading / 2)), float(np.cos(heading / 2)))
-        return self.new(
-            "geometry_msgs/msg/Pose",
-            self.new("geometry_msgs/msg/Point", x, y, 0.0),
-            self.new("geometry_msgs/msg/Quaternion", *turn),
-        )
-
-    def odometry(self, ns: int, x: float, y: float, heading: float) -> Any:
-        still = self.new("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)
-        twist = self.new("geometry_msgs/msg/Twist", still, still)
-        return self.new(
-            "nav_msgs/msg/Odometry",
-            self.header(ns, "odom"),
-            "base_link",
-            self.new(
-                "geometry_msgs/msg/PoseWithCovariance", self.pose(x, y, heading), np.zeros(36)
-            ),
-            self.new("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
-        )
-
-    def transform(self, ns: int, parent: str, child: str, pose: tuple[float, ...]) -> Any:
-        x, y, heading = pose
-        turn = self.pose(x, y, heading).orientation
-        move = self.new(
-            "geometry_msgs/msg/Transform", self.new("geometry_msgs/msg/Vector3", x, y, 0.0), turn
-        )
-        one = self.new("geometry_msgs/msg/TransformStamped", self.header(ns, parent), child, move)
-        return self.new("tf2_msgs/msg/TFMessage", [one])
-
-    def bag(self, path: Path, rows: Iterable[Row]) -> Path:
-        """Write messages: topic, type, time [ns], message."""
-        from rosbags.rosbag1 import Writer as Writer1
-        from rosbags.rosbag2 import Writer as Writer2
-
-        writer: Any = Writer2(path, version=9) if self.version == 2 else Writer1(path)
-        with writer:
-            connections: dict[str, Any] = {}
-            for topic, kind, ns, message in rows:
-                if topic not in connections:
-                    connections[topic] = writer.add_connection(topic, kind, typestore=self.types)
-                serialize = (
-                    self.types.serialize_cdr if self.version == 2 else self.types.serialize_ros1
-                )
-                writer.write(connections[topic], ns, bytes(serialize(message, kind)))
-        return path
-
-
-ODOMETRY = "nav_msgs/msg/Odometry"
-TF = "tf2_msgs/msg/TFMessage"
 
 
 def drive(ros: Ros, topic: str = "/odom", begin: int = NINE) -> list[Row]:
@@ -110,7 +37,7 @@ def test_odometry_is_read_in_the_local_time_of_the_home(ros: Ros, tmp_path: Path
     assert [nine + i * 10**6 for i in range(10)] == log.time_us.tolist()
     assert [[float(i), 2.0] for i in range(10)] == log.xy.tolist()
     np.testing.assert_allclose(log.heading, 0.5)
-    assert ("/odom: 10 poses in the frame 'odom'",) == log.notes
+    assert ("/odom: 10 poses in the frame 'map'",) == log.notes
 
 
 def test_zone_is_asked_for(ros: Ros, tmp_path: Path) -> None:
@@ -150,10 +77,16 @@ def test_frame_is_followed_through_its_tree(ros: Ros, tmp_path: Path) -> None:
             rows.append(("/tf", TF, t, ros.transform(t, "map", "odom", pose)))
     log: Any = read_log(ros.bag(tmp_path / name_of(ros), rows), time_zone="UTC", id="base_link")
 
-    expected = [(5, i) if i < 6 else (7, 1 + i) for i in range(2, 10)]
+    share = [min(max(i - 2, 0) / 4, 1) for i in range(2, 10)]  # of the way to the correction
+    expected = [(5 + 2 * part, i + part) for i, part in enumerate(share, 2)]
     np.testing.assert_allclose(log.xy, expected, atol=1e-12)
     np.testing.assert_allclose(log.heading, np.pi / 2)
-    assert "base_link: 8 poses in the frame 'map'" in log.notes
+    way = "transform from 'base_link' to 'map'"
+    assert log.notes == (
+        "base_link: 10 poses in the frame 'map'",
+        f"2 poses before the first {way} were left out",
+        f"2 poses use the last {way}, which is up to 3 s older",
+    )
 
 
 def test_frame_with_two_parents_is_refused(tmp_path: Path) -> None:
@@ -162,8 +95,215 @@ def test_frame_with_two_parents_is_refused(tmp_path: Path) -> None:
         ("/tf", TF, NINE, ros.transform(NINE, parent, "base_link", (0.0, 0.0, 0.0)))
         for parent in ("odom", "map")
     ]
-    with pytest.raises(LogError, match="'base_link' has two parents, 'odom' and 'map'"):
+    with pytest.raises(
+        LogError, match=r"'base_link' has two parents, 'map' \(/tf\) and 'odom' \(/t"
+    ):
         read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="base_link")
+
+
+def test_poses_in_odom_are_transformed_to_the_map(ros: Ros, tmp_path: Path) -> None:
+    rows = [moved(ros, "odom"), stamped(ros, "odom")]
+    log: Any = read_log(ros.bag(tmp_path / name_of(ros), rows), time_zone="UTC")
+
+    assert log.xy.tolist() == [[9.0, 4.0]]
+
+
+@pytest.mark.parametrize(
+    ("frame", "turn", "place", "heading"),
+    [
+        ("odom", (0.0, 0.0, 0.0, 1.0), (9.2, 4.0), 0.0),
+        ("map", (0.0, 0.0, 1.414, 1.414), (7.2, 4.0), np.pi / 2),
+    ],
+)
+def test_a_robot_is_where_its_bag_has_it_in_the_map(
+    frame: str,
+    turn: tuple[float, ...],
+    place: tuple[float, float],
+    heading: float,
+    tmp_path: Path,
+) -> None:
+    """A drive along x at 2 cm/s from (7, 4), with `/tf` from map to odom by 2 m."""
+    ros, rows = Ros(2), [moved(Ros(2), "odom")]
+    for second in range(20):
+        topic, kind, ns, message = stamped(ros, frame, turn, x=7 + 0.02 * second, after=second)
+        rows.append((topic, kind, ns, message))
+    bag = str(ros.bag(tmp_path / "bag", rows))
+    replay = {"type": "replay", "path": bag, "id": "/pose", "time_zone": "UTC", "day": "date"}
+    simulation = fleet2d.Simulation(
+        "bundled:base",
+        "simulation.duration=20 s",
+        "simulation.start=2026-01-05T08:00",
+        robots={"astro": {"behaviors": [replay]}},
+    )
+    for _ in range(10):
+        simulation.advance()
+
+    astro = simulation.state["astro"]
+    assert (astro["x"], astro["y"]) == pytest.approx(place, abs=0.01)
+    assert astro["heading"] == pytest.approx(heading, abs=0.01)
+
+
+@pytest.mark.parametrize("spelling", ["/odom", "odom"])
+def test_a_slash_before_a_frame_makes_no_difference(spelling: str, tmp_path: Path) -> None:
+    ros = Ros(1)
+    rows = [moved(ros, "odom", "/map"), stamped(ros, spelling)]
+    log: Any = read_log(ros.bag(tmp_path / "drive.bag", rows), time_zone="UTC")
+
+    assert log.xy.tolist() == [[9.0, 4.0]]
+
+
+def test_frames_of_namespaces_are_followed_to_their_own_map(tmp_path: Path) -> None:
+    ros = Ros(2)
+    rows = [
+        moved(ros, "bob/odom", "bob/map", x=5.0),
+        moved(ros, "astro/odom", "astro/map"),
+        stamped(ros, "astro/odom"),
+    ]
+    log: Any = read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="/pose")
+
+    assert log.xy.tolist() == [[9.0, 4.0]]
+
+
+def test_a_map_below_odom_is_found(tmp_path: Path) -> None:
+    ros = Ros(2)
+    rows = [moved(ros, "map", "odom"), stamped(ros, "odom")]
+    log: Any = read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="/pose")
+
+    assert log.xy.tolist() == [[5.0, 4.0]]
+
+
+@pytest.mark.parametrize(
+    ("links", "listed"),
+    [([], "none"), ([("base_link", "odom")], "base_link, odom"), ([("x", "map")], "x, map")],
+)
+def test_poses_without_a_way_to_the_map_are_refused(
+    links: list[tuple[str, str]], listed: str, tmp_path: Path
+) -> None:
+    ros = Ros(2)
+    rows = [*(moved(ros, *link) for link in links), stamped(ros, "odom")]
+    path = ros.bag(tmp_path / "bag", rows)
+
+    with pytest.raises(LogError) as caught:
+        read_log(path, time_zone="UTC", id="/pose")
+    assert str(caught.value).endswith(
+        f"/pose: no transform leads from the frame 'odom' to 'map' (frames of /tf: {listed}); to"
+        " take coordinates in 'odom' as those of the floor plan, write frame: {name: odom}"
+    )
+    log: Any = read_log(path, time_zone="UTC", id="/pose", frame="odom")
+    assert log.xy.tolist() == [[7.0, 4.0]]
+
+
+def test_poses_before_the_first_transform_are_left_out_and_counted(tmp_path: Path) -> None:
+    ros = Ros(2)
+    late = NINE + 7 * 10**9
+    link: Row = ("/tf", TF, late, ros.transform(late, "map", "odom", (2.0, 0.0, 0.0)))
+    odometry = [
+        ("/odom", ODOMETRY, t, ros.odometry(t, float(i), 2.0, 0.5, "odom"))
+        for i, t in enumerate(range(NINE, NINE + 10 * 10**9, 10**9))
+    ]
+    log: Any = read_log(ros.bag(tmp_path / "bag", [*odometry, link]), time_zone="UTC", id="/odom")
+
+    assert log.xy[:, 0].tolist() == [9.0, 10.0, 11.0]
+    assert "7 poses before the first transform from 'odom' to 'map' were left out" in log.notes
+
+
+def test_a_bag_whose_transforms_come_too_late_is_refused(tmp_path: Path) -> None:
+    ros = Ros(2)
+    link: Row = ("/tf", TF, NINE, ros.transform(NINE + 1, "map", "odom", (2.0, 0.0, 0.0)))
+    path = ros.bag(tmp_path / "bag", [link, stamped(ros, "odom")])
+    with pytest.raises(LogError, match=r"no pose is left: .*; 1 poses before the first transform"):
+        read_log(path, time_zone="UTC", id="/pose")
+
+
+def test_poses_without_a_frame_count_as_in_the_map(tmp_path: Path) -> None:
+    ros = Ros(2)
+    log: Any = read_log(ros.bag(tmp_path / "bag", [stamped(ros, "")]), time_zone="UTC")
+
+    assert log.xy.tolist() == [[7.0, 4.0]]
+    assert "1 poses without a frame count as in 'map'" in log.notes
+
+
+@pytest.mark.parametrize(
+    ("turn", "heading", "note"),
+    [
+        ((0.0, 0.0, 1.414, 1.414), np.pi / 2, ""),
+        ((0.0, 0.0, -3.0, 3.0), -np.pi / 2, ""),
+        ((0.0, 0.0, 0.0, 0.0), np.nan, "1 poses have no heading: their quaternion is 0 or not"),
+        ((0.0, 0.0, np.nan, 1.0), np.nan, "1 poses have no heading: their quaternion is 0 or not"),
+        ((0.6, 0.0, 0.0, 0.8), 0.0, "1 poses are tilted by more than 45 degrees"),
+    ],
+)
+def test_quaternions_are_normalized_or_say_nothing(
+    turn: tuple[float, ...], heading: float, note: str, tmp_path: Path
+) -> None:
+    ros = Ros(2)
+    log: Any = read_log(ros.bag(tmp_path / "bag", [stamped(ros, "map", turn)]), time_zone="UTC")
+
+    np.testing.assert_allclose(log.heading, [heading])
+    assert len(log.notes) == 1 + bool(note)
+    assert log.notes[-1].startswith(note)
+
+
+def test_a_transform_without_a_turn_is_left_out_and_counted(tmp_path: Path) -> None:
+    ros = Ros(2)
+    broken = ros.transform(NINE, "map", "odom", (50.0, 0.0, 0.0))
+    broken.transforms[0].transform.rotation.w = 0.0
+    rows = [("/tf", TF, NINE, broken), moved(ros, "odom"), stamped(ros, "odom")]
+    log: Any = read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="/pose")
+
+    assert log.xy.tolist() == [[9.0, 4.0]]
+    assert "1 transforms without a place or a turn were left out" in log.notes
+
+
+def test_odometry_of_a_sensor_is_told(tmp_path: Path) -> None:
+    ros = Ros(2)
+    row = ("/vio", ODOMETRY, NINE, ros.odometry(NINE, 1.0, 2.0, 0.0, "map", "camera_link"))
+    log: Any = read_log(ros.bag(tmp_path / "bag", [row]), time_zone="UTC")
+
+    assert log.notes[-1] == "/vio: these are poses of 'camera_link', not of a base_link"
+
+
+def test_a_frame_that_never_moves_is_refused(tmp_path: Path) -> None:
+    ros = Ros(2)
+    dock: Row = ("/tf_static", TF, NINE, ros.transform(0, "map", "dock", (1.0, 0.0, 0.0)))
+    with pytest.raises(LogError, match="the frame 'dock' never moves in 'map'"):
+        read_log(ros.bag(tmp_path / "bag", [dock]), time_zone="UTC", id="dock")
+
+
+def test_a_transform_topic_is_read(tmp_path: Path) -> None:
+    ros = Ros(2)
+    kind = "geometry_msgs/msg/TransformStamped"
+    one = ros.transform(NINE, "map", "astro", (3.0, 4.0, 0.5)).transforms[0]
+    log: Any = read_log(ros.bag(tmp_path / "bag", [("/vicon", kind, NINE, one)]), time_zone="UTC")
+
+    assert log.xy.tolist() == [[3.0, 4.0]]
+    np.testing.assert_allclose(log.heading, 0.5)
+
+
+def test_all_publishers_of_a_topic_are_read(tmp_path: Path) -> None:
+    """ROS 1 keeps a connection for each: only the last one's messages were read."""
+    from rosbags.rosbag1 import Writer
+
+    ros = Ros(1)
+    with Writer(tmp_path / "drive.bag") as writer:
+        for i, caller in enumerate(("/first", "/second")):
+            connection = writer.add_connection(
+                "/odom", ODOMETRY, typestore=ros.types, callerid=caller
+            )
+            ns = NINE + i * 10**9
+            message = ros.odometry(ns, float(i), 2.0, 0.0)
+            writer.write(connection, ns, bytes(ros.types.serialize_ros1(message, ODOMETRY)))
+    log: Any = read_log(tmp_path / "drive.bag", time_zone="UTC")
+
+    assert log.xy[:, 0].tolist() == [0.0, 1.0]
+
+
+def test_a_simulated_clock_may_begin_at_zero(ros: Ros, tmp_path: Path) -> None:
+    """The stamp 0 was replaced by the time of recording, of another clock."""
+    rows = [(*row[:2], NINE + i, row[3]) for i, row in enumerate(drive(ros, begin=0))]
+    log: Any = read_log(ros.bag(tmp_path / name_of(ros), rows))
+
+    assert (None, 0, 9 * 10**6) == (log.first_day, log.time_us[0], log.time_us[-1])
 
 
 def test_transforms_in_a_circle_are_refused(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.logs.ros import NINE, TF, Ros, Row
 
 from fleet2d.logs.detections import read_detections
 from fleet2d.logs.log import LogError
@@ -236,3 +237,46 @@ def test_a_wrong_topic_or_field_of_a_bag_is_refused(
         read_detections(bag(tmp_path, simulated), time_zone="UTC", **options)  # type: ignore[arg-type]
 
     assert message in str(caught.value)
+
+
+def people(folder: Path, frame: str, links: list[Row]) -> Path:
+    """Somebody 3 m ahead of a camera: z is ahead in its frame, x to the right."""
+    ros, kind = Ros(2), "geometry_msgs/msg/PoseArray"
+    place = ros.new("geometry_msgs/msg/Point", 0.0, 0.0, 3.0)
+    turn = ros.new("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
+    pose = ros.new("geometry_msgs/msg/Pose", place, turn)
+    message = ros.new(kind, ros.header(NINE, frame), [pose])
+    return ros.bag(folder / "bag", [*links, ("/people", kind, NINE, message)])
+
+
+def camera(ros: Ros) -> Row:
+    """A camera 0.1 m ahead of the robot's middle, in the orientation of optical frames."""
+    message = ros.transform(NINE, "base_link", "camera", (0.1, 0.0, 0.0))
+    turn = ros.new("geometry_msgs/msg/Quaternion", -0.5, 0.5, -0.5, 0.5)
+    message.transforms[0].transform.rotation = turn
+    return "/tf_static", TF, NINE, message
+
+
+def test_detections_of_a_camera_are_transformed_to_the_map(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    ros = Ros(2)
+    robot: Row = ("/tf", TF, NINE, ros.transform(NINE, "map", "base_link", (5.0, 1.0, np.pi / 2)))
+
+    log = read_detections(people(tmp_path, "camera", [camera(ros), robot]), time_zone="UTC")
+
+    np.testing.assert_allclose(log.xy, [[5.0, 4.1]], atol=1e-9)
+
+
+def test_detections_relative_to_the_robot_are_in_its_base_link(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    path = people(tmp_path, "camera", [camera(Ros(2))])
+
+    log = read_detections(path, time_zone="UTC", frame="base_link")
+
+    np.testing.assert_allclose(log.xy, [[3.1, 0.0]], atol=1e-9)
+
+
+def test_detections_of_a_camera_without_transforms_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    with pytest.raises(LogError, match="no transform leads from the frame 'camera' to 'map'"):
+        read_detections(people(tmp_path, "camera", []), time_zone="UTC")

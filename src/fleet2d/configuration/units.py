@@ -114,9 +114,12 @@ def parse_peer_address(text: str) -> SplitResult:
         wrong = f": {error}."
     else:
         is_known = parts.scheme in PEER_SCHEMES
-        if is_known and parts.netloc:
+        is_plain = not {"#", "+", "?"} & set(text.rpartition("@")[2])
+        if is_known and parts.netloc and is_plain:
             return parts
-        wrong = ": it has no host." if is_known else did_you_mean(parts.scheme, PEER_SCHEMES)
+        wrong = did_you_mean(parts.scheme, PEER_SCHEMES)
+        if is_known:
+            wrong = ": it has no host." if is_plain else ": #, + and ? have no meaning in it."
     raise problem(
         f"{text!r} is not the address of a peer{wrong or '.'} Write udp://HOST:PORT, ws://HOST:PORT,"
         " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"

@@ -18,6 +18,7 @@ from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
 from fleet2d.logs.placement import LogFrame
+from fleet2d.storage.bags import is_bag
 
 if TYPE_CHECKING:
     from fleet2d.logs.detections import RobotDetections
@@ -81,10 +82,12 @@ class ReplayedDetections(EvidenceSource):
         # Imported here, as it needs more of pyarrow than most runs.
         from fleet2d.logs.detections import read_detections
 
+        is_robots = self.relative and is_bag(self.path)
         with errors_as(LogError, f"{actor.path}.perceives", of=LogError):
             log = read_detections(
                 self.path,
                 topic=self.topic,
+                frame=self.frame.name or ("base_link" if is_robots else None),
                 columns=self.columns,
                 time_zone=self.time_zone,
                 sort=self.sort,

@@ -8,6 +8,7 @@ import gc
 import json
 import math
 import queue
+import re
 import sys
 import threading
 import time
@@ -17,14 +18,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import shapely
 
+from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.loop import deferred_interrupt
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
+from fleet2d.live.library_errors import libraries_told
 from fleet2d.live.messages import (
     DetectionsMessage,
     GoalMessage,
@@ -55,8 +58,12 @@ MAX_PER_STEP = 1000
 MAX_WAITING_STEPS = 10
 # Of so many steps it is kept how late they began: a run may last for months.
 MAX_LATENESS = 100_000
-# The number of texts of one kind that are told in full.
+# The number of reasons of one kind that are told.
 MAX_TOLD = 20
+MAX_TEXT = 300
+# A pose that is farther from the one before it was not reached on foot or wheels [m, m/s].
+JUMP_M, JUMP_M_PER_S = 1.0, 5.0
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,21 @@ class LiveStep:
         return [json.dumps(message, default=str) for message in self.messages]
 
 
-Content = str | bytes | Mapping[str, Any] | None
+class PeerFault(NamedTuple):
+    """What a peer noticed about what arrived, or about a client.
+
+    Attributes:
+        kind: What it is counted as, such as "wrong" or "slow clients".
+        text: What is wrong, on one line.
+        is_message: Whether it is instead of a message.
+    """
+
+    kind: str
+    text: str
+    is_message: bool = False
+
+
+Content = str | bytes | Mapping[str, Any] | PeerFault | None
 
 
 class Post(Protocol):
@@ -103,9 +124,16 @@ class Post(Protocol):
         """Receive a message.
 
         Args:
-            content: The message; None: the client is gone, and with it what it was heading for.
+            content: The message; None: the client is gone, and with it what it was heading for; a
+                fault is counted and told.
             client: Which of several clients of a peer sent it: each counts its own messages.
         """
+
+
+def lose(post: Post, address: str) -> None:
+    """Tell a run that a server is gone, and with it all that it was heading for."""
+    post(None)
+    post(PeerFault("lost connections", f"{address}: the connection is tried again"))
 
 
 class Peer:
@@ -173,7 +201,8 @@ class Bridge:
             body does what its behaviors decide: one of the type `live` stands.
         rows: Whether rows of tables are passed on, besides poses and events.
         tell: Called with notes about what arrived.
-        counts: How many messages were received, applied, late, lost, wrong, replaced, too many.
+        counts: How many messages were received, applied, late, lost, wrong, replaced, too many; and
+            how often anything else was odd.
         lateness_s: How late each of the last steps began, at most MAX_LATENESS of them.
 
     Example:
@@ -223,10 +252,19 @@ class Bridge:
         self._standing: set[str] = set()  # the bodies for which none has arrived for a while
         self._numbers: dict[Sender, int] = {}
         self._told: Counter[str] = Counter()
+        self._first: dict[tuple[str, str], str] = {}  # the first text of each kind and reason
+        self._reasons: Counter[tuple[str, str]] = Counter()  # how often, by kind and first text
+        self._times: dict[tuple[Sender, tuple[str, str]], float] = {}  # the last of each part
+        self._poses: dict[str, tuple[Sender, int, float, float]] = {}  # the last: step, x, y
+        self._names = {*self.simulation.actors, *self.simulation.scenario.objects}
         self._is_stopping = False
 
     def run(self) -> Run:
         """Simulate to the end, or to the step of Ctrl-C, and return the run."""
+        with libraries_told(lambda text: self._post_of(-1)(PeerFault("errors", text))):
+            return self._run()
+
+    def _run(self) -> Run:
         simulation = self.simulation
         simulation.listen(self._events.extend)
         if self.rows:
@@ -250,11 +288,14 @@ class Bridge:
 
     def notes(self) -> list[str]:
         """Return lines about what arrived."""
-        counts = self.counts
-        if not counts["received"]:
+        words = [f"{self.counts[key]} {key}" for key in sorted(self.counts) if key != "received"]
+        if not words:
             return []
-        words = [f"{counts[key]} {key}" for key in sorted(counts) if key != "received"]
-        return [f"live: {counts['received']} messages were received: {', '.join(words)}"]
+        received = self.counts["received"]
+        return [
+            f"live: {received} messages were received: {', '.join(words)}",
+            *(f"live: {count} {kind}: {text}" for (kind, text), count in self._reasons.items()),
+        ]
 
     def _post_of(self, number: int) -> Post:
         def post(content: Content, client: int = 0) -> None:
@@ -263,7 +304,7 @@ class Bridge:
                 with self._lock:
                     self._dropped += 1
                 return
-            self._inbox.put((time.monotonic(), (number, client), content))
+            self._inbox.put((time.time(), (number, client), content))
 
         return post
 
@@ -308,16 +349,8 @@ class Bridge:
             if content is None:
                 gone.append(sender)
                 continue
-            self.counts["received"] += 1
-            if len(messages) >= self.max_per_step:
-                self._leave_out("too many", f"more than {self.max_per_step} messages in a step")
-                continue
-            try:
-                message = parse_message(content)
-            except InputError as error:
-                self._leave_out("wrong", str(error))
-                continue
-            if not self._is_timely(message, arrived, sender):
+            message = self._read(content, len(messages) >= self.max_per_step)
+            if message is None or not self._is_timely(message, arrived, sender):
                 continue
             if isinstance(message, PoseMessage | GoalMessage):
                 key = message.type, message.entity
@@ -329,22 +362,46 @@ class Bridge:
             messages.append((message, sender))
         return messages, gone
 
+    def _read(self, content: Any, is_full: bool) -> LiveMessage | None:
+        """Return a message; None if there is none in the content, or no room for it."""
+        is_fault = isinstance(content, PeerFault)
+        if not is_fault or content.is_message:
+            self.counts["received"] += 1
+        if is_fault:
+            self._count(content.kind, content.text)
+        elif is_full:
+            self._count("too many", f"more than {self.max_per_step} messages in a step")
+        else:
+            try:
+                return parse_message(content)
+            except InputError as error:
+                self._count("wrong", str(error))
+        return None
+
     def _is_timely(self, message: LiveMessage, arrived: float, sender: Sender) -> bool:
         """Return whether a message is neither late nor out of order, and count lost ones."""
         if message.time is not None:
-            age = time.time() - message.time
-            if abs(age) > self.max_age_s:
-                self._leave_out("late", f"a message was sent {age:.1f} s ago by its clock")
+            age = arrived - message.time
+            if age > self.max_age_s:
+                self._count("late", f"a message was sent {age:.1f} s ago by its clock")
                 return False
+            if age < -self.max_age_s:
+                self._count("late", f"a message is dated {-age:.1f} s ahead of this clock")
+                return False
+            key = sender, _part_of(message)
+            if message.time < self._times.get(key, message.time):
+                self._count("late", f"{key[1][1]}: a message was sent before the last one")
+                return False
+            if key[1][1] in self._names:
+                self._times[key] = message.time
         if message.number is not None:
             expected = self._numbers.get(sender, -1) + 1
             if message.number < expected:
-                self._leave_out("late", f"message {message.number} after {expected - 1}")
+                self._count("late", f"message {message.number} after {expected - 1}")
                 return False
             if expected and message.number > expected:
                 lost = message.number - expected
-                self.counts["lost"] += lost
-                self._say("lost", f"{lost} messages before number {message.number} are lost")
+                self._count("lost", f"{lost} messages before number {message.number}", lost)
             self._numbers[sender] = message.number
         return True
 
@@ -355,17 +412,32 @@ class Bridge:
                 for act in _acts_of(self._mended(message)):
                     self.simulation.intervene(act)
             except InputError as error:
-                self._leave_out("wrong", str(error))
+                self._count("wrong", str(error))
                 continue
             self.counts["applied"] += 1
             if isinstance(message, GoalMessage):
                 self._goals[message.entity] = sender, message.to
             if isinstance(message, PoseMessage):
                 self._goals.pop(message.entity, None)
+                self._compare(message, sender)
                 self._heard[message.entity] = time.monotonic()
                 if message.entity in self._standing:
                     self._standing.remove(message.entity)
                     self._say("back", f"{message.entity}: poses arrive again")
+
+    def _compare(self, pose: PoseMessage, sender: Sender) -> None:
+        """Tell a pose that doesn't follow from the one before it."""
+        name, step = pose.entity, self.simulation.step
+        before, last, x, y = self._poses.get(name, (sender, step, pose.x, pose.y))
+        self._poses[name] = sender, step, pose.x, pose.y
+        passed_s = (step - last) * self.simulation.clock.step_us / 1e6
+        off = math.hypot(pose.x - x, pose.y - y)
+        if before != sender and time.monotonic() - self._heard[name] < self.silence_s:
+            self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
+        if off > JUMP_M + JUMP_M_PER_S * passed_s:
+            self._count(
+                "jumps", f"{name}: a pose is {off:.1f} m from the one {passed_s:g} s before"
+            )
 
     def _check(self, message: LiveMessage, sender: Sender) -> None:
         """Refuse messages from others than the source, and poses of bodies that decide."""
@@ -401,12 +473,14 @@ class Bridge:
             x, y = lattice.to_metres(near).tolist()
             off = math.hypot(x - message.x, y - message.y)
             if off > REACH_M:
+                in_mm = lattice.point_at((message.x / 1000, message.y / 1000))
+                fits = actor.space.part_at(*in_mm) >= 0
+                advice = "in millimetres they would" if fits else "do they fit the floor plan?"
                 raise InputError(
-                    f"{message.entity} would be {off:.1f} m from any place where its body fits: do"
-                    " its coordinates fit the floor plan?"
+                    f"{message.entity} would be {off:.1f} m from any place where its body fits by"
+                    f" its coordinates: {advice}"
                 )
-            self.counts["moved"] += 1
-            self._say("moved", f"{message.entity}: a pose in or at a wall is moved by {off:.2f} m")
+            self._count("moved", f"{message.entity}: a pose in or at a wall, by {off:.2f} m")
             return message.model_copy(update={"x": x, "y": y})
         if isinstance(message, DetectionsMessage):
             robot = self.simulation.scenario.robots.get(message.entity)
@@ -417,9 +491,8 @@ class Bridge:
             far = [float(free.distance(place)) for place in places]
             inside = [d for d, m in zip(message.detections, far, strict=True) if m <= REACH_M]
             if outside := len(far) - len(inside):
-                self.counts["outside"] += outside
-                text = f"{outside} detections are outside of the home, by up to {max(far):.1f} m"
-                self._say("outside", f"{message.entity}: {text}: left out")
+                text = f"detections are outside of the home, by up to {max(far):.1f} m: left out"
+                self._count("outside", f"{message.entity}: {text}", outside)
             return message.model_copy(update={"detections": tuple(inside)})
         return message
 
@@ -442,9 +515,17 @@ class Bridge:
                 self._say("gone", f"{name}: who sent it to {to} is gone: the goal is withdrawn")
                 self.simulation.intervene({"release": name})
 
-    def _leave_out(self, why: str, text: str) -> None:
-        self.counts[why] += 1
-        self._say(why, f"{why}: {text}")
+    def _count(self, kind: str, text: str, count: int = 1) -> None:
+        """Count what is odd, and tell it once for each reason: numbers in it make no other one."""
+        self.counts[kind] += count
+        text = one_line(text, MAX_TEXT)
+        reason = kind, _NUMBER.sub("0", text)
+        if reason not in self._first:
+            if self._told[kind] >= MAX_TOLD:
+                return
+            self._first[reason] = text
+            self._say(kind, f"{kind}: {text}")
+        self._reasons[kind, self._first[reason]] += count
 
     def _say(self, kind: str, text: str) -> None:
         """Tell a note; of many of one kind, only the first."""
@@ -501,14 +582,17 @@ def _part_of(message: LiveMessage) -> tuple[str, str]:
     return kind, message.entity
 
 
+def _heading_of(message: PoseMessage | GoalMessage) -> dict[str, float]:
+    return {} if message.heading_deg is None else {"heading_deg": message.heading_deg}
+
+
 def _acts_of(message: LiveMessage) -> Iterator[dict[str, Any]]:
     """Yield the interventions of a message."""
     if isinstance(message, PoseMessage):
-        heading = {} if message.heading_deg is None else {"heading_deg": message.heading_deg}
-        yield {"put": message.entity, "to": [message.x, message.y], **heading}
+        yield {"put": message.entity, "to": [message.x, message.y], **_heading_of(message)}
     elif isinstance(message, GoalMessage):
         to = message.to if isinstance(message.to, str) else list(message.to)
-        yield {"send": message.entity, "to": to}
+        yield {"send": message.entity, "to": to, **_heading_of(message)}
     elif isinstance(message, DetectionsMessage):
         if message.detections:
             detections = [d.model_dump() for d in message.detections]

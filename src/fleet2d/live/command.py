@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -49,29 +50,34 @@ def live(
         return
     from fleet2d.engine.simulation import Simulation
     from fleet2d.live.bridge import Bridge
+    from fleet2d.live.library_errors import libraries_told
     from fleet2d.live.peers import open_peers
     from fleet2d.scenario.model import load_scenario
 
     scenario, overrides = split(arguments)
     changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]
-    checked = load_scenario(scenario, *changes)
-    opened = open_peers(checked, *peers or ())
-    if not opened:
-        raise InputError(
-            "name at least one other program by --with, like --with ws://127.0.0.1:8765, or as"
-            " the source of something live"
+    with libraries_told(id):  # before and after the run: not told
+        checked = load_scenario(scenario, *changes)
+        opened = open_peers(checked, *peers or ())
+        if not opened:
+            raise InputError(
+                "name at least one other program by --with, like --with ws://127.0.0.1:8765, or as"
+                " the source of something live"
+            )
+        simulation = Simulation(checked, out=out)
+        tell = partial(typer.echo, err=True)
+        for address, peer in opened.items():
+            port = getattr(peer, "port", None)
+            shown = re.sub(r"//.*@", "//", address)  # without a password
+            tell(f"{shown}: {'connected' if port is None else f'listens at {port}'}")
+        bridge = Bridge(
+            simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell
         )
-    simulation = Simulation(checked, out=out)
-    tell = partial(typer.echo, err=True)
-    for address, peer in opened.items():
-        port = getattr(peer, "port", None)
-        tell(f"{address}: {'connected' if port is None else f'listens at {port}'}")
-    bridge = Bridge(simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell)
-    run = bridge.run()
-    for note in bridge.notes():
-        tell(note)
-    place = f", stored in {out}" if out else ""
-    typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
+        run = bridge.run()
+        for note in bridge.notes():
+            tell(note)
+        place = f", stored in {out}" if out else ""
+        typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
     if run.status != "complete":
         raise typer.Exit(130)
 

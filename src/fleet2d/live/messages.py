@@ -53,11 +53,13 @@ class GoalMessage(LiveMessage):
         type: "goal".
         entity: The body.
         to: A room, furniture, or a point [x, y].
+        heading_deg: Its heading there, counter-clockwise from +x; left out: as it arrives.
     """
 
     type: Literal["goal"] = "goal"
     entity: str
     to: str | tuple[Coordinate, Coordinate]
+    heading_deg: AngleDeg | None = None
 
 
 class DetectionsMessage(LiveMessage):
@@ -99,6 +101,13 @@ def message_schema() -> dict[str, Any]:
     return {"title": "Messages to a live run of Fleet2D", **_MESSAGES.json_schema()}
 
 
+def first_fault(error: ValidationError) -> str:
+    """Return the first of the faults of a message, with the place of it."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}" if place else first["msg"]
+
+
 def parse_message(content: str | bytes | Mapping[str, Any]) -> LiveMessage:
     """Read a message.
 
@@ -116,9 +125,7 @@ def parse_message(content: str | bytes | Mapping[str, Any]) -> LiveMessage:
             content = json.loads(content)
         message: LiveMessage = _MESSAGES.validate_python(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{place}: {first['msg']}" if place else first["msg"]) from None
+        raise InputError(first_fault(error)) from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"not JSON: {error}") from None
     return message

@@ -11,16 +11,21 @@ import queue
 import re
 import socket
 import threading
+import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from http import HTTPStatus
 from typing import Any
+from urllib.parse import unquote
 
 from pydantic_core import PydanticCustomError
 
+from fleet2d.bounds import one_line
 from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
-from fleet2d.errors import InputError, errors_as, extra, os_errors_as
-from fleet2d.live.bridge import LiveStep, Peer, Post, sources_of
+from fleet2d.errors import InputError, errors_as, extra, os_errors_as, printable
+from fleet2d.live.bridge import LiveStep, Peer, PeerFault, Post, lose, sources_of
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
@@ -43,6 +48,8 @@ DEVICE_CLASSES = {
 }
 """Home Assistant's class of each type of sensor."""
 WAIT_S = 5.0
+# Of more messages before a run, the last ones count.
+MAX_EARLY = 1000
 
 
 class FunctionPeer(Peer):
@@ -146,7 +153,17 @@ class WebSocketPeer(Peer):
             from websockets.sync.server import serve
 
         with os_errors_as(InputError, f"ws://{host}:{port}"):
-            self._server = serve(self._serve, host, port, max_size=MAX_BYTES, origins=ORIGINS)
+            self._server = serve(
+                self._serve,
+                host,
+                port,
+                max_size=MAX_BYTES,
+                origins=ORIGINS,
+                process_response=self._tell_refusal,
+                open_timeout=WAIT_S,
+                close_timeout=WAIT_S,
+            )
+        self._address = f"ws://{host}:{self.port}"
         self._clients: dict[Any, queue.Queue[str | None]] = {}
         self._lock = threading.Lock()
         self._hello, self._numbers = "", itertools.count()
@@ -168,7 +185,7 @@ class WebSocketPeer(Peer):
 
         texts: queue.Queue[str | None] = queue.Queue(MAX_QUEUE)
         number = next(self._numbers)
-        with contextlib.suppress(ConnectionClosed):
+        try:
             texts.put(self._hello)
             with self._lock:
                 self._clients[connection] = texts
@@ -178,8 +195,15 @@ class WebSocketPeer(Peer):
             sender.start()
             for content in connection:
                 self._post(content, number)
+        except ConnectionClosed as error:
+            self._post(PeerFault("lost connections", f"a client of {self._address}: {error}"))
         self._post(None, number)
         self._forget(connection)
+
+    def _tell_refusal(self, _: Any, request: Any, response: Any) -> None:
+        if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
+            text = printable(one_line(response.body.decode(errors="replace"), 200))
+            self._post(PeerFault("refused clients", f"{self._address}: {text}"))
 
     def _pass_on(self, connection: Any, texts: "queue.Queue[str | None]") -> None:
         from websockets.exceptions import ConnectionClosed
@@ -204,8 +228,10 @@ class WebSocketPeer(Peer):
                 for text in texts:
                     waiting.put_nowait(text)
             except queue.Full:  # too slow: it is disconnected, and the run goes on
+                text = f"a client of {self._address} doesn't read: it is disconnected"
+                self._post(PeerFault("slow clients", text))
                 self._forget(connection)
-                threading.Thread(target=connection.close, daemon=True).start()
+                _cut(connection)
 
     def send(self, frame: LiveStep) -> None:
         """Pass a frame on to all clients."""
@@ -222,7 +248,18 @@ class WebSocketPeer(Peer):
         with self._lock:  # for clients that have just connected, too
             self._end = json.dumps(end), None
         self._put(self._end)
+        until = time.monotonic() + WAIT_S
+        while self._clients and time.monotonic() < until:
+            time.sleep(0.01)
+        for connection in list(self._clients):
+            _cut(connection)
         self._server.shutdown()
+
+
+def _cut(connection: Any) -> None:
+    """End a connection whose client doesn't read: closing it properly would wait for that."""
+    with contextlib.suppress(OSError):
+        connection.socket.shutdown(socket.SHUT_RDWR)
 
 
 def open_peer(address: str) -> Peer:
@@ -230,7 +267,7 @@ def open_peer(address: str) -> Peer:
 
     Args:
         address: `udp://HOST:PORT` and `ws://HOST:PORT` listen there; `rosbridge://HOST:PORT` and
-            `mqtt://HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
+            `mqtt://USER:PASSWORD@HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
 
     Raises:
         InputError: There is no such scheme, the address can't be used, or an extra isn't installed.
@@ -253,7 +290,8 @@ Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT
 
         return RosbridgePeer(host, port or 9090)
 
-    return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d")
+    names = [None if part is None else unquote(part) for part in (parts.username, parts.password)]
+    return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d", *names)
 
 
 def open_peers(scenario: Scenario, *addresses: str) -> dict[str, Peer]:
@@ -280,37 +318,82 @@ class MqttPeer(Peer):
         prefix: The beginning of all topics of the run.
     """
 
-    def __init__(self, host: str, port: int, prefix: str) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        prefix: str,
+        user: str | None = None,
+        password: str | None = None,
+    ) -> None:
         """Connect to a broker.
 
         Raises:
-            InputError: There is no broker at the address, or paho-mqtt isn't installed.
+            InputError: There is no broker at the address, it refuses, or it doesn't answer; or
+                paho-mqtt isn't installed.
         """
         with extra("mqtt", "mqtt:// needs paho-mqtt"):
             from paho.mqtt.client import Client
             from paho.mqtt.enums import CallbackAPIVersion
 
         self.prefix = prefix
+        self._address = f"mqtt://{host}:{port}"
+        self._retained: dict[str, str] = {}  # what a broker that was restarted has lost
+        self._on: dict[str, str] = {}  # the word of each sensor for being on
+        self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # "", or why it refuses
+        self._post: Post | None = None
+        self._early: deque[bytes] = deque(maxlen=MAX_EARLY)  # what arrives before the run begins
         self._client: Any = Client(CallbackAPIVersion.VERSION2)
+        self._client.username_pw_set(user, password)
         self._client.will_set(f"{prefix}/status", "offline", retain=True)
-        self._is_on = threading.Event()
-        self._client.on_connect = self._subscribe
-        with os_errors_as(InputError, f"mqtt://{host}:{port}: there is no broker"):
+        self._client.on_connect = self._greet
+        self._client.on_subscribe = self._subscribed
+        self._client.on_message = lambda *args: self._receive(args[-1].payload)
+        with os_errors_as(InputError, f"{self._address}: there is no broker"):
             self._client.connect(host, port)
         self._client.loop_start()
-        if not self._is_on.wait(WAIT_S):
+        try:
+            refusal = self._answers.get(timeout=WAIT_S)
+        except queue.Empty:
+            refusal = f"nothing there answers within {WAIT_S:g} s as a broker does"
+        if refusal:
+            self._client.disconnect()
             self._client.loop_stop()
-            raise InputError(f"mqtt://{host}:{port}: the broker doesn't answer")
-        self._on: dict[str, str] = {}  # the word of each sensor for being on
+            raise InputError(f"{self._address}: {refusal}")
 
-    def _subscribe(self, *_: object) -> None:
-        self._is_on.set()
+    def _greet(self, *arguments: Any) -> None:
+        """Subscribe, and publish what the broker is to keep: at each connection."""
+        if (reason := arguments[3]).is_failure:
+            self._answer(f"the broker refuses the connection: {reason}")
+            return
         self._client.subscribe(f"{self.prefix}/in/#", qos=1)
+        for topic, text in list(self._retained.items()):
+            self._client.publish(topic, text, qos=1, retain=True)
+
+    def _subscribed(self, *arguments: Any) -> None:
+        refused = [reason for reason in arguments[3] if reason.is_failure]
+        text = f"the broker refuses the subscription to {self.prefix}/in/#"
+        self._answer(f"{text}: {refused[0]}" if refused else "")
+
+    def _receive(self, content: bytes) -> None:
+        if self._post is None:
+            self._early.append(content)
+        else:
+            self._post(content)
+
+    def _answer(self, refusal: str) -> None:
+        """Pass on the answer of the broker: to the constructor, or to the run."""
+        if self._post is None:
+            self._answers.put(refusal)
+        elif refusal:
+            self._post(PeerFault("lost connections", f"{self._address}: {refusal}"))
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Announce the sensors and bodies, and begin to receive."""
-        self._client.on_message = lambda *args: post(args[-1].payload)
-        self._client.on_disconnect = lambda *_: post(None)
+        self._post = post
+        while self._early:
+            post(self._early.popleft())
+        self._client.on_disconnect = lambda *_: lose(post, self._address)
         for name, item in simulation.scenario.objects.items():
             if isinstance(item, Sensor):
                 self._on[name] = item.words[0]
@@ -318,11 +401,11 @@ class MqttPeer(Peer):
                 if item.type_name in DEVICE_CLASSES:
                     config["device_class"] = DEVICE_CLASSES[item.type_name]
                 self._announce("binary_sensor", name, f"sensor/{name}", config)
-                self._publish(f"sensor/{name}", "OFF", retain=True)
+                self._retain(f"{self.prefix}/sensor/{name}", "OFF")
         for name in simulation.actors:
             template = {"value_template": "{{ value_json.room or 'away' }}"}
             self._announce("sensor", name, f"pose/{name}", template)
-        self._publish("status", "online", retain=True)
+        self._retain(f"{self.prefix}/status", "online")
 
     def _announce(self, component: str, name: str, topic: str, config: dict[str, Any]) -> None:
         """Publish a configuration of Home Assistant's discovery."""
@@ -335,11 +418,16 @@ class MqttPeer(Peer):
             "device": {"identifiers": [node], "name": "Fleet2D", "manufacturer": "Fleet2D"},
             **config,
         }
-        path = f"{DISCOVERY}/{component}/{node}/{re.sub(r'[^A-Za-z0-9_-]', '_', name)}/config"
-        self._client.publish(path, json.dumps(content), qos=1, retain=True)
+        place = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        self._retain(f"{DISCOVERY}/{component}/{node}/{place}/config", json.dumps(content))
 
-    def _publish(self, topic: str, text: str, *, retain: bool = False) -> None:
-        self._client.publish(f"{self.prefix}/{topic}", text, qos=1 if retain else 0, retain=retain)
+    def _retain(self, topic: str, text: str) -> None:
+        """Publish what the broker is to keep."""
+        self._retained[topic] = text
+        self._client.publish(topic, text, qos=1, retain=True)
+
+    def _publish(self, topic: str, text: str) -> None:
+        self._client.publish(f"{self.prefix}/{topic}", text)
 
     def send(self, frame: LiveStep) -> None:
         """Publish a frame."""
@@ -348,7 +436,7 @@ class MqttPeer(Peer):
         for event in frame.events:
             if event.event == EventKind.SENSOR:
                 state = "ON" if event.detail == self._on.get(event.entity) else "OFF"
-                self._publish(f"sensor/{event.entity}", state, retain=True)
+                self._retain(f"{self.prefix}/sensor/{event.entity}", state)
             self._publish("event", json.dumps({**event._asdict(), "event": str(event.event)}))
         for table, row in frame.rows:
             self._publish(f"row/{table}", json.dumps(row, default=str))
@@ -359,6 +447,7 @@ class MqttPeer(Peer):
 
     def close(self, run: Run) -> None:
         """Publish that the run is over, and disconnect."""
+        self._retained[f"{self.prefix}/status"] = "offline"
         message = self._client.publish(f"{self.prefix}/status", "offline", qos=1, retain=True)
         if self._client.is_connected():
             message.wait_for_publish(WAIT_S)

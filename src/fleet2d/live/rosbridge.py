@@ -6,16 +6,23 @@ the frames of `fleet2d export`. Subscribed, for each body: `/NAME/goal_pose` and
 """
 
 import math
+from collections.abc import Iterator
 from datetime import UTC
+from functools import cache
 from typing import Any
 
 import numpy as np
+from pydantic import AliasChoices, BaseModel, Field, ValidationError
 
+from fleet2d.bounds import one_line
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError, extra
 from fleet2d.kernels import F64, Mesh, region_outline, visible_region
-from fleet2d.live.bridge import LiveStep, Peer, Post
+from fleet2d.live.bridge import Content, LiveStep, Peer, PeerFault, Post, lose
+from fleet2d.live.messages import first_fault
+from fleet2d.logs.frames import MAP, frame_name, is_named
 from fleet2d.runs.run import Run
+from fleet2d.storage.bags import LATEST_SIMULATED_NS, headings_of
 
 WAIT_S = 5
 BEAMS = 360
@@ -38,12 +45,14 @@ class RosbridgePeer(Peer):
             import roslibpy
 
         self._library: Any = roslibpy
+        self._address = f"rosbridge://{host}:{port}"
+        _quiet_twisted()
         self._ros = roslibpy.Ros(host=host, port=port)
         try:
             self._ros.run(timeout=WAIT_S)
         except Exception as error:
             self._ros.close()
-            raise InputError(f"rosbridge://{host}:{port}: there is no server: {error}") from error
+            raise InputError(f"{self._address}: there is no server: {error}") from error
         self._topics: dict[str, Any] = {}
 
     def open(self, simulation: Simulation, post: Post) -> None:
@@ -53,14 +62,16 @@ class RosbridgePeer(Peer):
         self._last: dict[str, tuple[float, float, float]] = {}
         self._step_s = simulation.clock.step_us / 1e6
         self._simulation = simulation
-        self._ros.on("close", lambda *_: post(None))
+        self._ros.on("close", lambda *_: lose(post, self._address))
         for robot in self._robots:
             self._advertise(f"/{robot}/odom", "nav_msgs/Odometry")
             self._advertise(f"/{robot}/scan", "sensor_msgs/LaserScan")
             self._advertise(f"/{robot}/detections", "vision_msgs/Detection3DArray")
         self._advertise("/tf", "tf2_msgs/TFMessage")
         self._advertise("/map", "nav_msgs/OccupancyGrid", latch=True)
-        self._topics["/map"].publish(self._map(simulation))
+        chart = self._map(simulation)
+        self._topics["/map"].publish(chart)
+        self._ros.on("ready", lambda _: self._topics["/map"].publish(chart))  # again: it is latched
         for name in simulation.actors:
             self._subscribe(f"/{name}/goal_pose", name, "goal", post)
             self._subscribe(f"/{name}/pose", name, "pose", post)
@@ -70,16 +81,9 @@ class RosbridgePeer(Peer):
         self._topics[name].advertise()
 
     def _subscribe(self, topic: str, name: str, kind: str, post: Post) -> None:
-        def receive(message: dict[str, Any]) -> None:
-            place = message["pose"]["position"]
-            turn = message["pose"]["orientation"]
-            z, w = float(turn.get("z", 0)), float(turn.get("w", 1))
-            x, y = float(place["x"]), float(place["y"])
-            if kind == "goal":
-                post({"type": "goal", "entity": name, "to": [x, y]})
-            else:
-                heading = math.degrees(2 * math.atan2(z, w))
-                post({"type": "pose", "entity": name, "x": x, "y": y, "heading_deg": heading})
+        def receive(message: object) -> None:
+            for content in contents_of(topic, name, kind, message):
+                post(content)
 
         self._topics[topic] = self._library.Topic(self._ros, topic, "geometry_msgs/PoseStamped")
         self._topics[topic].subscribe(receive)
@@ -181,6 +185,89 @@ class RosbridgePeer(Peer):
         for topic in self._topics.values():
             topic.unsubscribe() if topic.is_subscribed else topic.unadvertise()
         self._ros.close()
+
+
+class _RosStamp(BaseModel):
+    """A time of ROS 2, or of ROS 1."""
+
+    sec: int = Field(default=0, ge=0, lt=1 << 32, validation_alias=AliasChoices("sec", "secs"))
+    nanosec: int = Field(
+        default=0, ge=0, lt=1 << 32, validation_alias=AliasChoices("nanosec", "nsecs")
+    )
+
+
+class _RosHeader(BaseModel):
+    frame_id: str = ""
+    stamp: _RosStamp = _RosStamp()
+
+
+class _RosPoint(BaseModel):
+    x: float
+    y: float
+
+
+class _RosQuaternion(BaseModel):
+    """A turn; rosbridge has null for NaN."""
+
+    x: float | None = 0.0
+    y: float | None = 0.0
+    z: float | None = 0.0
+    w: float | None = 0.0
+
+
+class _RosPose(BaseModel):
+    position: _RosPoint
+    orientation: _RosQuaternion = _RosQuaternion()
+
+
+class _PoseStamped(BaseModel):
+    """A `geometry_msgs/PoseStamped`."""
+
+    header: _RosHeader = _RosHeader()
+    pose: _RosPose
+
+
+def contents_of(topic: str, name: str, kind: str, message: object) -> Iterator[Content]:
+    """Yield the message to a run that a `PoseStamped` is, and what is odd about it.
+
+    Args:
+        topic: The topic on which it arrived.
+        name: The body.
+        kind: "pose" or "goal".
+        message: The message of ROS as JSON has it.
+    """
+    try:
+        stamped = _PoseStamped.model_validate(message)
+    except ValidationError as error:
+        yield PeerFault("wrong", f"{topic}: {first_fault(error)}", is_message=True)
+        return
+    frame = frame_name(stamped.header.frame_id)
+    if frame and not is_named(frame, MAP):
+        text = f"{topic} is in the frame {one_line(frame)!r}: only poses in {MAP!r} count"
+        yield PeerFault("in other frames", text, is_message=True)
+        return
+    position, turn = stamped.pose.position, stamped.pose.orientation
+    content: dict[str, Any] = {"type": kind, "entity": name}
+    content |= {"to": [position.x, position.y]} if kind == "goal" else dict(position)
+    stamp_ns = stamped.header.stamp.sec * 1_000_000_000 + stamped.header.stamp.nanosec
+    if stamp_ns >= LATEST_SIMULATED_NS:
+        content["time"] = stamp_ns / 1e9
+    elif stamp_ns:
+        yield PeerFault("of a simulated clock", f"{topic}: nobody knows which messages are late")
+    (heading,) = headings_of(np.array([[turn.x, turn.y, turn.z, turn.w]], np.float64))
+    if math.isfinite(heading):
+        content["heading_deg"] = math.degrees(heading)
+    else:
+        yield PeerFault("without heading", f"{topic}: the quaternion is 0 or not a number")
+    yield content
+
+
+@cache
+def _quiet_twisted() -> None:
+    """Keep Twisted from writing errors to the terminal: roslibpy passes them to its logger."""
+    from twisted.logger import globalLogBeginner
+
+    globalLogBeginner.beginLoggingTo([], redirectStandardIO=False)
 
 
 def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:

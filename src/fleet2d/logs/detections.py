@@ -14,9 +14,10 @@ import pyarrow.compute as pc
 from fleet2d.bounds import FIXES, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import I64
+from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import NAMES, LogTable, RawFixes, Stamps
-from fleet2d.storage.bags import is_bag, open_bag, stamp_of
+from fleet2d.storage.bags import headings_of, is_bag, open_bag, stamp_ns, times_of
 
 COLUMNS = {
     "time": NAMES["time"],
@@ -27,7 +28,7 @@ COLUMNS = {
 }
 """The names that a column may have, if the user gives none."""
 
-POSE = ("x", "y", "heading")
+SPACE = ("x", "y", "z", "heading")
 ARRAYS = ("vision_msgs/msg/Detection3DArray", "geometry_msgs/msg/PoseArray")
 _FIELDS: dict[str, dict[str, str]] = {
     "vision_msgs/msg/Detection3DArray": {
@@ -66,6 +67,7 @@ def read_detections(
     path: str | Path,
     *,
     topic: str | None = None,
+    frame: str | None = None,
     columns: Mapping[str, str] | None = None,
     time_zone: str | None = None,
     sort: bool = False,
@@ -77,6 +79,7 @@ def read_detections(
     Args:
         path: A table (.csv, .parquet, .jsonl), or a bag of ROS 1 or ROS 2.
         topic: The topic of a bag; needed if several have detections.
+        frame: The frame of a bag in which positions are returned; None: the map.
         columns: Names of columns, {"user": "face"}. Of a bag, the fields of its messages, like
             {"each": "people", "user": "name", "x": "pose.position.x"}, where `each` is the list of
             detections in a message; numbers select an element of a list.
@@ -84,18 +87,18 @@ def read_detections(
         sort: Put rows in order of time instead of refusing times that run backwards.
 
     Raises:
-        LogError: The file can't be read, a column or field is missing, a value is not a number, or
-            times run backwards.
+        LogError: The file can't be read, a column or field is missing, a value is not a number,
+            times run backwards, or no transforms lead to `frame`.
         InputError: rosbags isn't installed.
     """
     path = Path(path)
     if not path.exists():
         raise LogError(f"no such file: {path}")
     if is_bag(path):
-        fixes, label, labels = _from_bag(path, topic, columns or {})
+        fixes, label, labels = _from_bag(path, topic, columns or {}, frame or MAP)
     else:
-        if topic is not None:
-            raise LogError(f"{path} is a table: 'topic' is for bags")
+        if topic is not None or frame is not None:
+            raise LogError(f"{path} is a table: 'topic' is for bags, and so is the name of a frame")
         fixes, label, labels = _from_table(path, columns or {})
     local = fixes.local(path, "detections", time_zone=time_zone, sort=sort)
     xy, heading = np.stack([fixes.x, fixes.y], 1)[local.row], fixes.heading[local.row]
@@ -128,30 +131,46 @@ def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:
 # Bags
 
 
-def _from_bag(path: Path, topic: str | None, columns: Mapping[str, str]) -> _LabelledFixes:
+def _from_bag(
+    path: Path, topic: str | None, columns: Mapping[str, str], frame: str
+) -> _LabelledFixes:
     with open_bag(path, LogError) as reader:
         connection, fields = _topic(reader, path, topic, columns)
         FIXES.check(connection.msgcount, path, LogError)
-        times: list[int] = []
+        depth = {"z": f"{fields['x'][:-1]}z"} if fields["x"].endswith(".x") else {}
+        stamps, recorded, frames = list[int](), list[int](), list[str]()
         rows: list[list[float]] = []
         users: list[str | None] = []
         number = 0
         for number, (_, time, data) in enumerate(reader.messages([connection]), 1):
             message = reader.deserialize(data, connection.msgtype)
-            stamp = stamp_of(message, time) if hasattr(message, "header") else time
             for one in _each(message, fields, path, number):
-                times.append(stamp)
-                rows.append([_number(one, fields.get(k), path, number) for k in POSE])
+                stamps.append(stamp_ns(message))
+                recorded.append(time)
+                frames.append(_frame_of(message))
+                rows.append([_number(one, (fields | depth).get(k), path, number) for k in SPACE])
                 user = _value(one, fields["user"]) if "user" in fields else None
                 users.append(None if user is None else str(user))
-            FIXES.check(len(times), path, LogError)
-    topic = connection.topic
-    if not times:
-        raise LogError(f"{path}: none of the {number} messages of {topic} has a detection")
-    stamps = Stamps.of_messages(np.array(times, np.int64))
-    note = f"{topic}: {len(times)} detections in {number} messages"
-    x, y, heading = np.array(rows, np.float64).T
-    return RawFixes(stamps, x, y, heading, [note]), *_codes(pa.array(users, pa.string()))
+            FIXES.check(len(rows), path, LogError)
+        topic = connection.topic
+        if not rows:
+            raise LogError(f"{path}: none of the {number} messages of {topic} has a detection")
+        notes = [f"{topic}: {len(rows)} detections in {number} messages"]
+        times = times_of(np.array(stamps, np.int64), np.array(recorded, np.int64))
+        x, y, z, heading = np.array(rows, np.float64).T
+        level = np.zeros(len(x))
+        turns = np.stack([level, level, np.sin(heading / 2), np.cos(heading / 2)], 1)
+        motions = RigidMotions(np.stack([x, y, np.nan_to_num(z)], 1), turns)
+        poses = StampedPoses(times, frames, motions)
+        motions, is_known = poses.seen_from(frame, FrameTree(reader, path), topic, notes)
+    x, y = np.where(is_known, motions.place[:, :2].T, np.nan)
+    heading = headings_of(motions.turn)
+    fixes = RawFixes(Stamps.of_messages(times), x, y, heading, notes)
+    return fixes, *_codes(pa.array(users, pa.string()))
+
+
+def _frame_of(message: Any) -> str:
+    return frame_name(message.header.frame_id) if hasattr(message, "header") else ""
 
 
 def _topic(

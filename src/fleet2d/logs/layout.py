@@ -348,6 +348,7 @@ def read_log(
     layout: Layout = "auto",
     *,
     id: str | None = None,  # noqa: A002 - the name of the column
+    frame: str | None = None,
     columns: Mapping[str, str] | None = None,
     time_zone: str | None = None,
     sort: bool = False,
@@ -358,6 +359,7 @@ def read_log(
         path: The file; or the folder, for a home that has several.
         layout: The layout; "auto" recognizes it by its content.
         id: The tag to read, of positions; the topic or frame, of a bag; see `read_bag`.
+        frame: The frame of a bag in which positions are returned; None: the map.
         columns: The names of the columns of positions; see `read_positions`.
         time_zone: The time zone of the home, for positions and bags; see `read_positions`.
         sort: Sort lines whose time runs backwards instead of refusing them.
@@ -369,6 +371,8 @@ def read_log(
     if not path.exists():
         raise LogError(f"no such file: {path}")
     layout = _recognize(path) if layout == "auto" else layout
+    if frame is not None and layout != "bag":
+        raise LogError(f"{path} is no bag: the name of a frame is for bags")
     if layout == "positions":
         # Imported here, as no other layout needs pyarrow.
         from fleet2d.logs.positions import read_positions
@@ -379,7 +383,7 @@ def read_log(
             raise LogError(f"{path} is a bag: columns are for tables of positions")
         from fleet2d.logs.bags import read_bag
 
-        return read_bag(path, id=id, time_zone=time_zone, sort=sort)
+        return read_bag(path, id=id, frame=frame or "map", time_zone=time_zone, sort=sort)
     if id is not None or columns or time_zone is not None:
         raise LogError(
             f"{path} is of the layout {layout}: id, columns and time_zone are for positions"

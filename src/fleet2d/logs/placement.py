@@ -56,6 +56,7 @@ class LogFrame(Settings):
     """How the positions of a log lie in the floor plan: mirrored, scaled, turned, then moved.
 
     Attributes:
+        name: The frame of a bag in which positions are read, such as odom; left out: map.
         scale: Metres in one unit of the log.
         rotation_deg: Direction of the log's x axis in the plan, counter-clockwise.
         flip_y: Whether the log's y axis is the other way, as in pictures.
@@ -72,6 +73,7 @@ class LogFrame(Settings):
         [[-2.048, 5.048]]
     """
 
+    name: str | None = None
     scale: float = Field(default=1.0, gt=0)
     rotation_deg: AngleDeg = 0.0
     flip_y: bool = False

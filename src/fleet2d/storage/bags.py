@@ -9,6 +9,7 @@ import numpy as np
 
 from fleet2d.bounds import LOG_BYTES, check_file, one_line
 from fleet2d.errors import Fleet2DError, InputError, extra
+from fleet2d.kernels import F64, I64
 
 VISION_TYPES = {
     "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
@@ -29,6 +30,8 @@ VISION_TYPES = {
 LATEST_SIMULATED_NS = 10**17
 """Stamps below are of a simulated clock [ns]: three years."""
 
+# A quaternion that is shorter says nothing.
+SHORTEST = 1e-3
 _BAGS = (".bag", ".mcap", ".db3")
 
 
@@ -82,14 +85,45 @@ def open_bag(path: Path, failure: type[InputError] = InputError) -> Iterator[Any
         raise failure(f"{path} can't be read as a bag: {one_line(error, 200)}") from error
 
 
-def stamp_of(message: Any, time: int) -> int:
-    """Return the stamp of a message [ns]; the time at which it was recorded if it has none."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec) or time
+def stamp_ns(message: Any) -> int:
+    """Return the stamp of a message [ns], 0 if it has none."""
+    stamp = message.header.stamp if hasattr(message, "header") else None
+    return 0 if stamp is None else int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def planar(place: Any, turn: Any) -> tuple[float, float, float]:
-    """Return x, y and the heading of a pose in space."""
-    x, y, z, w = (float(value) for value in (turn.x, turn.y, turn.z, turn.w))
-    heading = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return float(place.x), float(place.y), float(heading)
+def times_of(stamps: I64, recorded: I64) -> I64:
+    """Return the times of messages [ns]: their stamps, or when they were recorded if these are 0.
+
+    A simulated clock begins at 0, so that this is one of its stamps.
+    """
+    latest = int(stamps.max(initial=0))
+    has_zeros = latest == 0 or latest >= LATEST_SIMULATED_NS
+    return np.where(stamps == 0, recorded, stamps) if has_zeros else stamps
+
+
+def numbers_of(place: Any, turn: Any) -> list[float]:
+    """Return x, y, z of a place, and x, y, z, w of a quaternion."""
+    numbers = (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+    return [float(number) for number in numbers]
+
+
+def unit_turns(turns: F64) -> F64:
+    """Return quaternions x, y, z, w at the length 1, float64 (n, 4); NaN if they are none."""
+    with np.errstate(all="ignore"):
+        length = np.sqrt((turns * turns).sum(axis=1, keepdims=True))
+        return np.where((length > SHORTEST) & (length < np.inf), turns / length, np.nan)
+
+
+def headings_of(turns: F64) -> F64:
+    """Return the headings of quaternions of any length [rad], float64 (n,).
+
+    Args:
+        turns: Their x, y, z and w, float64 (n, 4). All zeros, and NaN, have no heading: NaN.
+
+    Example:
+        >>> headings_of(np.array([[0.0, 0.0, 1.414, 1.414], [0.0, 0.0, 0.0, 0.0]])).round(4)
+        array([1.5708,    nan])
+    """
+    x, y, z, w = unit_turns(turns).T
+    heading: F64 = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return heading

@@ -483,6 +483,7 @@ class Replay(Behavior):
                 self.path,
                 self.format,
                 id=self.id,
+                frame=self.frame.name,
                 columns=self.columns,
                 time_zone=self.time_zone,
                 sort=self.sort,

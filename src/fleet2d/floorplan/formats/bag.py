@@ -15,7 +15,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.storage.bags import open_bag, planar
+from fleet2d.storage.bags import headings_of, numbers_of, open_bag
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 # Chances of being occupied, in percent, as map_server divides them.
@@ -91,8 +91,11 @@ def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, st
             f"{path}: the map of {topic} is damaged: {len(cells)} cells for {columns} × {rows} of"
             f" {side:g} m"
         )
-    x, y, heading = planar(info.origin.position, info.origin.orientation)
-    x, y, side, percent = x * scale, y * scale, round(side, 6), cells.reshape(rows, columns)
+    corner = numbers_of(info.origin.position, info.origin.orientation)
+    heading = float(np.nan_to_num(headings_of(np.array([corner[3:]])))[0])  # many leave it out
+    x, y = corner[0] * scale, corner[1] * scale
+    side = round(side, 6)
+    percent = cells.reshape(rows, columns)
     free = (percent >= 0) & (percent < FREE_BELOW)
     return OccupancyMap(free, percent > OCCUPIED_ABOVE, side, (x, y), turn_by(heading)), (
         f"{topic}: the last of {connection.msgcount} maps, {columns} × {rows} cells of {side:g} m,"

@@ -1,0 +1,104 @@
+"""Messages of ROS 1 and ROS 2, and bags of them, that tests share."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+NINE = 1_767_600_000 * 10**9  # 2026-01-05T08:00 UTC, 09:00 in Berlin
+Row = tuple[str, str, int, Any]
+
+
+class Ros:
+    """Messages of ROS, and bags of them."""
+
+    def __init__(self, version: int) -> None:
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+        self.version = version
+        self.types = get_typestore(Stores.ROS2_HUMBLE if version == 2 else Stores.ROS1_NOETIC)
+        if TF not in self.types.types:
+            text = "geometry_msgs/TransformStamped[] transforms"
+            self.types.register(get_types_from_msg(text, TF))
+
+    def new(self, name: str, *values: Any) -> Any:
+        return self.types.types[name](*values)
+
+    def header(self, ns: int, frame: str) -> Any:
+        stamp = self.new("builtin_interfaces/msg/Time", *divmod(ns, 10**9))
+        sequence = () if self.version == 2 else (0,)
+        return self.new("std_msgs/msg/Header", *sequence, stamp, frame)
+
+    def pose(self, x: float, y: float, heading: float) -> Any:
+        turn = (0.0, 0.0, float(np.sin(heading / 2)), float(np.cos(heading / 2)))
+        return self.new(
+            "geometry_msgs/msg/Pose",
+            self.new("geometry_msgs/msg/Point", x, y, 0.0),
+            self.new("geometry_msgs/msg/Quaternion", *turn),
+        )
+
+    def odometry(
+        self, ns: int, x: float, y: float, heading: float, frame: str = "map", body: str = ""
+    ) -> Any:
+        still = self.new("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)
+        twist = self.new("geometry_msgs/msg/Twist", still, still)
+        return self.new(
+            "nav_msgs/msg/Odometry",
+            self.header(ns, frame),
+            body or "base_link",
+            self.new(
+                "geometry_msgs/msg/PoseWithCovariance", self.pose(x, y, heading), np.zeros(36)
+            ),
+            self.new("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
+        )
+
+    def transform(self, ns: int, parent: str, child: str, pose: tuple[float, ...]) -> Any:
+        x, y, heading = pose
+        turn = self.pose(x, y, heading).orientation
+        move = self.new(
+            "geometry_msgs/msg/Transform", self.new("geometry_msgs/msg/Vector3", x, y, 0.0), turn
+        )
+        one = self.new("geometry_msgs/msg/TransformStamped", self.header(ns, parent), child, move)
+        return self.new("tf2_msgs/msg/TFMessage", [one])
+
+    def bag(self, path: Path, rows: Iterable[Row]) -> Path:
+        """Write messages: topic, type, time [ns], message."""
+        from rosbags.rosbag1 import Writer as Writer1
+        from rosbags.rosbag2 import Writer as Writer2
+
+        writer: Any = Writer2(path, version=9) if self.version == 2 else Writer1(path)
+        with writer:
+            connections: dict[str, Any] = {}
+            for topic, kind, ns, message in rows:
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=self.types)
+                serialize = (
+                    self.types.serialize_cdr if self.version == 2 else self.types.serialize_ros1
+                )
+                writer.write(connections[topic], ns, bytes(serialize(message, kind)))
+        return path
+
+
+ODOMETRY = "nav_msgs/msg/Odometry"
+TF = "tf2_msgs/msg/TFMessage"
+
+
+def moved(ros: Ros, child: str, parent: str = "map", x: float = 2.0) -> Row:
+    """Return a transform of `/tf` that moves along x."""
+    return "/tf", TF, NINE, ros.transform(NINE, parent, child, (x, 0.0, 0.0))
+
+
+def stamped(
+    ros: Ros,
+    frame: str,
+    turn: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0),
+    x: float = 7.0,
+    after: int = 0,
+) -> Row:
+    """Return a pose at (7, 4), some seconds after nine."""
+    ns = NINE + after * 10**9
+    kind = "geometry_msgs/msg/PoseStamped"
+    place = ros.new("geometry_msgs/msg/Point", x, 4.0, 0.0)
+    pose = ros.new("geometry_msgs/msg/Pose", place, ros.new("geometry_msgs/msg/Quaternion", *turn))
+    return "/pose", kind, ns, ros.new(kind, ros.header(ns, frame), pose)
