@@ -128,7 +128,7 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. */
 export interface RunFacts {
   title: string;
   status: string;
@@ -148,6 +148,7 @@ export interface RunFacts {
   marks: MarkFacts[];
   slows: SlowFacts[];
   starts_unlit: boolean;
+  event_kinds: string[];
   metrics: Record<string, unknown>;
   scenario: Record<string, unknown>;
   walks_every_s: number;

@@ -1,7 +1,7 @@
 /** The state of the page: signals that all parts read, and the few functions that change them. */
 
 import { batch, computed, signal } from "@preact/signals";
-import { type Answer, eventText, hasWords } from "./data/ask";
+import { type Answer, ask, withWords } from "./data/ask";
 import type { EventRow } from "./data/events";
 import type { Run } from "./data/run";
 import { firstAtLeast, lastAtMost } from "./data/search";
@@ -29,8 +29,8 @@ export const followed = signal("");
 export const plot = signal("");
 export const eventKind = signal("");
 export const search = signal("");
-/** What was asked of the timeline, and what answers it. */
-export const answer = signal<Answer | null>(null);
+/** What was asked of the timeline, and the moment that was shown then. */
+export const question = signal<{ text: string; nearUs: number } | null>(null);
 export const shown = signal<ReadonlySet<Switch>>(new Set(SWITCHES.filter((name) => name !== "beliefs")));
 export const layer = signal("");
 export const panel = signal<Panel>("now");
@@ -51,7 +51,15 @@ export const foundEvents = computed<readonly EventRow[]>(() => {
   void entry.version.value;
   const [kind, words] = [eventKind.value, search.value.trim()];
   const rows = kind ? entry.events.ofKind(kind) : entry.events.rows;
-  return words ? rows.filter((row) => hasWords(eventText(row), words)) : rows;
+  return words ? withWords(entry, rows, words) : rows;
+});
+
+/** What answers the question, as far as the run is read or simulated. */
+export const answer = computed<Answer | null>(() => {
+  const [entry, other = null] = runs.value;
+  if (!entry || !question.value) return null;
+  void [entry.version.value, other?.version.value];
+  return ask(entry, question.value.text, question.value.nearUs, other);
 });
 
 const SHORTEST_US = 10e6;

@@ -41,6 +41,8 @@ export class Run {
   observations: ObservationSource | null = null;
   /** Goes up by one whenever something more of the run was read. */
   readonly version = signal(0);
+  /** Whether everything was read that questions are about. */
+  readonly isRead = signal(false);
   /** What could not be read, in plain words. */
   readonly problems = signal<string[]>([]);
   /** Paths ahead of bodies in a live run [lattice]; those of a stored run follow from its tracks. */
@@ -92,6 +94,11 @@ export class Run {
   isOfNow(algorithm: string): boolean {
     const algorithms = this.facts.scenario.algorithms as Record<string, { type?: string } | undefined> | undefined;
     return algorithms?.[algorithm]?.type === "real_time_presence";
+  }
+
+  /** Whether it is known who was noticed. */
+  get storesSightings(): boolean {
+    return this.knownUs < Infinity || this.tableFacts("observations") !== undefined;
   }
 
   get bodies(): readonly BodyFacts[] {
@@ -161,6 +168,7 @@ export class Run {
       const table = await this.open("observations");
       if (table) this.observations = new Observations(table);
     });
+    this.isRead.value = true;
     this.changed();
   }
 

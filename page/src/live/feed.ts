@@ -101,6 +101,7 @@ export class Feed {
       run.rooms.set(name, stretchesUntil(past?.roomsOf(name) ?? { from: [], to: [], value: [] }, us));
     }
     if (past) this.takePast(past, us);
+    run.isRead.value = true;
   }
 
   /** Follow a simulation; a branch begins with what the run before it was. */

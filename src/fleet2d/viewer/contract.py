@@ -197,7 +197,8 @@ class SightingFacts(TypedDict):
 class RunFacts(TypedDict):
     """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown.
 
-    With `starts_unlit` all lights are off at first; its events switch them.
+    With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all
+    that Fleet2D records, also those that the run has none of.
     """
 
     title: str
@@ -218,6 +219,7 @@ class RunFacts(TypedDict):
     marks: list[MarkFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
+    event_kinds: list[str]
     metrics: dict[str, Any]
     scenario: dict[str, Any]
     walks_every_s: float

@@ -19,6 +19,7 @@ from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.run import LAYER_PREFIX, Run
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import KINDS
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in
 from fleet2d.viewer.contract import (
@@ -270,6 +271,7 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         marks=marks_of(run),
         slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
         starts_unlit=_starts_unlit(scenario),
+        event_kinds=sorted(KINDS),
         metrics=run.metrics,
         scenario=scenario,
         walks_every_s=0.0,
@@ -399,6 +401,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         marks=[],
         slows=slow_floors(scenario, simulation.interventions, clock),
         starts_unlit=_starts_unlit(scenario),
+        event_kinds=sorted(KINDS),
         metrics={},
         scenario=scenario,
         walks_every_s=0.0,
