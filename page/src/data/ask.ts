@@ -170,12 +170,13 @@ class Question {
     }
   }
 
-  /** Ways to read the tokens: `last`, `first` and parts of days as such where they can be, or as names. */
+  /** Ways to read the tokens: `last`, `first`, `nights` and the first `night` as such where they can be, or as names. */
   private *readings(): Generator<{ which: string; part: string; rest: Token[] }> {
     const indices = (words: ReadonlySet<string>): number[] => [...this.tokens.keys()].filter((i) => isWord(this.tokens[i], words));
-    const parts = new Set(Object.keys(PARTS).flatMap((part) => [part, part.slice(0, -1)])); // the first night, and nights
-    for (const which of [...indices(new Set(["last", "first"])), -1])
-      for (const part of [...indices(parts), -1]) {
+    const order = indices(new Set(["last", "first"]));
+    const days = indices(new Set(Object.keys(PARTS).map((part) => part.slice(0, -1)))).filter((i) => order.includes(i - 1));
+    for (const which of [...order, -1])
+      for (const part of [...indices(new Set(Object.keys(PARTS))), ...days, -1]) {
         const word = this.tokens[part]?.text.toLowerCase() ?? "";
         const rest = this.tokens.filter((_, i) => i !== which && i !== part);
         yield { which: this.tokens[which]?.text.toLowerCase() ?? "", part: word && (word.endsWith("s") ? word : `${word}s`), rest };
