@@ -208,7 +208,7 @@ export interface LiveEvent {
   detail: string;
 }
 
-/** The state of a running simulation; `speed` 0 is as fast as it goes. `served_as` is the number of the stored run that it has become; -1 while it is under way. */
+/** The state of a running simulation; `speed` 0 is as fast as it goes. `beliefs` are of algorithms about users: shares of rooms and last of away, which sum to 1. `served_as` is the number of the stored run that it has become; -1 while it is under way. */
 export interface LiveFrame {
   step: number;
   paused: boolean;
@@ -218,7 +218,7 @@ export interface LiveFrame {
   bodies: LiveBody[];
   seen: [string, string][];
   doors: Record<string, boolean>;
-  beliefs: Record<string, number[]>;
+  beliefs: Record<string, Record<string, number[]>>;
   events: LiveEvent[];
   marks: MarkFacts[];
   slows: SlowFacts[];

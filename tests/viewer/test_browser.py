@@ -106,7 +106,7 @@ def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Pat
 
 
 def shares_are(page: Any, believed: dict[str, float]) -> bool:
-    """Say whether every bar shows what is believed of its room; panels follow with a delay."""
+    """Say whether every bar shows what is believed of its room."""
     bars = page.locator("table.bars tr[data-room]")  # read at once: they may be replaced between
     pairs = bars.evaluate_all("rows => rows.map(row => [row.dataset.room, row.dataset.believed])")
     shown = {room: float(share) for room, share in pairs}
@@ -124,8 +124,59 @@ def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
         page.press("#goto", "Enter")
         shows_moment(page, step)
         last = max((row["step"] for row in table if row["step"] <= step), default=-1)
-        believed = {row["room"]: row["share"] for row in table if row["step"] == last}
-        until(page, lambda: shares_are(page, believed))  # noqa: B023
+        rows = [row for row in table if row["step"] == last and row["user"] == "ana"]
+        until(page, lambda: shares_are(page, with_away(rows)))  # noqa: B023
+
+
+def with_away(rows: list[dict[str, Any]]) -> dict[str, float]:
+    """Return shares of rooms and of away that sum to one; those of rooms are stored given home."""
+    shares = {row["room"]: row["share"] for row in rows}
+    away = shares.get("away", 0.0)
+    return {room: s if room == "away" else s * (1 - away) for room, s in shares.items()}
+
+
+BELIEFS = {
+    "ltp": {"type": "ltp", "period": "6 h"},
+    "rtp": {"type": "rtp", "period": "30 min"},
+    "later": {"type": "belief_table", "period": "2 h", "every": "30 min"},
+}
+
+
+@pytest.mark.slow
+def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(
+    browser: Any, tmp_path: Path
+) -> None:
+    ben = {"type": "routine", "persona": "works_outside"}
+    root = tmp_path / "run"
+    run = fleet2d.run(
+        "bundled:base", "simulation.duration=1 d", users={"ben": ben}, algorithms=BELIEFS, out=root
+    )
+    draw = np.random.default_rng(1)
+    with served(root) as address, page_at(browser, f"{address}#panel=beliefs") as page:
+        for algorithm in BELIEFS:
+            rows = run.tables[algorithm].to_pylist()
+            column = "at" if algorithm == "later" else "step"
+            moments = sorted({row[column] for row in rows})
+            for user in ("ana", "ben", "anyone"):
+                for moment in moments:
+                    shares = with_away(
+                        [r for r in rows if r[column] == moment and r["user"] == user]
+                    )
+                    assert 1 == pytest.approx(sum(shares.values()))
+                page.select_option("#panel select", f"{algorithm}/{user}")
+                for step in draw.integers(moments[0], 86_400, 4).tolist():
+                    page.fill("#goto", f"step {step}")
+                    page.press("#goto", "Enter")
+                    shows_moment(page, step)
+                    last = max(moment for moment in moments if moment <= step)
+                    of = [r for r in rows if r[column] == last and r["user"] == user]
+                    until(page, lambda: shares_are(page, with_away(of)))  # noqa: B023
+                    assert f"as of {run.clock.time(last):%a %-d %b %H:%M:%S}" in page.inner_text(
+                        "#panel"
+                    )
+                    numbers = page.locator("table.bars td.number").all_inner_texts()
+                    parts = [int(number.removesuffix(" %")) for number in numbers]
+                    assert [100, 100] == [sum(parts[::2]), sum(parts[1::2])]
 
 
 def test_dragging_over_the_timeline_scrubs(page: Any) -> None:

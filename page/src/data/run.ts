@@ -93,7 +93,7 @@ export class Run {
   /** Whether an algorithm says where users are now, and not for which shares of their time. */
   isOfNow(algorithm: string): boolean {
     const algorithms = this.facts.scenario.algorithms as Record<string, { type?: string } | undefined> | undefined;
-    return algorithms?.[algorithm]?.type === "real_time_presence";
+    return ["real_time_presence", "belief_table", "told_presence"].includes(algorithms?.[algorithm]?.type ?? "");
   }
 
   /** Whether it is known who was noticed. */
@@ -160,7 +160,8 @@ export class Run {
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
       await this.attempt(async () => {
         const table = await this.open(facts.name);
-        const beliefs = table && (await readBeliefs(facts.name, table, this.home, this.clock.stepUs, this.isOfNow(facts.name)));
+        const users = this.bodies.filter((body) => !body.robot).map((body) => body.name);
+        const beliefs = table && (await readBeliefs(facts.name, table, this.home, users, this.clock.stepUs, this.isOfNow(facts.name)));
         if (beliefs) this.beliefs.push(beliefs);
       });
     }

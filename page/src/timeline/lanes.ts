@@ -1,7 +1,7 @@
 /** The lanes of a timeline: what each shows, in which colours. */
 
 import type { Answer } from "../data/ask";
-import type { BeliefSeries } from "../data/beliefs";
+import { type BeliefSeries, percents } from "../data/beliefs";
 import type { Run, Switches } from "../data/run";
 import type { BodyFacts } from "../contract";
 import { type EventRow, shownText } from "../data/events";
@@ -83,10 +83,11 @@ export function beliefLanes(run: Run, prefix: string, title = ""): Lane[] {
   const words = (us: number): string => {
     const at = lastAtMost(beliefs.us, us);
     if (at < 0) return "";
-    const shares = rows.map((room) => [room, beliefs.shares[at]![room]!] as const).sort((one, other) => other[1] - one[1]);
-    const believed = shares.slice(0, 3).map(([room, share]) => `${name(room)} ${(100 * share).toFixed(0)} %`);
+    const ofRooms = percents(beliefs.shares[at]!);
+    const likeliest = [...rows].sort((one, other) => ofRooms[other]! - ofRooms[one]!).slice(0, 3);
+    const believed = likeliest.map((room) => `${name(room)} ${ofRooms[room]} %`);
     const room = valueAt(truth, us);
-    return `${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
+    return `as of ${run.clock.text(beliefs.us[at]!)}: ${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
   };
   const paint: LanePaint = { kind: "heat", beliefs, rows, names: rows.map(name), truth, color, endUs: run.endUs };
   const height = rows.length * HEAT_ROW_HEIGHT;

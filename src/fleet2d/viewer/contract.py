@@ -302,6 +302,7 @@ class LiveEvent(TypedDict):
 class LiveFrame(TypedDict):
     """The state of a running simulation; `speed` 0 is as fast as it goes.
 
+    `beliefs` are of algorithms about users: shares of rooms and last of away, which sum to 1.
     `served_as` is the number of the stored run that it has become; -1 while it is under way.
     """
 
@@ -313,7 +314,7 @@ class LiveFrame(TypedDict):
     bodies: list[LiveBody]
     seen: list[tuple[str, str]]
     doors: dict[str, bool]
-    beliefs: dict[str, list[float]]
+    beliefs: dict[str, dict[str, list[float]]]
     events: list[LiveEvent]
     marks: list[MarkFacts]
     slows: list[SlowFacts]
