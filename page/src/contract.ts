@@ -111,6 +111,14 @@ export interface MarkFacts {
   label: string;
 }
 
+/** What became of an expectation; `step` is the first at which it is violated. */
+export interface VerdictFacts {
+  name: string;
+  outcome: "violated" | "held" | "not decided" | "untested";
+  says: string;
+  step: number | null;
+}
+
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
 export interface SlowFacts {
   outline: [number, number][];
@@ -128,7 +136,7 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. `verdict` sums up the `verdicts`, of which violated ones come first. */
 export interface RunFacts {
   title: string;
   status: string;
@@ -146,6 +154,8 @@ export interface RunFacts {
   tables: TableFacts[];
   walls: WallsChange[];
   marks: MarkFacts[];
+  verdict: string;
+  verdicts: VerdictFacts[];
   slows: SlowFacts[];
   starts_unlit: boolean;
   event_kinds: string[];

@@ -549,6 +549,34 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
 
 
 @pytest.mark.slow
+def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser: Any) -> None:
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=2 h",
+        "expect.unseen=never(seen(ana, by=astro))",
+        "expect.apart=always(distance(ana, astro) > 0 m)",
+        seed=4,
+    )
+    run.notes.append("a remark")
+    first = run.tables["violations"]["step"].to_pylist()[0]
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        badge = page.locator("header button")
+        moment = f"{run.clock.time(first):%a %d %b %H:%M:%S}"
+        assert f"✗ 1 of 2 expectations violated: unseen at {moment}" == badge.inner_text()
+        badge.click()
+        shows_moment(page, first)
+        alarm = badge.evaluate("element => getComputedStyle(element).color")
+        note = page.locator(".notes summary")
+        assert "1 note" == note.inner_text()
+        assert alarm != note.evaluate("element => getComputedStyle(element).color")
+
+
+def test_page_of_a_run_without_expectations_has_no_alarm(page: Any) -> None:
+    assert 0 == page.locator(".violated, .status").count()
+    assert 0 == page.locator(".verdict").count()
+
+
+@pytest.mark.slow
 def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="PyAV is not installed")
     run = fleet2d.run(

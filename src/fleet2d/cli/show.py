@@ -5,6 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
+from fleet2d.cli.run import print_verdict
 from fleet2d.configuration.problems import suggest, validating
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
@@ -178,6 +179,7 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture) -> Path:
 
     picture.check()
     run = open_run(directory)
+    print_verdict(run, err=True)  # stdout is the path
     if picture.layer is not None:
         from fleet2d.pictures.layers import draw_layer
 

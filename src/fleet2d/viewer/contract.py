@@ -172,6 +172,15 @@ class MarkFacts(TypedDict):
     label: str
 
 
+class VerdictFacts(TypedDict):
+    """What became of an expectation; `step` is the first at which it is violated."""
+
+    name: str
+    outcome: Literal["violated", "held", "not decided", "untested"]
+    says: str
+    step: int | None
+
+
 class SlowFacts(TypedDict):
     """A floor that slows robots down from `step` to before `end`: its outline [m], its effect."""
 
@@ -198,7 +207,8 @@ class RunFacts(TypedDict):
     """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown.
 
     With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all
-    that Fleet2D records, also those that the run has none of.
+    that Fleet2D records, also those that the run has none of. `verdict` sums up the
+    `verdicts`, of which violated ones come first.
     """
 
     title: str
@@ -217,6 +227,8 @@ class RunFacts(TypedDict):
     tables: list[TableFacts]
     walls: list[WallsChange]
     marks: list[MarkFacts]
+    verdict: str
+    verdicts: list[VerdictFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
     event_kinds: list[str]
