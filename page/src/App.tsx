@@ -15,7 +15,6 @@ import { LayersPanel } from "./panels/LayersPanel";
 import { MetricsPanel } from "./panels/MetricsPanel";
 import { NotesPanel } from "./panels/NotesPanel";
 import { Now } from "./panels/Now";
-import { slowMoment } from "./panels/slow";
 import { Terms } from "./panels/Terms";
 import { downloadFilm, filming } from "./film";
 import { Plan } from "./plan/Plan";
@@ -191,7 +190,7 @@ function Controls() {
       <GoTo />
       <Ask />
       <output class="clock" aria-label="Shown moment">
-        day {run.clock.day(slowMoment.value)} · {run.clock.text(slowMoment.value)}
+        day {run.clock.day(state.moment.value)} · {run.clock.text(state.moment.value)}
       </output>
       <span class="group">
         <button type="button" aria-label={state.answer.value ? "Previous answer" : "Previous event"} onClick={() => state.jump(false)}>

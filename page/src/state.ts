@@ -62,12 +62,21 @@ export const answer = computed<Answer | null>(() => {
   return ask(entry, question.value.text, question.value.nearUs, other);
 });
 
+/** Their moments. */
+export const foundTimes = computed<readonly number[]>(() => foundEvents.value.map((row) => row.us));
+
 const SHORTEST_US = 10e6;
 
+/**
+ * Show a moment everywhere. While time passes it may lie between two steps; else it is that of a step, so that what
+ * is shown is what the run stored.
+ */
 export function goTo(us: number): void {
   const end = endUs.value;
-  const last = Math.max(beginUs.value, end - (run.value?.clock.stepUs ?? 1));
-  const at = Math.max(beginUs.value, Math.min(last, us));
+  const stepUs = run.value?.clock.stepUs ?? 1;
+  const last = Math.max(beginUs.value, end - stepUs);
+  const inside = Math.max(beginUs.value, Math.min(last, us));
+  const at = playing.value ? inside : Math.floor(inside / stepUs) * stepUs;
   batch(() => {
     moment.value = at;
     const [from, to] = range.value;
@@ -134,7 +143,7 @@ export function faster(by: 1 | -1): void {
 
 /** Go to the next answer, or without a question to the next event; or to the one before. */
 export function jump(forward: boolean): void {
-  const moments = (answer.value?.spans ?? foundEvents.value.map((row) => ({ from: row.us }))).map((span) => span.from);
+  const moments = answer.value?.spans.map((span) => span.from) ?? foundTimes.value;
   const at = forward ? lastAtMost(moments, moment.value) + 1 : firstAtLeast(moments, moment.value) - 1;
   const us = moments[at];
   if (us !== undefined) goTo(us);

@@ -5,7 +5,7 @@ import { Walls } from "../src/data/sight";
 import { differences, timeByValue, valueAt } from "../src/data/stretches";
 import { TURN } from "../src/data/tracks";
 import { Beliefs, makeDistribution, percents } from "../src/data/beliefs";
-import { belief } from "../src/state";
+import * as state from "../src/state";
 import { chosenBelief, comparisonAt, errorsOf } from "../src/plan/beliefs";
 import { beliefLanes } from "../src/timeline/lanes";
 import { expected, held, wholeRun } from "./fixture";
@@ -78,7 +78,7 @@ describe("a stored run", () => {
   });
 
   it.each(["ana", "anyone"])("has beliefs of %s that sum to one in each output, and truths at each moment", (user) => {
-    belief.value = `ltp/${user}`;
+    state.belief.value = `ltp/${user}`;
     const { beliefs } = chosenBelief(run)!;
     const outputs = beliefs.of(user)!;
     expect(outputs.shares.length).toBeGreaterThan(2);
@@ -88,7 +88,7 @@ describe("a stored run", () => {
       expect(percents(shares).reduce((total, percent) => total + percent, 0)).toBe(100);
     }
     for (const hour of [1, 7, 13, 23]) expect(sum(comparisonAt(run, hour * 3600e6)!.truth!)).toBeCloseTo(1, 9);
-    belief.value = "";
+    state.belief.value = "";
   });
 
   it("knows how wrong each output of shares was: the total variation to the shares until then", () => {
@@ -123,6 +123,21 @@ describe("a stored run", () => {
     expect(heat!.words(20 * 3600e6)).toContain(`true: ${room}`);
     expect(heat!.paint().kind).toBe("heat");
     expect(error!.label).toContain("error");
+    const [first, second] = chosenBelief(run)!.beliefs.of("ana")!.us;
+    for (const lane of [heat!, error!]) {
+      expect(lane.words(first! - 1)).toBe("");
+      for (const us of [first!, second! - 1]) expect(lane.words(us)).toContain(`as of ${run.clock.text(first!)}`);
+    }
+  });
+
+  it("is shown at steps, and between them only while time passes", () => {
+    state.runs.value = [run];
+    state.goTo(3600.7e6);
+    expect(state.moment.value).toBe(3600e6);
+    state.playing.value = true;
+    state.goTo(3600.7e6);
+    expect(state.moment.value).toBe(3600.7e6);
+    state.playing.value = false;
   });
 
   it("reads its layers", async () => {

@@ -199,6 +199,16 @@ def test_playing_passes_time_at_the_chosen_speed(page: Any) -> None:
     assert stopped == moment(page)
 
 
+def test_panels_keep_up_with_the_timeline_while_a_day_passes_in_a_second(page: Any) -> None:
+    page.select_option("select[aria-label=Speed]", "3600")
+    page.click("button.play")
+    shown = """[document.querySelector('.lanes').ariaValueNow,
+                document.querySelector('table.now').dataset.step]"""
+    pairs = [page.evaluate(shown) for _ in range(20)]
+    assert all(timeline == panel for timeline, panel in pairs)
+    assert len({timeline for timeline, _ in pairs}) > 5
+
+
 def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page: Any) -> None:
     page.keyboard.press("Home")
     for key in ("ArrowRight", ".", ".", ","):
@@ -500,6 +510,41 @@ def test_layers_and_switches_change_the_plan(page: Any) -> None:
     for switch in ("[name=names]", "[name=furniture]", "[name=sight]", "[name=layer] >> nth=1"):
         page.click(f"input{switch}")
         add_new_picture(page, pictures)
+
+
+def test_layer_of_another_moment_says_so(page: Any, run_dir: Path) -> None:
+    stored = fleet2d.open_run(run_dir).tables["layer.dust"]["step"].to_pylist()
+    assert {9 * 3600 - 1} == set(stored)
+    page.click("#tab-layers")
+    page.click("input[name=layer] >> nth=1")
+    page.wait_for_selector("#panel >> text=as of Mon 5 Jan 08:59:59, which is later")
+    page.keyboard.press("End")
+    page.locator("#panel >> text=as of").wait_for(state="detached")
+
+
+@pytest.mark.slow
+def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(
+    browser: Any, tmp_path: Path
+) -> None:
+    root = tmp_path / "minutes"
+    run = fleet2d.run("bundled:base", "simulation={duration: 8 h, step: 1 min}", seed=4, out=root)
+    paths = {name: run.path(name, timedelta(minutes=1)) for name in ("ana", "astro")}
+    with served(root) as address, page_at(browser, f"{address}#select=astro") as page:
+        for seconds in (4 * 3600 + 37, 6 * 3600 + 59, 7 * 3600 + 12):
+            step = seconds // 60
+            moment = f"{run.clock.time(step):%a %-d %b %H:%M:%S}"
+            page.fill("#goto", f"{seconds} s")
+            page.press("#goto", "Enter")
+            shows_moment(page, step)
+            page.click("#tab-now")
+            until(page, lambda: moment in page.inner_text("output.clock"))  # noqa: B023
+            assert moment == page.get_attribute(".lanes", "aria-valuetext")
+            for name, path in paths.items():
+                row = page.locator(f"tr[data-body={name}]")
+                assert path.x[step] == pytest.approx(float(row.get_attribute("data-x")), abs=1e-9)
+            page.click("#tab-inspect")
+            place = f"{paths['astro'].x[step]:.2f} m, {paths['astro'].y[step]:.2f} m"
+            page.wait_for_selector(f"[data-inspected=astro] >> text={place}")
 
 
 def test_click_on_a_body_shows_its_state_and_history(page: Any) -> None:

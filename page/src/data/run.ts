@@ -54,6 +54,9 @@ export class Run {
   /** What is known of the run ends here: the step that its simulation has come to. */
   knownUs = Infinity;
 
+  /** The moment that the layer on the plan is of [us]; null while there is none. */
+  readonly layerUs = signal<number | null>(null);
+
   /** Notes and bookmarks, which are stored beside the run. */
   readonly notes = signal<readonly NoteFacts[]>([]);
 

@@ -2,6 +2,7 @@
 
 import type { Answer } from "../data/ask";
 import { type BeliefSeries, percents } from "../data/beliefs";
+import type { Clock } from "../data/clock";
 import type { Run, Switches } from "../data/run";
 import type { BodyFacts } from "../contract";
 import { type EventRow, shownText } from "../data/events";
@@ -93,7 +94,7 @@ export function beliefLanes(run: Run, prefix: string, title = ""): Lane[] {
   const height = rows.length * HEAT_ROW_HEIGHT;
   const heat: Lane = { id: `${prefix}belief`, label, height, group: "Beliefs", isMain: true, words, paint: () => paint, subject: chosen.user };
   const error = errorsOf(run, chosen);
-  return [heat, { ...lineLane(prefix, label, error), label: `error of ${label}`, group: "Beliefs" }];
+  return [heat, { ...lineLane(run.clock, prefix, label, error), label: `error of ${label}`, group: "Beliefs" }];
 }
 
 /** What answers the question that was asked; its words are those of each mark. */
@@ -387,18 +388,18 @@ export async function tableLanes(run: Run, prefix: string): Promise<Lane[]> {
       else {
         const series = await readSeries(facts, table, run.clock.stepUs);
         const first = series[0];
-        if (first && first.us.length > 1) lanes.push(lineLane(prefix, facts.name, first));
+        if (first && first.us.length > 1) lanes.push(lineLane(run.clock, prefix, facts.name, first));
       }
     });
   }
   return lanes;
 }
 
-function lineLane(prefix: string, name: string, series: Series): Lane {
+function lineLane(clock: Clock, prefix: string, name: string, series: Series): Lane {
   const words = (us: number): string => {
-    const i = Math.min(series.us.length - 1, firstAtLeast(series.us, us));
+    const i = lastAtMost(series.us, us);
     const value = series.values[i];
-    return value === undefined || Number.isNaN(value) ? "" : `${series.name}: ${value.toPrecision(3)}`;
+    return value === undefined || Number.isNaN(value) ? "" : `${series.name}: ${value.toPrecision(3)}, as of ${clock.text(series.us[i]!)}`;
   };
   const paint: LanePaint = { kind: "line", series, extent: extentOf(series), color: colors.value.text };
   const place = { id: `${prefix}${name}/metric`, label: `${name} ${series.name}`, subject: "", group: "Metrics" as const, height: 24 };
