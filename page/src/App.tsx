@@ -4,6 +4,7 @@ import { useSignal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useRef } from "preact/hooks";
 import { copyLink } from "./address";
+import type { Run } from "./data/run";
 import { KEYS } from "./keyboard";
 import { LiveControls } from "./live/LiveControls";
 import { branchHere, branching, refusal } from "./live/orders";
@@ -14,7 +15,6 @@ import { LayersPanel } from "./panels/LayersPanel";
 import { MetricsPanel } from "./panels/MetricsPanel";
 import { NotesPanel } from "./panels/NotesPanel";
 import { Now } from "./panels/Now";
-import { slowMoment } from "./panels/slow";
 import { Terms } from "./panels/Terms";
 import { downloadFilm, filming } from "./film";
 import { Plan } from "./plan/Plan";
@@ -64,24 +64,54 @@ function Header() {
       <p>
         {length} in {facts.home.name.slice(0, 24)}, seed {facts.seed ?? "–"}
         {facts.digest ? `, digest ${facts.digest.slice(0, 8)}` : ""}
-        {facts.status !== "complete" && !state.live.value ? <strong class="status"> {facts.status}</strong> : ""}
+        {!["complete", "failed"].includes(facts.status) && !state.live.value ? <strong> {facts.status}</strong> : ""}
       </p>
+      {state.runs.value.map((entry, i) => (
+        <Verdicts key={i} run={entry} title={state.runs.value.length > 1 ? `${entry.facts.title}: ` : ""} />
+      ))}
     </header>
   );
 }
 
-function Notes() {
-  const notes = state.runs.value.flatMap((run) => [...run.facts.notes, ...run.problems.value]);
-  if (notes.length === 0) return null;
+/** What became of the run and its expectations: failures and violations are red, and the first thing to see. */
+function Verdicts({ run, title }: { run: Run; title: string }) {
+  const { verdict: words, verdicts, status } = run.facts;
+  const first = verdicts[0]?.step ?? null;
+  if (status !== "failed" && first === null) return words ? <p class="verdict">{title + words}</p> : null;
+  const us = (first ?? 0) * run.clock.stepUs;
+  const isShown = first !== null && us >= run.beginUs && us < run.endUs;
+  const says = verdicts.filter((verdict) => verdict.step !== null).map((verdict) => verdict.says);
   return (
-    <details class="notes">
-      <summary>{notes.length === 1 ? "1 note" : `${notes.length} notes`}</summary>
-      <ul role="status">
-        {notes.map((note) => (
-          <li key={note}>{note}</li>
-        ))}
-      </ul>
-    </details>
+    <button type="button" class="verdict violated" disabled={!isShown} title={says.join("\n")} onClick={() => state.goTo(us)}>
+      ✗ {title}
+      {[status === "failed" ? "the run failed" : "", words].filter(Boolean).join("; ")}
+    </button>
+  );
+}
+
+/** Notes are remarks; what could not be read is missing on the page. */
+function Notes() {
+  const notes = state.runs.value.flatMap((run) => run.facts.notes);
+  const problems = state.runs.value.flatMap((run) => run.problems.value);
+  if (notes.length + problems.length === 0) return null;
+  return (
+    <div class="notes">
+      {problems.map((problem) => (
+        <p key={problem} role="alert" class="status">
+          ✗ {problem}
+        </p>
+      ))}
+      {notes.length > 0 && (
+        <details>
+          <summary>{notes.length === 1 ? "1 note" : `${notes.length} notes`}</summary>
+          <ul role="status">
+            {notes.map((note) => (
+              <li key={note}>{note}</li>
+            ))}
+          </ul>
+        </details>
+      )}
+    </div>
   );
 }
 
@@ -160,7 +190,7 @@ function Controls() {
       <GoTo />
       <Ask />
       <output class="clock" aria-label="Shown moment">
-        day {run.clock.day(slowMoment.value)} · {run.clock.text(slowMoment.value)}
+        day {run.clock.day(state.moment.value)} · {run.clock.text(state.moment.value)}
       </output>
       <span class="group">
         <button type="button" aria-label={state.answer.value ? "Previous answer" : "Previous event"} onClick={() => state.jump(false)}>

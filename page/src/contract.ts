@@ -111,6 +111,14 @@ export interface MarkFacts {
   label: string;
 }
 
+/** What became of an expectation; `step` is the first at which it is violated. */
+export interface VerdictFacts {
+  name: string;
+  outcome: "violated" | "held" | "not decided" | "untested";
+  says: string;
+  step: number | null;
+}
+
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
 export interface SlowFacts {
   outline: [number, number][];
@@ -128,7 +136,7 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. `verdict` sums up the `verdicts`, of which violated ones come first. */
 export interface RunFacts {
   title: string;
   status: string;
@@ -146,8 +154,11 @@ export interface RunFacts {
   tables: TableFacts[];
   walls: WallsChange[];
   marks: MarkFacts[];
+  verdict: string;
+  verdicts: VerdictFacts[];
   slows: SlowFacts[];
   starts_unlit: boolean;
+  event_kinds: string[];
   metrics: Record<string, unknown>;
   scenario: Record<string, unknown>;
   walks_every_s: number;
@@ -207,7 +218,7 @@ export interface LiveEvent {
   detail: string;
 }
 
-/** The state of a running simulation; `speed` 0 is as fast as it goes. `served_as` is the number of the stored run that it has become; -1 while it is under way. */
+/** The state of a running simulation; `speed` 0 is as fast as it goes. `beliefs` are of algorithms about users: shares of rooms and last of away, which sum to 1. `served_as` is the number of the stored run that it has become; -1 while it is under way. */
 export interface LiveFrame {
   step: number;
   paused: boolean;
@@ -217,7 +228,7 @@ export interface LiveFrame {
   bodies: LiveBody[];
   seen: [string, string][];
   doors: Record<string, boolean>;
-  beliefs: Record<string, number[]>;
+  beliefs: Record<string, Record<string, number[]>>;
   events: LiveEvent[];
   marks: MarkFacts[];
   slows: SlowFacts[];

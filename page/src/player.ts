@@ -1,6 +1,6 @@
 /** Let time pass at the chosen speed. */
 
-import { effect } from "@preact/signals";
+import { effect, untracked } from "@preact/signals";
 import * as state from "./state";
 
 export function followPlaying(): void {
@@ -17,7 +17,7 @@ export function followPlaying(): void {
     requestAnimationFrame(tick);
   };
   effect(() => {
-    if (!state.playing.value) return;
+    if (!state.playing.value) return untracked(() => state.goTo(state.moment.value)); // to a step
     last = performance.now();
     requestAnimationFrame(tick);
   });

@@ -1,7 +1,7 @@
 /** The state of the page: signals that all parts read, and the few functions that change them. */
 
 import { batch, computed, signal } from "@preact/signals";
-import { type Answer, eventText, hasWords } from "./data/ask";
+import { type Answer, ask, withWords } from "./data/ask";
 import type { EventRow } from "./data/events";
 import type { Run } from "./data/run";
 import { firstAtLeast, lastAtMost } from "./data/search";
@@ -29,8 +29,8 @@ export const followed = signal("");
 export const plot = signal("");
 export const eventKind = signal("");
 export const search = signal("");
-/** What was asked of the timeline, and what answers it. */
-export const answer = signal<Answer | null>(null);
+/** What was asked of the timeline, and the moment that was shown then. */
+export const question = signal<{ text: string; nearUs: number } | null>(null);
 export const shown = signal<ReadonlySet<Switch>>(new Set(SWITCHES.filter((name) => name !== "beliefs")));
 export const layer = signal("");
 export const panel = signal<Panel>("now");
@@ -51,15 +51,32 @@ export const foundEvents = computed<readonly EventRow[]>(() => {
   void entry.version.value;
   const [kind, words] = [eventKind.value, search.value.trim()];
   const rows = kind ? entry.events.ofKind(kind) : entry.events.rows;
-  return words ? rows.filter((row) => hasWords(eventText(row), words)) : rows;
+  return words ? withWords(entry, rows, words) : rows;
 });
+
+/** What answers the question, as far as the run is read or simulated. */
+export const answer = computed<Answer | null>(() => {
+  const [entry, other = null] = runs.value;
+  if (!entry || !question.value) return null;
+  void [entry.version.value, other?.version.value];
+  return ask(entry, question.value.text, question.value.nearUs, other);
+});
+
+/** Their moments. */
+export const foundTimes = computed<readonly number[]>(() => foundEvents.value.map((row) => row.us));
 
 const SHORTEST_US = 10e6;
 
+/**
+ * Show a moment everywhere. While time passes it may lie between two steps; else it is that of a step, so that what
+ * is shown is what the run stored.
+ */
 export function goTo(us: number): void {
   const end = endUs.value;
-  const last = Math.max(beginUs.value, end - (run.value?.clock.stepUs ?? 1));
-  const at = Math.max(beginUs.value, Math.min(last, us));
+  const stepUs = run.value?.clock.stepUs ?? 1;
+  const last = Math.max(beginUs.value, end - stepUs);
+  const inside = Math.max(beginUs.value, Math.min(last, us));
+  const at = playing.value ? inside : Math.floor(inside / stepUs) * stepUs;
   batch(() => {
     moment.value = at;
     const [from, to] = range.value;
@@ -126,7 +143,7 @@ export function faster(by: 1 | -1): void {
 
 /** Go to the next answer, or without a question to the next event; or to the one before. */
 export function jump(forward: boolean): void {
-  const moments = (answer.value?.spans ?? foundEvents.value.map((row) => ({ from: row.us }))).map((span) => span.from);
+  const moments = answer.value?.spans.map((span) => span.from) ?? foundTimes.value;
   const at = forward ? lastAtMost(moments, moment.value) + 1 : firstAtLeast(moments, moment.value) - 1;
   const us = moments[at];
   if (us !== undefined) goTo(us);

@@ -72,7 +72,18 @@ describe("a question", () => {
   });
 
   it.each([
-    ["ana in cellar", "nothing is called 'cellar'"],
+    ["ana in cellar", "no person, room, activity or event is called 'cellar'"],
+    ["ana in kichen", "is called 'kichen'; did you mean 'kitchen'?"],
+    ["anna in kitchen", "is called 'anna'; did you mean 'ana'?"],
+    ["seen anna", "is called 'anna'; did you mean 'ana'?"],
+    ["ana slep", "did you mean 'sleep'?"],
+    ["ana not sleep", "'not' goes with rooms and 'seen'"],
+    ["ana in bathroom > 20 minutes", "a length is written as > 20 min"],
+    ["seen astro", "'seen by astro' is when astro sees somebody"],
+    ["seen ana by ana", "only robots see"],
+    ["ana differs", "compares two runs"],
+    ["ana activity > 1 min sees", "is called 'sees'"],
+    ["ana after lunch", "'lunch' is no time of this run"],
     ["kitchen at noonish", "'noonish' is no time of this run"],
     ["seen ana before never", "'never' is no time of this run"],
     ["last", "ask for something like"],
@@ -91,15 +102,15 @@ describe("a question", () => {
 
 describe("‹ and ›", () => {
   it("step through the answers", () => {
-    state.answer.value = ask(run, "ana in bathroom", 0);
+    state.question.value = { text: "ana in bathroom", nearUs: 0 };
     state.goTo(0);
     state.jump(true);
-    expect(state.moment.value).toBe(state.answer.value.spans[0]!.from);
+    expect(state.moment.value).toBe(state.answer.value!.spans[0]!.from);
     state.jump(true);
-    expect(state.moment.value).toBe(state.answer.value.spans[1]!.from);
+    expect(state.moment.value).toBe(state.answer.value!.spans[1]!.from);
     state.jump(false);
-    expect(state.moment.value).toBe(state.answer.value.spans[0]!.from);
-    state.answer.value = null;
+    expect(state.moment.value).toBe(state.answer.value!.spans[0]!.from);
+    state.question.value = null;
   });
 
   it("step through the events that were searched for", () => {

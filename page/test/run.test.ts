@@ -4,7 +4,8 @@ import type { Run } from "../src/data/run";
 import { Walls } from "../src/data/sight";
 import { differences, timeByValue, valueAt } from "../src/data/stretches";
 import { TURN } from "../src/data/tracks";
-import { Beliefs } from "../src/data/beliefs";
+import { Beliefs, makeDistribution, percents } from "../src/data/beliefs";
+import * as state from "../src/state";
 import { chosenBelief, comparisonAt, errorsOf } from "../src/plan/beliefs";
 import { beliefLanes } from "../src/timeline/lanes";
 import { expected, held, wholeRun } from "./fixture";
@@ -70,9 +71,24 @@ describe("a stored run", () => {
 
   it("compares beliefs with the share of time until now", () => {
     const comparison = comparisonAt(run, run.clock.endUs - 1)!;
-    const sum = (values: Float64Array): number => values.slice(0, -1).reduce((total, part) => total + part, 0);
-    expect(sum(comparison.believed)).toBeCloseTo(1, 6);
-    expect(sum(comparison.truth)).toBeCloseTo(1, 6);
+    expect(sum(comparison.believed!)).toBeCloseTo(1, 9);
+    expect(sum(comparison.truth!)).toBeCloseTo(1, 9);
+    const time = timeByValue(run.roomsOf("ana"), run.facts.home.rooms.length, run.clock.endUs - 1);
+    comparison.truth!.forEach((share, i) => expect(share).toBeCloseTo(time[i]! / (run.clock.endUs - 1), 9));
+  });
+
+  it.each(["ana", "anyone"])("has beliefs of %s that sum to one in each output, and truths at each moment", (user) => {
+    state.belief.value = `ltp/${user}`;
+    const { beliefs } = chosenBelief(run)!;
+    const outputs = beliefs.of(user)!;
+    expect(outputs.shares.length).toBeGreaterThan(2);
+    expect(outputs.shares.some((shares) => shares.at(-1)! > 0.01)).toBe(true); // somebody was away
+    for (const shares of outputs.shares) {
+      expect(sum(shares)).toBeCloseTo(1, 9);
+      expect(percents(shares).reduce((total, percent) => total + percent, 0)).toBe(100);
+    }
+    for (const hour of [1, 7, 13, 23]) expect(sum(comparisonAt(run, hour * 3600e6)!.truth!)).toBeCloseTo(1, 9);
+    state.belief.value = "";
   });
 
   it("knows how wrong each output of shares was: the total variation to the shares until then", () => {
@@ -81,7 +97,7 @@ describe("a stored run", () => {
     expect(error.us.length).toBeGreaterThan(2);
     error.us.forEach((us, i) => {
       const { believed, truth } = comparisonAt(run, us)!;
-      const apart = believed.slice(0, -1).reduce((sum, share, room) => sum + Math.abs(share - truth[room]!), 0) / 2;
+      const apart = believed!.reduce((sum, share, place) => sum + Math.abs(share - truth![place]!), 0) / 2;
       expect(error.values[i]).toBeCloseTo(apart, 9);
     });
   });
@@ -95,7 +111,7 @@ describe("a stored run", () => {
     run.beliefs.unshift(new Beliefs("now", series, true));
     const comparison = comparisonAt(run, 7200e6)!;
     const room = valueAt(run.roomsOf("ana"), 7200e6)!;
-    expect([comparison.algorithm, comparison.truth[room], comparison.now]).toEqual(["now", 1, room]);
+    expect([comparison.algorithm, comparison.truth![room], [...comparison.now]]).toEqual(["now", 1, [room]]);
     for (const value of errorsOf(run, chosenBelief(run)!).values) expect(value).toBeCloseTo(rooms / (rooms + 1), 9);
     run.beliefs.shift();
     expect(chosenBelief(run)!.beliefs.name).toBe(name);
@@ -107,6 +123,21 @@ describe("a stored run", () => {
     expect(heat!.words(20 * 3600e6)).toContain(`true: ${room}`);
     expect(heat!.paint().kind).toBe("heat");
     expect(error!.label).toContain("error");
+    const [first, second] = chosenBelief(run)!.beliefs.of("ana")!.us;
+    for (const lane of [heat!, error!]) {
+      expect(lane.words(first! - 1)).toBe("");
+      for (const us of [first!, second! - 1]) expect(lane.words(us)).toContain(`as of ${run.clock.text(first!)}`);
+    }
+  });
+
+  it("is shown at steps, and between them only while time passes", () => {
+    state.runs.value = [run];
+    state.goTo(3600.7e6);
+    expect(state.moment.value).toBe(3600e6);
+    state.playing.value = true;
+    state.goTo(3600.7e6);
+    expect(state.moment.value).toBe(3600.7e6);
+    state.playing.value = false;
   });
 
   it("reads its layers", async () => {
@@ -124,6 +155,30 @@ describe("a stored run", () => {
     expect(AWAY).toBe(-1);
   });
 });
+
+describe("shares", () => {
+  it.each<[string, number[], number[] | null]>([
+    ["of rooms at home beside that of away", [0.5, 0.5, 0.2], [0.4, 0.4, 0.2]],
+    ["of rooms and away together", [0.5, 0.3, 0.2], [0.5, 0.3, 0.2]],
+    ["of rooms alone", [0.5, 0.5, 0], [0.5, 0.5, 0]],
+    ["that sum to something else", [0.9, 0.9, 0.1], null],
+    ["that are none", [NaN, 1, 0], null],
+  ])("%s sum to one, or aren't shown", (_, given, expected) => {
+    const shares = Float64Array.from(given);
+    expect(makeDistribution(shares)).toBe(expected !== null);
+    if (expected) [...shares].forEach((share, i) => expect(share).toBeCloseTo(expected[i]!, 12));
+  });
+
+  it("are percents that sum to 100", () => {
+    expect(percents(Float64Array.of(1 / 3, 1 / 3, 1 / 3))).toEqual([34, 33, 33]);
+    expect(percents(Float64Array.of(0.005, 0.005, 0.99))).toEqual([1, 0, 99]);
+    for (let n = 1; n < 60; n++) expect(percents(new Float64Array(n).fill(1 / n)).reduce((total, percent) => total + percent, 0)).toBe(100);
+  });
+});
+
+function sum(values: Float64Array): number {
+  return values.reduce((total, value) => total + value, 0);
+}
 
 /** The arrangement in which every door is open: the mesh with the fewest wall edges. */
 function openWalls(): number {

@@ -102,11 +102,29 @@ def test_run_says_what_held_and_what_was_violated(fleet2d: Cli) -> None:
     path = written(apart=HOLDS, still=FAILS)
     code, out, _ = fleet2d("run", path, "--out", "run")
 
+    lines = out.splitlines()
     assert code == 0
+    assert lines[0].startswith("1 of 2 expectations violated: still at Mon 05 Jan 07:00:0")
+    assert lines[1].startswith("still is violated: never(moving")
     assert "apart held by" in out
-    assert "still is violated" in out
+    assert 1 == out.count("still is violated")
     _, out, _ = fleet2d("run", path, "--out", "again", "--json")
+    assert lines[0] == json.loads(out)["verdict"]
+    assert "verdict" == next(iter(json.loads(out)))
     assert json.loads(out)["expectations"]["still"]["holds"] is False
+    _, out, err = fleet2d("show", "run")
+    assert lines[:2] == err.splitlines()
+    assert "run/picture.png" == out.strip()
+
+
+def test_run_that_did_as_expected_says_so_first_and_one_without_says_nothing(
+    fleet2d: Cli,
+) -> None:
+    _, out, _ = fleet2d("run", written(apart=HOLDS), "--out", "run")
+    assert "1 expectation: 1 held" == out.splitlines()[0]
+    _, out, _ = fleet2d("run", written(), "--out", "none")
+    assert "x real time" in out.splitlines()[0]
+    assert "verdict" not in json.loads(fleet2d("run", written(), "--out", "c", "--json")[1])
 
 
 def test_one_file_runs_over_a_folder_of_homes(fleet2d: Cli) -> None:

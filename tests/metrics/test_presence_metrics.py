@@ -160,6 +160,41 @@ def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:
         assert better["log_loss"] < scores[user]["log_loss"]
 
 
+@pytest.mark.parametrize(
+    ("user", "metric", "log_loss", "brier", "top_1"),
+    [
+        # Of six rooms each is as likely, and the person is in one of them.
+        ("ben", "score", math.log(6), 1 - 1 / 6, 1 / 6),
+        ("ben", "at_home", math.log(6), 1 - 1 / 6, 1 / 6),
+        # Nobody guesses that a person who was never seen is away.
+        ("gone", "score", -math.log(1e-6), 1 + 1 / 6, 0),
+    ],
+)
+def test_naive_guess_of_somebody_who_was_never_seen_is_every_room_alike(
+    user: str, metric: str, log_loss: float, brier: float, top_1: float
+) -> None:
+    blind = {"type": "patrol", "dwell": "20 s", "camera": None}
+    unseen = run(
+        content(
+            "30 min",
+            robots={"astro": blind},
+            algorithms={"rtp": {"type": "rtp"}},
+            metrics={
+                "score": {"type": "rtp_score", "of": "rtp"},
+                "at_home": {"type": "rtp_score", "of": "rtp", "given_home": True},
+            },
+        )
+    )
+    assert 0 == len(table(unseen, "observations")["step"])
+    scores = unseen.metrics[metric][user]
+    assert {"never seen", "all"} == set(scores)
+    for each in scores.values():
+        assert 30 == each["bins"]
+        assert log_loss == pytest.approx(each["naive_log_loss"], rel=1e-12)
+        assert brier == pytest.approx(each["naive_brier"], rel=1e-12)
+        assert top_1 == pytest.approx(each["naive_top_1"], rel=1e-12, abs=0)
+
+
 @pytest.mark.parametrize("user", ["ana", "ben", "gone"])
 def test_scores_of_each_gap_are_consistent(stored: Any, user: str) -> None:
     for scores in stored.metrics["score"][user].values():

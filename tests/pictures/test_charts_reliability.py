@@ -26,7 +26,11 @@ def forecast_run() -> Any:
             "3 h",
             users=users,
             robots={"astro": {"type": "patrol", "dwell": "20 s"}},
-            algorithms={"rtp": {"type": "rtp"}, "share": {"type": "tests.own_components:Share"}},
+            algorithms={
+                "rtp": {"type": "rtp"},
+                "later": {"type": "belief_table", "period": "1 h", "every": "5 min"},
+                "share": {"type": "tests.own_components:Share"},
+            },
             metrics={"room_share": {"period": "1 h"}, "score": {"type": "rtp_score", "of": "rtp"}},
             artifacts={"trajectories": "every step"},
         )
@@ -53,6 +57,14 @@ def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run:
             )
             place = "away" if trajectory["away"][step] else trajectory["room"][step]
             assert place == [*rooms, "away"][truth[36 * number + k]]
+
+
+def test_forecasts_that_are_stored_later_are_compared_with_their_own_moment(
+    forecast_run: Any,
+) -> None:
+    (belief, truth), later = forecasts_of(forecast_run, "rtp"), forecasts_of(forecast_run, "later")
+    assert np.array_equal(truth, later.truth)
+    assert belief == pytest.approx(later.belief, abs=1e-6)
 
 
 @pytest.mark.slow

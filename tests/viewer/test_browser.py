@@ -106,7 +106,7 @@ def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Pat
 
 
 def shares_are(page: Any, believed: dict[str, float]) -> bool:
-    """Say whether every bar shows what is believed of its room; panels follow with a delay."""
+    """Say whether every bar shows what is believed of its room."""
     bars = page.locator("table.bars tr[data-room]")  # read at once: they may be replaced between
     pairs = bars.evaluate_all("rows => rows.map(row => [row.dataset.room, row.dataset.believed])")
     shown = {room: float(share) for room, share in pairs}
@@ -124,8 +124,59 @@ def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
         page.press("#goto", "Enter")
         shows_moment(page, step)
         last = max((row["step"] for row in table if row["step"] <= step), default=-1)
-        believed = {row["room"]: row["share"] for row in table if row["step"] == last}
-        until(page, lambda: shares_are(page, believed))  # noqa: B023
+        rows = [row for row in table if row["step"] == last and row["user"] == "ana"]
+        until(page, lambda: shares_are(page, with_away(rows)))  # noqa: B023
+
+
+def with_away(rows: list[dict[str, Any]]) -> dict[str, float]:
+    """Return shares of rooms and of away that sum to one; those of rooms are stored given home."""
+    shares = {row["room"]: row["share"] for row in rows}
+    away = shares.get("away", 0.0)
+    return {room: s if room == "away" else s * (1 - away) for room, s in shares.items()}
+
+
+BELIEFS = {
+    "ltp": {"type": "ltp", "period": "6 h"},
+    "rtp": {"type": "rtp", "period": "30 min"},
+    "later": {"type": "belief_table", "period": "2 h", "every": "30 min"},
+}
+
+
+@pytest.mark.slow
+def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(
+    browser: Any, tmp_path: Path
+) -> None:
+    ben = {"type": "routine", "persona": "works_outside"}
+    root = tmp_path / "run"
+    run = fleet2d.run(
+        "bundled:base", "simulation.duration=1 d", users={"ben": ben}, algorithms=BELIEFS, out=root
+    )
+    draw = np.random.default_rng(1)
+    with served(root) as address, page_at(browser, f"{address}#panel=beliefs") as page:
+        for algorithm in BELIEFS:
+            rows = run.tables[algorithm].to_pylist()
+            column = "at" if algorithm == "later" else "step"
+            moments = sorted({row[column] for row in rows})
+            for user in ("ana", "ben", "anyone"):
+                for moment in moments:
+                    shares = with_away(
+                        [r for r in rows if r[column] == moment and r["user"] == user]
+                    )
+                    assert 1 == pytest.approx(sum(shares.values()))
+                page.select_option("#panel select", f"{algorithm}/{user}")
+                for step in draw.integers(moments[0], 86_400, 4).tolist():
+                    page.fill("#goto", f"step {step}")
+                    page.press("#goto", "Enter")
+                    shows_moment(page, step)
+                    last = max(moment for moment in moments if moment <= step)
+                    of = [r for r in rows if r[column] == last and r["user"] == user]
+                    until(page, lambda: shares_are(page, with_away(of)))  # noqa: B023
+                    assert f"as of {run.clock.time(last):%a %-d %b %H:%M:%S}" in page.inner_text(
+                        "#panel"
+                    )
+                    numbers = page.locator("table.bars td.number").all_inner_texts()
+                    parts = [int(number.removesuffix(" %")) for number in numbers]
+                    assert [100, 100] == [sum(parts[::2]), sum(parts[1::2])]
 
 
 def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
@@ -146,6 +197,16 @@ def test_playing_passes_time_at_the_chosen_speed(page: Any) -> None:
     stopped = moment(page)
     page.wait_for_timeout(300)
     assert stopped == moment(page)
+
+
+def test_panels_keep_up_with_the_timeline_while_a_day_passes_in_a_second(page: Any) -> None:
+    page.select_option("select[aria-label=Speed]", "3600")
+    page.click("button.play")
+    shown = """[document.querySelector('.lanes').ariaValueNow,
+                document.querySelector('table.now').dataset.step]"""
+    pairs = [page.evaluate(shown) for _ in range(20)]
+    assert all(timeline == panel for timeline, panel in pairs)
+    assert len({timeline for timeline, _ in pairs}) > 5
 
 
 def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page: Any) -> None:
@@ -451,6 +512,41 @@ def test_layers_and_switches_change_the_plan(page: Any) -> None:
         add_new_picture(page, pictures)
 
 
+def test_layer_of_another_moment_says_so(page: Any, run_dir: Path) -> None:
+    stored = fleet2d.open_run(run_dir).tables["layer.dust"]["step"].to_pylist()
+    assert {9 * 3600 - 1} == set(stored)
+    page.click("#tab-layers")
+    page.click("input[name=layer] >> nth=1")
+    page.wait_for_selector("#panel >> text=as of Mon 5 Jan 08:59:59, which is later")
+    page.keyboard.press("End")
+    page.locator("#panel >> text=as of").wait_for(state="detached")
+
+
+@pytest.mark.slow
+def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(
+    browser: Any, tmp_path: Path
+) -> None:
+    root = tmp_path / "minutes"
+    run = fleet2d.run("bundled:base", "simulation={duration: 8 h, step: 1 min}", seed=4, out=root)
+    paths = {name: run.path(name, timedelta(minutes=1)) for name in ("ana", "astro")}
+    with served(root) as address, page_at(browser, f"{address}#select=astro") as page:
+        for seconds in (4 * 3600 + 37, 6 * 3600 + 59, 7 * 3600 + 12):
+            step = seconds // 60
+            moment = f"{run.clock.time(step):%a %-d %b %H:%M:%S}"
+            page.fill("#goto", f"{seconds} s")
+            page.press("#goto", "Enter")
+            shows_moment(page, step)
+            page.click("#tab-now")
+            until(page, lambda: moment in page.inner_text("output.clock"))  # noqa: B023
+            assert moment == page.get_attribute(".lanes", "aria-valuetext")
+            for name, path in paths.items():
+                row = page.locator(f"tr[data-body={name}]")
+                assert path.x[step] == pytest.approx(float(row.get_attribute("data-x")), abs=1e-9)
+            page.click("#tab-inspect")
+            place = f"{paths['astro'].x[step]:.2f} m, {paths['astro'].y[step]:.2f} m"
+            page.wait_for_selector(f"[data-inspected=astro] >> text={place}")
+
+
 def test_click_on_a_body_shows_its_state_and_history(page: Any) -> None:
     page.click("tr[data-body=astro] button")
     page.wait_for_selector("[data-inspected=astro]")
@@ -495,6 +591,34 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         for name in ("slows", "lights"):
             page.uncheck(f"input[name={name}]")
             add_new_picture(page, pictures)
+
+
+@pytest.mark.slow
+def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser: Any) -> None:
+    run = fleet2d.run(
+        "bundled:base",
+        "simulation.duration=2 h",
+        "expect.unseen=never(seen(ana, by=astro))",
+        "expect.apart=always(distance(ana, astro) > 0 m)",
+        seed=4,
+    )
+    run.notes.append("a remark")
+    first = run.tables["violations"]["step"].to_pylist()[0]
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        badge = page.locator("header button")
+        moment = f"{run.clock.time(first):%a %d %b %H:%M:%S}"
+        assert f"✗ 1 of 2 expectations violated: unseen at {moment}" == badge.inner_text()
+        badge.click()
+        shows_moment(page, first)
+        alarm = badge.evaluate("element => getComputedStyle(element).color")
+        note = page.locator(".notes summary")
+        assert "1 note" == note.inner_text()
+        assert alarm != note.evaluate("element => getComputedStyle(element).color")
+
+
+def test_page_of_a_run_without_expectations_has_no_alarm(page: Any) -> None:
+    assert 0 == page.locator(".violated, .status").count()
+    assert 0 == page.locator(".verdict").count()
 
 
 @pytest.mark.slow

@@ -117,6 +117,21 @@ def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, report: str
     assert '<iframe title="Timeline" sandbox="allow-scripts"' in text
 
 
+@pytest.mark.slow
+def test_report_begins_with_what_is_violated(tmp_path: Path) -> None:
+    changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
+    run = fleet2d.run("bundled:base", *changes, seed=4)
+    write_report(run, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    verdict = text.index("<b>\u2717 1 of 1 expectation violated: still at Mon 05 Jan 00:00:0")
+    assert text.index("<h1>") < verdict < text.index('<th scope="row">status')
+
+
+def test_report_without_expectations_or_with_a_note_is_calm(report: str) -> None:
+    assert "border-left" not in report.partition("<h2>Timeline")[0]
+    assert "expectation" not in report.partition("<h2>Metrics")[0]
+
+
 def test_report_escapes_what_a_scenario_names(report: str) -> None:
     assert "<script>" not in report
     assert "alert(1)" in report

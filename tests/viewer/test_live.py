@@ -85,6 +85,24 @@ def test_frames_have_every_intervention_once(live: LiveRun) -> None:
     ]
 
 
+def test_beliefs_in_frames_sum_to_one_and_are_of_everybody() -> None:
+    own = "algorithms.share={type: 'tests.own_components:Share'}"
+    watched = LiveRun(fleet2d.Simulation("bundled:base", "simulation.duration=13 h", own, seed=4))
+    frames = watched.frames()
+    watched.start()
+    beliefs = []
+    for batch in frames:
+        beliefs += [frame["beliefs"] for frame in batch if frame["beliefs"]]
+        if batch and batch[-1]["done"]:
+            break
+    watched.end()
+    assert {"ana", "anyone"} == set(beliefs[-1]["ltp"])
+    assert {"ana"} == set(beliefs[-1]["share"])
+    sums = [sum(s) for each in beliefs for users in each.values() for s in users.values()]
+    assert sums == pytest.approx([1.0] * len(sums))
+    assert max(users["ana"][-1] for each in beliefs for users in each.values()) > 0  # away
+
+
 def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
     assert "" == live.submit(order("step", value=1))
     assert "" == live.submit(order("step", value=60))

@@ -31,6 +31,22 @@ def test_run_and_home_show_themselves_in_a_notebook(run_dir: Path) -> None:
     assert picture.startswith(b"\x89PNG")
 
 
+def test_violated_expectation_comes_before_the_facts_of_a_run_and_notes_are_calm() -> None:
+    changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
+    run = fleet2d.run("bundled:base", *changes, "expect.any=always(distance(ana, astro) > 0 m)")
+    run.notes.append("a remark")
+    shown = run._repr_html_()
+    verdict = shown.index("\u2717 1 of 2 expectations violated: still at Mon 05 Jan 00:00:0")
+    assert verdict < shown.index("still is violated: never(moving") < shown.index("complete")
+    assert 1 == shown.count("border-left")
+    run.manifest["expectations"]["still"]["holds"] = True
+    calm = run._repr_html_()
+    assert "<p>2 expectations: 2 held</p>" in calm
+    assert "border-left" not in calm
+    run.manifest["status"] = "failed"
+    assert "\u2717 the run failed; 2 expectations: 2 held" in run._repr_html_()
+
+
 def test_run_is_a_widget(run_dir: Path) -> None:
     pytest.importorskip("anywidget", reason="anywidget is not installed")
     widget = fleet2d.open_run(run_dir).view(height=400)

@@ -3,22 +3,19 @@
  *
  *     last seen ana before 3 Mar 18:00
  *     nights ana not in bedroom
- *     ana in bathroom > 20 min
+ *     ana and ben in kitchen > 20 min
  *     astro way blocked > 1 min
  *     kitchen at 13 Jan 19:30
  */
 
-import type { EventRow } from "./events";
+import { durationText } from "./clock";
+import { type EventRow, shownText } from "./events";
+import { Misunderstood, namesOf, type Names } from "./names";
+import { type Clause, clauseOf, type Group, isWord, meaningful, subjectOf, textOf, type Token, tokensOf, wrongRoomOf } from "./question";
 import { AWAY } from "./rooms";
 import type { Run } from "./run";
-import { durationText } from "./clock";
+import { clipped, complement, filled, intersection, type Span, union } from "./spans";
 import { differences, valueAt } from "./stretches";
-
-export interface Span {
-  from: number;
-  to: number;
-  words: string;
-}
 
 export interface Answer {
   question: string;
@@ -26,8 +23,6 @@ export interface Answer {
   /** What was understood, or why nothing was. */
   words: string;
 }
-
-type Test = (span: { from: number; to: number }) => boolean;
 
 /** Parts of a day: hours from the midnight that begins it. */
 const PARTS: Record<string, [number, number]> = {
@@ -39,73 +34,29 @@ const PARTS: Record<string, [number, number]> = {
 };
 const UNITS: Record<string, number> = { s: 1e6, min: 60e6, h: 3600e6, d: 86_400e6 };
 const HOUR_US = 3600e6;
-/** Words that carry no meaning of their own. */
-const FILLERS = new Set(["in", "the", "is", "was", "of", "by", "does", "did", "at", "on", "a"]);
+const BOUNDS = new Set(["before", "until", "after", "since"]);
+const AT = new Set(["at"]);
+const NOT = new Set(["not"]);
+const TIMES = "try 13 Jan 19:30, day 3 18:30, 2 d 14 h or 18:30";
 
 export const EXAMPLES = ["last seen NAME", "nights NAME not in ROOM", "NAME in ROOM > 10 min", "ROOM at 18:30"];
 
-/** The text of an event as it is shown, for searches. */
-export function eventText(row: { entity: string; event: string; user: string; detail: string }): string {
-  return `${row.entity} ${row.event} ${row.user} ${row.detail}`.replaceAll("_", " ").toLowerCase();
-}
-
-/** Whether a text has all of some words, in any order. */
-export function hasWords(text: string, words: string): boolean {
-  return words
-    .toLowerCase()
-    .replaceAll("_", " ")
-    .split(/\s+/)
-    .every((word) => text.includes(word));
-}
-
-/** When somebody is in different rooms in two runs. */
-function differing(run: Run, other: Run, names: readonly string[]): Span[] {
-  const bodies = run.bodies.filter((body) => names.length === 0 || names.includes(body.name.toLowerCase()));
-  const spans = bodies.flatMap(({ name }) => {
-    const { from, to } = differences(run.roomsOf(name), other.roomsOf(name));
-    return Array.from(from, (us, i) => ({ from: us, to: to[i]!, words: `${name} is in another room` }));
-  });
-  return spans.sort((a, b) => a.from - b.from);
-}
-
 /** Answer a question; times without a date are on the day of `nearUs`. */
 export function ask(run: Run, question: string, nearUs: number, other: Run | null = null): Answer {
-  const answer = (spans: Span[], words: string): Answer => ({ question, spans, words });
-  let rest = ` ${question.trim().toLowerCase().replace(/\s+/g, " ")} `;
-  const moment = / at (.+) $/.exec(rest);
-  if (moment) {
-    const us = run.clock.parse(moment[1]!, nearUs);
-    if (us === null) return answer([], `'${moment[1]}' is no time of this run: try 13 Jan 19:30, day 3 18:30, 2 d 14 h or 18:30`);
-    return answer(...whereAt(run, rest.slice(0, moment.index), us));
+  if (!run.isRead.value) return { question, spans: [], words: "the run is still being read" };
+  try {
+    return { question, ...new Question(run, question, nearUs, other).answer() };
+  } catch (error) {
+    if (!(error instanceof Misunderstood)) throw error;
+    return { question, spans: [], words: error.message };
   }
-  const limits: [number, number] = [run.beginUs, run.endUs];
-  const bound = / (before|until|after|since) ((?:(?! before | until | after | since ).)+) $/;
-  for (let found = bound.exec(rest); found; found = bound.exec(rest)) {
-    const us = run.clock.parse(found[2]!, nearUs);
-    if (us === null) return answer([], `'${found[2]}' is no time of this run: try 13 Jan 19:30, day 3 18:30 or 2 d 14 h`);
-    if (found[1] === "before" || found[1] === "until") limits[1] = us;
-    else limits[0] = us;
-    rest = `${rest.slice(0, found.index)} `;
-  }
-  const length = / ([<>]) ?(\d+(?:\.\d+)?) ?(s|min|h|d) /.exec(rest);
-  if (length) rest = rest.replace(length[0], " ");
-  const which = / (last|first) /.exec(rest)?.[1];
-  const singular = (name: string): string => name.slice(0, -1); // the first night, and nights
-  const part = Object.keys(PARTS).find((name) => rest.includes(` ${name} `) || rest.includes(` ${singular(name)} `));
-  const words = rest.split(" ").filter((word) => word && word !== which && word !== part && !(part && word === singular(part)));
-  const asksDifference = other && words.includes("differs");
-  let found = asksDifference ? differing(run, other, words.filter((word) => word !== "differs")) : stretchesOf(run, words);
-  if (typeof found === "string") return answer([], found);
-  if (part) found = partsOfDays(run, part, found);
-  const longest = length ? Number(length[2]) * UNITS[length[3]!]! : 0;
-  const fits: Test = length ? ({ from, to }) => (length[1] === ">" ? to - from > longest : to - from < longest) : () => true;
-  let spans = found.filter((span) => span.from >= limits[0] && span.from < limits[1] && fits(span));
-  if (which) spans = which === "last" ? spans.slice(-1) : spans.slice(0, 1);
-  if (spans.length === 0) return answer([], "never");
-  const total = spans.reduce((sum, span) => sum + span.to - span.from, 0);
-  const noun = part?.slice(0, -1) ?? "time";
-  const count = `${spans.length} ${noun}${spans.length === 1 ? "" : "s"}`;
-  return answer(spans, total > 0 && !part ? `${count}, ${durationText(total)} in all` : count);
+}
+
+/** The events that have all of some words, as whole words and whole names, in any order. */
+export function withWords(run: Run, rows: readonly EventRow[], words: string): EventRow[] {
+  const names = namesOf(run);
+  const units = names.units(words);
+  return rows.filter((row) => names.has(row, units));
 }
 
 /** What can follow the words so far: names, rooms and kinds of events. */
@@ -114,7 +65,7 @@ export function completions(run: Run, question: string, hasOther = false): strin
   const begun = question.slice(before.length).toLowerCase();
   const { rooms } = run.facts.home;
   const words = [
-    ...(before ? ["not", "in", "before", "after"] : ["last", "first", ...Object.keys(PARTS)]),
+    ...(before ? ["not", "in", "and", "before", "after"] : ["last", "first", ...Object.keys(PARTS)]),
     ...run.bodies.map((body) => body.name),
     ...rooms.map((room) => room.name),
     ...rooms.map((room) => room.type),
@@ -123,138 +74,261 @@ export function completions(run: Run, question: string, hasOther = false): strin
     ...run.events.kinds.map((kind) => kind.replaceAll("_", " ")),
     ...run.events.ofKind("activity").map((row) => row.detail.replaceAll("_", " ")),
   ];
-  const fitting = [...new Set(words)].filter((word) => word.startsWith(begun) && word !== begun);
+  const fitting = [...new Set(words)].filter((word) => word.toLowerCase().startsWith(begun) && word !== begun);
   return fitting.slice(0, 12).map((word) => before + word);
 }
 
-/** Who is in a room at a moment, or where somebody is. */
-function whereAt(run: Run, text: string, us: number): [Span[], string] {
-  const words = text.split(" ").filter((word) => word && !FILLERS.has(word));
-  const name = words.join(" ").replaceAll(" ", "_");
-  const body = run.bodies.find((entry) => entry.name.toLowerCase() === name);
-  const span = (found: string): [Span[], string] => [[{ from: us, to: us, words: found }], `${run.clock.text(us)}: ${found}`];
-  if (body) return span(`${body.name} is ${placeName(run, valueAt(run.roomsOf(body.name), us))}`);
-  const rooms = roomsCalled(run, name);
-  if (rooms === null) return [[], unknown(run, words.join(" "))];
-  const inside = run.bodies.filter((entry) => rooms.has(valueAt(run.roomsOf(entry.name), us) ?? NaN));
-  return span(inside.length > 0 ? inside.map((entry) => entry.name).join(", ") : "nobody");
+interface Length {
+  isLonger: boolean;
+  us: number;
+}
+
+class Question {
+  private readonly names: Names;
+  private tokens: Token[];
+  private readonly lengths: Length[] = [];
+  private limits: [number, number];
+  /** Why words that look like a time are none. */
+  private wrongTime = "";
+
+  constructor(
+    private readonly run: Run,
+    question: string,
+    private readonly nearUs: number,
+    private readonly other: Run | null,
+  ) {
+    this.names = namesOf(run);
+    this.limits = [run.beginUs, this.knownUs];
+    const rest = question.replaceAll(/([<>])\s*(\d+(?:\.\d+)?)\s*(s|min|h|d)(?=\s|$)/gi, (_, sign: string, count: string, unit: string) => {
+      this.lengths.push({ isLonger: sign === ">", us: Number(count) * UNITS[unit.toLowerCase()]! });
+      return " ";
+    });
+    if (/[<>]/.test(rest)) throw new Misunderstood("a length is written as > 20 min or < 1.5 h, in s, min, h or d");
+    this.tokens = tokensOf(rest);
+  }
+
+  /** The end of what is known of the run. */
+  private get knownUs(): number {
+    return Math.min(this.run.endUs, this.run.presentUs);
+  }
+
+  answer(): Omit<Answer, "question"> {
+    const moment = this.moment();
+    if (moment) return moment;
+    this.readBounds();
+    for (const { which, part, rest } of this.readings()) {
+      const clause = clauseOf(rest, this.names);
+      if (clause) return this.chosen(this.spansOf(clause), which, part);
+    }
+    return this.events();
+  }
+
+  /** Read a last `at TIME`: who is in a room then, where somebody is, or whether something is so. */
+  private moment(): Omit<Answer, "question"> | null {
+    for (let at = this.tokens.length - 2; at > 0; at--) {
+      if (!isWord(this.tokens[at], AT)) continue;
+      const us = this.timeOf(at);
+      if (us === null) continue;
+      const words = this.at(this.tokens.slice(0, at), us);
+      if (words) return { spans: [{ from: us, to: us, words }], words: `${this.run.clock.text(us)}: ${words}` };
+    }
+    return null;
+  }
+
+  private at(tokens: readonly Token[], us: number): string {
+    const { run } = this;
+    const subject = subjectOf(tokens, this.names);
+    if (subject && "bodies" in subject) {
+      return subject.bodies.map((name) => `${name} is ${placeName(run, valueAt(run.roomsOf(name), us))}`).join(", ");
+    }
+    if (subject) {
+      const inside = run.bodies.filter(({ name }) => subject.rooms.has(valueAt(this.roomsOf(name), us) ?? NaN));
+      return inside.map(({ name }) => name).join(", ") || "nobody";
+    }
+    const clause = clauseOf(tokens, this.names);
+    if (!clause) throw this.names.unknown(textOf(tokens));
+    return this.spansOf(clause).some((span) => span.from <= us && us < span.to) ? "yes" : "no";
+  }
+
+  /** The time that the tokens after one name; null, and a reason to tell: none of this run. */
+  private timeOf(at: number): number | null {
+    const text = textOf(this.tokens.slice(at + 1));
+    const us = this.run.clock.parse(text, this.nearUs);
+    if (us === null) this.wrongTime ||= `'${text}' is no time of this run: ${TIMES}`;
+    return us;
+  }
+
+  /** Take `before`, `until`, `after` and `since` from the end, as long as times follow them. */
+  private readBounds(): void {
+    for (let at = this.tokens.length - 2; at >= 0; at--) {
+      if (!isWord(this.tokens[at], BOUNDS)) continue;
+      const us = this.timeOf(at);
+      if (us === null) continue;
+      const isEnd = ["before", "until"].includes(this.tokens[at]!.text.toLowerCase());
+      this.limits = isEnd ? [this.limits[0], Math.min(us, this.limits[1])] : [Math.max(us, this.limits[0]), this.limits[1]];
+      this.tokens = this.tokens.slice(0, at);
+    }
+  }
+
+  /** Ways to read the tokens: `last`, `first`, `nights` and the first `night` as such where they can be, or as names. */
+  private *readings(): Generator<{ which: string; part: string; rest: Token[] }> {
+    const indices = (words: ReadonlySet<string>): number[] => [...this.tokens.keys()].filter((i) => isWord(this.tokens[i], words));
+    const order = indices(new Set(["last", "first"]));
+    const days = indices(new Set(Object.keys(PARTS).map((part) => part.slice(0, -1)))).filter((i) => order.includes(i - 1));
+    for (const which of [...order, -1])
+      for (const part of [...indices(new Set(Object.keys(PARTS))), ...days, -1]) {
+        const word = this.tokens[part]?.text.toLowerCase() ?? "";
+        const rest = this.tokens.filter((_, i) => i !== which && i !== part);
+        yield { which: this.tokens[which]?.text.toLowerCase() ?? "", part: word && (word.endsWith("s") ? word : `${word}s`), rest };
+      }
+  }
+
+  /** What is so of the stretches of an answer: their length, their part of days, the limits of time; the first or last. */
+  private chosen(found: readonly Span[], which: string, part: string): Omit<Answer, "question"> {
+    const [from, to] = this.limits;
+    const isFitting = (us: number): boolean => this.lengths.every((length) => (length.isLonger ? us > length.us : us < length.us));
+    const all = part
+      ? this.partsOfDays(part, found, isFitting).filter((span) => span.from >= from && span.from < to)
+      : clipped(found.filter((span) => isFitting(span.to - span.from)), from, to);
+    const spans = which ? (which === "last" ? all.slice(-1) : all.slice(0, 1)) : all;
+    if (spans.length === 0) return { spans, words: "never" };
+    const total = filled(union([spans]), from, to);
+    const noun = part.slice(0, -1) || "time";
+    const count = `${spans.length} ${noun}${spans.length === 1 ? "" : "s"}`;
+    return { spans, words: total > 0 && !part ? `${count}, ${durationText(total)} in all` : count };
+  }
+
+  private spansOf(clause: Clause): Span[] {
+    if (clause.kind === "rooms") return combined(clause.who, (name) => this.inRooms(name, clause.rooms, clause.isNot));
+    if (clause.kind === "seen") return this.seen(clause);
+    const { other, run } = this;
+    if (!other) throw new Misunderstood("'differs' compares two runs: show another beside this one");
+    return combined(clause.who ?? { names: run.bodies.map(({ name }) => name), any: true }, (name) => {
+      const { from, to } = differences(run.roomsOf(name), other.roomsOf(name));
+      return Array.from(from, (us, i) => ({ from: us, to: to[i]!, words: `${name} is in another room` }));
+    });
+  }
+
+  private roomsOf(name: string): ReturnType<Run["roomsOf"]> {
+    const rooms = this.run.roomsOf(name);
+    if (rooms.from.length === 0) throw new Misunderstood(`nobody knows where ${name} was: the run stored no key frames of it`);
+    return rooms;
+  }
+
+  private inRooms(name: string, rooms: ReadonlySet<number>, isNot: boolean): Span[] {
+    const { from, to, value } = this.roomsOf(name);
+    const spans: Span[] = [];
+    for (let i = 0; i < from.length; i++) {
+      if (rooms.has(value[i]!) !== isNot) spans.push({ from: from[i]!, to: to[i]!, words: `${name} ${placeName(this.run, value[i]!)}` });
+    }
+    return clipped(union([spans]), this.run.beginUs, this.knownUs);
+  }
+
+  private seen({ who, by, isNot }: Extract<Clause, { kind: "seen" }>): Span[] {
+    const { run } = this;
+    if (!run.storesSightings) throw new Misunderstood("the run stored no observations: nobody knows who was seen");
+    const robot = who?.names.find((name) => run.body(name)?.robot);
+    if (robot) throw new Misunderstood(`robots see people: 'seen by ${robot}' is when ${robot} sees somebody`);
+    const person = by?.names.find((name) => !run.body(name)?.robot);
+    if (person) throw new Misunderstood(`only robots see: ${person} is none`);
+    const everybody: Group = { names: [""], any: true };
+    return combined(who ?? everybody, (user) => combined(by ?? everybody, (name) => this.sightings(user, name, isNot)));
+  }
+
+  /** When a robot noticed a user, each of which may be left out; what it took for somebody else doesn't count. */
+  private sightings(user: string, robot: string, isNot: boolean): Span[] {
+    const step = this.run.clock.stepUs;
+    const lanes = this.run.sightings.filter((lane) => (!user || lane.user === user) && (!robot || lane.robot === robot));
+    const lists = lanes.map((lane) => {
+      const words = `${lane.robot} sees ${lane.user || "somebody"}`;
+      const spans = lane.first.map((first, i) => ({ from: first * step, to: (lane.last[i]! + 1) * step, words }));
+      return spans.filter((_, i) => !lane.false[i]);
+    });
+    const { beginUs } = this.run;
+    const spans = clipped(union(lists), beginUs, this.knownUs);
+    const words = `${robot || "nobody"} ${robot ? "doesn't see" : "sees"} ${user || "anybody"}`;
+    return isNot ? complement(spans, beginUs, this.knownUs, words) : spans;
+  }
+
+  /** Events that have all words; the reason where they can't be what was asked. */
+  private events(): Omit<Answer, "question"> {
+    if (this.tokens.length > 0 && this.wrongTime) throw new Misunderstood(this.wrongTime);
+    const readings = [...this.readings()].flatMap((reading) =>
+      [meaningful(reading.rest), reading.rest].map((tokens) => ({ ...reading, units: this.names.units(textOf(tokens)) })),
+    );
+    const simplest = readings[0]!;
+    if (simplest.units.length === 0) throw new Misunderstood(`ask for something like: ${EXAMPLES.join("; ")}`);
+    const room = wrongRoomOf(simplest.rest, this.names);
+    if (room) throw this.names.unknown(room);
+    if (this.tokens.some((token) => isWord(token, NOT))) throw this.misplacedNot(simplest.units);
+    // Words that events have are those of events before they are a part of a day, or carry no meaning.
+    const known = readings.reverse().filter(({ units }) => units.length > 0 && units.every((unit) => this.names.isKnown(unit)));
+    if (known.length === 0) throw this.names.unknown(simplest.units.filter((unit) => !this.names.isKnown(unit)).join(" "));
+    for (const { units, which, part } of known) {
+      const found = this.happened(units);
+      if (found.length === 0) continue;
+      if (this.lengths.length > 0 && !part && found.every((span) => span.to === span.from)) {
+        throw new Misunderstood("these events are moments: they have no length");
+      }
+      return this.chosen(found, which, part);
+    }
+    return { spans: [], words: "never: no event has all of these words" };
+  }
+
+  private misplacedNot(units: readonly string[]): Misunderstood {
+    const unknown = units.find((unit) => unit !== "not" && !this.names.isKnown(unit));
+    return unknown ? this.names.unknown(unknown) : new Misunderstood("'not' goes with rooms and 'seen'");
+  }
+
+  /** An activity lasts until the next of that body, a blocked way until the next event of that robot but a sighting. */
+  private happened(units: readonly string[]): Span[] {
+    const { rows } = this.run.events;
+    const spans: Span[] = [];
+    const ends = new Map<string, number>();
+    for (let i = rows.length - 1; i >= 0; i--) {
+      const row = rows[i]!;
+      const activity = `${row.entity}/activity`;
+      const end = row.event === "activity" ? activity : row.event === "way_blocked" ? row.entity : null;
+      const to = end === null ? row.us : (ends.get(end) ?? this.knownUs);
+      if (this.names.has(row, units)) spans.push({ from: row.us, to, words: `${row.entity} ${shownText(row)}`.trim() });
+      if (row.event === "activity") ends.set(activity, row.us);
+      if (!SIGHTS.has(row.event)) ends.set(row.entity, row.us);
+    }
+    return spans.reverse();
+  }
+
+  /**
+   * The parts of days in which stretches fill more than half, or as much as is asked for; or in which one of
+   * them is, if they are moments.
+   */
+  private partsOfDays(part: string, found: readonly Span[], isFitting: (us: number) => boolean): Span[] {
+    const { clock, beginUs } = this.run;
+    const [begin, end] = PARTS[part]!;
+    const spans = union([found]);
+    const parts: Span[] = [];
+    for (let day = clock.day(beginUs) - 1; clock.dayStart(day) < this.knownUs; day++) {
+      const from = Math.max(beginUs, clock.dayStart(day) + begin * HOUR_US);
+      const to = Math.min(this.knownUs, clock.dayStart(day) + end * HOUR_US);
+      if (from >= to) continue;
+      const time = filled(spans, from, to);
+      const isMoment = spans.some((span) => span.from === span.to && span.from >= from && span.from < to);
+      if (this.lengths.length > 0 ? isFitting(time) : isMoment || 2 * time > to - from) {
+        parts.push({ from, to, words: `${part.slice(0, -1)} of ${clock.dateText(from)}: ${durationText(time)}` });
+      }
+    }
+    return parts;
+  }
+}
+
+const SIGHTS = new Set(["user_seen", "user_lost", "robot_seen", "robot_lost"]);
+
+/** What holds of all of a group at the same time, or of any of it. */
+function combined({ names, any }: Group, spansOf: (name: string) => Span[]): Span[] {
+  const lists = names.map(spansOf);
+  return any ? union(lists) : lists.reduce(intersection);
 }
 
 function placeName(run: Run, room: number | null): string {
   if (room === null) return "nowhere yet";
   return room === AWAY ? "away" : `in ${run.home.roomName(room)}`;
-}
-
-/** The rooms that a word names: a room, a kind of rooms, away or home. Null: it names none. */
-function roomsCalled(run: Run, word: string): ReadonlySet<number> | null {
-  const { rooms } = run.facts.home;
-  if (word === "away") return new Set([AWAY]);
-  if (word === "home") return new Set(rooms.keys());
-  const found = [...rooms.keys()].filter((i) => [rooms[i]!.name, rooms[i]!.type].some((name) => name.toLowerCase() === word));
-  return found.length > 0 ? new Set(found) : null;
-}
-
-/** The stretches in which what some words say is so; the reason where they say nothing. */
-function stretchesOf(run: Run, words: readonly string[]): Span[] | string {
-  const isNot = words.includes("not");
-  const rest = words.filter((word) => word !== "not" && !FILLERS.has(word));
-  if (rest.length === 0) return `ask for something like: ${EXAMPLES.join("; ")}`;
-  const names = run.bodies.filter((body) => rest.includes(body.name.toLowerCase()));
-  const others = rest.filter((word) => !names.some((body) => body.name.toLowerCase() === word)).join(" ");
-  const rooms = roomsCalled(run, others.replaceAll(" ", "_"));
-  if (rooms && names.length > 0) {
-    const spans = names.flatMap((body) => inRooms(run, body.name, rooms, isNot));
-    return spans.sort((a, b) => a.from - b.from);
-  }
-  if (others === "seen" && names.length > 0) return sighted(run, new Set(names.map((body) => body.name)), isNot);
-  const found = happened(run, rest.join(" "));
-  if (found.length > 0) return isNot ? "'not' goes with rooms and 'seen'" : found;
-  return unknown(run, others || rest.join(" "));
-}
-
-function inRooms(run: Run, name: string, rooms: ReadonlySet<number>, isNot: boolean): Span[] {
-  const { from, to, value } = run.roomsOf(name);
-  const spans: Span[] = [];
-  for (let i = 0; i < from.length; i++) {
-    if (rooms.has(value[i]!) === isNot) continue;
-    const last = spans[spans.length - 1];
-    if (last && last.to === from[i]) last.to = to[i]!;
-    else spans.push({ from: from[i]!, to: to[i]!, words: `${name} ${placeName(run, value[i]!)}` });
-  }
-  return spans;
-}
-
-/** When robots noticed one of some users, or a user when some robots noticed it. */
-function sighted(run: Run, names: ReadonlySet<string>, isNot: boolean): Span[] {
-  const step = run.clock.stepUs;
-  const users = [...names].filter((name) => !run.body(name)?.robot);
-  const robots = [...names].filter((name) => run.body(name)?.robot);
-  const spans = run.sightings
-    .filter((lane) => (users.length === 0 || users.includes(lane.user)) && (robots.length === 0 || robots.includes(lane.robot)))
-    .flatMap((lane) =>
-      lane.first.map((first, i) => ({
-        from: first * step,
-        to: (lane.last[i]! + 1) * step,
-        words: `${lane.robot} sees ${lane.user || "somebody"}${lane.false[i] ? " (false)" : ""}`,
-      })),
-    )
-    .sort((a, b) => a.from - b.from);
-  return isNot ? between(spans, run, "not seen") : spans;
-}
-
-/** The gaps between stretches. */
-function between(spans: readonly Span[], run: Run, words: string): Span[] {
-  const gaps: Span[] = [];
-  let at = run.beginUs;
-  for (const span of spans) {
-    if (span.from > at) gaps.push({ from: at, to: span.from, words });
-    at = Math.max(at, span.to);
-  }
-  if (at < run.endUs) gaps.push({ from: at, to: run.endUs, words });
-  return gaps;
-}
-
-/** Events whose shown text has all words; an activity lasts until the next of that body. */
-function happened(run: Run, words: string): Span[] {
-  const { rows } = run.events;
-  const spans: Span[] = [];
-  const ends = new Map<string, number>();
-  const known = new Map<string, boolean>(); // few texts are different
-  const fits = (row: EventRow): boolean => {
-    const key = `${row.entity}/${row.event}/${row.user}/${row.detail}`;
-    let is = known.get(key);
-    if (is === undefined) known.set(key, (is = hasWords(eventText(row), words)));
-    return is;
-  };
-  for (let i = rows.length - 1; i >= 0; i--) {
-    const row = rows[i]!;
-    const key = `${row.entity} ${row.event}`;
-    if (fits(row)) {
-      const lasts = row.event === "activity" || row.event === "way_blocked";
-      const to = lasts ? (ends.get(row.event === "activity" ? key : row.entity) ?? run.endUs) : row.us;
-      spans.push({ from: row.us, to, words: eventText(row).trim() });
-    }
-    ends.set(key, row.us);
-    ends.set(row.entity, row.us);
-  }
-  return spans.reverse();
-}
-
-/** The parts of days in which stretches fill more than half. */
-function partsOfDays(run: Run, part: string, spans: readonly Span[]): Span[] {
-  const [begin, end] = PARTS[part]!;
-  const found: Span[] = [];
-  for (let day = run.clock.day(run.beginUs) - 1; run.clock.dayStart(day) < run.endUs; day++) {
-    const from = Math.max(run.beginUs, run.clock.dayStart(day) + begin * HOUR_US);
-    const to = Math.min(run.endUs, run.clock.dayStart(day) + end * HOUR_US);
-    if (from >= to) continue;
-    const filled = spans.reduce((sum, span) => sum + Math.max(0, Math.min(to, span.to) - Math.max(from, span.from)), 0);
-    if (2 * filled > to - from) found.push({ from, to, words: `${part.slice(0, -1)} of ${run.clock.dateText(from)}: ${durationText(filled)}` });
-  }
-  return found;
-}
-
-function unknown(run: Run, words: string): string {
-  const names = [...run.bodies.map((body) => body.name), ...new Set(run.facts.home.rooms.map((room) => room.type))];
-  return `nothing is called '${words}'. There are ${names.slice(0, 14).join(", ")}, and kinds of events`;
 }

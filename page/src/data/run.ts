@@ -41,6 +41,8 @@ export class Run {
   observations: ObservationSource | null = null;
   /** Goes up by one whenever something more of the run was read. */
   readonly version = signal(0);
+  /** Whether everything was read that questions are about. */
+  readonly isRead = signal(false);
   /** What could not be read, in plain words. */
   readonly problems = signal<string[]>([]);
   /** Paths ahead of bodies in a live run [lattice]; those of a stored run follow from its tracks. */
@@ -51,6 +53,9 @@ export class Run {
 
   /** What is known of the run ends here: the step that its simulation has come to. */
   knownUs = Infinity;
+
+  /** The moment that the layer on the plan is of [us]; null while there is none. */
+  readonly layerUs = signal<number | null>(null);
 
   /** Notes and bookmarks, which are stored beside the run. */
   readonly notes = signal<readonly NoteFacts[]>([]);
@@ -91,7 +96,12 @@ export class Run {
   /** Whether an algorithm says where users are now, and not for which shares of their time. */
   isOfNow(algorithm: string): boolean {
     const algorithms = this.facts.scenario.algorithms as Record<string, { type?: string } | undefined> | undefined;
-    return algorithms?.[algorithm]?.type === "real_time_presence";
+    return ["real_time_presence", "belief_table", "told_presence"].includes(algorithms?.[algorithm]?.type ?? "");
+  }
+
+  /** Whether it is known who was noticed. */
+  get storesSightings(): boolean {
+    return this.knownUs < Infinity || this.tableFacts("observations") !== undefined;
   }
 
   get bodies(): readonly BodyFacts[] {
@@ -153,7 +163,8 @@ export class Run {
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
       await this.attempt(async () => {
         const table = await this.open(facts.name);
-        const beliefs = table && (await readBeliefs(facts.name, table, this.home, this.clock.stepUs, this.isOfNow(facts.name)));
+        const users = this.bodies.filter((body) => !body.robot).map((body) => body.name);
+        const beliefs = table && (await readBeliefs(facts.name, table, this.home, users, this.clock.stepUs, this.isOfNow(facts.name)));
         if (beliefs) this.beliefs.push(beliefs);
       });
     }
@@ -161,6 +172,7 @@ export class Run {
       const table = await this.open("observations");
       if (table) this.observations = new Observations(table);
     });
+    this.isRead.value = true;
     this.changed();
   }
 

@@ -2,7 +2,7 @@
 
 import { batch, computed, signal } from "@preact/signals";
 import type { LiveFrame, LiveSession, RunFacts, SightingFacts, WallsFacts } from "../contract";
-import { Beliefs, type BeliefSeries } from "../data/beliefs";
+import { Beliefs } from "../data/beliefs";
 import { Decisions } from "../data/decisions";
 import type { Observation, ObservationSource } from "../data/observations";
 import { AWAY } from "../data/rooms";
@@ -81,7 +81,6 @@ export class Feed {
   readonly status = signal<LiveFrame | null>(null);
   private readonly observations: LiveObservations;
   private readonly decisions: Decisions;
-  private readonly shares = new Map<string, BeliefSeries>();
   private stream: EventSource | null = null;
   private lastStep: number;
 
@@ -101,6 +100,7 @@ export class Feed {
       run.rooms.set(name, stretchesUntil(past?.roomsOf(name) ?? { from: [], to: [], value: [] }, us));
     }
     if (past) this.takePast(past, us);
+    run.isRead.value = true;
   }
 
   /** Follow a simulation; a branch begins with what the run before it was. */
@@ -123,7 +123,6 @@ export class Feed {
       return { ...lane, first: lane.first.slice(0, count), last, false: lane.false.slice(0, count) };
     });
     run.beliefs = past.beliefs.map((beliefs) => beliefs.until(us));
-    for (const beliefs of run.beliefs) this.shares.set(beliefs.name, beliefs.of(beliefs.users[0] ?? "")!);
   }
 
   follow(): void {
@@ -200,7 +199,7 @@ export class Feed {
     this.observations.step = frame.step;
     this.observations.seen = frame.seen;
     for (const [robot, user] of frame.seen) this.addSighting(robot, user, frame.step);
-    for (const [name, shares] of Object.entries(frame.beliefs)) this.addBelief(name, us, shares);
+    for (const [name, ofUsers] of Object.entries(frame.beliefs)) this.addBeliefs(name, us, ofUsers);
     this.lastStep = frame.step;
     this.run.knownUs = us;
   }
@@ -231,18 +230,10 @@ export class Feed {
     }
   }
 
-  private addBelief(name: string, us: number, shares: readonly number[]): void {
-    let series = this.shares.get(name);
-    if (!series) {
-      series = { us: [], shares: [] };
-      this.shares.set(name, series);
-      const user = this.run.bodies.find((body) => !body.robot)?.name ?? "";
-      this.run.beliefs.push(new Beliefs(name, new Map([[user, series]]), this.run.isOfNow(name)));
-    }
-    const last = series.shares[series.shares.length - 1];
-    if (last && shares.every((share, i) => share === last[i])) return;
-    series.us.push(us);
-    series.shares.push(Float64Array.from([...shares, 0]));
+  private addBeliefs(name: string, us: number, ofUsers: Record<string, number[]>): void {
+    let beliefs = this.run.beliefs.find((entry) => entry.name === name);
+    if (!beliefs) this.run.beliefs.push((beliefs = new Beliefs(name, new Map(), this.run.isOfNow(name))));
+    for (const [user, shares] of Object.entries(ofUsers)) beliefs.add(user, us, Float64Array.from(shares));
   }
 }
 

@@ -1,10 +1,10 @@
 /** What an algorithm believes of each room, as bars beside what is true. */
 
+import { percents } from "../data/beliefs";
 import type { Run } from "../data/run";
 import { beliefNames, comparisonAt } from "../plan/beliefs";
 import * as state from "../state";
 import { bodyColor } from "../theme";
-import { slowMoment } from "./slow";
 
 export function BeliefsPanel() {
   return (
@@ -19,12 +19,14 @@ export function BeliefsPanel() {
 function BeliefsOf({ run, title }: { run: Run; title: string }) {
   void run.version.value;
   const names = beliefNames(run);
-  const comparison = comparisonAt(run, slowMoment.value);
-  if (!comparison) return <p class="hint">No algorithm of this run puts out shares per room.</p>;
+  const comparison = comparisonAt(run, state.moment.value);
+  if (!comparison) return <p class="hint">No algorithm of this run puts out shares per room that sum to 1.</p>;
   const color = bodyColor(run.body(comparison.user)?.color ?? "#0077bb");
+  const { believed, truth } = comparison;
+  const [believedPercents, truePercents] = [believed && percents(believed), truth && percents(truth)];
   const rows = [...run.facts.home.rooms.map((room) => room.name), "away"]
-    .map((name, i) => ({ name, i, believed: comparison.believed[i]!, truth: comparison.truth[i]! }))
-    .filter((row) => row.believed > 0.002 || row.truth > 0.002 || row.i === comparison.now);
+    .map((name, i) => ({ name, isNow: comparison.now.has(i), believed: believed?.[i] ?? 0, truth: truth?.[i] ?? 0, percents: [believedPercents?.[i], truePercents?.[i]] }))
+    .filter((row) => row.isNow || row.percents.some((percent) => percent));
   return (
     <div>
       {title && <h2>{title}</h2>}
@@ -44,26 +46,26 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
         </select>
       </label>
       <p class="hint">
-        {comparison.sinceUs < 0
-          ? "No output yet."
-          : `Bars: believed since ${run.clock.text(comparison.sinceUs)}. ${
-              comparison.isOfNow ? "Line and ●: the room now." : "Lines: share of the time until now, of rooms at home. ● is there now."
-            }`}
+        {comparison.asOfUs < 0 ? "No output yet." : `Bars: believed, as of ${run.clock.text(comparison.asOfUs)}.`}{" "}
+        {comparison.isOfNow ? "Line and ●: the room now." : `Lines: share of the time from ${run.clock.text(run.beginUs)} until now. ● is there now.`}
       </p>
       <table class="bars">
         <tbody>
           {rows.map((row) => (
             <tr key={row.name} data-room={row.name} data-believed={row.believed} data-truth={row.truth}>
               <th scope="row">
-                {row.i === comparison.now ? <span aria-label="is here now">● </span> : ""}
+                {row.isNow ? <span aria-label="is here now">● </span> : ""}
                 {row.name.replaceAll("_", " ")}
               </th>
               <td class="bar">
                 <span class="believed" style={{ width: `${100 * row.believed}%`, background: color }} />
                 <span class="truth" style={{ left: `${100 * row.truth}%` }} />
               </td>
-              <td class="number">{(100 * row.believed).toFixed(0)} %</td>
-              <td class="number">{(100 * row.truth).toFixed(0)} %</td>
+              {row.percents.map((percent, i) => (
+                <td key={i} class="number">
+                  {percent === undefined ? "–" : `${percent} %`}
+                </td>
+              ))}
             </tr>
           ))}
         </tbody>

@@ -2,7 +2,6 @@
 
 import { lastAtMost } from "../data/search";
 import * as state from "../state";
-import { slowMoment } from "./slow";
 
 const BEFORE = 40;
 const AFTER = 60;
@@ -10,8 +9,8 @@ const AFTER = 60;
 export function EventsPanel() {
   const run = state.run.value!;
   const rows = state.foundEvents.value;
-  const us = slowMoment.value;
-  const at = lastAtMost(rows.map((row) => row.us), us) + 1;
+  const us = state.moment.value;
+  const at = lastAtMost(state.foundTimes.value, us) + 1;
   const visibleRows = rows.slice(Math.max(0, at - BEFORE), at + AFTER);
   return (
     <div>

@@ -8,7 +8,6 @@ import { lastAtMost } from "../data/search";
 import { valueAt } from "../data/stretches";
 import * as state from "../state";
 import { bodyState } from "./Now";
-import { slowMoment } from "./slow";
 import { Terms } from "./Terms";
 
 const SHOWN_EVENTS = 12;
@@ -32,7 +31,7 @@ function Facts({ rows }: { rows: [string, string][] }) {
 
 function BodyView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = slowMoment.value;
+  const us = state.moment.value;
   const body = run.body(name)!;
   const now = bodyState(run, name, us);
   useEffect(() => void run.readDecisions(), [run]);
@@ -77,13 +76,10 @@ function BodyView({ run, name }: { run: Run; name: string }) {
 /** The last note of a behavior: an event that is neither sight nor activity. */
 function noteOf(run: Run, name: string, us: number): string {
   const routine = new Set(["user_seen", "user_lost", "activity", "left_home", "came_home"]);
-  for (let i = run.events.after(us) - 1; i >= 0; i--) {
-    const row = run.events.rows[i]!;
-    if (row.entity === name && !routine.has(row.event)) {
-      return `${row.event.replaceAll("_", " ")} ${row.detail} (${run.clock.text(row.us)})`;
-    }
-  }
-  return "";
+  const kinds = run.events.kindsOf(name).filter((kind) => !routine.has(kind));
+  const rows = kinds.flatMap((kind) => run.events.last(name, kind, us) ?? []);
+  const row = rows.sort((a, b) => b.index - a.index)[0];
+  return row ? `${row.event.replaceAll("_", " ")} ${row.detail} (${run.clock.text(row.us)})` : "";
 }
 
 function since(run: Run, name: string, us: number): string {
@@ -119,7 +115,7 @@ export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]
 
 function DoorView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = slowMoment.value;
+  const us = state.moment.value;
   return (
     <div data-inspected={name}>
       <h2>{name}</h2>
@@ -144,7 +140,7 @@ function FurnitureView({ run, name }: { run: Run; name: string }) {
 
 function RoomView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = slowMoment.value;
+  const us = state.moment.value;
   const index = run.home.roomIndex(name);
   const room = run.facts.home.rooms[index]!;
   const occupants = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);

@@ -2,6 +2,7 @@
 
 import * as state from "../state";
 import { roomColor, scaleColor } from "../theme";
+import { olderWords } from "../plan/older";
 import { Terms } from "./Terms";
 
 const WORDS: Record<state.Switch, string> = {
@@ -45,6 +46,7 @@ export function LayersPanel() {
           </label>
         ))}
         {layers.length === 0 && <p class="hint">The run stored none; a scenario asks for them under floorplan.layers.</p>}
+        {state.layer.value && <p class="hint">{olderWords(run)}</p>}
         {state.layer.value && <ScaleBar />}
       </fieldset>
       <Legend />

@@ -16,7 +16,7 @@ export function MetricsPanel() {
     <div>
       {tables.flatMap((table) => numberColumns(table).map((column) => <Chart key={`${table.name}.${column}`} run={run} name={table.name} column={column} />))}
       <AnyColumn run={run} />
-      <h2>Results</h2>
+      <h2>Results at the end of the run</h2>
       <Results runs={state.runs.value} />
     </div>
   );

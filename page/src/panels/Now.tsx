@@ -6,7 +6,6 @@ import type { Run } from "../data/run";
 import { TURN } from "../data/tracks";
 import * as state from "../state";
 import { bodyColor } from "../theme";
-import { slowMoment } from "./slow";
 
 export interface BodyState {
   name: string;
@@ -49,7 +48,7 @@ export function Now() {
 
 function NowOf({ run, title }: { run: Run; title: string }) {
   void run.version.value;
-  const us = slowMoment.value;
+  const us = state.moment.value;
   const step = run.clock.stepAt(us);
   return (
     <table class="now" data-step={step}>
@@ -64,7 +63,7 @@ function NowOf({ run, title }: { run: Run; title: string }) {
       </thead>
       <tbody>
         {run.bodies.map((body) => {
-          const now = bodyState(run, body.name, step * run.clock.stepUs);
+          const now = bodyState(run, body.name, us);
           return (
             <tr
               key={body.name}

@@ -1,6 +1,6 @@
 /** The plan of a run at the moment: ground, layers, people, robots. */
 
-import { effect, useSignal } from "@preact/signals";
+import { effect, untracked, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Run } from "../data/run";
 import type { Layer } from "../data/layers";
@@ -13,9 +13,11 @@ import { bodyState } from "../panels/Now";
 import { bodyRadius, drawScene, slowFloorsAt } from "./bodies";
 import { fitted, oncePerFrame } from "./canvas";
 import { FOOT, Frame } from "./frame";
+import { olderWords } from "./older";
 import { cellImage, drawCells, drawGround, drawNames, tracePolygons } from "./ground";
 
 const FOLLOW_ZOOM = 3;
+const READ_MS = 120;
 
 interface Pointer {
   x: number;
@@ -31,6 +33,7 @@ class PlanPainter {
   private readonly ground = document.createElement("canvas");
   private groundKey = "";
   private layerImage: HTMLCanvasElement | null = null;
+  private layerName = "";
   private layerKey = "";
   private night: HTMLCanvasElement | null = null;
   private nightKey = "";
@@ -51,7 +54,7 @@ class PlanPainter {
     this.paintGround(frame, width, height);
     context.clearRect(0, 0, width, height);
     context.drawImage(this.ground, 0, 0, width, height);
-    if (this.layerImage && state.layer.value) this.paintCells(context, frame, this.layerImage, 0.7);
+    if (this.layerImage && this.layerName === state.layer.value) this.paintCells(context, frame, this.layerImage, 0.7);
     if (state.shown.value.has("lights")) this.paintNight(context, frame);
     if (state.shown.value.has("beliefs")) drawBeliefs(context, this.run, frame, state.moment.value);
     drawScene(context, {
@@ -63,6 +66,11 @@ class PlanPainter {
       shows: (name) => state.shown.value.has(name as state.Switch),
       other: this.other,
     });
+    context.font = "12px system-ui, sans-serif";
+    context.textAlign = "right";
+    context.fillStyle = colors.value.text;
+    context.fillText(olderWords(this.run), width - 8, height - 5);
+    context.textAlign = "left";
   }
 
   /** Keep the body that is followed in the middle. */
@@ -111,13 +119,13 @@ class PlanPainter {
   }
 
   async loadLayer(name: string, step: number): Promise<void> {
-    if (!name) return;
-    const table = await this.run.layer(name);
-    const layer = await table.at(step);
+    const layer = name ? await (await this.run.layer(name)).at(step) : null;
     const key = `${name}@${layer?.step}`;
-    if (!layer || key === this.layerKey) return;
+    if (key === this.layerKey) return;
     this.layerKey = key;
-    this.layerImage = layerImage(this.run, layer);
+    this.layerName = name;
+    this.layerImage = layer && layerImage(this.run, layer);
+    this.run.layerUs.value = layer && layer.step * this.run.clock.stepUs;
   }
 
   /** The body at a pixel; empty where there is none. */
@@ -241,23 +249,37 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
   );
 }
 
-/** Read the observations and the layer of the moment, once the moment rests. */
+/** Read the observations and the layer of the moment, several times a second while it changes. */
 function readAtMoment(run: Run, painter: PlanPainter, repaint: () => void): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
-  return effect(() => {
-    const step = run.clock.stepAt(state.moment.value);
-    void run.version.value;
-    const [name, observations] = [state.layer.value, run.observations];
-    if (observations && observations.at(step) !== null && !name) return;
-    clearTimeout(timer);
+  let last = "";
+  const wanted = (): string => `${state.layer.value}@${run.clock.stepAt(state.moment.value)}${run.observations ? "" : " alone"}`;
+  const readNext = (): void => {
+    if (wanted() === last || timer !== undefined) return;
     timer = setTimeout(() => {
-      void run.attempt(async () => {
-        await Promise.all([observations?.load(step), painter.loadLayer(name, step)]);
+      last = wanted();
+      const { observations } = run;
+      const step = run.clock.stepAt(state.moment.value);
+      const isMissing = observations?.at(step) === null;
+      const read = run.attempt(async () => {
+        await Promise.all([observations?.load(step), painter.loadLayer(state.layer.value, step)]);
         repaint();
-        if (observations) run.changed();
+        if (isMissing) run.changed();
       });
-    }, 120);
+      void read.then(() => {
+        timer = undefined;
+        untracked(readNext); // the moment may have changed meanwhile
+      });
+    }, READ_MS);
+  };
+  const stop = effect(() => {
+    void run.version.value;
+    readNext();
   });
+  return () => {
+    stop();
+    clearTimeout(timer);
+  };
 }
 
 function followPointer(

@@ -139,7 +139,9 @@ function drawWay(context: Context, scene: Scene, body: BodyFacts): void {
   const track = run.tracks.get(body.name);
   if (!track || track.empty) return;
   const behind = track.way(Math.max(0, us - BEHIND_US), us);
-  const ahead = run.ahead.get(body.name) ?? track.way(us, Math.min(run.clock.endUs, us + AHEAD_US));
+  // What a live simulation plans is ahead of its present only.
+  const planned = us >= run.knownUs ? run.ahead.get(body.name) : undefined;
+  const ahead = planned ?? track.way(us, Math.min(run.presentUs, us + AHEAD_US));
   context.strokeStyle = bodyColor(body.color);
   context.lineWidth = body.name === selected ? 2.5 : 1.5;
   context.lineJoin = "round";

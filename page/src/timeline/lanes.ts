@@ -1,7 +1,8 @@
 /** The lanes of a timeline: what each shows, in which colours. */
 
 import type { Answer } from "../data/ask";
-import type { BeliefSeries } from "../data/beliefs";
+import { type BeliefSeries, percents } from "../data/beliefs";
+import type { Clock } from "../data/clock";
 import type { Run, Switches } from "../data/run";
 import type { BodyFacts } from "../contract";
 import { type EventRow, shownText } from "../data/events";
@@ -83,16 +84,17 @@ export function beliefLanes(run: Run, prefix: string, title = ""): Lane[] {
   const words = (us: number): string => {
     const at = lastAtMost(beliefs.us, us);
     if (at < 0) return "";
-    const shares = rows.map((room) => [room, beliefs.shares[at]![room]!] as const).sort((one, other) => other[1] - one[1]);
-    const believed = shares.slice(0, 3).map(([room, share]) => `${name(room)} ${(100 * share).toFixed(0)} %`);
+    const ofRooms = percents(beliefs.shares[at]!);
+    const likeliest = [...rows].sort((one, other) => ofRooms[other]! - ofRooms[one]!).slice(0, 3);
+    const believed = likeliest.map((room) => `${name(room)} ${ofRooms[room]} %`);
     const room = valueAt(truth, us);
-    return `${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
+    return `as of ${run.clock.text(beliefs.us[at]!)}: ${believed.join(", ")}${room === null ? "" : `; true: ${name(room)}`}`;
   };
   const paint: LanePaint = { kind: "heat", beliefs, rows, names: rows.map(name), truth, color, endUs: run.endUs };
   const height = rows.length * HEAT_ROW_HEIGHT;
   const heat: Lane = { id: `${prefix}belief`, label, height, group: "Beliefs", isMain: true, words, paint: () => paint, subject: chosen.user };
   const error = errorsOf(run, chosen);
-  return [heat, { ...lineLane(prefix, label, error), label: `error of ${label}`, group: "Beliefs" }];
+  return [heat, { ...lineLane(run.clock, prefix, label, error), label: `error of ${label}`, group: "Beliefs" }];
 }
 
 /** What answers the question that was asked; its words are those of each mark. */
@@ -386,18 +388,18 @@ export async function tableLanes(run: Run, prefix: string): Promise<Lane[]> {
       else {
         const series = await readSeries(facts, table, run.clock.stepUs);
         const first = series[0];
-        if (first && first.us.length > 1) lanes.push(lineLane(prefix, facts.name, first));
+        if (first && first.us.length > 1) lanes.push(lineLane(run.clock, prefix, facts.name, first));
       }
     });
   }
   return lanes;
 }
 
-function lineLane(prefix: string, name: string, series: Series): Lane {
+function lineLane(clock: Clock, prefix: string, name: string, series: Series): Lane {
   const words = (us: number): string => {
-    const i = Math.min(series.us.length - 1, firstAtLeast(series.us, us));
+    const i = lastAtMost(series.us, us);
     const value = series.values[i];
-    return value === undefined || Number.isNaN(value) ? "" : `${series.name}: ${value.toPrecision(3)}`;
+    return value === undefined || Number.isNaN(value) ? "" : `${series.name}: ${value.toPrecision(3)}, as of ${clock.text(series.us[i]!)}`;
   };
   const paint: LanePaint = { kind: "line", series, extent: extentOf(series), color: colors.value.text };
   const place = { id: `${prefix}${name}/metric`, label: `${name} ${series.name}`, subject: "", group: "Metrics" as const, height: 24 };

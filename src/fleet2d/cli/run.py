@@ -18,6 +18,7 @@ import typer
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, blame, os_errors_as, own_frames
 from fleet2d.options import Trust, file_name, resume_hint, show_code, split
+from fleet2d.runs.verdicts import verdict_line, verdicts_of
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
 if TYPE_CHECKING:
@@ -131,9 +132,10 @@ def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
 
 def summary_of(run: "Run") -> dict[str, Any]:
     """Return the content of `--json`."""
-    manifest = run.manifest
+    manifest, verdicts = run.manifest, verdicts_of(run)
     wall = {**manifest["wall_s"], "total": _since_start()}
     return {
+        **({"verdict": verdict_line(run, verdicts)} if verdicts else {}),
         "run_dir": str(run.directory),
         "steps": manifest["steps"],
         "simulated_s": manifest["simulated_s"],
@@ -143,12 +145,12 @@ def summary_of(run: "Run") -> dict[str, Any]:
         "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
         "peak_rss_mb": peak_memory_mb(),
         "metrics": run.metrics,
-        **({"expectations": verdicts} if (verdicts := manifest["expectations"]) else {}),
+        **({"expectations": manifest["expectations"]} if verdicts else {}),
     }
 
 
 def print_summary(summary: dict[str, Any], run: "Run") -> None:
-    """Print the summary as text: speed, a table of metrics, notes."""
+    """Print the summary as text: verdicts, speed, a table of metrics, notes."""
     from rich.console import Console
     from rich.table import Table
 
@@ -156,6 +158,7 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     from fleet2d.configuration.units import format_duration
     from fleet2d.metrics.metric import SEPARATOR, flat
 
+    print_verdict(run)
     console = Console(highlight=False, markup=False, soft_wrap=True)
     wall = summary["wall_s"]
     simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
@@ -181,11 +184,19 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
     if table.row_count:
         console.print(table, soft_wrap=False)
     lines = [f"{hidden} more numbers are in the run: --json shows them"] if hidden else []
-    lines += [verdict["says"] for verdict in run.manifest["expectations"].values()]
+    lines += [verdict.says for verdict in verdicts_of(run) if verdict.outcome != "violated"]
     lines += [f"note: {note}" for note in run.notes or run.manifest["notes"]]
     lines += [f"seed {summary['seed']}, digest {summary['digest'][:16]}"]
     lines += [f"stored in {summary['run_dir']}"]
     console.print(*lines, sep="\n")
+
+
+def print_verdict(run: "Run", *, err: bool = False) -> None:
+    """Print what became of the expectations, a line for each violated one; red if one is."""
+    verdicts = verdicts_of(run)
+    violated = [verdict.says for verdict in verdicts if verdict.outcome == "violated"]
+    if line := verdict_line(run, verdicts):
+        typer.secho("\n".join([line, *violated]), fg="red" if violated else None, err=err)
 
 
 def _text(value: Any, unit: str) -> str:

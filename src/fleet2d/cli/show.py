@@ -5,6 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
+from fleet2d.cli.run import print_verdict
 from fleet2d.configuration.problems import suggest, validating
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
@@ -182,6 +183,7 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture, *, trust: 
     run = open_run(directory, trust=trust)
     if trust:
         show_code(run.manifest)
+    print_verdict(run, err=True)  # stdout is the path
     if picture.layer is not None:
         from fleet2d.pictures.layers import draw_layer
 

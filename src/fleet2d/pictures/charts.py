@@ -150,7 +150,8 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
             " a presence algorithm such as ltp or rtp"
         )
     shares = table["share"].to_numpy().reshape(-1, len(users) + 1, places)
-    steps = table["step"].to_numpy().reshape(shares.shape)[:, 0, 0]
+    at = "at" if "at" in table.column_names else "step"  # of `belief_table`, of the others
+    steps = table[at].to_numpy().reshape(shares.shape)[:, 0, 0]
     every = timedelta(microseconds=run.manifest["step_us"])
     beliefs, truths = [], []
     for row, user in enumerate(users):

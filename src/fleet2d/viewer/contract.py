@@ -172,6 +172,15 @@ class MarkFacts(TypedDict):
     label: str
 
 
+class VerdictFacts(TypedDict):
+    """What became of an expectation; `step` is the first at which it is violated."""
+
+    name: str
+    outcome: Literal["violated", "held", "not decided", "untested"]
+    says: str
+    step: int | None
+
+
 class SlowFacts(TypedDict):
     """A floor that slows robots down from `step` to before `end`: its outline [m], its effect."""
 
@@ -197,7 +206,9 @@ class SightingFacts(TypedDict):
 class RunFacts(TypedDict):
     """Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown.
 
-    With `starts_unlit` all lights are off at first; its events switch them.
+    With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all
+    that Fleet2D records, also those that the run has none of. `verdict` sums up the
+    `verdicts`, of which violated ones come first.
     """
 
     title: str
@@ -216,8 +227,11 @@ class RunFacts(TypedDict):
     tables: list[TableFacts]
     walls: list[WallsChange]
     marks: list[MarkFacts]
+    verdict: str
+    verdicts: list[VerdictFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
+    event_kinds: list[str]
     metrics: dict[str, Any]
     scenario: dict[str, Any]
     walks_every_s: float
@@ -300,6 +314,7 @@ class LiveEvent(TypedDict):
 class LiveFrame(TypedDict):
     """The state of a running simulation; `speed` 0 is as fast as it goes.
 
+    `beliefs` are of algorithms about users: shares of rooms and last of away, which sum to 1.
     `served_as` is the number of the stored run that it has become; -1 while it is under way.
     """
 
@@ -311,7 +326,7 @@ class LiveFrame(TypedDict):
     bodies: list[LiveBody]
     seen: list[tuple[str, str]]
     doors: dict[str, bool]
-    beliefs: dict[str, list[float]]
+    beliefs: dict[str, dict[str, list[float]]]
     events: list[LiveEvent]
     marks: list[MarkFacts]
     slows: list[SlowFacts]

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from fleet2d.algorithms.algorithm import RoomDistribution
+from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.configuration.documents import parse_yaml
 from fleet2d.configuration.trust import running_code
 from fleet2d.engine.simulation import Simulation
@@ -89,14 +91,16 @@ class LiveEngine:
         state = self.simulation.state
         return {name: bool(entry["open"]) for name, entry in state.items() if "open" in entry}
 
-    def beliefs(self) -> dict[str, list[float]]:
-        """Return the newest shares of rooms of each algorithm whose output has shares."""
-        shares = {}
+    def beliefs(self) -> dict[str, dict[str, list[float]]]:
+        """Return the newest shares of rooms, and last of away, of algorithms by name and user."""
+        beliefs = {}
         for name, output in self.simulation.outputs.items():
-            share = getattr(output, "share", None)
-            if isinstance(share, np.ndarray) and share.ndim == 1:
-                shares[name] = share.round(5).tolist()
-        return shares
+            if isinstance(output, Presence):
+                beliefs[name] = {user: output.with_away(user).tolist() for user in output.names}
+            elif isinstance(output, RoomDistribution):
+                shares = np.append(output.share, 0.0).tolist()
+                beliefs[name] = dict.fromkeys(self.simulation.scenario.users, shares)
+        return beliefs
 
     def events(self) -> list[LiveEvent]:
         """Return the events since the last call."""

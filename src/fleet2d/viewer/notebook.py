@@ -9,6 +9,7 @@ from typing import Any
 from fleet2d.errors import Fleet2DError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.run import Run
+from fleet2d.runs.verdicts import verdict_line, verdicts_of
 from fleet2d.viewer.moments import step_of
 from fleet2d.viewer.run_facts import run_title
 
@@ -60,8 +61,23 @@ def run_widget(run: Run, height: int) -> Any:
     return widget.run_widget(run, height)
 
 
+VIOLATED_STYLE = "border-left: 5px solid #c8452f; padding-left: .6em"
+
+
+def verdict_html(run: Run) -> str:
+    """Return the verdicts on a run, and its failure, as HTML; empty if there are none."""
+    verdicts = verdicts_of(run)
+    failure = "the run failed" if run.status == "failed" else ""
+    line = html.escape("; ".join(filter(None, (failure, verdict_line(run, verdicts)))))
+    says = [verdict.says for verdict in verdicts if verdict.outcome == "violated"]
+    if not failure and not says:
+        return line and f"<p>{line}</p>"
+    items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in says)
+    return f'<div style="{VIOLATED_STYLE}"><b>\N{BALLOT X} {line}</b><ul>{items}</ul></div>'
+
+
 def run_html(run: Run) -> str:
-    """Return a run as HTML for notebooks: its facts and its picture."""
+    """Return a run as HTML for notebooks: its verdicts, its facts and its picture."""
     clock, entities = run.clock, run.manifest["entities"]
     facts = [
         run.status,
@@ -76,7 +92,8 @@ def run_html(run: Run) -> str:
         content = base64.b64encode(figure_png(draw_run(run, None, None))).decode()
         image = f"data:image/png;base64,{content}"
         picture = f'<img alt="The run in its home" style="max-width:100%" src="{image}">'
-    return f"<div><b>{html.escape(run_title(run))}</b><p>{text}</p>{picture}</div>"
+    title = html.escape(run_title(run))
+    return f"<div><b>{title}</b>{verdict_html(run)}<p>{text}</p>{picture}</div>"
 
 
 def figure_png(figure: Any, dpi: float | str = NOTEBOOK_DPI) -> bytes:

@@ -16,7 +16,7 @@ from fleet2d.errors import ArtifactError, InputError
 from fleet2d.metrics.metric import flat
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY
-from fleet2d.viewer.notebook import figure_png
+from fleet2d.viewer.notebook import figure_png, verdict_html
 from fleet2d.viewer.page_data import POLICY, PageData, embedded_run, html_of, write_file
 from fleet2d.viewer.run_facts import run_title
 
@@ -48,6 +48,7 @@ def report_html(run: Run) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}: report</title><style>{STYLE}</style></head><body>",
         f"<h1>{title}</h1>",
+        verdict_html(run),
         _what_ran(run),
         _notes(run),
         "<h2>Metrics</h2>",

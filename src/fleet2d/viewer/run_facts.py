@@ -18,7 +18,9 @@ from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.run import LAYER_PREFIX, Run
+from fleet2d.runs.verdicts import verdict_line, verdicts_of, violations_of
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import KINDS
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in
 from fleet2d.viewer.contract import (
@@ -30,12 +32,12 @@ from fleet2d.viewer.contract import (
     SightingFacts,
     SlowFacts,
     TableFacts,
+    VerdictFacts,
     WallsChange,
 )
 from fleet2d.viewer.home_facts import WallsHistory, door_facts, home_facts
 
 INTERVENTIONS = "interventions"
-VIOLATIONS = "violations"  # name of the table
 
 
 def marks_of(run: Run) -> list[MarkFacts]:
@@ -47,7 +49,7 @@ def marks_of(run: Run) -> list[MarkFacts]:
     manifest = run.manifest
     marks = intervention_marks(manifest.get("interventions") or ())
     verdicts = manifest.get("expectations") or {}
-    violations = _violations(run) if verdicts else {}
+    violations = violations_of(run) if verdicts else {}
     for name, verdict in verdicts.items():
         marks += expectation_marks(name, verdict, violations.get(name, []), manifest["steps"])
     return marks
@@ -147,19 +149,6 @@ def expectation_marks(
     ]
 
 
-def _violations(run: Run) -> dict[str, list[tuple[int, int]]]:
-    """Return the first and last steps of violations in order, by name of the expectation."""
-    if VIOLATIONS not in run.tables:
-        return {}
-    table = run.tables[VIOLATIONS]
-    columns = ("expectation", "step", "last_step")
-    names, first, last = (table[column].to_pylist() for column in columns)
-    violations: dict[str, list[tuple[int, int]]] = {}
-    for name, begin, end in sorted(zip(names, first, last, strict=True)):
-        violations.setdefault(name, []).append((begin, end))
-    return violations
-
-
 JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane
 
 
@@ -251,6 +240,7 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
     """
     manifest = run.manifest
     scenario = manifest["scenario"]
+    verdicts = verdicts_of(run)
     return RunFacts(
         title=run_title(run),
         status=run.status,
@@ -268,8 +258,13 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         tables=[_table_facts(run, name) for name in run.tables],
         walls=walls.changes,
         marks=marks_of(run),
+        verdict=verdict_line(run, verdicts),
+        verdicts=[
+            VerdictFacts(name=v.name, outcome=v.outcome, says=v.says, step=v.step) for v in verdicts
+        ],
         slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
         starts_unlit=_starts_unlit(scenario),
+        event_kinds=sorted(KINDS),
         metrics=run.metrics,
         scenario=scenario,
         walks_every_s=0.0,
@@ -397,8 +392,11 @@ def live_facts(simulation: Simulation) -> RunFacts:
         tables=[],
         walls=[WallsChange(step=0, walls=0)],
         marks=[],
+        verdict="",
+        verdicts=[],
         slows=slow_floors(scenario, simulation.interventions, clock),
         starts_unlit=_starts_unlit(scenario),
+        event_kinds=sorted(KINDS),
         metrics={},
         scenario=scenario,
         walks_every_s=0.0,
