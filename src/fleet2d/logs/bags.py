@@ -10,7 +10,8 @@ from fleet2d.bounds import FIXES
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import F64, I64
 from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.positions import RawFixes, Stamps, localize
+from fleet2d.logs.positions import RawFixes, localize
+from fleet2d.logs.times import Stamps
 from fleet2d.storage.bags import open_bag, planar, stamp_of
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")

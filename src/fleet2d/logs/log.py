@@ -1,10 +1,11 @@
 """Logs of people in one form for all layouts: readings of rooms, or position fixes."""
 
+import codecs
 import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import date, datetime, timedelta, timezone
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -23,7 +24,12 @@ _MAX_NAMED = 20
 _LONGEST = 10_000
 AWAY = "away"
 """The room label for being out of the home."""
-_TIME = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})[ T](\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
+_DATE = r"(?:(\d{4})([-./])(\d{1,2})\2(\d{1,2})|(\d{1,2})([-./])(\d{1,2})\6(\d{4}))"
+_CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,9}))?)?(?:\s?([AP])\.?M\.?)?"
+_ZONE = r"(?:\s?(Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?))?"
+_TIME = re.compile(rf"{_DATE}(?:,?\s+|T){_CLOCK}{_ZONE}", re.IGNORECASE)
+DAY_AND_MONTH = re.compile(r"\s*(\d{1,2})[-/](\d{1,2})[-/]\d{4}")
+"""The beginning of a date whose order of day and month a reader can't know."""
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -42,7 +48,7 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
     """
     with os_errors_as(LogError, f"{path} can't be read"):
         check_file(path, LOG_BYTES, LogError)
-        with path.open(encoding="utf-8", errors="replace") as lines:
+        with path.open(encoding=encoding_of(path), errors="replace") as lines:
             for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
                 if number > LOG_ROWS.limit:
                     LOG_ROWS.check(number, path, LogError, prefix="more than ")
@@ -52,6 +58,13 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
                     )
                 if stripped := text.strip():
                     yield number, stripped
+
+
+def encoding_of(path: Path) -> str:
+    """Return the encoding of a text file by its byte order mark, without one UTF-8."""
+    with path.open("rb") as file:
+        begin = file.read(2)
+    return "utf-16" if begin in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
 
 
 class LogError(InputError):
@@ -117,6 +130,7 @@ class PositionLog:
         xy: Positions in the log's own frame, float64 (n, 2).
         heading: Headings in the log's own frame, float64 (n,) [rad]; NaN where it has none.
         notes: Anomalies in the log, and how they were resolved.
+        unit_m: The unit of the positions [m]; None: the log doesn't say.
     """
 
     path: Path
@@ -126,6 +140,7 @@ class PositionLog:
     xy: F64
     heading: F64
     notes: tuple[str, ...] = ()
+    unit_m: float | None = None
 
     @property
     def days(self) -> int:
@@ -203,8 +218,16 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     return [r._replace(end_us=max(r.end_us, r.begin_us)) for r in readings], notes
 
 
-def parse_time(text: str, path: Path, line: int) -> datetime:
-    """Read a local time like '2011-06-15 01:03:39.14962', exact to the microsecond.
+def parse_time(text: str, path: Path, line: int, *, day_first: bool | None = None) -> datetime:
+    """Read a time like '2011-06-15 01:03:39.14962', exact to the microsecond.
+
+    Days come before months in dates with dots, as in 15.06.2011.
+
+    Args:
+        text: The text, with or without a time zone.
+        path: The file that it is from, for messages.
+        line: Its line.
+        day_first: Whether 03/04/2026 is in April; None: such a date is refused.
 
     Raises:
         LogError: The text is not a time, or there is no such day or hour.
@@ -212,19 +235,43 @@ def parse_time(text: str, path: Path, line: int) -> datetime:
     Example:
         >>> parse_time("2011-06-15 01:03:39.14962", Path("log"), 1).isoformat()
         '2011-06-15T01:03:39.149620'
+        >>> parse_time("15.6.2011 1:03 PM", Path("log"), 1).isoformat()
+        '2011-06-15T13:03:00'
     """
-    match = _TIME.fullmatch(text.strip())
-    if match is None:
+    text = text.strip()
+    match = _TIME.fullmatch(text)
+    if match is None or (match[6] in ("-", "/") and day_first is None):
         raise LogError(
             f"{path}, line {line}: expected a time like '2011-06-15 01:03:39', got"
             f" {one_line(text)!r}"
         )
-    year, month, day, hour, minute = (int(match[i]) for i in range(1, 6))
-    micros = int((match[7] or "").ljust(6, "0")[:6])
+    if match[1]:
+        year, month, day = match[1], match[3], match[4]
+    elif match[6] == "." or day_first:
+        day, month, year = match[5], match[7], match[8]
+    else:
+        month, day, year = match[5], match[7], match[8]
+    hour, half = int(match[9]), (match[13] or "").upper()
+    micros = int((match[12] or "").ljust(6, "0")[:6])
     try:
-        return datetime(year, month, day, hour, minute, int(match[6] or 0), micros)
+        if half and not 1 <= hour <= 12:
+            raise ValueError(f"hour {hour} of a clock of 12 hours")
+        if half:
+            hour = hour % 12 + (12 if half == "P" else 0)
+        moment = datetime(
+            int(year), int(month), int(day), hour, int(match[10]), int(match[11] or 0), micros
+        )
     except ValueError as error:
         raise LogError(f"{path}, line {line}: {one_line(text)!r} is not a time: {error}") from None
+    return moment.replace(tzinfo=_zone(match[14]))
+
+
+def _zone(text: str | None) -> timezone | None:
+    if text is None:
+        return None
+    digits = re.sub(r"\D", "", text).ljust(4, "0")
+    offset = timedelta(hours=int(digits[:2]), minutes=int(digits[2:]))
+    return timezone(-offset if text[0] == "-" else offset)
 
 
 def since(first_day: date, moment: datetime) -> int:
