@@ -212,11 +212,12 @@ class Simulation(InterventionMethods):
 
     @property
     def notes(self) -> list[str]:
-        """What is odd in the floor plan or won't work in it, and about bodies and cameras."""
+        """What is odd in the floor plan or won't work in it, and about bodies and their sources."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
         home = (*self.home.plan.notes, *self._home_errors)
-        return [*home, *sources, *self._unused_heights, *bodies]
+        sensors = self._state.sensors.notes
+        return [*home, *sources, *sensors, *self._unused_heights, *bodies]
 
     @property
     def _unused_heights(self) -> Iterator[str]:

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 from datetime import date, datetime, timedelta, timezone
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError, os_errors_as
@@ -71,6 +75,30 @@ class LogError(InputError):
     """A log is unreadable or contradicts itself; the message says where and what to do."""
 
 
+class LogKeys(Settings):
+    """The keys of what reads a log: how its columns, numbers and times are written.
+
+    Attributes:
+        columns: The names of its columns, as {x: east}.
+        decimal_comma: Whether numbers of a table have a comma as decimal mark; left out: as the
+            table shows.
+        day_first: Whether 03/04/2026 is in April; left out: as other dates of the table show.
+        time_zone: The time zone of the home, if times have one or count from 1970.
+        sort: Sort lines whose time runs backwards; else they are refused.
+    """
+
+    columns: dict[str, str] = Field(default={})
+    decimal_comma: bool | None = None
+    day_first: bool | None = None
+    time_zone: str | None = None
+    sort: bool = False
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """The keys as arguments of `read_log`."""
+        return {name: getattr(self, name) for name in LogKeys.model_fields}
+
+
 class Reading(NamedTuple):
     """A person is in a room, at an instant or for a while.
 
@@ -117,6 +145,17 @@ class ActivityLog:
         """How many readings name each room label."""
         return Counter(reading.room for reading in self.readings)
 
+    @property
+    def noun(self) -> str:
+        """What its lines are, in the plural."""
+        return "readings"
+
+    def moments(self) -> tuple[I64, I64]:
+        """Return the beginning and the end of each reading [us since the first midnight]."""
+        pairs = [(reading.begin_us, reading.end_us) for reading in self.readings]
+        begins, ends = np.array(pairs, np.int64).reshape(-1, 2).T
+        return begins, ends
+
 
 @dataclass(frozen=True)
 class PositionLog:
@@ -147,12 +186,23 @@ class PositionLog:
         """The number of calendar days from its first to its last fix."""
         return int(self.time_us[-1]) // DAY_US + 1
 
+    @property
+    def noun(self) -> str:
+        """What its rows are, in the plural."""
+        return self.layout if self.layout in ("detections", "readings") else "fixes"
+
+    def moments(self) -> tuple[I64, I64]:
+        """Return the time of each fix, as its beginning and its end."""
+        return self.time_us, self.time_us
+
 
 Day = int | Literal["date", "weekday"]
 """The day of a log that is the first of the run: a number, its date, or the same weekday."""
 
 
-def begin_of_run(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
+def begin_of_run(
+    log: ActivityLog | PositionLog, day: Day, clock: Clock
+) -> tuple[int, tuple[str, ...]]:
     """Return the moment of a log that is step 0 of a run [us since the log's first midnight].
 
     Args:
@@ -160,23 +210,44 @@ def begin_of_run(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
         day: The day of the log that is the first of the run.
         clock: The steps of the run.
 
+    Returns:
+        The moment, and a note on what lies outside of the run, if anything does.
+
     Raises:
-        LogError: The log has no such day, or no dates.
+        LogError: All of the log lies outside of the run, or it has no dates.
     """
-    start = clock.start
-    clock_us = micros(start - midnight_of(start))
+    start, begins, ends = clock.start, *log.moments()
     if isinstance(day, str):
         if log.first_day is None:
             raise LogError(f"day: {day} needs a log with dates, and this one has none")
         ahead = (start.date() - log.first_day).days
         day = ahead if day == "date" else ahead % 7
-    if not 0 <= day < log.days:
+    begin_us = day * DAY_US + micros(start - midnight_of(start))
+    end_us = begin_us + clock.steps * clock.step_us
+    first, last = int(begins.min()), int(ends.max())
+    if last < begin_us or first >= end_us:
         since = f", from {log.first_day}" if log.first_day else ""
+        of_log = f"{_moment(clock, first - begin_us)} to {_moment(clock, last - begin_us)}"
+        of_run = f"{_moment(clock, 0)} to {_moment(clock, end_us - begin_us)}"
         raise LogError(
             f"the run begins on day {day} of the log, which has the days 0 to"
-            f" {log.days - 1}{since}; choose another by 'day'"
+            f" {log.days - 1}{since}: by the calendar of the run, the log is from {of_log}, the run"
+            f" from {of_run}; choose another 'day', or set simulation.start"
         )
-    return day * DAY_US + clock_us
+    early, late = np.count_nonzero(ends < begin_us), np.count_nonzero(begins >= end_us)
+    if not early + late:
+        return begin_us, ()
+    return begin_us, (
+        f"of {len(begins)} {log.noun}, {early} are before the run and {late} after its end",
+    )
+
+
+def _moment(clock: Clock, elapsed_us: int) -> str:
+    """Return a moment of a run as text; far ones in days from its start."""
+    try:
+        return str(clock.start + timedelta(microseconds=elapsed_us))
+    except OverflowError:
+        return f"day {elapsed_us // DAY_US}"
 
 
 def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[Reading], list[str]]:

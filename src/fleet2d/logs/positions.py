@@ -1,12 +1,12 @@
 """Position fixes of a real-time location system: a table with time, id, x, y and heading."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from fleet2d.kernels import F64
+from fleet2d.kernels import F64, Bool
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.tables import LogTable
 from fleet2d.logs.times import LocalTimes, Stamps
@@ -43,8 +43,7 @@ def read_positions(
         LogError: A column or the tag is missing, a value is not a number, or times run backwards.
     """
     table = LogTable.read(path, columns or {}, decimal_comma=decimal_comma, day_first=day_first)
-    table, notes = _of_tag(table, id)
-    fixes = RawFixes.of(table, notes)
+    fixes = RawFixes.of(table, _of_tag(table, id))
     return localize(path, "positions", fixes, time_zone=time_zone, sort=sort)
 
 
@@ -58,6 +57,7 @@ class RawFixes(NamedTuple):
         heading: float64 (n,) [rad], NaN where there is none.
         notes: Anomalies in the file.
         unit_m: The unit of x and y [m]; None: the file doesn't say.
+        chosen: Which of them count, bool (n,); None: all.
     """
 
     stamps: Stamps
@@ -66,17 +66,26 @@ class RawFixes(NamedTuple):
     heading: F64
     notes: list[str]
     unit_m: float | None = None
+    chosen: Bool | None = None
 
     @classmethod
-    def of(cls, table: LogTable, notes: Iterable[str] = ()) -> Self:
-        """Return the fixes of a table."""
+    def of(cls, table: LogTable, chosen: Bool | None = None) -> Self:
+        """Return the fixes of a table; `chosen` are those that count, bool (n,)."""
         x, y, unit = table.numbers("x"), table.numbers("y"), table.unit("x")
-        told = [] if unit is None else [f"positions are in {unit}, as the names of columns say"]
-        return cls(table.stamps(), x, y, table.headings(), [*notes, *told], table.unit_m)
+        notes = [] if unit is None else [f"positions are in {unit}, as the names of columns say"]
+        if chosen is not None and not chosen.all():
+            notes.append(f"{np.count_nonzero(~chosen)} fixes of other ids were left out")
+        return cls(table.stamps(), x, y, table.headings(), notes, table.unit_m, chosen)
 
     def local(self, path: Path, noun: str, *, time_zone: str | None, sort: bool) -> LocalTimes:
         """Return the local times of those with a position; see `Stamps.local`."""
-        usable, notes = np.isfinite(self.x) & np.isfinite(self.y), self.notes
+        chosen, is_placed = self.chosen, np.isfinite(self.x) & np.isfinite(self.y)
+        if chosen is None:
+            chosen = np.ones(len(is_placed), bool)
+        without = np.count_nonzero(chosen & ~is_placed)
+        if without:
+            self.notes.append(f"{without} {noun} without a position were left out")
+        usable, notes = chosen & is_placed, self.notes
         return self.stamps.local(path, noun, usable, notes, time_zone=time_zone, sort=sort)
 
 
@@ -96,7 +105,7 @@ def localize(
         LogError: There is no fix, times run backwards or are out of range, or a time zone is
             missing or unknown.
     """
-    _, x, y, heading, notes, unit_m = fixes
+    _, x, y, heading, notes, unit_m, _ = fixes
     time_us, row, first_day = fixes.local(path, "fixes", time_zone=time_zone, sort=sort)
     last = np.append(np.diff(time_us) > 0, True)
     if not last.all():
@@ -107,16 +116,12 @@ def localize(
     return PositionLog(path, layout, *columns, unit_m=unit_m)
 
 
-def _of_tag(table: LogTable, tag: str | None) -> tuple[LogTable, list[str]]:
-    """Return the rows of one tag, and notes."""
+def _of_tag(table: LogTable, tag: str | None) -> Bool | None:
+    """Return which rows are of one tag; None: all."""
     if not table.rows.num_rows:
         raise LogError(f"{table.path} holds no position")
-    if "id" not in table.named:
-        if tag is not None:
-            raise LogError(
-                f"{table.path} has no column of ids: leave out 'id', or name it by columns"
-            )
-        return table, []
-    of_tag = table.of("id", tag)
-    others = len(table.line) - len(of_tag.line)
-    return of_tag, [f"{others} fixes of other ids were left out"] if others else []
+    if "id" in table.named:
+        return table.rows_of("id", tag)
+    if tag is not None:
+        raise LogError(f"{table.path} has no column of ids: leave out 'id', or name it by columns")
+    return None

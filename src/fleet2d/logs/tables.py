@@ -111,7 +111,7 @@ def _read_csv(path: Path) -> tuple[pa.Table, I64]:
         delimiter, content = head.decode().strip()[4:] or "\t", rest
     else:
         delimiter = max("\t;,", key=re.sub('"[^"]*"', "", head.decode()).count)
-    names = next(_rows(content.partition(b"\n")[0], delimiter), [])
+    names: list[str] = next(_rows(content.partition(b"\n")[0], delimiter), [])
     has_quotes = b'"' in content
     table = pacsv.read_csv(
         pa.BufferReader(content),
@@ -121,14 +121,22 @@ def _read_csv(path: Path) -> tuple[pa.Table, I64]:
     FIXES.check(table.num_rows, path, LogError)
     line = np.arange(2, table.num_rows + 2)
     if has_quotes or b"\n\n" in content or b"\n\r\n" in content:
-        reader, ends = _rows(content, delimiter), [0]
-        ends += [reader.line_num for row in reader if row]
-        line = np.array(ends[1:-1], np.int64) + 1
+        line = _first_lines(_rows(content, delimiter))
     return table, line + names_excel
 
 
 def _rows(content: bytes, delimiter: str) -> Any:
     return csv.reader(io.StringIO(content.decode(), newline=""), delimiter=delimiter)
+
+
+def _first_lines(rows: Any) -> I64:
+    """Return the line in which each row after the head begins; blank lines are no rows."""
+    lines, begin = [], 1
+    for row in rows:
+        if row:
+            lines.append(begin)
+        begin = rows.line_num + 1
+    return np.array(lines[1:], np.int64)
 
 
 def _named_unit(column: str, quantity: str) -> tuple[str, str | None]:
@@ -394,8 +402,8 @@ class LogTable:
         """Return the table with some of its rows: bool (n,)."""
         return replace(self, rows=self.rows.filter(pa.array(is_kept)), line=self.line[is_kept])
 
-    def of(self, quantity: str, name: str | None) -> Self:
-        """Return the rows of one of several names in a column; None: of the only one.
+    def rows_of(self, quantity: str, name: str | None) -> Bool:
+        """Return which rows are of one of several names in a column; None: of the only one.
 
         Raises:
             LogError: There is no such name, or there are several.
@@ -411,8 +419,8 @@ class LogTable:
             near = did_you_mean(name, known)
             raise LogError(f"{self.path} has no {quantity} {name!r}{near} There are: {listed}")
         if len(known) <= 1:
-            return self
-        return self.where(pc.equal(texts, name).to_numpy(zero_copy_only=False))
+            return np.ones(len(texts), bool)
+        return np.asarray(pc.equal(texts, name).to_numpy(zero_copy_only=False), bool)
 
 
 def _is_text(column: pa.Array) -> bool:

@@ -67,7 +67,7 @@ class Stamps(NamedTuple):
         Args:
             path: The file.
             noun: What its rows are called in notes, in the plural.
-            usable: Whether each row has a position, bool (n,).
+            usable: Whether each row counts, bool (n,).
             notes: Gets a line for each kind of anomaly.
             time_zone: The time zone of the home.
             sort: Put rows in order of time instead of refusing times that run backwards.
@@ -88,21 +88,21 @@ class Stamps(NamedTuple):
                     " time_zone, like 'Europe/Berlin' or 'UTC'"
                 )
             time_us, repeated = _in_zone(time_us, time_zone)
-        if not usable.all():
-            notes.append(f"{np.count_nonzero(~usable)} {noun} without a position were left out")
-        if repeated.any():
+        twice = np.count_nonzero(repeated & usable)
+        if twice:
             notes.append(
-                f"{np.count_nonzero(repeated)} {noun} of the hour that the end of summer time"
+                f"{twice} {noun} of the hour that the end of summer time"
                 " repeats were left out: a simulated day has 24 hours"
             )
         row = np.flatnonzero(usable & ~repeated)
         if not len(row):
             raise LogError(f"{path} has no row with a position")
+        # Also of rows that don't count: parts of one file begin with the same day.
+        first_day = int(time_us.min()) // DAY_US
         time_us, row, order_notes = _in_order(time_us[row], row, path, line, sort=sort)
         notes.extend([*order_notes, *_jumps(time_us, line[row])])
         if not has_date:
             return LocalTimes(time_us, row, None)
-        first_day = int(time_us[0]) // DAY_US
         since_us = time_us - first_day * DAY_US
         return LocalTimes(since_us, row, date(1970, 1, 1) + timedelta(days=first_day))
 
