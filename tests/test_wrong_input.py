@@ -389,7 +389,7 @@ CASES = [(path, name) for path, names in FAILING.items() for name in names]
 def test_a_component_that_fails_is_named_with_exit_1(fleet2d: Cli, where: str, name: str) -> None:
     Path("mine.py").write_text(COMPONENTS)
     bucket, entry = where.split(".")
-    fields = {"type": f"mine:{name}", **({"period": 60} if bucket == "algorithms" else {})}
+    fields = {"type": f"mine:{name}", **({"period": "60 s"} if bucket == "algorithms" else {})}
     content = small()
     content[bucket] = {**content.get(bucket, {}), entry: fields}
     scenario_file = written(content)
@@ -408,7 +408,7 @@ def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d: Cli) -> None
         "    def update(self, history, state):\n        raise RuntimeError('no ruler')\n"
     )
     content = small()
-    content["metrics"] = {"broken": {"type": "mine:Breaks", "period": 60}}
+    content["metrics"] = {"broken": {"type": "mine:Breaks", "period": "60 s"}}
     code, _, err = fleet2d("run", written(content), "--out", "run")
     assert 1 == code
     assert "metrics.broken" in err
@@ -457,7 +457,7 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
         (["validate", "floorplan.path=he.json"], ["unknown key 'path'", "is a key of", "houseexpo", "give floorplan.type, too"]),
         (["validate", "bundled:rounds", "robots.astro.dwell=5 min"], ["unknown key 'dwell'", "robots.astro.behaviors.0.dwell"]),
         (["run", "home.yaml", "users.bob=null"], ["users.bob", "none of this name", "ana"]),
-        (["run", "home.yaml", "robots.astro.behaviors.3.dwell=5"], ["behaviors.3"]),
+        (["run", "home.yaml", "robots.astro.behaviors.3.dwell=5 s"], ["behaviors.3"]),
         (["run", "home.yaml", "other.yaml"], ["'other.yaml'", "no '='"]),
         (["run", "home.yaml", "--fast"], ["--fast"]),
         (["rum"], ["rum"]),
