@@ -49,7 +49,11 @@ FORMULAS: list[tuple[str, Expectation, int]] = [
     ("(x >= 0.5) since (y >= 1)", since(X >= 0.5, Y >= 1), 0),
     ("(x >= 0.5) since[0:4] (y >= 1)", since(X >= 0.5, Y >= 1, within="4 s"), 0),
     ("(x >= 0.5) since[1:4] (y >= 1)", since(X >= 0.5, Y >= 1, within="1..4 s"), 0),
-    ("always[0:3](eventually[0:2](x >= 0.5))", always(eventually(X >= 0.5, within="2 s"), within="3 s"), 5),
+    (
+        "always[0:3](eventually[0:2](x >= 0.5))",
+        always(eventually(X >= 0.5, within="2 s"), within="3 s"),
+        5,
+    ),
     ("always(x >= 0.5)", always(X >= 0.5), 0),
     ("eventually(x >= 0.5)", eventually(X >= 0.5), 0),
 ]

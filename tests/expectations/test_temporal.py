@@ -29,6 +29,14 @@ from fleet2d.expectations.expectation import Expectation, RunSignals, Trace
 from fleet2d.expectations.verdict import verdict_of
 from fleet2d.runtime.clock import Clock
 
+
+def seconds(limit: Any) -> Any:
+    """Return a limit in steps of a second as one of an expectation."""
+    if isinstance(limit, tuple):
+        return tuple(map(seconds, limit))
+    return None if limit is None else timedelta(seconds=limit)
+
+
 CLOCK = Clock(datetime(2026, 1, 5), 1_000_000, 1000)
 BUILD = {
     "is": lambda name: moving(name),
@@ -36,14 +44,14 @@ BUILD = {
     "less": lambda one, other: metric(one) < metric(other),
     "not": lambda part: ~part,
     "implies": lambda one, other: implies(one, other),
-    "once": lambda part, steps: once(part, within=steps),
-    "since": lambda hold, goal, steps: since(hold, goal, within=steps),
+    "once": lambda part, steps: once(part, within=seconds(steps)),
+    "since": lambda hold, goal, steps: since(hold, goal, within=seconds(steps)),
     "and": lambda one, other: one & other,
     "or": lambda one, other: one | other,
-    "always": lambda part, steps: always(part, within=steps),
-    "eventually": lambda part, steps: eventually(part, within=steps),
-    "until": lambda hold, goal, steps: until(hold, goal, within=steps),
-    "after": lambda trigger, part, steps: after(trigger, part, within=steps),
+    "always": lambda part, steps: always(part, within=seconds(steps)),
+    "eventually": lambda part, steps: eventually(part, within=seconds(steps)),
+    "until": lambda hold, goal, steps: until(hold, goal, within=seconds(steps)),
+    "after": lambda trigger, part, steps: after(trigger, part, within=seconds(steps)),
     "holds_for": lambda part, steps: holds_for(part, f"{steps} s"),
 }
 atoms: st.SearchStrategy[Any] = st.sampled_from(
