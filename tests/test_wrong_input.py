@@ -451,6 +451,18 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
         (["run", "home.yaml", "simulation..x=1"], ["key is empty"]),
         (["run", "home.yaml", "simulation.durations=1 h"], ["durations", "did you mean 'duration'"]),
         (["run", "home.yaml", "users.ana.speed=fast"], ["users.ana.speed=fast", "expected a speed"]),
+        (["validate", "home.yaml", "simulation.duration=7"], ["7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"]),
+        (["validate", "home.yaml", "robots.astro.behaviors[0].dwell=1 h"], ["write robots.astro.behaviors.0.dwell=1 h"]),
+        (["validate", "home.yaml", "simulation/seed=3"], ["write simulation.seed=3"]),
+        (["validate", "home.yaml", "seed=3"], ["unknown key 'seed'", "Write simulation.seed"]),
+        (["validate", "home.yaml", "astro.speed=1"], ["unknown key 'astro'", "Write robots.astro"]),
+        (["validate", "home.yaml", "users=[ana]"], ["expected a mapping of keys, got ['ana']: write {ana: …}"]),
+        (["validate", "home.yaml", "users={null: routine}"], ["null is not text in YAML: choose another name"]),
+        (["validate", "home.yaml", "users={007: routine}"], ["the name '007' must be letters"]),
+        (["validate", "home.yaml", "robots.astro.behaviors=hangout"], ["expected a list, got 'hangout': write [hangout]"]),
+        (["validate", "home.yaml", "expect={a: never(room(astro) = bathroom)}"], ["write never(room(astro) == bathroom)"]),
+        (["validate", "home.yaml", "expect={a: always(speed(astro) => 1 && moving(astro))}"], ["write always(speed(astro) >= 1 and moving(astro))"]),
+        (["validate", "home.yaml", "robots.astro.camera.range=0.3,4.5"], ["expected a list like [0"]),
         (["validate", "home.yaml", "robots.asto.speed=0.3"], ["there is no robots.asto", "did you mean 'astro'"]),
         (["validate", "home.yaml", "robots.astro.camera.range=4.5"], ["expected a list like [0"]),
         (["validate", "floorplan=nope.json"], ["override 'floorplan=nope.json': floorplan.type", "to read a file write {type: TYPE, path: nope.json} with one of ", "houseexpo", "valetudo"]),
@@ -489,7 +501,7 @@ def test_a_flat_that_moved_is_named_by_the_file_that_names_it(fleet2d: Cli) -> N
     content = small()
     content["floorplan"]["path"] = str(plan)
     scenario_file = written(content)
-    assert 0 == fleet2d("validate", scenario_file)[0]
+    assert "" == fleet2d("validate", scenario_file)[2]  # one of its rooms has no door
     plan.unlink()
     check(
         fleet2d("validate", scenario_file),
