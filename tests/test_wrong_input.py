@@ -389,7 +389,7 @@ CASES = [(path, name) for path, names in FAILING.items() for name in names]
 def test_a_component_that_fails_is_named_with_exit_1(fleet2d: Cli, where: str, name: str) -> None:
     Path("mine.py").write_text(COMPONENTS)
     bucket, entry = where.split(".")
-    fields = {"type": f"mine:{name}", **({"period": 60} if bucket == "algorithms" else {})}
+    fields = {"type": f"mine:{name}", **({"period": "60 s"} if bucket == "algorithms" else {})}
     content = small()
     content[bucket] = {**content.get(bucket, {}), entry: fields}
     scenario_file = written(content)
@@ -408,7 +408,7 @@ def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d: Cli) -> None
         "    def update(self, history, state):\n        raise RuntimeError('no ruler')\n"
     )
     content = small()
-    content["metrics"] = {"broken": {"type": "mine:Breaks", "period": 60}}
+    content["metrics"] = {"broken": {"type": "mine:Breaks", "period": "60 s"}}
     code, _, err = fleet2d("run", written(content), "--out", "run")
     assert 1 == code
     assert "metrics.broken" in err
@@ -451,13 +451,25 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
         (["run", "home.yaml", "simulation..x=1"], ["key is empty"]),
         (["run", "home.yaml", "simulation.durations=1 h"], ["durations", "did you mean 'duration'"]),
         (["run", "home.yaml", "users.ana.speed=fast"], ["users.ana.speed=fast", "expected a speed"]),
+        (["validate", "home.yaml", "simulation.duration=7"], ["7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"]),
+        (["validate", "home.yaml", "robots.astro.behaviors[0].dwell=1 h"], ["write robots.astro.behaviors.0.dwell=1 h"]),
+        (["validate", "home.yaml", "simulation/seed=3"], ["write simulation.seed=3"]),
+        (["validate", "home.yaml", "seed=3"], ["unknown key 'seed'", "Write simulation.seed"]),
+        (["validate", "home.yaml", "astro.speed=1"], ["unknown key 'astro'", "Write robots.astro"]),
+        (["validate", "home.yaml", "users=[ana]"], ["expected a mapping of keys, got ['ana']: write {ana: …}"]),
+        (["validate", "home.yaml", "users={null: routine}"], ["null is not text in YAML: choose another name"]),
+        (["validate", "home.yaml", "users={007: routine}"], ["the name '007' must be letters"]),
+        (["validate", "home.yaml", "robots.astro.behaviors=hangout"], ["expected a list, got 'hangout': write [hangout]"]),
+        (["validate", "home.yaml", "expect={a: never(room(astro) = bathroom)}"], ["write never(room(astro) == bathroom)"]),
+        (["validate", "home.yaml", "expect={a: always(speed(astro) => 1 && moving(astro))}"], ["write always(speed(astro) >= 1 and moving(astro))"]),
+        (["validate", "home.yaml", "robots.astro.camera.range=0.3,4.5"], ["expected a list like [0"]),
         (["validate", "home.yaml", "robots.asto.speed=0.3"], ["there is no robots.asto", "did you mean 'astro'"]),
         (["validate", "home.yaml", "robots.astro.camera.range=4.5"], ["expected a list like [0"]),
         (["validate", "floorplan=nope.json"], ["override 'floorplan=nope.json': floorplan.type", "to read a file write {type: TYPE, path: nope.json} with one of ", "houseexpo", "valetudo"]),
         (["validate", "floorplan.path=he.json"], ["unknown key 'path'", "is a key of", "houseexpo", "give floorplan.type, too"]),
         (["validate", "bundled:rounds", "robots.astro.dwell=5 min"], ["unknown key 'dwell'", "robots.astro.behaviors.0.dwell"]),
         (["run", "home.yaml", "users.bob=null"], ["users.bob", "none of this name", "ana"]),
-        (["run", "home.yaml", "robots.astro.behaviors.3.dwell=5"], ["behaviors.3"]),
+        (["run", "home.yaml", "robots.astro.behaviors.3.dwell=5 s"], ["behaviors.3"]),
         (["run", "home.yaml", "other.yaml"], ["'other.yaml'", "no '='"]),
         (["run", "home.yaml", "--fast"], ["--fast"]),
         (["rum"], ["rum"]),
@@ -489,7 +501,7 @@ def test_a_flat_that_moved_is_named_by_the_file_that_names_it(fleet2d: Cli) -> N
     content = small()
     content["floorplan"]["path"] = str(plan)
     scenario_file = written(content)
-    assert 0 == fleet2d("validate", scenario_file)[0]
+    assert "" == fleet2d("validate", scenario_file)[2]  # one of its rooms has no door
     plan.unlink()
     check(
         fleet2d("validate", scenario_file),

@@ -185,11 +185,24 @@ def test_progress_is_shown_on_a_terminal_only(fleet2d: Cli) -> None:
 
 def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
     code, out, err = fleet2d("validate", written(small()), "simulation.step=2 s")
-    assert (0, "") == (code, err)
-    for word in ("ok", "1 user", "1 robot", "flat", "150 steps of 2 s", "2026-01-05 07:00"):
+    assert (2, "") == (code, err)
+    assert "\nwrong: a body of radius 0.15 m can't get to storage_0" in out
+    for word in ("wrong", "1 user", "1 robot", "flat", "150 steps of 2 s", "2026-01-05 07:00"):
         assert word in out
     assert ["home.yaml"] == [path.name for path in Path().iterdir()]
     assert 0 == fleet2d("validate")[0]
+
+
+def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d: Cli) -> None:
+    file = written(small())
+    code, out, err = fleet2d("run", file, "--out", "run")
+    wrong = "wrong: a body of radius 0.15 m can't get to storage_0 (4.0 m2)"
+    assert (0, f"{wrong}\n") == (code, err)
+    assert f"note: {wrong}" in out
+    assert wrong in json.loads(Path("run/manifest.json").read_text())["notes"]
+    code, out, err = fleet2d("run", file, "--out", "other", "--strict")
+    assert (2, "") == (code, out)
+    assert f"{wrong}\nerror: flat: --strict refuses" in err
 
 
 @pytest.fixture(scope="module")

@@ -52,9 +52,8 @@ def message(type_: Any, value: object) -> str:
     ("written", "microseconds"),
     [
         (timedelta(hours=1), 3_600_000_000),
-        (1, 1_000_000),
-        (0.1, 100_000),
-        (0.1 + 0.2, 300_000),
+        ({"s": 0.1}, 100_000),
+        ({"s": 0.1 + 0.2}, 300_000),
         ("1 s", 1_000_000),
         ("14 d", 1_209_600_000_000),
         ("1.5 h", 5_400_000_000),
@@ -65,7 +64,8 @@ def message(type_: Any, value: object) -> str:
         ("1 day, 1 s", 86_401_000_000),
         ("1e-3 s", 1000),
         ("7 µs", 7),
-        ("90", 90_000_000),
+        ("90 s", 90_000_000),
+        (timedelta(seconds=90), 90_000_000),
         ({"days": 30, "hours": 2}, 2_599_200_000_000),
         ({"minutes": 0.1}, 6_000_000),
         (0, 0),
@@ -84,7 +84,7 @@ def test_duration_survives_its_canonical_spelling(count: int) -> None:
 
 @pytest.mark.parametrize(
     ("written", "dumped"),
-    [("30 d", "30 d"), ("60 min", "1 h"), (90, "90 s"), ("500 ms", "0.5 s"), (0, "0 s"),
+    [("30 d", "30 d"), ("60 min", "1 h"), ("90 s", "90 s"), ("500 ms", "0.5 s"), (0, "0 s"),
      ("2 weeks", "14 d"), ("1 us", "0.000001 s"), ("36 h", "36 h"), ("100 s", "100 s")],
 )  # fmt: skip
 def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dumped: str) -> None:
@@ -100,7 +100,10 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dum
         ("1 parsec", "unknown unit 'parsec' in '1 parsec': a duration is written like '30 s', "
                      "'5 min', '1 h', '14 d'"),
         ({"fortnights": 1}, "unknown unit 'fortnights' in"),
-        ("fast", "expected a duration, got 'fast': write a number in s, or like '30 s'"),
+        ("fast", "expected a duration, got 'fast': write it with a unit, like '30 s'"),
+        (7, "7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"),
+        ("7", "7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"),
+        (0.5, "0.5 has no unit: write '0.5 d'"),
         ("", "expected a duration, got ''"),
         ("5 3", "expected a duration, got '5 3'"),
         ("1 h 30", "expected a duration, got '1 h 30'"),
@@ -108,9 +111,9 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dum
         (None, "expected a duration, got None"),
         ({}, "expected a duration, got {}"),
         ({"days": "3"}, "expected a duration, got {'days': '3'}"),
-        (-1, "expected a duration of 0 or more, got -1 s"),
+        ("-1 s", "expected a duration of 0 or more, got -1 s"),
         (timedelta(-1), "expected a duration of 0 or more"),
-        (1e-7, "expected a duration of 1 microsecond or longer, got 1e-07"),
+        ("1e-7 s", "expected a duration of 1 microsecond or longer, got '1e-7 s'"),
         ("1e300 s", "expected a duration of at most 1000 years, got '1e300 s'"),
         (timedelta.max, "expected a duration of at most 1000 years"),
         (float("nan"), "expected a duration, a finite number, got nan"),

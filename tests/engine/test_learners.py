@@ -143,9 +143,9 @@ def test_a_reader_sees_the_output_of_the_same_step_others_that_of_before() -> No
 
     fleet2d.run(
         watched("30 s", algorithms={
-            "reader": algorithm(reader, reads=("source",), period=5),
-            "source": algorithm(source, period=5),
-        }, metrics={"judge": metric(judge, period=10)})
+            "reader": algorithm(reader, reads=("source",), period="5 s"),
+            "source": algorithm(source, period="5 s"),
+        }, metrics={"judge": metric(judge, period="10 s")})
         | {"users": {"ana": {"behaviors": [Look()]}}}
     )  # fmt: skip
     ends = list(range(5, 31, 5))
@@ -175,7 +175,7 @@ def test_histories_are_whole_periods_without_gaps(max_span: int | None) -> None:
             "10 min",
             algorithms={
                 "a": algorithm(record("a"), period="3 min"),
-                "b": algorithm(record("b"), period=1),
+                "b": algorithm(record("b"), period="1 s"),
             },
         ),
         max_span=max_span,
@@ -281,14 +281,14 @@ def test_algorithms_may_ask_for_robots_but_not_for_users() -> None:
         history.poses("ana")
 
     with pytest.raises(ComponentError) as caught:
-        fleet2d.run(watched(algorithms={"a": algorithm(update, period=60)}))
+        fleet2d.run(watched(algorithms={"a": algorithm(update, period="60 s")}))
     for word in ("algorithms.a", "'ana'", "only metrics know where users are", "astro"):
         assert word in str(caught.value)
 
 
 def test_an_unknown_body_is_refused_with_those_there_are() -> None:
     with pytest.raises(ComponentError, match=r"no such body.*ana, astro"):
-        fleet2d.run(watched(metrics={"m": metric(lambda h, s: h.poses("bob"), period=60)}))
+        fleet2d.run(watched(metrics={"m": metric(lambda h, s: h.poses("bob"), period="60 s")}))
 
 
 def test_draws_of_an_algorithm_depend_on_path_purpose_and_step() -> None:
@@ -298,7 +298,7 @@ def test_draws_of_an_algorithm_depend_on_path_purpose_and_step() -> None:
         for purpose in ("this", "that"):
             drawn[state.path, purpose, state.step] = state.random(purpose).uniform()
 
-    fleet2d.run(watched("5 min", algorithms={n: algorithm(update, period=60) for n in "ab"}))
+    fleet2d.run(watched("5 min", algorithms={n: algorithm(update, period="60 s") for n in "ab"}))
     assert 20 == len(drawn) == len(set(drawn.values()))
 
 
@@ -309,7 +309,9 @@ def test_outputs_become_rows_with_step_and_time() -> None:
     def update(history: History, state: Present) -> Any:
         return {"n": history.end, "share": 0.5, "late": history.end > 60, "word": f"w{history.end}"}
 
-    rows = table(fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period=60)})), "a")
+    rows = table(
+        fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")})), "a"
+    )
     assert ["step", "time", "n", "share", "late", "word"] == list(rows)
     assert [59, 119] == rows["step"].tolist()
     assert ["2026-01-05T07:00:59", "2026-01-05T07:01:59"] == [str(t)[:19] for t in rows["time"]]
@@ -323,7 +325,9 @@ def test_arrays_become_a_row_per_entry() -> None:
         watched(
             "1 min",
             algorithms={
-                "a": algorithm(lambda h, s: {"x": np.arange(3), "y": ["p", "q", "r"]}, period=30)
+                "a": algorithm(
+                    lambda h, s: {"x": np.arange(3), "y": ["p", "q", "r"]}, period="30 s"
+                )
             },
         )
     )
@@ -335,7 +339,7 @@ def test_arrays_become_a_row_per_entry() -> None:
 
 def test_nothing_put_out_is_no_table_and_no_output() -> None:
     simulation = fleet2d.Simulation(
-        watched("2 min", algorithms={"a": algorithm(lambda h, s: None, period=60)})
+        watched("2 min", algorithms={"a": algorithm(lambda h, s: None, period="60 s")})
     )
     stored = simulation.run()
     assert "a" not in stored.tables
@@ -345,7 +349,7 @@ def test_nothing_put_out_is_no_table_and_no_output() -> None:
 def test_an_output_of_none_keeps_the_one_before() -> None:
     update = lambda h, s: {"end": h.end} if h.end == 60 else None  # noqa: E731
     simulation = fleet2d.Simulation(
-        watched("3 min", algorithms={"a": algorithm(update, period=60)})
+        watched("3 min", algorithms={"a": algorithm(update, period="60 s")})
     )
     simulation.run()
     assert {"a": {"end": 60}} == simulation.outputs
@@ -354,7 +358,7 @@ def test_an_output_of_none_keeps_the_one_before() -> None:
 @pytest.mark.parametrize("name", ["events", "trajectories", "observations", "key_frames"])
 def test_an_algorithm_may_be_called_like_a_table_of_the_engine(name: str) -> None:
     stored = fleet2d.run(
-        watched("2 min", algorithms={name: algorithm(lambda h, s: {"n": 1}, period=60)})
+        watched("2 min", algorithms={name: algorithm(lambda h, s: {"n": 1}, period="60 s")})
     )
     assert [1, 1] == table(stored, f"algorithms_{name}")["n"].tolist()
 
@@ -363,8 +367,8 @@ def test_an_algorithm_and_a_metric_of_one_name_have_a_table_each() -> None:
     stored = fleet2d.run(
         watched(
             "2 min",
-            algorithms={"same": algorithm(lambda h, s: {"n": 1}, period=60)},
-            metrics={"same": metric(lambda h, s: {"other": 0.5, "more": 1}, period=60)},
+            algorithms={"same": algorithm(lambda h, s: {"n": 1}, period="60 s")},
+            metrics={"same": metric(lambda h, s: {"other": 0.5, "more": 1}, period="60 s")},
         )
     )
     assert [1, 1] == table(stored, "same")["n"].tolist()
@@ -374,21 +378,21 @@ def test_an_algorithm_and_a_metric_of_one_name_have_a_table_each() -> None:
 def test_fractions_where_whole_numbers_came_first_are_refused() -> None:
     update = lambda h, s: {"mean": 0 if h.end == 60 else 0.5}  # noqa: E731
     with pytest.raises((ComponentError, ArtifactError)) as caught:
-        fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period=60)}))
+        fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")}))
     for word in ("algorithms.a", "'mean'", "float64", "int64", "0.0"):
         assert word in str(caught.value)
 
 
 def test_whole_numbers_where_fractions_came_first_are_stored() -> None:
     update = lambda h, s: {"mean": 0.5 if h.end == 60 else 1}  # noqa: E731
-    stored = fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period=60)}))
+    stored = fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")}))
     assert [0.5, 1.0] == table(stored, "a")["mean"].tolist()
 
 
 def test_other_columns_than_before_are_refused() -> None:
     update = lambda h, s: {"x": 1} if h.end == 60 else {"x": 1, "y": 2}  # noqa: E731
     with pytest.raises(ComponentError, match=r"algorithms\.a returned x, y, but x before"):
-        fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period=60)}))
+        fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")}))
 
 
 def test_what_one_component_does_to_its_history_is_not_seen_by_others() -> None:
@@ -403,7 +407,7 @@ def test_what_one_component_does_to_its_history_is_not_seen_by_others() -> None:
             except ValueError:
                 assert not array.flags.writeable
 
-    names = {"a": metric(spoil, period=60), "b": metric(spoil, period=60)}
+    names = {"a": metric(spoil, period="60 s"), "b": metric(spoil, period="60 s")}
     stored = fleet2d.run(watched("10 min", metrics=names))
     assert len(table(stored, "observations")["x"])
     assert table(stored, "observations")["x"].all()
@@ -413,8 +417,8 @@ def test_what_one_component_does_to_its_history_is_not_seen_by_others() -> None:
 def test_outputs_may_be_left_unstored() -> None:
     content = watched(
         "2 min",
-        algorithms={"a": algorithm(lambda h, s: {"n": 1}, period=60)},
-        metrics={"m": metric(lambda h, s: {"n": 1}, period=60)},
+        algorithms={"a": algorithm(lambda h, s: {"n": 1}, period="60 s")},
+        metrics={"m": metric(lambda h, s: {"n": 1}, period="60 s")},
         artifacts={"outputs": False},
     )
     stored = fleet2d.run(content)
@@ -445,7 +449,7 @@ def test_outputs_may_be_left_unstored() -> None:
 def test_an_output_that_can_not_be_is_an_error_with_a_name(output: Any, words: list[str]) -> None:
     with pytest.raises((ComponentError, ArtifactError)) as caught:
         fleet2d.run(
-            watched("2 min", algorithms={"mine": algorithm(lambda h, s: output(s), period=60)})
+            watched("2 min", algorithms={"mine": algorithm(lambda h, s: output(s), period="60 s")})
         )
     for word in ("algorithms.mine", *words):
         assert word in str(caught.value)

@@ -18,7 +18,8 @@ def small(every: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("every", "steps"), [("1 min", 60), ("10 min", 600), ("every step", 1), ("1 s", 1), (90, 90)]
+    ("every", "steps"),
+    [("1 min", 60), ("10 min", 600), ("every step", 1), ("1 s", 1), ("90 s", 90)],
 )
 def test_trajectories_are_stored_as_often_as_asked(every: Any, steps: int) -> None:
     rows = table(run(small(every)), "trajectories", entity="ben")

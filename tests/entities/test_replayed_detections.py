@@ -187,7 +187,7 @@ def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen: Path) -> N
 
     run = fleet2d.run(content)
 
-    note = "robots.astro: 30 detections before the run and 0 after its end were left out"
+    note = "robots.astro: of 61 detections, 30 are before the run and 0 after its end"
     assert note in run.manifest["notes"]
     assert run.tables["observations"].num_rows == 31
 
@@ -206,7 +206,7 @@ def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen: Path) -> N
         (
             [(90000, "ana", 1.0, 1.0), (90001, "ana", 1.0, 1.0)],
             {},
-            "none of its 2 detections is in the run: 0 before it begins, 2 after it ends",
+            "the log is from 2026-01-06 01:00:00 to 2026-01-06 01:00:01, the run from 2026-01-05 00:00:00",
         ),
         (
             [(0, "ana", 1.0, 1.0)],

@@ -37,19 +37,23 @@ FORMULAS: list[tuple[str, Expectation, int]] = [
     ("x >= y", X >= Y, 0),
     ("x + y >= 1", X + Y >= 1, 0),
     ("x - y <= 1", X - Y <= 1, 0),
-    ("always[0:5](x >= 0.5)", always(X >= 0.5, within=5), 5),
-    ("eventually[0:5](x >= 0.5)", eventually(X >= 0.5, within=5), 5),
-    ("always[2:6](x >= 0.5)", always(X >= 0.5, within=(2, 6)), 6),
-    ("eventually[2:6](x >= 0.5)", eventually(X >= 0.5, within=(2, 6)), 6),
-    ("(x >= 0.5) until[0:4] (y >= 1)", until(X >= 0.5, Y >= 1, within=4), 4),
-    ("(x >= 0.5) until[2:5] (y >= 1)", until(X >= 0.5, Y >= 1, within=(2, 5)), 5),
+    ("always[0:5](x >= 0.5)", always(X >= 0.5, within="5 s"), 5),
+    ("eventually[0:5](x >= 0.5)", eventually(X >= 0.5, within="5 s"), 5),
+    ("always[2:6](x >= 0.5)", always(X >= 0.5, within="2..6 s"), 6),
+    ("eventually[2:6](x >= 0.5)", eventually(X >= 0.5, within="2..6 s"), 6),
+    ("(x >= 0.5) until[0:4] (y >= 1)", until(X >= 0.5, Y >= 1, within="4 s"), 4),
+    ("(x >= 0.5) until[2:5] (y >= 1)", until(X >= 0.5, Y >= 1, within="2..5 s"), 5),
     ("once(x >= 0.5)", once(X >= 0.5), 0),
-    ("once[0:3](x >= 0.5)", once(X >= 0.5, within=3), 0),
-    ("once[2:5](x >= 0.5)", once(X >= 0.5, within=(2, 5)), 0),
+    ("once[0:3](x >= 0.5)", once(X >= 0.5, within="3 s"), 0),
+    ("once[2:5](x >= 0.5)", once(X >= 0.5, within="2..5 s"), 0),
     ("(x >= 0.5) since (y >= 1)", since(X >= 0.5, Y >= 1), 0),
-    ("(x >= 0.5) since[0:4] (y >= 1)", since(X >= 0.5, Y >= 1, within=4), 0),
-    ("(x >= 0.5) since[1:4] (y >= 1)", since(X >= 0.5, Y >= 1, within=(1, 4)), 0),
-    ("always[0:3](eventually[0:2](x >= 0.5))", always(eventually(X >= 0.5, within=2), within=3), 5),
+    ("(x >= 0.5) since[0:4] (y >= 1)", since(X >= 0.5, Y >= 1, within="4 s"), 0),
+    ("(x >= 0.5) since[1:4] (y >= 1)", since(X >= 0.5, Y >= 1, within="1..4 s"), 0),
+    (
+        "always[0:3](eventually[0:2](x >= 0.5))",
+        always(eventually(X >= 0.5, within="2 s"), within="3 s"),
+        5,
+    ),
     ("always(x >= 0.5)", always(X >= 0.5), 0),
     ("eventually(x >= 0.5)", eventually(X >= 0.5), 0),
 ]
@@ -93,7 +97,7 @@ def test_robustness_equals_that_of_rtamt(
 @given(x=signals)
 def test_holds_for_is_historically(x: list[float]) -> None:
     known = known_of({"x": x}, STEPS, over=True)
-    ours = np.array(dense(holds_for(X >= 0.5, 3).robustness(known, True)))
+    ours = np.array(dense(holds_for(X >= 0.5, "3 s").robustness(known, True)))
 
     np.testing.assert_allclose(
         theirs("historically[0:3](x >= 0.5)", x, x)[3:], ours[3:], atol=1e-12

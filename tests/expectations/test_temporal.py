@@ -29,6 +29,14 @@ from fleet2d.expectations.expectation import Expectation, RunSignals, Trace
 from fleet2d.expectations.verdict import verdict_of
 from fleet2d.runtime.clock import Clock
 
+
+def seconds(limit: Any) -> Any:
+    """Return a limit in steps of a second as one of an expectation."""
+    if isinstance(limit, tuple):
+        return tuple(map(seconds, limit))
+    return None if limit is None else timedelta(seconds=limit)
+
+
 CLOCK = Clock(datetime(2026, 1, 5), 1_000_000, 1000)
 BUILD = {
     "is": lambda name: moving(name),
@@ -36,15 +44,15 @@ BUILD = {
     "less": lambda one, other: metric(one) < metric(other),
     "not": lambda part: ~part,
     "implies": lambda one, other: implies(one, other),
-    "once": lambda part, steps: once(part, within=steps),
-    "since": lambda hold, goal, steps: since(hold, goal, within=steps),
+    "once": lambda part, steps: once(part, within=seconds(steps)),
+    "since": lambda hold, goal, steps: since(hold, goal, within=seconds(steps)),
     "and": lambda one, other: one & other,
     "or": lambda one, other: one | other,
-    "always": lambda part, steps: always(part, within=steps),
-    "eventually": lambda part, steps: eventually(part, within=steps),
-    "until": lambda hold, goal, steps: until(hold, goal, within=steps),
-    "after": lambda trigger, part, steps: after(trigger, part, within=steps),
-    "holds_for": lambda part, steps: holds_for(part, steps),
+    "always": lambda part, steps: always(part, within=seconds(steps)),
+    "eventually": lambda part, steps: eventually(part, within=seconds(steps)),
+    "until": lambda hold, goal, steps: until(hold, goal, within=seconds(steps)),
+    "after": lambda trigger, part, steps: after(trigger, part, within=seconds(steps)),
+    "holds_for": lambda part, steps: holds_for(part, f"{steps} s"),
 }
 atoms: st.SearchStrategy[Any] = st.sampled_from(
     [("is", "a"), ("is", "b"), ("above", "x", 0.5), ("above", "y", -0.5), ("less", "x", "y")]
@@ -147,7 +155,7 @@ def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
     a, b = [0] * 14, [0] * 14
     a[1] = a[5] = 1
     b[2] = 1
-    expectation = after(moving("a"), moving("b"), within=3)
+    expectation = after(moving("a"), moving("b"), within="3 s")
     verdict = verdict_of("", expectation, known_of({"a": a, "b": b}, 14, over=True))
 
     assert [(v.first, v.last) for v in verdict.violations] == [(5, 8)]
@@ -159,20 +167,20 @@ def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
 
 def test_occasions_cut_by_the_end_of_the_run_do_not_count() -> None:
     a = [0] * 12 + [1, 0]
-    expectation = after(moving("a"), moving("b"), within=3)
+    expectation = after(moving("a"), moving("b"), within="3 s")
     verdict = verdict_of("", expectation, known_of({"a": a, "b": [0] * 14}, 14, over=True))
 
     assert (verdict.holds, verdict.slack_s, verdict.occasions) == (None, None, 0)
     assert verdict.untested == "its trigger came only too near to the end"
     assert str(verdict).endswith("is untested: its trigger came only too near to the end")
-    whole = after(moving("a"), moving("b"), within=1)
+    whole = after(moving("a"), moving("b"), within="1 s")
     verdict = verdict_of("", whole, known_of({"a": a, "b": [0] * 13 + [1]}, 14, over=True))
     assert (verdict.holds, verdict.occasions) == (True, 1)
 
 
 def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it() -> None:
     b = [0, 0, 0, 1] + [0] * 10
-    expectation = eventually(moving("b"), within=5)
+    expectation = eventually(moving("b"), within="5 s")
 
     def at(end: int) -> tuple[bool, bool]:
         verdict = verdict_of("", expectation, known_of({"b": b}, end, over=False))

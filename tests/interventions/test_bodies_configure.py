@@ -39,7 +39,7 @@ def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("behavior", "keys", "error", "words"),
     [
-        ("hangot", {"tau": 3}, ScenarioError, "did you mean 'hangout'"),
+        ("hangot", {"tau": "3 s"}, ScenarioError, "did you mean 'hangout'"),
         ("hangout", {"tao": 3}, ScenarioError, "did you mean 'tau'"),
         ("hangout", {"source": "lpt"}, ScenarioError, "did you mean 'ltp'"),
         ("hangout", {"avoid": ["bethroom"]}, PlacementError, "did you mean 'bathroom'"),

@@ -37,7 +37,7 @@ def test_a_time_of_day_may_have_days_before_it(text: str, days: Any, hours: floa
         ("2026-01-07 14:00", datetime(2026, 1, 7, 14)),
         ("2026-01-07", datetime(2026, 1, 7)),
         ("2 d 14 h", timedelta(days=2, hours=14)),
-        (3600, timedelta(hours=1)),
+        ("3600 s", timedelta(hours=1)),
     ],
 )
 def test_a_date_or_a_time_from_the_start_is_a_time(text: Any, meaning: Any) -> None:

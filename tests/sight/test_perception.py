@@ -186,8 +186,8 @@ def test_misses_are_correlated_with_their_time_constant(
     still = np.full(N, 3.0)
     watch = Watch(
         around(still, 0 * still),
-        camera={"detection": 0.6, "period": period * step_s, "lost_after": 60},
-        perception={"detection": {"memory": memory}},
+        camera={"detection": 0.6, "period": f"{period * step_s} s", "lost_after": "60 s"},
+        perception={"detection": {"memory": f"{memory} s"}},
         step_s=step_s,
     )
     hits = noticed(watch)[::period]
@@ -206,7 +206,7 @@ def test_attention_fades_while_a_user_is_out_of_view() -> None:
     watch = Watch(
         around(np.minimum(distance, 9.5), 0 * distance),
         camera={"detection": 0.5, "range": [0, 9]},
-        perception={"detection": {"memory": 30}},
+        perception={"detection": {"memory": "30 s"}},
     )
     hits = noticed(watch)
     first, second, following = hits[:-31:31], hits[1:-31:31], hits[31::31]
@@ -218,7 +218,7 @@ def test_attention_fades_while_a_user_is_out_of_view() -> None:
 def test_misses_of_two_users_are_independent() -> None:
     still = np.full(N, 3.0)
     users = np.concatenate([around(still, 0 * still), around(still, 90 + 0 * still)])
-    watch = Watch(users, camera={"detection": 0.5}, perception={"detection": {"memory": 1}})
+    watch = Watch(users, camera={"detection": 0.5}, perception={"detection": {"memory": "1 s"}})
     rows = watch.look()
     ana, ben = (
         np.bincount(rows[rows[:, Column.USER] == u, Column.STEP], minlength=N) for u in (0, 1)
@@ -449,7 +449,7 @@ EVERYTHING = {
         "bearing": [[-180, 0.6], [180, 1]],
         "orientation": [[0, 1], [180, 0.7]],
         "light": [[0, 0.5], [12, 1]],
-        "memory": 10,
+        "memory": "10 s",
     },
     "false_positives": {"per_hour": 60, "spots": [{"at": [12, 12], "per_hour": 60}]},
     "identity": {"right": 0.8, "mistaken": 0.1, "per_track": True},

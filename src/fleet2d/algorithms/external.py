@@ -19,8 +19,8 @@ from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PositiveDuration, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
-from fleet2d.logs.log import AWAY, LogError
-from fleet2d.logs.positions import LogTable
+from fleet2d.logs.log import AWAY, LogError, LogKeys
+from fleet2d.logs.tables import LogTable
 from fleet2d.runtime.program import ExternalProgram
 
 # What ends an Arrow IPC stream: no further message.
@@ -170,7 +170,7 @@ _TABLES = {"observations": _observations, "evidence": _evidence, "poses": _poses
 
 
 @register("algorithm", "replay")
-class ReplayedOutput(Algorithm):
+class ReplayedOutput(Algorithm, LogKeys):
     """Put out what an algorithm believed according to a table: shares of rooms at some times.
 
     A table of a stored run, such as its `ltp.parquet`, is one; shares are given at home, so rows of
@@ -181,13 +181,10 @@ class ReplayedOutput(Algorithm):
         path: The table (.csv, .parquet, .jsonl): a row for each time and room.
         columns: Names of its columns time, room, share and user, as {share: belief}.
         user: The person whose shares count, if the table has several.
-        time_zone: The time zone of the home, if its times have one or count from 1970.
     """
 
     path: InputPath
-    columns: dict[str, str] = Field(default={})
     user: str | None = None
-    time_zone: str | None = None
 
     def files(self) -> list[Path]:
         """Return the file that it reads."""
@@ -199,19 +196,26 @@ class ReplayedOutput(Algorithm):
         Raises:
             LogError: It can't be read, lacks a column, or names rooms or people of another home.
         """
-        table = LogTable.read(self.path, self.columns, NAMES, ("time", "room", "share"))
+        table = LogTable.read(
+            self.path,
+            self.columns,
+            NAMES,
+            ("time", "room", "share"),
+            decimal_comma=self.decimal_comma,
+            day_first=self.day_first,
+        )
         if "user" in table.named:
-            table = table.of("user", self.user)
+            table = table.where(table.rows_of("user", self.user))
         rooms = [room.name for room in home.rooms]
-        is_at_home = pc.fill_null(pc.not_equal(table.texts("room"), AWAY), False).combine_chunks()
+        is_at_home = pc.fill_null(pc.not_equal(table.texts("room"), AWAY), False)
         table = table.where(is_at_home.to_numpy(zero_copy_only=False))
-        texts = table.texts("room").combine_chunks()
+        texts = table.texts("room")
         for name in pc.unique(texts).to_pylist():
             check_known(name, "room", rooms, LogError, f"{self.path}: ")
         room = pc.index_in(texts, value_set=pa.array(rooms)).to_numpy(zero_copy_only=False)
         share, stamps, zone = table.numbers("share"), table.stamps(), self.time_zone
         usable = np.isfinite(share)
-        local = stamps.local(self.path, "shares", usable, [], time_zone=zone, sort=True)
+        local = stamps.local(self.path, "shares", usable, [], time_zone=zone, sort=self.sort)
         is_new = np.append(True, np.diff(local.time_us) > 0)
         self._times, self._day = local.time_us[is_new], local.first_day
         self._shares = np.zeros((len(self._times), len(rooms)))

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from fleet2d.errors import ArtifactError, RunDirectoryError, blame, os_errors_as, own_frames
+from fleet2d.errors import (
+    ArtifactError,
+    InputError,
+    RunDirectoryError,
+    blame,
+    os_errors_as,
+    own_frames,
+)
 from fleet2d.options import Trust, file_name, resume_hint, show_code, split
 from fleet2d.runs.verdicts import verdict_line, verdicts_of
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
@@ -218,6 +225,9 @@ def _since_start() -> float:
         return time.perf_counter() - _LOADED
 
 
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Refuse a home in which something will not work.")
+]
 Arguments = Annotated[
     list[str] | None,
     typer.Argument(
@@ -233,16 +243,30 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Directory for the run.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    strict: Strict = False,
 ) -> None:
     """Simulate a scenario and store the run."""
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
-        result = run_with_progress(
-            _set_up(arguments, seed, out), show=sys.stderr.isatty() and not quiet
-        )
+        simulation = _set_up(arguments, seed, out, strict=strict, quiet=quiet)
+        result = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
     print_results(result, as_json=as_json, quiet=quiet)
 
 
-def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> "Simulation":
+def report_wrong(simulation: "Simulation", *, strict: bool, quiet: bool = False) -> None:
+    """Print to stderr what will not work in a home, unless `quiet`.
+
+    Raises:
+        InputError: Something will not, and `strict` refuses that.
+    """
+    for text in simulation.wrong if strict or not quiet else ():
+        typer.echo(f"wrong: {text}", err=True)
+    if strict and simulation.wrong:
+        raise InputError(f"{simulation.home.plan.name}: --strict refuses a home like that")
+
+
+def _set_up(
+    arguments: list[str] | None, seed: int | None, out: Path | None, **wrong: bool
+) -> "Simulation":
     with rare_collections():
         from fleet2d.engine.simulation import Simulation
         from fleet2d.scenario.model import load_scenario
@@ -256,7 +280,9 @@ def _set_up(arguments: list[str] | None, seed: int | None, out: Path | None) -> 
         name = loaded.name or (Path(scenario).stem if scenario else "run")
         directory = out or _fresh_directory(name)
         try:
-            return Simulation(loaded, out=directory)
+            simulation = Simulation(loaded, out=directory)
+            report_wrong(simulation, **wrong)
+            return simulation
         except BaseException:
             if out is None:
                 with suppress(OSError):

@@ -52,22 +52,25 @@ def validate(
 
     simulation = Simulation(scenario, *overrides)
     plan, settings = simulation.home.plan, simulation.scenario.simulation
+    verdict = "wrong" if simulation.wrong else "ok"
     typer.echo(
-        f"ok: {counted(len(simulation.scenario.users), 'user')} and"
+        f"{verdict}: {counted(len(simulation.scenario.users), 'user')} and"
         f" {counted(len(simulation.scenario.robots), 'robot')} in {plan.name}"
         f" ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
         f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
     )
     for note in simulation.notes:
-        typer.echo(f"note: {note}")
+        typer.echo(note if note.startswith("wrong: ") else f"note: {note}")
     for actor in simulation.actors.values():
         for behavior in actor.behaviors:
             for note in getattr(behavior, "notes", ()):
                 typer.echo(f"note: {actor.path}: {note}")
+    if simulation.wrong:
+        raise typer.Exit(2)
 
 
 def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None:
-    """Print the findings of a floor plan and draw them; exit with 2 if it is unlivable.
+    """Print the findings of a floor plan and draw them; exit with 2 if something is wrong.
 
     Without matplotlib there is no picture, which is an error only if one is asked for.
     """
@@ -92,7 +95,7 @@ def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None
     for note in plan.notes:
         typer.echo(f"note: {note}")
     typer.echo(picture)
-    if any(finding.severity == "unlivable" for finding in findings):
+    if any(finding.severity != "odd" for finding in findings):
         raise typer.Exit(2)
 
 

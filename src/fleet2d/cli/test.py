@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 
 import typer
 
+from fleet2d.cli.run import Strict, report_wrong
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import Fleet2DError, InputError, os_errors_as
 from fleet2d.options import file_name
@@ -189,7 +190,7 @@ MAX_STORED_SEEDS = 5
 """Maximum number of failing seeds of one scenario that are stored or drawn."""
 
 
-def test(
+def test(  # noqa: PLR0913 - options of the command line
     arguments: Annotated[
         list[str],
         typer.Argument(
@@ -216,6 +217,7 @@ def test(
         Path | None, typer.Option(help="Folder for the run directories of seeds that fail.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    strict: Strict = False,
 ) -> None:
     """Run scenarios and judge their expectations; exit code 1 if one is violated."""
     files = [argument for argument in arguments if "=" not in argument]
@@ -228,7 +230,7 @@ def test(
         case
         for file in files
         for home, change in _homes(homes, file, overrides)
-        for case in _cases(file, [*overrides, *change], seeds, seed, home)
+        for case in _cases(file, [*overrides, *change], seeds, seed, home, strict=strict)
     ]
     failures: Counter[str] = Counter()
     for case in cases:
@@ -273,7 +275,13 @@ def _homes(
 
 
 def _cases(
-    source: str, overrides: Sequence[str], seeds: int, seed: int | None, home: str = ""
+    source: str,
+    overrides: Sequence[str],
+    seeds: int,
+    seed: int | None,
+    home: str = "",
+    *,
+    strict: bool = False,
 ) -> Iterator[ScenarioCase]:
     """Yield a scenario with each of its seeds, after a check of its set-up.
 
@@ -293,7 +301,7 @@ def _cases(
         seed = scenario.simulation.seed
     first_seed = FIRST_SEED if seed is None else seed
     if not home:  # of several homes, some may lack what it needs
-        Simulation(scenario)
+        report_wrong(Simulation(scenario), strict=strict)
     for number in range(first_seed, first_seed + seeds):
         simulation = scenario.simulation.model_copy(update={"seed": number})
         yield ScenarioCase(

@@ -124,6 +124,10 @@ class DescribedModel(BaseModel):
 _FORM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 
 
+# What YAML takes for no text, so that a name couldn't be referred to without quotes.
+_NO_TEXT = frozenset({"null", "true", "false"})
+
+
 def _check_names(entries: Any) -> Any:
     """Refuse names that can't be part of a key path, a file name or a table name."""
     if isinstance(entries, Mapping):
@@ -135,6 +139,8 @@ def _check_names(entries: Any) -> Any:
                     f"the name {one_line(repr(name))} must be letters, digits, '_' and '-', a"
                     " letter first, 100 characters at most",
                 )
+            if str(name).lower() in _NO_TEXT:
+                raise problem_at((name,), f"{name} is not text in YAML: choose another name")
     return entries
 
 

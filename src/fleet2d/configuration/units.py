@@ -1,7 +1,8 @@
 """Types for the fields of a configuration: quantities with units, paths, days of the week.
 
-Each quantity reads a number in SI units (angles: degrees) or text with a unit, converts it exactly,
-and refuses values that are not finite. Models dump to JSON in the canonical spelling.
+Each quantity reads a number in SI units (angles: degrees; durations need a unit) or text with a
+unit, converts it exactly, and refuses values that are not finite. Models dump to JSON in the
+canonical spelling.
 """
 
 import math
@@ -20,6 +21,7 @@ from urllib.parse import SplitResult, urlsplit
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import did_you_mean, problem, shown
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.inputs import resolved
@@ -147,12 +149,21 @@ _TIME_OF_DAY = re.compile(r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:\.\d{1,6})?))?")
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity, its base unit, and the size of its units in base units, by spelling."""
+    """A physical quantity, and how it is written.
+
+    Attributes:
+        name: Its name, with an article.
+        base: Its base unit.
+        units: The size of its units in base units, by spelling.
+        examples: Values.
+        asked: The units to choose from if a number has none; without, it is in the base unit.
+    """
 
     name: str
     base: str
     units: Mapping[str, Fraction]
     examples: tuple[str, ...]
+    asked: tuple[str, ...] = ()
 
     def parse(self, value: object) -> Fraction:
         """Return the exact value in base units of a number, a text, or a mapping {unit: number}.
@@ -167,7 +178,13 @@ class Quantity:
                 (self._number(n, value) * self._unit(u, value) for u, n in value.items()),
                 Fraction(0),
             )
-        return self._number(value, value)
+        return self._without_unit(self._number(value, value), value)
+
+    def _without_unit(self, number: Fraction, value: object) -> Fraction:
+        if number and self.asked:
+            *first, last = (f"'{str(value).strip()} {unit}'" for unit in self.asked)
+            raise problem(f"{one_line(value)} has no unit: write {', '.join(first)} or {last}")
+        return number
 
     def _parse_text(self, text: str) -> Fraction:
         total, position = Fraction(0), 0
@@ -177,7 +194,10 @@ class Quantity:
                 raise self._unreadable(text)
             if len(part[1]) > MAX_DIGITS:
                 raise problem(f"expected at most {MAX_DIGITS} digits in a row, got {shown(text)}")
-            total += Fraction(part[1]) * (self._unit(part[2], text) if part[2] else 1)
+            number = Fraction(part[1])
+            total += (
+                number * self._unit(part[2], text) if part[2] else self._without_unit(number, text)
+            )
             position = part.end()
         return total
 
@@ -207,7 +227,8 @@ class Quantity:
 
     def _forms(self) -> str:
         unit = f" in {self.base}" if self.base else ""
-        return f"a number{unit}, or like {self._examples()}"
+        number = "it with a unit," if self.asked else f"a number{unit}, or"
+        return f"{number} like {self._examples()}"
 
     def _examples(self) -> str:
         return ", ".join(f"'{example}'" for example in self.examples)
@@ -218,7 +239,11 @@ class Quantity:
             {
                 "description": f"{self.name}: {self._forms()}",
                 "x-quantity": self.name.split(" ", 1)[1] + (f" [{self.base}]" if self.base else ""),
-                "anyOf": [{"type": "number"}, {"type": "string"}, *others],
+                "anyOf": [
+                    {"const": 0} if self.asked else {"type": "number"},
+                    {"type": "string"},
+                    *others,
+                ],
                 "examples": list(self.examples),
             }
         )
@@ -246,6 +271,7 @@ DURATION = Quantity(
         w=(604_800, "week weeks"),
     ),
     ("30 s", "5 min", "1 h", "14 d"),
+    ("d", "h", "min", "s"),
 )
 LENGTH = Quantity(
     "a length",
@@ -313,13 +339,14 @@ def whole_steps(
 
 
 def parse_duration(value: object) -> timedelta:
-    """Read a duration: a timedelta, a number of seconds, text, or {unit: number}.
+    """Read a duration: a timedelta, text with units, {unit: number}, or 0.
 
     >>> parse_duration("1 h 30 min") == parse_duration({"hours": 1.5}) == timedelta(seconds=5400)
     True
 
     Raises:
-        PydanticCustomError: not a duration, negative, too long, or shorter than a microsecond.
+        PydanticCustomError: not a duration, without a unit, negative, too long, or shorter than a
+            microsecond.
     """
     if not isinstance(value, timedelta):
         seconds = DURATION.parse(value)

@@ -76,6 +76,12 @@ class Sensors(Watcher):
         self._activities: dict[str, list[tuple[int, str]]] = {user.name: [] for user in basis.users}
 
     @property
+    def notes(self) -> list[str]:
+        """What is to be said about the tables of replayed sensors."""
+        notes = {name: getattr(sensor, "notes", ()) for name, sensor in self.sensors.items()}
+        return [f"objects.{name}: {note}" for name in notes for note in notes[name]]
+
+    @property
     def on(self) -> dict[str, bool]:
         """Whether each sensor is on at present."""
         return {name: state.on for name, state in self._states.items()}

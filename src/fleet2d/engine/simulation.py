@@ -221,11 +221,12 @@ class Simulation(InterventionMethods):
 
     @property
     def notes(self) -> list[str]:
-        """What is odd in the floor plan or won't work in it, and about bodies and cameras."""
+        """What is odd in the floor plan or won't work in it, and about bodies and their sources."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
-        home = (*self.home.plan.notes, *self._home_errors)
-        return [*home, *sources, *self._unused_heights, *bodies]
+        wrong, sensors = (f"wrong: {text}" for text in self.wrong), self._state.sensors.notes
+        plan = self.home.plan.notes
+        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
 
     @property
     def _unused_heights(self) -> Iterator[str]:
@@ -238,7 +239,7 @@ class Simulation(InterventionMethods):
                     yield f"{actor.path}.{path}.height has no effect without sight.heights: true"
 
     @property
-    def _home_errors(self) -> Sequence[str]:
+    def wrong(self) -> Sequence[str]:
         """What will not work in a home from a file; other homes have been checked."""
         if not self.scenario.floorplan.files():
             return ()

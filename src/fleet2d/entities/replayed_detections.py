@@ -16,7 +16,7 @@ from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.errors import errors_as
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.logs.log import Day, LogError, begin_of_run, files_of
+from fleet2d.logs.log import Day, LogError, LogKeys, begin_of_run, files_of
 from fleet2d.logs.placement import LogFrame
 from fleet2d.storage.bags import is_bag
 
@@ -33,7 +33,7 @@ ANONYMOUS = frozenset({"unknown", "person", "people", "human", "none", "nobody",
 
 
 @register("evidence_source", "replay")
-class ReplayedDetections(EvidenceSource):
+class ReplayedDetections(EvidenceSource, LogKeys):
     """Perceive what a real robot perceived: the detections in a table, or on a topic of a bag.
 
     Detections replace simulated sight for algorithms, behaviors and metrics. Who was really there
@@ -51,8 +51,6 @@ class ReplayedDetections(EvidenceSource):
         relative_to: Whether positions are in the floor plan, after `frame`, or in the frame of the
             robot: x ahead, y to the left.
         frame: The transform from the positions of the log to the floor plan.
-        time_zone: The time zone of the home, if the log's times have one or count from 1970.
-        sort: Sort rows whose time runs backwards; else they are refused.
         day: The day of the log that is the first of the run: a number from 0, its date, or the
             first of the same weekday.
         reach: A detection farther than this from the home's floor is left out.
@@ -60,12 +58,9 @@ class ReplayedDetections(EvidenceSource):
 
     path: InputFileOrFolder
     topic: str | None = None
-    columns: dict[str, str] = Field(default={})
     people: dict[str, str | None] = Field(default={})
     relative_to: Literal["map", "robot"] = "map"
     frame: LogFrame = LogFrame()
-    time_zone: str | None = None
-    sort: bool = False
     day: Day = 0
     reach: Length = Field(default=1.0, ge=0)
 
@@ -84,14 +79,8 @@ class ReplayedDetections(EvidenceSource):
 
         is_robots = self.relative and is_bag(self.path)
         with errors_as(LogError, f"{actor.path}.perceives", of=LogError):
-            log = read_detections(
-                self.path,
-                topic=self.topic,
-                frame=self.frame.name or ("base_link" if is_robots else None),
-                columns=self.columns,
-                time_zone=self.time_zone,
-                sort=self.sort,
-            )
+            frame = self.frame.name or ("base_link" if is_robots else None)
+            log = read_detections(self.path, topic=self.topic, frame=frame, **self.reading)
             self._rows = self._place(log, actor, users)
 
     def sightings(self, first: int, end: int) -> I64:
@@ -101,30 +90,21 @@ class ReplayedDetections(EvidenceSource):
 
     def _place(self, log: "RobotDetections", actor: Actor, users: Sequence[str]) -> I64:
         """Return the detections within the run as rows, and write the notes."""
-        clock = actor.clock
+        clock, frame = actor.clock, self.frame.in_unit(log.unit_m)
         identity = identities(log.labels, log.counts, self.people, users)[log.label]
-        time_us = log.time_us - begin_of_run(log, self.day, clock)
-        step = time_us // clock.step_us
-        early, late = int((step < 0).sum()), int((step >= clock.steps).sum())
+        begin_us, outside_notes = begin_of_run(log, self.day, clock)
+        step = (log.time_us - begin_us) // clock.step_us
         used = (step >= 0) & (step < clock.steps)
-        xy = self.frame.to_plan(log.xy)
-        turns = self.frame.turn_headings(log.heading / (2 * np.pi))
+        xy = frame.to_plan(log.xy)
+        turns = frame.turn_headings(log.heading / (2 * np.pi))
         since = f" from {log.first_day}" if log.first_day else ""
         notes = [
             f"{log.path.name}: {len(step)} detections of {counted(log.days, 'day')}{since}; who"
             " was really there is unknown",
             *log.notes,
-            *self.frame.notes(),
+            *frame.notes(),
+            *outside_notes,
         ]
-        if not used.any():
-            raise LogError(
-                f"none of its {len(step)} detections is in the run: {early} before it begins,"
-                f" {late} after it ends; choose another 'day', or start the run when the log does"
-            )
-        if early or late:
-            notes.append(
-                f"{early} detections before the run and {late} after its end were left out"
-            )
         if not self.relative:
             used &= self._inside(xy, used, actor, notes)
         for name, row in (("nobody known", NOBODY), *((u, i) for i, u in enumerate(users))):

@@ -16,23 +16,26 @@ from fleet2d.configuration.units import (
     Length,
     PeerAddress,
     PositiveLength,
+    format_duration,
 )
 from fleet2d.entities.place import Point
 from fleet2d.entities.sensor import FurnitureSensor, Sensor, SensorView, first_cause
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, TURN, Bool, half_sine, region_contains_points, visible_region
-from fleet2d.logs.log import Day, LogError, PositionLog, begin_of_run
+from fleet2d.logs.log import Day, LogError, LogKeys, PositionLog, begin_of_run
 from fleet2d.runtime.clock import Clock
 
 NAMES = {
-    "time": ("time", "timestamp", "t", "datetime", "time_s"),
-    "sensor": ("sensor", "id", "name", "entity"),
+    "time": ("time", "timestamp", "t", "datetime", "last_changed"),
+    "sensor": ("sensor", "id", "name", "entity", "entity_id"),
     "state": ("state", "value", "message", "on"),
 }
 """The names that a column may have, if the user gives none."""
 ON = frozenset({"on", "open", "true", "1", "1.0", "present", "opened", "motion"})
 OFF = frozenset({"off", "close", "closed", "false", "0", "0.0", "absent", "clear", "none"})
+SILENT = frozenset({"unavailable", "unknown", ""})
+"""The states of a sensor that reports nothing, as Home Assistant writes them."""
 
 
 @register("object", "contact_sensor")
@@ -207,26 +210,24 @@ class LiveSensor(Sensor):
 
 
 @register("object", "replay_sensor")
-class ReplaySensor(Sensor):
+class ReplaySensor(Sensor, LogKeys):
     """A real sensor, whose readings are replayed from a table.
+
+    Where it is `unavailable` or `unknown`, as Home Assistant writes it, it counts as off, and a
+    note says for how long.
 
     Attributes:
         path: The table (.csv, .parquet, .jsonl) with a row for each change of its state.
         room: The room that its readings name.
         columns: Names of the columns time, state and sensor, as {state: value}.
         sensor: The sensor, if the table has several.
-        time_zone: The time zone of the home, if the times have one or count from 1970.
-        sort: Sort rows whose time runs backwards; else they are refused.
         day: The day of the table that is the first of the run: a number from 0, its date, or the
             first of the same weekday.
     """
 
     path: InputPath
     room: str = Field(min_length=1)
-    columns: dict[str, str] = Field(default={})
     sensor: str | None = None
-    time_zone: str | None = None
-    sort: bool = False
     day: Day = 0
 
     def files(self) -> tuple[Path, ...]:
@@ -239,20 +240,39 @@ class ReplaySensor(Sensor):
         Raises:
             LogError: It can't be read, lacks a column, has no such sensor, or a state is unknown.
         """
-        from fleet2d.logs.positions import LogTable
+        from fleet2d.logs.tables import LogTable
 
-        table = LogTable.read(self.path, self.columns, NAMES, ("time", "state"))
-        if "sensor" in table.named:
-            table = table.of("sensor", self.sensor)
-        states = [_is_on(value, self.path) for value in table.column("state").to_pylist()]
-        stamps, usable, zone = table.stamps(), np.ones(len(states), bool), self.time_zone
-        local = stamps.local(self.path, "readings", usable, [], time_zone=zone, sort=self.sort)
-        nothing = np.zeros((len(local.row), 2))
-        log = PositionLog(
-            self.path, "readings", local.first_day, local.time_us, nothing, nothing[:, 0]
+        table = LogTable.read(
+            self.path,
+            self.columns,
+            NAMES,
+            ("time", "state"),
+            decimal_comma=self.decimal_comma,
+            day_first=self.day_first,
         )
-        self._steps = (local.time_us - begin_of_run(log, self.day, clock)) // clock.step_us
-        self._on = np.array(states, bool)[local.row]
+        stamps, zone, count = table.stamps(), self.time_zone, len(table.line)
+        chosen = np.ones(count, bool)
+        if "sensor" in table.named:
+            chosen = table.rows_of("sensor", self.sensor)
+        # The table may be of many sensors: its days, and its end, are those of all.
+        whole = stamps.local(self.path, "rows", np.ones(count, bool), [], time_zone=zone, sort=True)
+        nothing = np.zeros((len(whole.row), 2))
+        log = PositionLog(
+            self.path, "readings", whole.first_day, whole.time_us, nothing, nothing[:, 0]
+        )
+        begin_us, notes = begin_of_run(log, self.day, clock)
+        local = stamps.local(self.path, "readings", chosen, [], time_zone=zone, sort=self.sort)
+        states = table.column("state").to_pylist()
+        on = [_is_on(states[row], self.path, table.line[row]) for row in local.row.tolist()]
+        self._steps = (local.time_us - begin_us) // clock.step_us
+        self._on = np.array([bool(state) for state in on], bool)
+        ends = np.append(self._steps[1:], clock.steps).clip(0, clock.steps)
+        silent = np.array([state is None for state in on], bool)
+        silent_us = int((ends - self._steps.clip(0, clock.steps))[silent].sum()) * clock.step_us
+        gap = format_duration(timedelta(microseconds=silent_us))
+        self.notes = (*notes, f"off for {gap} of the run in which it is unavailable or unknown")
+        if not silent_us:
+            self.notes = notes
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps at which it is on, caused by nobody known."""
@@ -262,13 +282,16 @@ class ReplaySensor(Sensor):
         return on, np.full(len(on), -1, np.int64)
 
 
-def _is_on(value: Any, path: Path) -> bool:
-    """Return whether a state means on.
+def _is_on(value: Any, path: Path, line: int) -> bool | None:
+    """Return whether a state means on; None: the sensor reports nothing.
 
     Raises:
         LogError: The word is unknown.
     """
-    word = str(value).strip().lower()
-    if word not in ON | OFF:
-        raise LogError(f"{path}: the state {value!r} is unknown: expected ON or OFF, OPEN or CLOSE")
-    return word in ON
+    word = "" if value is None else str(value).strip().lower()
+    if word not in ON | OFF | SILENT:
+        raise LogError(
+            f"{path}, line {line}: the state {value!r} is unknown: expected ON or OFF, OPEN or"
+            " CLOSE"
+        )
+    return None if word in SILENT else word in ON

@@ -57,6 +57,13 @@ _LONGEST = 2000
 _DEEPEST = 40
 
 
+# Spellings of other languages, and their form here.
+_SLIPS = (
+    (r"\s*=>\s*", " >= "), (r"\s*=<\s*", " <= "), (r"(?<=\))\s*=\s*(?!=)", " == "),
+    (r"\s*&&\s*", " and "), (r"\s*\|\|\s*", " or "),
+)  # fmt: skip
+
+
 def parse_expectation(text: str) -> Expectation:
     """Read an expectation, or a part of one.
 
@@ -78,9 +85,11 @@ def parse_expectation(text: str) -> Expectation:
         words = _ANSWERED.sub(_answered, text.strip())
         tree = ast.parse(_QUANTITY.sub(_quoted, words), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise InputError(
-            f"{text!r} can't be read: write it like always(distance(ana, astro) > 0.5 m)"
-        ) from None
+        right = text
+        for slip, form in _SLIPS:
+            right = re.sub(slip, form, right)
+        form = "it like always(distance(ana, astro) > 0.5 m)" if right == text else right
+        raise InputError(f"{text!r} can't be read: write {form}") from None
     return _Reader().expectation(tree)
 
 

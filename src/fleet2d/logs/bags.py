@@ -10,7 +10,8 @@ from fleet2d.bounds import FIXES
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
 from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.positions import RawFixes, Stamps, localize
+from fleet2d.logs.positions import RawFixes, localize
+from fleet2d.logs.times import Stamps
 from fleet2d.storage.bags import headings_of, numbers_of, open_bag, stamp_ns, times_of
 
 # From a message to its place and its quaternion.

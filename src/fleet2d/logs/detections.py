@@ -16,7 +16,9 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import I64
 from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
 from fleet2d.logs.log import LogError, PositionLog
-from fleet2d.logs.positions import NAMES, LogTable, RawFixes, Stamps
+from fleet2d.logs.positions import RawFixes
+from fleet2d.logs.tables import NAMES, LogTable
+from fleet2d.logs.times import Stamps
 from fleet2d.storage.bags import headings_of, is_bag, open_bag, stamp_ns, times_of
 
 COLUMNS = {
@@ -71,13 +73,15 @@ def read_detections(
     columns: Mapping[str, str] | None = None,
     time_zone: str | None = None,
     sort: bool = False,
+    decimal_comma: bool | None = None,
+    day_first: bool | None = None,
 ) -> RobotDetections:
     """Read detections of people: time, x, y, and, if there are, whom and heading.
 
     Times are as those of positions; see `read_positions`.
 
     Args:
-        path: A table (.csv, .parquet, .jsonl), or a bag of ROS 1 or ROS 2.
+        path: A table (.csv, .tsv, .parquet, .jsonl), or a bag of ROS 1 or ROS 2.
         topic: The topic of a bag; needed if several have detections.
         frame: The frame of a bag in which positions are returned; None: the map.
         columns: Names of columns, {"user": "face"}. Of a bag, the fields of its messages, like
@@ -85,6 +89,8 @@ def read_detections(
             detections in a message; numbers select an element of a list.
         time_zone: The time zone of the home, if times have a zone or count from 1970.
         sort: Put rows in order of time instead of refusing times that run backwards.
+        decimal_comma: Whether numbers have a comma as decimal mark; None: shown by the file.
+        day_first: Whether 03/04/2026 is in April; None: shown by the file.
 
     Raises:
         LogError: The file can't be read, a column or field is missing, a value is not a number,
@@ -99,25 +105,27 @@ def read_detections(
     else:
         if topic is not None or frame is not None:
             raise LogError(f"{path} is a table: 'topic' is for bags, and so is the name of a frame")
-        fixes, label, labels = _from_table(path, columns or {})
+        table = LogTable.read(
+            path, columns or {}, COLUMNS, decimal_comma=decimal_comma, day_first=day_first
+        )
+        fixes, label, labels = _from_table(table)
     local = fixes.local(path, "detections", time_zone=time_zone, sort=sort)
     xy, heading = np.stack([fixes.x, fixes.y], 1)[local.row], fixes.heading[local.row]
     log = (path, "detections", local.first_day, local.time_us, xy, heading, tuple(fixes.notes))
-    return RobotDetections(*log, label=label[local.row], labels=labels)
+    return RobotDetections(*log, label=label[local.row], labels=labels, unit_m=fixes.unit_m)
 
 
 _LabelledFixes = tuple[RawFixes, I64, tuple[str, ...]]
 """Detections as a file has them, the label of each, and all labels; see `RobotDetections`."""
 
 
-def _from_table(path: Path, columns: Mapping[str, str]) -> _LabelledFixes:
-    table = LogTable.read(path, columns, COLUMNS)
+def _from_table(table: LogTable) -> _LabelledFixes:
     if not table.rows.num_rows:
-        raise LogError(f"{path} holds no detection")
+        raise LogError(f"{table.path} holds no detection")
     label, labels = np.full(len(table.line), -1, np.int64), tuple[str, ...]()
     if "user" in table.named:
-        label, labels = _codes(table.texts("user").combine_chunks())
-    return table.fixes(), label, labels
+        label, labels = _codes(table.texts("user"))
+    return RawFixes.of(table), label, labels
 
 
 def _codes(texts: pa.Array) -> tuple[I64, tuple[str, ...]]:

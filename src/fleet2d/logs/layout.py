@@ -343,7 +343,7 @@ else:
     Layout = Literal[("auto", *LAYOUTS, "bag", "positions")]
 
 
-def read_log(
+def read_log(  # noqa: PLR0913 - each is a key of a scenario
     path: str | Path,
     layout: Layout = "auto",
     *,
@@ -352,6 +352,8 @@ def read_log(
     columns: Mapping[str, str] | None = None,
     time_zone: str | None = None,
     sort: bool = False,
+    decimal_comma: bool | None = None,
+    day_first: bool | None = None,
 ) -> ActivityLog | PositionLog:
     """Read a log: a smart home's events, an activity script, or position fixes.
 
@@ -363,6 +365,9 @@ def read_log(
         columns: The names of the columns of positions; see `read_positions`.
         time_zone: The time zone of the home, for positions and bags; see `read_positions`.
         sort: Sort lines whose time runs backwards instead of refusing them.
+        decimal_comma: Whether numbers of positions have a comma as decimal mark; None: shown by the
+            file.
+        day_first: Whether 03/04/2026 is in April, for positions; None: shown by the file.
 
     Raises:
         LogError: It is of no known layout, damaged, or contradicts itself.
@@ -377,17 +382,27 @@ def read_log(
         # Imported here, as no other layout needs pyarrow.
         from fleet2d.logs.positions import read_positions
 
-        return read_positions(path, id=id, columns=columns, time_zone=time_zone, sort=sort)
+        return read_positions(
+            path,
+            id=id,
+            columns=columns,
+            time_zone=time_zone,
+            sort=sort,
+            decimal_comma=decimal_comma,
+            day_first=day_first,
+        )
+    if columns or decimal_comma is not None or day_first is not None:
+        raise LogError(
+            f"{path} is of the layout {layout}: decimal_comma, day_first and columns are for tables"
+            " of positions"
+        )
     if layout == "bag":
-        if columns:
-            raise LogError(f"{path} is a bag: columns are for tables of positions")
         from fleet2d.logs.bags import read_bag
 
         return read_bag(path, id=id, frame=frame or "map", time_zone=time_zone, sort=sort)
-    if id is not None or columns or time_zone is not None:
+    if id is not None or time_zone is not None:
         raise LogError(
-            f"{path} is of the layout {layout}: id, columns and time_zone are for positions"
-            " and bags"
+            f"{path} is of the layout {layout}: id and time_zone are for positions and bags"
         )
     return LAYOUTS[layout].read(path, sort=sort)
 
@@ -410,17 +425,21 @@ def _recognize(path: Path) -> str:
                 f" ({', '.join(several)}): for other layouts name the file"
             )
         return layout
-    if path.suffix.lower() in (".parquet", ".pq"):
+    suffix = path.suffix.lower()
+    if suffix in (".parquet", ".pq", ".jsonl", ".ndjson"):
         return "positions"
-    layout = _recognize_lines(path) or ("positions" if path.suffix.lower() == ".csv" else None)
+    # Of a table with tabs, the first line tells: others may look like events.
+    layout = _recognize_lines(path, 1 if suffix in (".csv", ".tsv") else FIRST_LINES)
+    if layout is None and suffix in (".csv", ".tsv"):
+        return "positions"
     if layout is None:
         names = ", ".join(LAYOUTS)
         raise LogError(f"{path} has no known layout: give 'format' ({names} or positions)")
     return layout
 
 
-def _recognize_lines(file: Path) -> str | None:
+def _recognize_lines(file: Path, count: int = FIRST_LINES) -> str | None:
     """Return the layout that one of the first lines of a file shows, if one does."""
-    lines = (line for _, line in islice(log_lines(file), FIRST_LINES))
+    lines = (line for _, line in islice(log_lines(file), count))
     shown = (name for line in lines for name, layout in LAYOUTS.items() if layout.matches(line))
     return next(shown, None)

@@ -1,16 +1,21 @@
 """Logs of people in one form for all layouts: readings of rooms, or position fixes."""
 
+import codecs
 import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import date, datetime, timedelta, timezone
 from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
 
 from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import micros
 from fleet2d.errors import InputError, os_errors_as
@@ -25,7 +30,12 @@ _MAX_NAMED = 20
 _LONGEST = 10_000
 AWAY = "away"
 """The room label for being out of the home."""
-_TIME = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})[ T](\d{1,2}):(\d{2})(?::(\d{2})(?:\.(\d{1,9}))?)?")
+_DATE = r"(?:(\d{4})([-./])(\d{1,2})\2(\d{1,2})|(\d{1,2})([-./])(\d{1,2})\6(\d{4}))"
+_CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,9}))?)?(?:\s?([AP])\.?M\.?)?"
+_ZONE = r"(?:\s?(Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?))?"
+_TIME = re.compile(rf"{_DATE}(?:,?\s+|T){_CLOCK}{_ZONE}", re.IGNORECASE)
+DAY_AND_MONTH = re.compile(r"\s*(\d{1,2})[-/](\d{1,2})[-/]\d{4}")
+"""The beginning of a date whose order of day and month a reader can't know."""
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -44,7 +54,7 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
     """
     with os_errors_as(LogError, f"{path} can't be read"):
         check_file(path, LOG_BYTES, LogError)
-        with TextIOWrapper(open_input(path, LogError), "utf-8", "replace") as lines:
+        with TextIOWrapper(open_input(path, LogError), encoding_of(path), "replace") as lines:
             for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
                 if number > LOG_ROWS.limit:
                     LOG_ROWS.check(number, path, LogError, prefix="more than ")
@@ -56,8 +66,39 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
                     yield number, stripped
 
 
+def encoding_of(path: Path) -> str:
+    """Return the encoding of a text file by its byte order mark, without one UTF-8."""
+    with path.open("rb") as file:
+        begin = file.read(2)
+    return "utf-16" if begin in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
+
+
 class LogError(InputError):
     """A log is unreadable or contradicts itself; the message says where and what to do."""
+
+
+class LogKeys(Settings):
+    """The keys of what reads a log: how its columns, numbers and times are written.
+
+    Attributes:
+        columns: The names of its columns, as {x: east}.
+        decimal_comma: Whether numbers of a table have a comma as decimal mark; left out: as the
+            table shows.
+        day_first: Whether 03/04/2026 is in April; left out: as other dates of the table show.
+        time_zone: The time zone of the home, if times have one or count from 1970.
+        sort: Sort lines whose time runs backwards; else they are refused.
+    """
+
+    columns: dict[str, str] = Field(default={})
+    decimal_comma: bool | None = None
+    day_first: bool | None = None
+    time_zone: str | None = None
+    sort: bool = False
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """The keys as arguments of `read_log`."""
+        return {name: getattr(self, name) for name in LogKeys.model_fields}
 
 
 class Reading(NamedTuple):
@@ -106,6 +147,17 @@ class ActivityLog:
         """How many readings name each room label."""
         return Counter(reading.room for reading in self.readings)
 
+    @property
+    def noun(self) -> str:
+        """What its lines are, in the plural."""
+        return "readings"
+
+    def moments(self) -> tuple[I64, I64]:
+        """Return the beginning and the end of each reading [us since the first midnight]."""
+        pairs = [(reading.begin_us, reading.end_us) for reading in self.readings]
+        begins, ends = np.array(pairs, np.int64).reshape(-1, 2).T
+        return begins, ends
+
 
 @dataclass(frozen=True)
 class PositionLog:
@@ -119,6 +171,7 @@ class PositionLog:
         xy: Positions in the log's own frame, float64 (n, 2).
         heading: Headings in the log's own frame, float64 (n,) [rad]; NaN where it has none.
         notes: Anomalies in the log, and how they were resolved.
+        unit_m: The unit of the positions [m]; None: the log doesn't say.
     """
 
     path: Path
@@ -128,18 +181,30 @@ class PositionLog:
     xy: F64
     heading: F64
     notes: tuple[str, ...] = ()
+    unit_m: float | None = None
 
     @property
     def days(self) -> int:
         """The number of calendar days from its first to its last fix."""
         return int(self.time_us[-1]) // DAY_US + 1
 
+    @property
+    def noun(self) -> str:
+        """What its rows are, in the plural."""
+        return self.layout if self.layout in ("detections", "readings") else "fixes"
+
+    def moments(self) -> tuple[I64, I64]:
+        """Return the time of each fix, as its beginning and its end."""
+        return self.time_us, self.time_us
+
 
 Day = int | Literal["date", "weekday"]
 """The day of a log that is the first of the run: a number, its date, or the same weekday."""
 
 
-def begin_of_run(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
+def begin_of_run(
+    log: ActivityLog | PositionLog, day: Day, clock: Clock
+) -> tuple[int, tuple[str, ...]]:
     """Return the moment of a log that is step 0 of a run [us since the log's first midnight].
 
     Args:
@@ -147,23 +212,44 @@ def begin_of_run(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
         day: The day of the log that is the first of the run.
         clock: The steps of the run.
 
+    Returns:
+        The moment, and a note on what lies outside of the run, if anything does.
+
     Raises:
-        LogError: The log has no such day, or no dates.
+        LogError: All of the log lies outside of the run, or it has no dates.
     """
-    start = clock.start
-    clock_us = micros(start - midnight_of(start))
+    start, begins, ends = clock.start, *log.moments()
     if isinstance(day, str):
         if log.first_day is None:
             raise LogError(f"day: {day} needs a log with dates, and this one has none")
         ahead = (start.date() - log.first_day).days
         day = ahead if day == "date" else ahead % 7
-    if not 0 <= day < log.days:
+    begin_us = day * DAY_US + micros(start - midnight_of(start))
+    end_us = begin_us + clock.steps * clock.step_us
+    first, last = int(begins.min()), int(ends.max())
+    if last < begin_us or first >= end_us:
         since = f", from {log.first_day}" if log.first_day else ""
+        of_log = f"{_moment(clock, first - begin_us)} to {_moment(clock, last - begin_us)}"
+        of_run = f"{_moment(clock, 0)} to {_moment(clock, end_us - begin_us)}"
         raise LogError(
             f"the run begins on day {day} of the log, which has the days 0 to"
-            f" {log.days - 1}{since}; choose another by 'day'"
+            f" {log.days - 1}{since}: by the calendar of the run, the log is from {of_log}, the run"
+            f" from {of_run}; choose another 'day', or set simulation.start"
         )
-    return day * DAY_US + clock_us
+    early, late = np.count_nonzero(ends < begin_us), np.count_nonzero(begins >= end_us)
+    if not early + late:
+        return begin_us, ()
+    return begin_us, (
+        f"of {len(begins)} {log.noun}, {early} are before the run and {late} after its end",
+    )
+
+
+def _moment(clock: Clock, elapsed_us: int) -> str:
+    """Return a moment of a run as text; far ones in days from its start."""
+    try:
+        return str(clock.start + timedelta(microseconds=elapsed_us))
+    except OverflowError:
+        return f"day {elapsed_us // DAY_US}"
 
 
 def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[Reading], list[str]]:
@@ -205,8 +291,16 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     return [r._replace(end_us=max(r.end_us, r.begin_us)) for r in readings], notes
 
 
-def parse_time(text: str, path: Path, line: int) -> datetime:
-    """Read a local time like '2011-06-15 01:03:39.14962', exact to the microsecond.
+def parse_time(text: str, path: Path, line: int, *, day_first: bool | None = None) -> datetime:
+    """Read a time like '2011-06-15 01:03:39.14962', exact to the microsecond.
+
+    Days come before months in dates with dots, as in 15.06.2011.
+
+    Args:
+        text: The text, with or without a time zone.
+        path: The file that it is from, for messages.
+        line: Its line.
+        day_first: Whether 03/04/2026 is in April; None: such a date is refused.
 
     Raises:
         LogError: The text is not a time, or there is no such day or hour.
@@ -214,19 +308,43 @@ def parse_time(text: str, path: Path, line: int) -> datetime:
     Example:
         >>> parse_time("2011-06-15 01:03:39.14962", Path("log"), 1).isoformat()
         '2011-06-15T01:03:39.149620'
+        >>> parse_time("15.6.2011 1:03 PM", Path("log"), 1).isoformat()
+        '2011-06-15T13:03:00'
     """
-    match = _TIME.fullmatch(text.strip())
-    if match is None:
+    text = text.strip()
+    match = _TIME.fullmatch(text)
+    if match is None or (match[6] in ("-", "/") and day_first is None):
         raise LogError(
             f"{path}, line {line}: expected a time like '2011-06-15 01:03:39', got"
             f" {one_line(text)!r}"
         )
-    year, month, day, hour, minute = (int(match[i]) for i in range(1, 6))
-    micros = int((match[7] or "").ljust(6, "0")[:6])
+    if match[1]:
+        year, month, day = match[1], match[3], match[4]
+    elif match[6] == "." or day_first:
+        day, month, year = match[5], match[7], match[8]
+    else:
+        month, day, year = match[5], match[7], match[8]
+    hour, half = int(match[9]), (match[13] or "").upper()
+    micros = int((match[12] or "").ljust(6, "0")[:6])
     try:
-        return datetime(year, month, day, hour, minute, int(match[6] or 0), micros)
+        if half and not 1 <= hour <= 12:
+            raise ValueError(f"hour {hour} of a clock of 12 hours")
+        if half:
+            hour = hour % 12 + (12 if half == "P" else 0)
+        moment = datetime(
+            int(year), int(month), int(day), hour, int(match[10]), int(match[11] or 0), micros
+        )
     except ValueError as error:
         raise LogError(f"{path}, line {line}: {one_line(text)!r} is not a time: {error}") from None
+    return moment.replace(tzinfo=_zone(match[14]))
+
+
+def _zone(text: str | None) -> timezone | None:
+    if text is None:
+        return None
+    digits = re.sub(r"\D", "", text).ljust(4, "0")
+    offset = timedelta(hours=int(digits[:2]), minutes=int(digits[2:]))
+    return timezone(-offset if text[0] == "-" else offset)
 
 
 def since(first_day: date, moment: datetime) -> int:

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -86,6 +86,21 @@ class LogFrame(Settings):
             raise problem("give matches, or scale, rotation_deg and origin, and not both")
         if self.matches and len({match.log for match in self.matches}) < 2:
             raise problem("matches: two different places are needed at least")
+
+    def in_unit(self, unit_m: float | None) -> Self:
+        """Return the frame of a log whose own unit is known [m].
+
+        Raises:
+            LogError: `scale` is another one.
+        """
+        if unit_m is None or self.matches or self.scale == unit_m:
+            return self
+        if "scale" in self.model_fields_set:
+            raise LogError(
+                f"frame.scale is {self.scale:g} m, but by the names of its columns the unit of the"
+                f" log is {unit_m:g} m: leave out one of them"
+            )
+        return self.model_copy(update={"scale": unit_m})
 
     def to_plan(self, xy: F64) -> F64:
         """Return positions of the log, float64 (n, 2), as positions in the plan [m]."""

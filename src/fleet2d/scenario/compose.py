@@ -151,6 +151,11 @@ def _read_override(text: str) -> Document:
     place = f"override {(text if len(text) <= 100 else one_line(text, 100))!r}"
     if not equals:
         raise ScenarioError(f"{place}: expected key.path=value, but there is no '='")
+    right = re.sub(r"\[['\"]?(.*?)['\"]?\]", r".\1", key)
+    if "." not in key:
+        right = right.replace("/", ".")
+    if right != key:
+        raise ScenarioError(f"{place}: write {right}={value}")
     if not all(keys):
         raise ScenarioError(f"{place}: a part of its key is empty")
     # '#d62728' is a colour, not a comment, although it is not quoted within the value.

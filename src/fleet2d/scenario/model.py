@@ -1,7 +1,7 @@
 """The scenario: everything that defines a run, and messages about what is wrong in one."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime, timedelta
 from functools import partial
@@ -462,15 +462,32 @@ def describe(*lines: ErrorDetails) -> str:
         *first, last = dict.fromkeys(expected)
         joint = ", or " if any("," in text for text in first) else " or "
         hint = did_you_mean(value, choices) if choices else ""
-        hint = hint if hint.endswith("?") else ""
+        hint = hint if hint.endswith("?") else _right_form(value, expected)
         alternatives = joint.join([*first, last])
         texts.insert(0, f"expected {alternatives}, got {_quote(value)}{hint}")
     return "; or ".join(dict.fromkeys(texts))
 
 
+def _right_form(value: Any, expected: Sequence[str]) -> str:
+    """Return how to write a value of another form; empty if that isn't known."""
+    if "text" in expected and isinstance(value, int | float | date):
+        return ": put it in quotes, as it is written"
+    if expected == ["a list"] and isinstance(value, str):
+        return f": write [{value}]"
+    is_names = isinstance(value, list) and value and all(isinstance(v, str) for v in value)
+    if expected == ["a mapping of keys"] and is_names:
+        return f": write {{{value[0]}: …}}"
+    return ""
+
+
 def _type_with_key(line: ErrorDetails, location: Location, data: Any) -> str:
     """Return which types have an unknown key of a component, and what to do; empty if none has."""
     *parents, key = map(str, location or ("",))
+    if line["type"] == "unknown_key" and not parents:
+        entries = {name: data.get(name) for name in data if isinstance(data[name], Mapping)}
+        sections = {**entries, "simulation": SimulationSettings.model_fields}
+        section = next((name for name, keys in sections.items() if key in keys and name != key), "")
+        return f". Write {section}.{key}" if section else ""
     kind = slot_kind(tuple(parents))
     if line["type"] != "unknown_key" or kind is None:
         return ""

@@ -21,7 +21,16 @@ from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
 from fleet2d.logs import placement
 from fleet2d.logs.layout import Layout, read_log
-from fleet2d.logs.log import AWAY, ActivityLog, Day, LogError, PositionLog, begin_of_run, files_of
+from fleet2d.logs.log import (
+    AWAY,
+    ActivityLog,
+    Day,
+    LogError,
+    LogKeys,
+    PositionLog,
+    begin_of_run,
+    files_of,
+)
 from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -426,7 +435,7 @@ RoomMap = Annotated[
 
 
 @register("behavior", "replay")
-class Replay(Behavior):
+class Replay(Behavior, LogKeys):
     """Be where a person was according to a log: a smart home's events, a script, or positions.
 
     When the log names a room, the body is in it at that step, as it left for it early enough. Where
@@ -437,9 +446,6 @@ class Replay(Behavior):
         path: The log, or the folder of a home's logs.
         format: The layout of the log; auto: recognized by its content.
         id: The tag to follow, if a log of positions has several.
-        columns: The names of the columns of positions, as {x: east}.
-        time_zone: The time zone of the home, if the times of positions have one.
-        sort: Sort lines whose time runs backwards; else they are refused.
         frame: The transform from the positions of the log to the floor plan.
         rooms: The room or kind of room of this home for each room label of the log, or away, or
             door; null leaves it out; labels that aren't listed have their usual meaning.
@@ -459,9 +465,6 @@ class Replay(Behavior):
     path: InputFileOrFolder
     format: Layout = "auto"
     id: str | None = None
-    columns: dict[str, str] = Field(default={})
-    time_zone: str | None = None
-    sort: bool = False
     frame: LogFrame = LogFrame()
     rooms: RoomMap = Field(default={})
     day: Day = 0
@@ -480,19 +483,14 @@ class Replay(Behavior):
         self.visits: list[LoggedVisit] = []
         with errors_as(LogError, actor.path, of=LogError):
             log = read_log(
-                self.path,
-                self.format,
-                id=self.id,
-                frame=self.frame.name,
-                columns=self.columns,
-                time_zone=self.time_zone,
-                sort=self.sort,
+                self.path, self.format, id=self.id, frame=self.frame.name, **self.reading
             )
-            begin_us = begin_of_run(log, self.day, actor.clock)
+            begin_us, outside_notes = begin_of_run(log, self.day, actor.clock)
             if isinstance(log, ActivityLog):
                 self._start_rooms(actor, log, begin_us)
             else:
                 self._start_fixes(actor, log, begin_us)
+        self.notes += outside_notes
 
     def decide(self, now: Situation) -> Plan:
         """Follow the log to its end, from the present step.
@@ -532,7 +530,7 @@ class Replay(Behavior):
     def _start_fixes(self, actor: Actor, log: PositionLog, begin_us: int) -> None:
         if self.rooms:
             raise LogError("a log of positions names no rooms: leave out 'rooms'")
-        clock = actor.clock
+        clock, frame = actor.clock, self.frame.in_unit(log.unit_m)
         time_us = log.time_us - begin_us
         step = time_us // clock.step_us
         # The first fix of each step of the run.
@@ -540,12 +538,12 @@ class Replay(Behavior):
         fixes = place_fixes(
             actor,
             time_us[used],
-            self.frame.to_plan(log.xy[used]),
-            self.frame.turn_headings(log.heading[used] / (2 * np.pi)),
+            frame.to_plan(log.xy[used]),
+            frame.turn_headings(log.heading[used] / (2 * np.pi)),
             self.reach,
         )
         gap_us = units.micros(self.gap or GAP_OF_FIXES)
         self.follower = FixFollower(actor, fixes, gap_us, self.gaps, self.fastest)
         self.follower.follow(Plan(actor, 0))
         thinned = int(np.count_nonzero(step[1:] == step[:-1]))
-        self.notes = report_fixes(log, self.follower, thinned, self.frame)
+        self.notes = report_fixes(log, self.follower, thinned, frame)

@@ -1,0 +1,270 @@
+"""Times of logs: text, timestamps and numbers since 1970 as local times, in order."""
+
+from datetime import UTC, date, datetime, timedelta
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+from zoneinfo import ZoneInfo, available_timezones
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from fleet2d.bounds import LOG_DAYS, one_line
+from fleet2d.configuration.problems import did_you_mean
+from fleet2d.configuration.units import micros
+from fleet2d.kernels import I64, Bool
+from fleet2d.logs.log import DAY_AND_MONTH, LogError, parse_time
+from fleet2d.runtime.clock import DAY_US
+from fleet2d.storage.bags import LATEST_SIMULATED_NS
+
+# A longer step forward is one of the clock, or a log of two stays [us].
+JUMP_US = 7 * DAY_US
+EARLIEST_US, LATEST_US = -2_208_988_800_000_000, 7_258_118_400_000_000
+"""The years 1900 and 2200 [us since 1970]."""
+
+MAX_TIMESTAMP_NS = 8e18  # of nanoseconds since 1970
+QUARTER_HOUR_US = 900_000_000
+SINCE_1970_S = 1e8
+"""Fewer seconds count from the beginning of the log."""
+
+
+class Stamps(NamedTuple):
+    """The times in a file.
+
+    Attributes:
+        time_us: Times [us since 1970], or since the beginning of the log, int64 (n,).
+        line: The number of each line or message in the file, int64 (n,).
+        has_date: Whether times count from 1970; else from the beginning of the log.
+        has_zone: Whether times are UTC, and become times of the home's zone.
+    """
+
+    time_us: I64
+    line: I64
+    has_date: bool
+    has_zone: bool
+
+    @classmethod
+    def of_messages(cls, time_ns: I64) -> Self:
+        """Return the stamps of the messages of a bag [ns]; a simulated clock has no date."""
+        has_date = bool(len(time_ns)) and int(time_ns.max()) >= LATEST_SIMULATED_NS
+        begin_ns = 0 if has_date or not len(time_ns) else time_ns.min()
+        line = np.arange(1, len(time_ns) + 1)
+        return cls((time_ns - begin_ns) // 1000, line, has_date, has_date)
+
+    def local(
+        self,
+        path: Path,
+        noun: str,
+        usable: Bool,
+        notes: list[str],
+        *,
+        time_zone: str | None,
+        sort: bool,
+    ) -> "LocalTimes":
+        """Return the usable rows of the file in order of their local times.
+
+        Args:
+            path: The file.
+            noun: What its rows are called in notes, in the plural.
+            usable: Whether each row counts, bool (n,).
+            notes: Gets a line for each kind of anomaly.
+            time_zone: The time zone of the home.
+            sort: Put rows in order of time instead of refusing times that run backwards.
+
+        Raises:
+            LogError: There is no row, times run backwards or are out of range, or a time zone is
+                missing or unknown.
+        """
+        time_us, line, has_date, has_zone = self
+        if not len(time_us):
+            raise LogError(f"{path} holds no position")
+        _check_times(time_us, path, line, has_date=has_date)
+        repeated = np.zeros(len(time_us), bool)
+        if has_zone:
+            if time_zone is None:
+                raise LogError(
+                    f"{path}: its times are of a time zone; say which local time the home has by"
+                    " time_zone, like 'Europe/Berlin' or 'UTC'"
+                )
+            time_us, repeated = _in_zone(time_us, time_zone)
+        twice = np.count_nonzero(repeated & usable)
+        if twice:
+            notes.append(
+                f"{twice} {noun} of the hour that the end of summer time"
+                " repeats were left out: a simulated day has 24 hours"
+            )
+        row = np.flatnonzero(usable & ~repeated)
+        if not len(row):
+            raise LogError(f"{path} has no row with a position")
+        # Also of rows that don't count: parts of one file begin with the same day.
+        first_day = int(time_us.min()) // DAY_US
+        time_us, row, order_notes = _in_order(time_us[row], row, path, line, sort=sort)
+        notes.extend([*order_notes, *_jumps(time_us, line[row])])
+        if not has_date:
+            return LocalTimes(time_us, row, None)
+        since_us = time_us - first_day * DAY_US
+        return LocalTimes(since_us, row, date(1970, 1, 1) + timedelta(days=first_day))
+
+
+class LocalTimes(NamedTuple):
+    """The usable rows of a file in the local time of the home, in order.
+
+    Attributes:
+        time_us: Local times since the midnight that begins the first day, int64 (m,) [us].
+        row: Which row of the file each is, from 0, int64 (m,).
+        first_day: The date of the first day; None where the log has no dates.
+    """
+
+    time_us: I64
+    row: I64
+    first_day: date | None
+
+
+def _in_order(
+    time_us: I64, row: I64, path: Path, line: I64, *, sort: bool
+) -> tuple[I64, I64, list[str]]:
+    """Return times and rows in order of time, and a note if that differs from the file's."""
+    back = np.flatnonzero(np.diff(time_us) < 0)
+    if not len(back):
+        return time_us, row, []
+    if not sort:
+        raise LogError(
+            f"{path}, line {line[row[back[0] + 1]]}: the time runs backwards there ({len(back)}"
+            f" such lines, by up to {float(-np.diff(time_us).min()) / 1e6:g} s); check the clock of"
+            " the log, or put its lines in order by 'sort: true'"
+        )
+    order = np.argsort(time_us, kind="stable")
+    note = f"{len(back)} lines ran backwards in time and were sorted in"
+    return time_us[order], row[order], [note]
+
+
+def _check_times(time_us: I64, path: Path, line: I64, *, has_date: bool) -> None:
+    """Refuse times of another century, and logs beyond the bound on days."""
+    first, end = (EARLIEST_US, LATEST_US) if has_date else (-LATEST_US, LATEST_US)
+    wrong = np.flatnonzero((time_us < first) | (time_us >= end))
+    if len(wrong):
+        expected = "a time from 1900 to 2199" if has_date else "seconds since the log began"
+        raise LogError(
+            f"{path}, line {line[wrong[0]]}: the time is out of range ({len(wrong)} such lines):"
+            f" expected {expected}"
+        )
+    days = int(time_us.max() - time_us.min()) // DAY_US + 1
+    if (jumps := _jumps(time_us, line)) and days > LOG_DAYS.limit:
+        advice = f"set {LOG_DAYS.variable}={days} in the environment"
+        raise LogError(
+            f"{path}, {jumps[0]}: leave out the lines of the clock that wasn't set, or {advice}"
+        )
+    LOG_DAYS.check(days, path, LogError)
+
+
+def _jumps(time_us: I64, line: I64) -> list[str]:
+    """Return a text about the largest step forward in time, if it is one of a clock."""
+    steps = np.diff(time_us)
+    if not len(steps) or (largest := int(steps.max())) < JUMP_US:
+        return []
+    at, count = line[int(steps.argmax()) + 1], np.count_nonzero(steps >= JUMP_US)
+    such = f" ({count} such lines)" if count > 1 else ""
+    return [f"line {at}: the time jumps forward by {largest / DAY_US:.1f} days there{such}"]
+
+
+def parse_texts(
+    texts: pa.Array, path: Path, line: I64, *, is_utc: bool, day_first: bool | None
+) -> Stamps:
+    """Return the stamps of dates in text, all of them with a time zone or none.
+
+    Args:
+        texts: The texts.
+        path: The file that they are from.
+        line: The line of each, int64 (n,).
+        is_utc: Whether times without a zone are UTC.
+        day_first: Whether 03/04/2026 is in April; None: the file has to show it.
+
+    Raises:
+        LogError: One is not a time, or the order of day and month is unknown.
+    """
+    for kind in (pa.timestamp("us"), pa.timestamp("us", "UTC")):
+        try:
+            values = pc.cast(pc.cast(texts, kind), pa.int64()).to_numpy()
+        except pa.ArrowException:
+            continue
+        return Stamps(values, line, True, is_utc or kind.tz is not None)
+    if day_first is None:
+        day_first = _shown_order(texts, path, line)
+    epoch, moments = datetime(1970, 1, 1), []
+    for at, text in zip(line.tolist(), texts.to_pylist(), strict=True):
+        moments.append(parse_time(text, path, at, day_first=day_first))
+    zones = {moment.tzinfo is not None for moment in moments}
+    if len(zones) > 1:
+        raise LogError(f"{path}: some of its times have a time zone and some have none")
+    local = (m.astimezone(UTC).replace(tzinfo=None) if m.tzinfo else m for m in moments)
+    time_us = np.array([micros(moment - epoch) for moment in local], np.int64)
+    return Stamps(time_us, line, True, is_utc or zones == {True})
+
+
+def _shown_order(texts: pa.Array, path: Path, line: I64) -> bool | None:
+    """Return whether days come before months in dates like 13/04/2026; None: there are none.
+
+    Raises:
+        LogError: Every date could be read either way, or they contradict each other.
+    """
+    matches = [DAY_AND_MONTH.match(text) for text in texts.to_pylist()]
+    pairs = [(int(match[1]), int(match[2])) for match in matches if match]
+    orders = {first > 12 for first, second in pairs if max(first, second) > 12}
+    if len(orders) == 1 or not pairs:
+        return next(iter(orders), None)
+    number = next(number for number, match in enumerate(matches) if match)
+    why = f"{one_line(texts[number].as_py())!r} may begin with the day or the month"
+    if orders:
+        why = "some of the dates begin with the day, some with the month"
+    raise LogError(
+        f"{path}, line {line[number]}: {why}: write dates like 2026-04-03, or say which by"
+        " 'day_first: true' or false"
+    )
+
+
+def parse_numbers(
+    numbers: NDArray[Any], path: Path, line: I64, unit_s: float | None = None
+) -> Stamps:
+    """Return the stamps of numbers: since 1970, or the beginning of the log.
+
+    Args:
+        numbers: The numbers.
+        path: The file that they are from.
+        line: The line of each, int64 (n,).
+        unit_s: Their unit [s]; None: recognized by their size.
+
+    Raises:
+        LogError: One is not a number, or out of range.
+    """
+    size = np.abs(numbers.astype(np.float64))
+    wrong = np.flatnonzero(~(size < MAX_TIMESTAMP_NS))
+    if len(wrong):
+        raise LogError(f"{path}, line {line[wrong[0]]}: its time is not a number, or out of range")
+    largest = float(size.max(initial=0))
+    if unit_s is None:
+        unit_s = next((unit for unit in (1e-9, 1e-6, 1e-3) if largest * unit >= SINCE_1970_S), 1.0)
+    has_date = largest * unit_s >= SINCE_1970_S
+    if unit_s < 1e-6:
+        return Stamps((numbers // round(1e-6 / unit_s)).astype(np.int64), line, has_date, has_date)
+    time_us = np.round(numbers * round(unit_s * 1e6)).astype(np.int64)
+    return Stamps(time_us, line, has_date, has_date)
+
+
+def _in_zone(utc_us: I64, name: str) -> tuple[I64, Bool]:
+    """Return the local times of a zone [us], and which of them are in a repeated hour."""
+    try:
+        zone = ZoneInfo(name)
+    except (KeyError, ValueError, OSError):
+        hint = did_you_mean(name, available_timezones())
+        raise LogError(f"there is no time zone {name!r}{hint}") from None
+    # Clocks change at whole quarters of an hour.
+    quarters, inverse = np.unique(utc_us // QUARTER_HOUR_US, return_inverse=True)
+    epoch = datetime(1970, 1, 1, tzinfo=UTC)
+    moments = [
+        (epoch + timedelta(microseconds=int(q) * QUARTER_HOUR_US)).astimezone(zone)
+        for q in quarters
+    ]
+    offsets = [micros(m.utcoffset() or timedelta(0)) for m in moments]
+    folds = np.array([m.fold for m in moments], bool)
+    return utc_us + np.array(offsets, np.int64)[inverse], folds[inverse]
