@@ -301,7 +301,7 @@ def test_an_event_says_where_the_user_was_perceived_last() -> None:
 
 def test_a_user_counts_as_lost_when_not_noticed_for_so_long() -> None:
     for patience in (5, 20):
-        stored = fleet2d.run(watched(lambda now: now.plan().stay(), lost_after=patience))
+        stored = fleet2d.run(watched(lambda now: now.plan().stay(), lost_after=f"{patience} s"))
         steps = table(stored, "observations")["step"]
         lost = table(stored, "events", event="user_lost")["step"].tolist()
         gap = np.flatnonzero(np.diff(steps) > 5)
