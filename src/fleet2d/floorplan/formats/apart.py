@@ -23,7 +23,7 @@ from io import BufferedWriter
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
 from threading import Lock, Timer
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast, get_type_hints
 
 import numpy as np
 import shapely
@@ -77,13 +77,13 @@ class _Failure:
         return (FloorPlanError if self.kind == "file" else InputError)(self.text)
 
 
-def apart(path: Path, returns: type[T], read: Callable[..., T], *arguments: Any) -> T:
+def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
     """Return what a function of Fleet2D returns for a file, called in the child.
 
     Args:
         path: The file, for messages.
-        returns: The type that it returns: plain data, dataclasses and polygons.
-        read: The function, or a method of a component.
+        read: The function, or a method of a component. Its annotation says what it returns: plain
+            data, dataclasses and polygons.
         arguments: Its arguments, among them the content of the file.
 
     Raises:
@@ -99,7 +99,7 @@ def apart(path: Path, returns: type[T], read: Callable[..., T], *arguments: Any)
             is_late = time.monotonic() - start >= patience
             raise _death(path, is_late, _stop(grace=1.0))
         try:
-            result = _decode(answer, returns)
+            result: T | _Failure = _decode(answer, get_type_hints(read)["return"])
         except (ValueError, TypeError, KeyError, RecursionError):
             _stop()
             raise FloorPlanError(
@@ -228,11 +228,11 @@ def _plain(part: Any) -> Any:
     raise TypeError(f"{type(part).__name__} is no part of an answer")
 
 
-def _decode(answer: bytes, returns: type[T]) -> T | _Failure:
-    """Return the value in an answer.
+def _decode(answer: bytes, kind: Any) -> Any:
+    """Return the value in an answer, of a type, or the failure.
 
     Raises:
-        ValueError: It isn't of that type.
+        ValueError: It is neither.
         TypeError: Likewise.
         KeyError: Likewise.
         RecursionError: It is nested too deeply.
@@ -242,7 +242,7 @@ def _decode(answer: bytes, returns: type[T]) -> T | _Failure:
     content = json.loads(answer, object_hook=_polygon, parse_constant=int)  # NaN is refused
     if "failure" in content:
         return _checked(content["failure"], _Failure)
-    return _checked(content["value"], returns)
+    return _checked(content["value"], kind)
 
 
 def _polygon(content: dict[str, Any]) -> Any:
@@ -257,10 +257,10 @@ def _polygon(content: dict[str, Any]) -> Any:
     return Polygon(rings[0], rings[1:]) if rings else Polygon()
 
 
-def _checked(content: object, kind: type[T]) -> T:
+def _checked(content: object, kind: Any) -> Any:
     """Return plain data as a type."""
     [value] = _adapter(kind).validate_python([content])
-    return cast("T", value)
+    return value
 
 
 @cache
@@ -299,8 +299,7 @@ def _answer(read: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     except Fleet2DError as error:
         cause = error.__cause__
         at = (*cause.place, cause.radius) if isinstance(cause, UnclearPlaceError) else None
-        kind = "file" if isinstance(error, FloorPlanError) else "input"
-        failure = _Failure(kind, str(error), at)
+        failure = _Failure("file" if isinstance(error, FloorPlanError) else "input", str(error), at)
     except RecursionError:
         failure = _Failure("other", "its parts are nested too deeply")
     except MemoryError:

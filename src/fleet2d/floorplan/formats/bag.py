@@ -45,7 +45,7 @@ class BagMap(OccupancySource):
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
         path, topic = Path(settings["path"]), settings.get("topic")
-        return apart(path, float, _pixel, path, topic, settings["scale"])
+        return apart(path, _pixel, path, topic, settings["scale"])
 
     def files(self) -> list[Path]:
         """Return the files of the bag."""

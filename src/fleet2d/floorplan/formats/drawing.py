@@ -196,13 +196,10 @@ def guess_resolution(path: Path) -> tuple[float, int] | None:
 
     Also the number of those doors. None if at no likely scale there are enough.
     """
-    return apart(path, _Guess, _guess, path, read_file(path, PICTURE_BYTES))
+    return apart(path, _guess, path, read_file(path, PICTURE_BYTES))
 
 
-_Guess = tuple[float, int] | None
-
-
-def _guess(path: Path, content: bytes) -> _Guess:
+def _guess(path: Path, content: bytes) -> tuple[float, int] | None:
     for pixel in TRIED_M:
         try:
             image = Image.model_construct(path=path, resolution=pixel, cell=None)

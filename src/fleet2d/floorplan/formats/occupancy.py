@@ -43,7 +43,7 @@ FLOOR_M2 = 2.0
 OBJECT_M2, OBJECT_SHARE = 8.0, 0.15
 
 
-class OccupancySource(ForeignSource, PixelSource):
+class OccupancySource(PixelSource, ForeignSource):
     """A source of a floor plan made of free, occupied and unknown pixels; see `free_space`.
 
     Attributes:

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from shapely import MultiPolygon, Polygon
 
@@ -52,7 +52,8 @@ class ForeignSource(FloorPlanSource):
     bound: ClassVar[Bound] = FILE_BYTES
     """The size of a file."""
 
-    path: Path
+    if TYPE_CHECKING:
+        path: Path
 
     @abstractmethod
     def read(self, files: Mapping[Path, bytes]) -> PlanParts:
@@ -69,7 +70,7 @@ class ForeignSource(FloorPlanSource):
             FloorPlanError: As of `read`, or it takes too much time or memory.
             InputError: A package that reads the format is not installed.
         """
-        parts = apart(self.path, PlanParts, self.read, self.contents())
+        parts = apart(self.path, self.read, self.contents())
         with in_file(self.path):
             return parts.plan()
 

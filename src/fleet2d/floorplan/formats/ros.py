@@ -52,8 +52,10 @@ class Ros(PictureSource):
 
     def files(self) -> list[Path]:
         """Return the YAML file and the image."""
-        settings = _settings(read_yaml(self.path), self.scale or 1.0)
-        return [self.path, _image_file(settings.image, self.path)]
+        content = read_yaml(self.path)
+        with in_file(self.path):
+            settings = _settings(content, self.scale or 1.0)
+            return [self.path, _image_file(settings.image, self.path)]
 
     def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the map.

@@ -281,7 +281,7 @@ TINY = 1e-6
 
 
 @register("floorplan", "valetudo")
-class Valetudo(ForeignSource, PixelSource):
+class Valetudo(PixelSource, ForeignSource):
     """A map of a robot vacuum that runs Valetudo.
 
     Attributes:
