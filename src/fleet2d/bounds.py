@@ -124,7 +124,7 @@ LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
 """Size of what an algorithm has learned, unpacked."""
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 """Size of a table, unpacked, that is read at once."""
-READ_SECONDS = Bound("READ_SECONDS", 7, "seconds")
+READ_SECONDS = Bound("READ_SECONDS", 6, "seconds")
 """Processor time to read a file of another program."""
 READ_MB = Bound("READ_MB", 800, "MB")
 """Memory to read a file of another program."""

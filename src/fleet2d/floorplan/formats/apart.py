@@ -31,7 +31,7 @@ from pydantic import ConfigDict, TypeAdapter
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import FILE_BYTES, JSON_VALUES, READ_MB, READ_SECONDS, Bound, one_line
-from fleet2d.errors import Fleet2DError, FloorPlanError, InputError
+from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, os_errors_as
 from fleet2d.floorplan.formats.raster import UnclearPlaceError
 
 try:
@@ -43,6 +43,8 @@ T = TypeVar("T")
 
 # By the clock a file may take so many times its processor time, which others may use meanwhile.
 PATIENCE = 3
+# What is raised by an answer that isn't valid.
+WRONG = (ValueError, TypeError, KeyError, RecursionError, shapely.errors.ShapelyError)
 _CODE = "from fleet2d.floorplan.formats.apart import serve; serve()"
 _VARIABLES = "FLEET2D_MAX_"
 
@@ -100,7 +102,7 @@ def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
             raise _death(path, is_late, _stop(grace=1.0))
         try:
             result: T | _Failure = _decode(answer, get_type_hints(read)["return"])
-        except (ValueError, TypeError, KeyError, RecursionError):
+        except WRONG:
             _stop()
             raise FloorPlanError(
                 f"{path} can't be read: its reader gave no valid answer: export the file again"
@@ -142,14 +144,15 @@ def _running() -> Popen[bytes]:
     global _child
     if _child is None or _child.poll() is not None:
         _stop()
-        _child = Popen(  # noqa: S603 - it is Python
-            [sys.executable, "-P", "-c", _CODE],
-            stdin=PIPE,
-            stdout=PIPE,
-            stderr=DEVNULL,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # each thread takes memory
-            creationflags=0x08000000 if sys.platform == "win32" else 0,  # without a window
-        )
+        with os_errors_as(InputError, "no process can be started to read files"):
+            _child = Popen(  # noqa: S603 - it is Python
+                [sys.executable, "-P", "-c", _CODE],
+                stdin=PIPE,
+                stdout=PIPE,
+                stderr=DEVNULL,
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # each thread takes memory
+                creationflags=0x08000000 if sys.platform == "win32" else 0,  # without a window
+            )
     return _child
 
 
@@ -232,10 +235,7 @@ def _decode(answer: bytes, kind: Any) -> Any:
     """Return the value in an answer, of a type, or the failure.
 
     Raises:
-        ValueError: It is neither.
-        TypeError: Likewise.
-        KeyError: Likewise.
-        RecursionError: It is nested too deeply.
+        Exception: It is neither: one of `WRONG`.
     """
     if answer.count(b",") > JSON_VALUES.limit:
         raise ValueError("too many values")
