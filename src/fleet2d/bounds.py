@@ -124,6 +124,10 @@ LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
 """Size of what an algorithm has learned, unpacked."""
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 """Size of a table, unpacked, that is read at once."""
+READ_SECONDS = Bound("READ_SECONDS", 6, "seconds")
+"""Processor time to read a file of another program."""
+READ_MB = Bound("READ_MB", 800, "MB")
+"""Memory to read a file of another program."""
 VARIANTS = Bound("VARIANTS", 1_000_000, "values")
 """Values of one axis of a study, and replicates."""
 

@@ -64,7 +64,7 @@ def test_layers_of_inkscape_with_walls_as_lines(tmp_path: Path) -> None:
         ("hello", "is damaged, or not SVG"),
         (CUBICASA[:-40], "is damaged, or not SVG"),
         (HEAD + "<rect width='9' height='9'/></svg>", "is named like walls or rooms"),
-        ("<!DOCTYPE svg [<!ENTITY a 'b'>]>" + HEAD + "</svg>", "defines entities"),
+        ("<!DOCTYPE svg [<!ENTITY a SYSTEM 'b'>]>" + HEAD + "&a;</svg>", "undefined entity &a;"),
         (HEAD + "<g class='Wall'><path d='M0,0 L nan,5'/></g></svg>", "named like walls|damaged"),
     ],
 )

@@ -295,7 +295,7 @@ def test_missing_image_is_refused(tmp_path: Path) -> None:
     (tmp_path / "map.pgm").unlink()
 
     assert "there is no image" in refusal(read_ros, path)
-    assert "map.pgm can't be read" in refusal(read_image, tmp_path / "map.pgm", 0.05)
+    assert "there is no file" in refusal(read_image, tmp_path / "map.pgm", 0.05)
 
 
 @pytest.mark.parametrize("resolution", [0.0, -1.0, 2.0, math.nan, math.inf])

@@ -1,5 +1,6 @@
 """What must hold whatever a reader is given: an error of Fleet2D at most, soon, in little memory."""
 
+import re
 import resource
 import signal
 import tempfile
@@ -18,6 +19,8 @@ MOST_S = 10.0
 MOST_BYTES = 1 << 30
 """Memory that reading may add to what the process has had at most."""
 MAX_TEXT_BYTES = 8000
+CHILD = re.compile("its reader (failed|died|gave)|to read than")
+"""What is said of files that the child fails at which reads foreign formats."""
 
 
 class HangError(BaseException):
@@ -39,6 +42,8 @@ def judge(reader: Reader, content: bytes) -> str:
             text = str(error)
             if len(text) > MAX_TEXT_BYTES or any(len(line) > 1000 for line in text.split("\n")):
                 return f"a message of {len(text)} characters"
+            if CHILD.search(text):  # which would have failed at it in this process, too
+                return text.replace(str(path), path.name)
         except HangError:
             return f"more than {MOST_S:g} s"
         except Exception as error:  # noqa: BLE001 - that is what is looked for

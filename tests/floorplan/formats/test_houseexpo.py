@@ -380,7 +380,7 @@ def test_file_that_is_not_json_is_refused(tmp_path: Path, content: bytes, messag
 def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FloorPlanError, match=r"there is no file .*: check floorplan\.path"):
         read_houseexpo(tmp_path / "nowhere.json")
-    with pytest.raises(FloorPlanError, match="is a folder: name the floor plan's JSON file in it"):
+    with pytest.raises(FloorPlanError, match="is a folder: name the floor plan's file in it"):
         read_houseexpo(tmp_path)
 
 

@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fleet2d.bounds import PICTURE_BYTES
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.raster import read_grey
+from fleet2d.floorplan.formats.files import read_file
+from fleet2d.floorplan.formats.raster import GreyPicture, grey_picture
 
 SHADES = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
 
@@ -15,6 +17,10 @@ def write(folder: Path, content: bytes, name: str = "map.pgm") -> Path:
     path = folder / name
     path.write_bytes(content)
     return path
+
+
+def read_grey(path: Path) -> GreyPicture:
+    return grey_picture(read_file(path, PICTURE_BYTES), path)
 
 
 def packed(values: NDArray[np.integer], white: int = 255) -> bytes:
@@ -119,7 +125,7 @@ def test_damaged_or_foreign_image_is_refused_with_the_reason(
 
 
 def test_folder_in_place_of_an_image_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FloorPlanError, match="can't be read"):
+    with pytest.raises(FloorPlanError, match="is a folder"):
         read_grey(tmp_path)
 
 

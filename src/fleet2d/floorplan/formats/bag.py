@@ -8,13 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fleet2d.bounds import LOG_BYTES, check_file
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.apart import apart
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.occupancy import OccupancySource
-from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.formats.parts import PlanParts
 from fleet2d.storage.bags import headings_of, numbers_of, open_bag
 
 GRID = "nav_msgs/msg/OccupancyGrid"
@@ -42,7 +44,8 @@ class BagMap(OccupancySource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
-        return _read(Path(settings["path"]), settings.get("topic"), settings["scale"])[0].pixel
+        path, topic = Path(settings["path"]), settings.get("topic")
+        return apart(path, _pixel, path, topic, settings["scale"])
 
     def files(self) -> list[Path]:
         """Return the files of the bag."""
@@ -50,7 +53,13 @@ class BagMap(OccupancySource):
             return [self.path]
         return sorted(file for file in self.path.iterdir() if file.is_file())
 
-    def load(self) -> FloorPlan:
+    def contents(self) -> dict[Path, bytes]:
+        """Return nothing: the child opens the bag, which is too large to be read as a whole."""
+        for file in self.files():
+            check_file(file, LOG_BYTES, FloorPlanError)
+        return {}
+
+    def read(self, _: Mapping[Path, bytes]) -> PlanParts:
         """Read the map.
 
         Raises:
@@ -59,7 +68,11 @@ class BagMap(OccupancySource):
         raw, note = _read(self.path, self.topic, self.scale or 1.0)
         notes: list[str] = []
         home = self.clean(raw, notes)
-        return self.build(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
+        return self.parts(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
+
+
+def _pixel(path: Path, topic: str | None, scale: float) -> float:
+    return _read(path, topic, scale)[0].pixel
 
 
 def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, str]:

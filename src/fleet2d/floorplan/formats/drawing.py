@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 from pydantic import Field, TypeAdapter
 
+from fleet2d.bounds import PICTURE_BYTES
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.formats.apart import apart
 from fleet2d.floorplan.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyMap
 from fleet2d.floorplan.formats.drawn_walls import LINE_M, find_gaps, told_apart, wall_candidates
-from fleet2d.floorplan.formats.files import in_file
+from fleet2d.floorplan.formats.files import in_file, read_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
-from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, read_grey
+from fleet2d.floorplan.formats.parts import PlanParts
+from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, grey_picture
 from fleet2d.floorplan.lattice import MAX_CELL_M
-from fleet2d.floorplan.plan import FloorPlan, largest_part
+from fleet2d.floorplan.plan import largest_part
 from fleet2d.kernels import Bool, label_parts, squared_distance
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
@@ -76,7 +79,7 @@ class Image(PictureSource):
         """Side of a pixel [m]."""
         return self.resolution * (self.scale or 1.0)
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the drawing.
 
         Light pixels that are connected to the edge of the picture are outside, and so are pixels
@@ -87,26 +90,26 @@ class Image(PictureSource):
             FloorPlanError: It can't be read, or no light space is enclosed by dark walls.
         """
         try:
-            return self._read_home()
+            return self._read_home(files[self.path])
         except FloorPlanError:
-            if not self.negate and self._is_negative():
+            if not self.negate and self._is_negative(files[self.path]):
                 raise FloorPlanError(
                     f"{self.path}: its walls are light on dark ground: set floorplan.negate=true,"
                     " or invert the picture"
                 ) from None
             raise
 
-    def _is_negative(self) -> bool:
+    def _is_negative(self, content: bytes) -> bool:
         """Return whether the picture is a home with light and dark exchanged."""
         try:
-            if read_grey(self.path).edge_grey()[0] >= DARK_EDGE:
+            if grey_picture(content, self.path).edge_grey()[0] >= DARK_EDGE:
                 return False
-            return bool(self.model_copy(update={"negate": True}).load())
+            return bool(self.model_copy(update={"negate": True})._read_home(content).plan())
         except FloorPlanError:
             return False
 
-    def _read_home(self) -> FloorPlan:
-        picture = read_grey(self.path)
+    def _read_home(self, content: bytes) -> PlanParts:
+        picture = grey_picture(content, self.path)
         if self.negate:
             picture = replace(picture, values=picture.white - picture.values)
         with in_file(self.path):
@@ -135,7 +138,7 @@ class Image(PictureSource):
             notes += found
             raw = OccupancyMap(inside[::-1], walls[::-1], pixel)
             free = self.home(raw, picture, notes)
-            return self.build(free, pixel, f"drawing, {self.path.name}", notes)
+            return self.parts(free, pixel, f"drawing, {self.path.name}", notes)
 
     def _without_lines(
         self, picture: GreyPicture, light: Bool, enclosed: Bool
@@ -193,9 +196,14 @@ def guess_resolution(path: Path) -> tuple[float, int] | None:
 
     Also the number of those doors. None if at no likely scale there are enough.
     """
+    return apart(path, _guess, path, read_file(path, PICTURE_BYTES))
+
+
+def _guess(path: Path, content: bytes) -> tuple[float, int] | None:
     for pixel in TRIED_M:
         try:
-            plan = Image.model_construct(path=path, resolution=pixel, cell=None).load()
+            image = Image.model_construct(path=path, resolution=pixel, cell=None)
+            plan = image.read({path: content}).plan()
         except FloorPlanError:
             continue
         widths = sorted(door.width_m for door in plan.doorways)

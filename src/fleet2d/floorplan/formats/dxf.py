@@ -1,7 +1,8 @@
 """Drawings of CAD programs as DXF: their walls as lines, on layers."""
 
 import re
-from collections.abc import Iterator, Sequence
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -17,9 +18,8 @@ from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, enclosed_space
 from fleet2d.floorplan.formats.files import in_file, reading
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.lattice import SIDE_M
-from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
 
 # Metres to a unit, by the header variable $INSUNITS, and what is tried if it says nothing.
@@ -42,7 +42,7 @@ WINDOW_LINES_M = 0.3
 
 
 @register("floorplan", "dxf")
-class Dxf(FloorPlanSource):
+class Dxf(ForeignSource):
     """A drawing in DXF; needs the extra `cad`.
 
     Attributes:
@@ -58,7 +58,7 @@ class Dxf(FloorPlanSource):
     scale: float | None = Field(default=None, gt=0)
     walls: str | None = None
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the drawing.
 
         Lines on the layers of walls bound the home, and the space between the two lines of a wall
@@ -69,7 +69,7 @@ class Dxf(FloorPlanSource):
             FloorPlanError: The file can't be read, or its lines enclose no home.
             InputError: ezdxf is not installed.
         """
-        drawing = _read(self.path)
+        drawing = _read(files[self.path], self.path)
         with in_file(self.path):
             notes: list[str] = []
             layers = self._layers(drawing, notes)
@@ -87,7 +87,7 @@ class Dxf(FloorPlanSource):
             free = _inside(metres, notes)
             panes = _panes([(line - low) * scale for line in _lines(drawing, windows)])
             draft = Draft([Feature("free", "walls", free, {}), *panes], 0.0, notes)
-            return draft.plan(self.path.stem, self.cell, f"DXF, {self.path.name}")
+            return draft.parts(self.path.stem, self.cell, f"DXF, {self.path.name}")
 
     def _layers(self, drawing: Any, notes: list[str]) -> set[str]:
         """Return the names of the layers with walls."""
@@ -109,12 +109,16 @@ class Dxf(FloorPlanSource):
         return walls
 
 
-def _read(path: Path) -> Any:
+def _read(content: bytes, path: Path) -> Any:
     """Return the document of a DXF file."""
     with extra("cad", "reading DXF needs ezdxf"):
         import ezdxf
-    with reading(path, "DXF", ezdxf.DXFError, ValueError, LookupError, AttributeError, TypeError):
-        return ezdxf.readfile(path)  # type: ignore[attr-defined,unused-ignore]
+        from ezdxf.document import Drawing
+        from ezdxf.lldxf.tagger import binary_tags_loader
+    with reading(path, "DXF"):
+        if content.startswith(b"AutoCAD Binary DXF"):
+            return Drawing.load(binary_tags_loader(content, errors="surrogateescape"))
+        return ezdxf.decode_base64(b64encode(content))  # it determines the encoding
 
 
 def _lines(drawing: Any, layers: set[str]) -> Iterator[F64]:

@@ -14,8 +14,9 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import validate
 from fleet2d.floorplan.formats.native import ObjectUse
+from fleet2d.floorplan.formats.parts import PlanParts
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, distinct_names
-from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.plan import LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
     TOUCH_M,
     DoorLine,
@@ -99,7 +100,7 @@ class Feature:
 
 
 class Draft:
-    """Converts features to the arguments of `FloorPlan.build`; all in metres."""
+    """Converts features to the parts of a home; all in metres."""
 
     def __init__(
         self,
@@ -133,21 +134,22 @@ class Draft:
         self._cut_doors()
         self.panes = list(self._glaze())
 
-    def plan(self, name: str, cell: float, source: str) -> FloorPlan:
-        """Build the plan."""
-        return FloorPlan.build(
-            name,
-            self.free,
-            self._regions(cell),
-            cell,
+    def parts(self, name: str, cell: float, source: str) -> PlanParts:
+        """Return the parts of the home."""
+        areas = self._of("no_go")
+        return PlanParts(
+            name=name,
+            free=self.free,
+            regions=tuple(self._regions(cell)),
+            cell=cell,
             source=source,
             entrance=self._entrance(),
-            doorways=self._doorways() if self._of("door", "opening") else None,
+            doorways=tuple(self._doorways()) if self._of("door", "opening") else None,
             regions_are="exact" if self.rooms else "none",
-            objects=[thing for f in self._of("object") for thing in _to_objects(f, self.move)],
-            no_go=[part for area in self._of("no_go") for part in _parts(area.shape)],
-            glass=self.panes,
-            notes=self.notes,
+            objects=tuple(o for f in self._of("object") for o in _to_objects(f, self.move)),
+            no_go=tuple(part for area in areas for part in _parts(area.shape)),
+            glass=tuple(self.panes),
+            notes=tuple(self.notes),
         )
 
     def _of(self, *kinds: str) -> list[Feature]:

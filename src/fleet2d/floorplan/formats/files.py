@@ -22,10 +22,10 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from fleet2d.bounds import FILE_BYTES, JSON_VALUES, check_file, one_line, read_bytes
+from fleet2d.bounds import FILE_BYTES, JSON_VALUES, Bound, one_line, read_bytes
 from fleet2d.configuration.components import DescribedModel
 from fleet2d.configuration.problems import Location, problem, suggest
-from fleet2d.errors import FloorPlanError, InputError, errors_as, os_errors_as
+from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, errors_as
 from fleet2d.floorplan.formats.foreign import foreign_file
 
 YAML = (".yaml", ".yml")
@@ -44,20 +44,36 @@ def in_file(path: Path) -> AbstractContextManager[None]:
 
 
 @contextmanager
-def reading(path: Path, form: str, *failures: type[Exception]) -> Iterator[None]:
-    """Refuse a file that is too large, and one in which a library fails in the block.
+def reading(path: Path, form: str) -> Iterator[None]:
+    """Refuse a file for which a library fails in the block.
 
     Args:
         path: The file.
         form: Its format.
-        failures: What the library raises for damaged files.
     """
-    with (
-        os_errors_as(FloorPlanError, f"{path} can't be read"),
-        errors_as(FloorPlanError, f"{path} is damaged, or not {form}", failures),
-    ):
-        check_file(path, FILE_BYTES, FloorPlanError)
+    try:
         yield
+    except (Fleet2DError, MemoryError, RecursionError):
+        raise
+    except Exception as error:
+        reason = one_line(error, 200) or type(error).__name__
+        raise FloorPlanError(f"{path} is damaged, or not {form}: {reason}") from error
+
+
+def read_file(path: Path, bound: Bound = FILE_BYTES) -> bytes:
+    """Return the content of a file of a bounded size.
+
+    Raises:
+        FloorPlanError: There is no such file, it can't be read, or it is too large.
+    """
+    if path.is_dir():
+        raise FloorPlanError(f"{path} is a folder: name the floor plan's file in it")
+    try:
+        return read_bytes(path, bound, FloorPlanError)
+    except FileNotFoundError:
+        raise FloorPlanError(f"there is no file {path}: check floorplan.path") from None
+    except OSError as error:
+        raise FloorPlanError(f"{path} can't be read: {error.strerror or error}") from None
 
 
 def read_document(path: Path) -> dict[str, Any]:
@@ -75,11 +91,20 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         FloorPlanError: There is no such file, or it doesn't hold a JSON object.
     """
-    text = _read_text(path, "JSON")
+    return parse_json(read_file(path), path)
+
+
+def parse_json(content: bytes, path: Path) -> dict[str, Any]:
+    """Return the JSON object in the content of a file.
+
+    Raises:
+        FloorPlanError: It doesn't hold a JSON object.
+    """
+    text = _text_of(content, path, "JSON")
     values = text.count(",") + text.count("[") + text.count("{")
     JSON_VALUES.check(values, path, FloorPlanError, prefix="about ")
     try:
-        content = json.loads(text)
+        document = json.loads(text)
     except json.JSONDecodeError as error:
         _refuse_foreign(path, text[:4096].encode())
         raise FloorPlanError(
@@ -89,7 +114,7 @@ def read_json(path: Path) -> dict[str, Any]:
         is_deep = isinstance(error, RecursionError)
         reason = "it has lists in lists without end" if is_deep else error
         raise FloorPlanError(f"{path} is not a floor plan: {reason}") from None
-    return _mapping(content, path, "a JSON object {…}")
+    return _mapping(document, path, "a JSON object {…}")
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -98,14 +123,23 @@ def read_yaml(path: Path) -> dict[str, Any]:
     Raises:
         FloorPlanError: There is no such file, or it doesn't hold a YAML mapping.
     """
+    return parse_yaml(read_file(path), path)
+
+
+def parse_yaml(content: bytes, path: Path) -> dict[str, Any]:
+    """Return the mapping in the content of a YAML file.
+
+    Raises:
+        FloorPlanError: It doesn't hold a YAML mapping.
+    """
     # A home in a JSON file is set up without them.
     import yaml
 
     from fleet2d.configuration.documents import NodeError, parse
 
-    text = _read_text(path, "YAML")
+    text = _text_of(content, path, "YAML")
     try:
-        content = parse(text)
+        document = parse(text)
     except (yaml.YAMLError, RecursionError) as error:
         _refuse_foreign(path, text[:4096].encode())
         raise FloorPlanError(f"{path} is not YAML: {one_line(error, 200)}") from None
@@ -114,21 +148,14 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise FloorPlanError(f"{path}, line {line}: {error}") from None
     except InputError as error:
         raise FloorPlanError(f"{path}: {error}") from None
-    if isinstance(content, str):
+    if isinstance(document, str):
         _refuse_foreign(path, text[:4096].encode())
-    return _mapping(content, path, "a YAML mapping of keys and values")
+    return _mapping(document, path, "a YAML mapping of keys and values")
 
 
-def _read_text(path: Path, language: str) -> str:
-    if path.is_dir():
-        raise FloorPlanError(f"{path} is a folder: name the floor plan's {language} file in it")
+def _text_of(content: bytes, path: Path, language: str) -> str:
     try:
-        content = read_bytes(path, FILE_BYTES, FloorPlanError)
         return content.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise FloorPlanError(f"there is no file {path}: check floorplan.path") from None
-    except OSError as error:
-        raise FloorPlanError(f"{path} can't be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         _refuse_foreign(path, content[:65536])
         if b"\0" not in content or content.startswith((BOM_UTF16_BE, BOM_UTF16_LE)):

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+GZIP = b"\x1f\x8b"
+
 
 @cache
 def _known() -> dict[str, Any]:
@@ -28,11 +30,13 @@ def foreign_file(content: bytes) -> str | None:
         >>> foreign_file(b"{}") is None
         True
     """
-    if content.startswith(b"\x1f\x8b"):
+    if content.startswith(GZIP):
+        inner = b""
         with suppress(zlib.error):
-            inner = foreign_file(zlib.decompressobj(31).decompress(content, 65536))
-            if inner is not None:
-                return f"is packed by gzip: unpacked it {inner}"
+            inner = zlib.decompressobj(31).decompress(content, 65536)
+        said = None if inner.startswith(GZIP) else foreign_file(inner)
+        if said is not None:
+            return f"is packed by gzip: unpacked it {said}"
     for beginning, kind, advice in _known()["beginnings"]:
         if content.startswith(beginning.encode("latin-1")):
             return _sentence(kind, advice)

@@ -6,8 +6,9 @@ Two dialects are read, also mixed: our own, which names the kind of a feature by
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -28,14 +29,14 @@ from fleet2d.floorplan.formats.files import (
     MAX_COORDINATE_M,
     clean_coordinate,
     in_file,
-    read_json,
+    parse_json,
     shown_value,
 )
 from fleet2d.floorplan.formats.native import object_document
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.room import room_type
-from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
 
 COLLECTION = "FeatureCollection"
@@ -298,7 +299,7 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
 
 
 @register("floorplan", "geojson")
-class GeoJson(FloorPlanSource):
+class GeoJson(ForeignSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
 
     Attributes:
@@ -315,7 +316,7 @@ class GeoJson(FloorPlanSource):
     wall_m: Length = Field(default=0.1, ge=0, le=1)
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the plan.
 
         Free space is the areas of kind `free` or, if there are none, the rooms, without the walls.
@@ -325,14 +326,14 @@ class GeoJson(FloorPlanSource):
         Raises:
             FloorPlanError: The file can't be read, isn't such a plan, or has no free space.
         """
-        content = read_json(self.path)
+        content = parse_json(files[self.path], self.path)
         with in_file(self.path):
             notes: list[str] = []
             raw = read_features(content, self.level, notes)
             units = "m" if self.scale and self.units == "auto" else self.units
             features, move = in_metres(raw, content, units, notes)
             name = content.get("name")
-            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).plan(
+            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).parts(
                 name if isinstance(name, str) and name else self.path.stem,
                 self.cell,
                 f"GeoJSON, {self.path.name}",

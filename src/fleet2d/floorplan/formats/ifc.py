@@ -1,6 +1,6 @@
 """Building models in IFC: the spaces, walls, doors, windows and furniture of one storey."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,10 +15,9 @@ from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
 from fleet2d.floorplan.formats.files import in_file, reading
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.formats.sweethome import furniture_type
 from fleet2d.floorplan.furniture import measured_height
-from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource
 
 # What each class of IFC is in a plan; classes that a version of IFC lacks are left out.
 KINDS = {
@@ -41,7 +40,7 @@ RAISED_M, SILL_M = 0.5, 1.3
 
 
 @register("floorplan", "ifc")
-class Ifc(FloorPlanSource):
+class Ifc(ForeignSource):
     """A building model in IFC; needs the extra `ifc`.
 
     Attributes:
@@ -54,7 +53,7 @@ class Ifc(FloorPlanSource):
     path: InputPath
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read a storey of the model, as seen from above.
 
         Free space is the spaces (`IfcSpace`) without the walls or, without spaces, what the walls
@@ -65,7 +64,7 @@ class Ifc(FloorPlanSource):
             FloorPlanError: The file can't be read, or its storey has no spaces and no closed walls.
             InputError: ifcopenshell is not installed.
         """
-        model = _read(self.path)
+        model = _read(files[self.path], self.path)
         with in_file(self.path):
             notes: list[str] = []
             storeys = {str(s.GlobalId): s for s in model.by_type("IfcBuildingStorey")}
@@ -75,18 +74,17 @@ class Ifc(FloorPlanSource):
             corners = shapely.get_num_coordinates([feature.shape for feature in features]).sum()
             CORNERS.check(int(corners), "it", FloorPlanError)
             draft = Draft(features, 0.1, notes, scale=self.scale)
-            return draft.plan(self.path.stem, self.cell, f"IFC, {self.path.name}")
+            return draft.parts(self.path.stem, self.cell, f"IFC, {self.path.name}")
 
 
-def _read(path: Path) -> Any:
+def _read(content: bytes, path: Path) -> Any:
     """Return the model in a file."""
     with extra("ifc", "reading IFC needs ifcopenshell"):
         import ifcopenshell
-    with reading(path, "IFC", ifcopenshell.Error, RuntimeError, ValueError):
-        with path.open("rb") as file:
-            if not file.read(64).lstrip().startswith(b"ISO-10303-21"):
-                raise ValueError("it has no header ISO-10303-21")
-        return ifcopenshell.open(str(path))
+    with reading(path, "IFC"):
+        if not content[:64].lstrip().startswith(b"ISO-10303-21"):
+            raise ValueError("it has no header ISO-10303-21")
+        return ifcopenshell.file.from_string(content.decode())
 
 
 def _elements(model: Any, storey: Any) -> Iterator[tuple[str, Any]]:

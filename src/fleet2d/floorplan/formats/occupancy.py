@@ -1,14 +1,14 @@
 """The free space in maps and drawings of pixels: cleaned of noise, checked, traced."""
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import shapely
 from pydantic import Field
 from shapely import Polygon
 
-from fleet2d.bounds import CORNERS
+from fleet2d.bounds import CORNERS, PICTURE_BYTES, Bound
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import (
@@ -18,9 +18,9 @@ from fleet2d.floorplan.formats.cleaning import (
     note_left_out,
     remove_specks,
 )
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.formats.raster import GreyPicture
 from fleet2d.floorplan.lattice import MIN_CELL_M
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import Bool, trace_rings
 
@@ -43,7 +43,7 @@ FLOOR_M2 = 2.0
 OBJECT_M2, OBJECT_SHARE = 8.0, 0.15
 
 
-class OccupancySource(PixelSource):
+class OccupancySource(PixelSource, ForeignSource):
     """A source of a floor plan made of free, occupied and unknown pixels; see `free_space`.
 
     Attributes:
@@ -76,8 +76,15 @@ class OccupancySource(PixelSource):
         notes += changes
         return free
 
-    def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
-        """Return the floor plan of free space [m] whose rooms and doorways the walls determine."""
+    def parts(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> PlanParts:
+        """Return the parts of a home in which walls determine the rooms and doorways.
+
+        Args:
+            free: The free space [m].
+            pixel: Side of a pixel [m].
+            source: The source, for readers.
+            notes: Sentences on how it was read; one is added if walls are straightened.
+        """
         tolerance, corners = self.simplify, shapely.get_num_coordinates(free)
         if tolerance == 0 and corners > CORNERS.limit:
             tolerance = pixel
@@ -87,14 +94,13 @@ class OccupancySource(PixelSource):
             )
         if tolerance > 0:
             free = _simplify(free, tolerance, notes)
-        return FloorPlan.build(
-            self.path.stem,
-            free,
+        return PlanParts(
+            name=self.path.stem,
+            free=free,
             cell=max(pixel, MIN_CELL_M) if self.cell is None else self.cell,
             source=source,
-            doorways=None,
             regions_are="none",
-            notes=notes,
+            notes=tuple(notes),
         )
 
 
@@ -106,6 +112,8 @@ class PictureSource(OccupancySource):
             255; auto: the one that most of the edge has, that map savers write, or that furniture
             is filled with; none: there is no such shade.
     """
+
+    bound: ClassVar[Bound] = PICTURE_BYTES
 
     unknown_grey: UnknownGrey = "auto"
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.bounds import PICTURE_BYTES, PIXELS, read_bytes
-from fleet2d.errors import FloorPlanError, os_errors_as
+from fleet2d.bounds import PIXELS
+from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.foreign import foreign_file
 from fleet2d.kernels import U8, Bool
 
@@ -106,15 +106,13 @@ class UnclearPlaceError(FloorPlanError):
         copy.save(out)
 
 
-def read_grey(path: Path) -> GreyPicture:
-    """Read a PGM (P2 or P5, 8 or 16 bits), PNG or JPEG file, by its content.
+def grey_picture(content: bytes, path: Path) -> GreyPicture:
+    """Return the picture in a PGM (P2 or P5, 8 or 16 bits), PNG or JPEG file, by its content.
 
     Raises:
         FloorPlanError: It can't be read, is damaged, too large or of another kind, or is PNG or
             JPEG and Pillow is not installed.
     """
-    with os_errors_as(FloorPlanError, f"the image {path} can't be read"):
-        content = read_bytes(path, PICTURE_BYTES, FloorPlanError)
     try:
         if content.startswith((b"P2", b"P5")):
             return _read_pgm(content)

@@ -1,6 +1,8 @@
 """Room scans of Apple's RoomPlan, as its JSON has them: walls, doors, openings and furniture."""
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -11,10 +13,9 @@ from shapely import LineString, Polygon
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.floorplan.formats.features import Draft, Feature
-from fleet2d.floorplan.formats.files import Listed, in_file, read_json, validate
+from fleet2d.floorplan.formats.files import Listed, in_file, parse_json, validate
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.furniture import measured_height
-from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.kernels import F64
 
 # Names of furniture in the catalogue that RoomPlan has under others.
@@ -107,7 +108,7 @@ _SCAN = TypeAdapter(_Scan)
 
 
 @register("floorplan", "roomplan")
-class RoomPlan(FloorPlanSource):
+class RoomPlan(ForeignSource):
     """A scan by Apple's RoomPlan, exported as JSON.
 
     Attributes:
@@ -120,17 +121,17 @@ class RoomPlan(FloorPlanSource):
     path: InputPath
     wall_m: Length = Field(default=0.1, ge=0.01, le=1)
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the scan; its longest wall is turned along x.
 
         Raises:
             FloorPlanError: The file can't be read, isn't such a scan, or its walls enclose nothing.
         """
-        content = read_json(self.path)
+        content = parse_json(files[self.path], self.path)
         with in_file(self.path):
             features = _features(validate(_SCAN, content))
             draft = Draft(features, self.wall_m, [], scale=self.scale)
-            return draft.plan(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
+            return draft.parts(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
 
 
 def _features(scan: _Scan) -> list[Feature]:

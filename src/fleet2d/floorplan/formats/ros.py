@@ -12,11 +12,17 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
-from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file, read_yaml, shown_value
+from fleet2d.floorplan.formats.files import (
+    MAX_COORDINATE_M,
+    in_file,
+    parse_yaml,
+    read_yaml,
+    shown_value,
+)
 from fleet2d.floorplan.formats.occupancy import PictureSource
-from fleet2d.floorplan.formats.raster import GreyPicture, read_grey
+from fleet2d.floorplan.formats.parts import PlanParts
+from fleet2d.floorplan.formats.raster import GreyPicture, grey_picture
 from fleet2d.floorplan.lattice import MAX_CELL_M
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.inputs import input_path
 from fleet2d.kernels import Bool
 
@@ -47,22 +53,25 @@ class Ros(PictureSource):
 
     def files(self) -> list[Path]:
         """Return the YAML file and the image."""
-        settings = _settings(read_yaml(self.path), self.scale or 1.0)
-        return [self.path, _image_file(settings.image, self.path)[0]]
+        content = read_yaml(self.path)
+        with in_file(self.path):
+            settings = _settings(content, self.scale or 1.0)
+            return [self.path, _image_file(settings.image, self.path)]
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the map.
 
         Raises:
             FloorPlanError: A file can't be read, isn't such a map, or has no free space.
         """
-        content = read_yaml(self.path)
+        content = parse_yaml(files[self.path], self.path)
         with in_file(self.path):
             settings = _settings(content, self.scale or 1.0)
-            file, notes = _image_file(settings.image, self.path)
-            picture = read_grey(file)
+            *_, (file, image) = files.items()
+            notes = _note_image(settings.image, file, self.path)
+            picture = grey_picture(image, file)
             free = self.home(self._occupancy(settings, picture, notes), picture, notes)
-            return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
+            return self.parts(free, settings.resolution, f"ROS map, {self.path.name}", notes)
 
     def _occupancy(
         self, settings: "_MapSettings", picture: GreyPicture, notes: list[str]
@@ -175,20 +184,26 @@ def _origin(value: object) -> tuple[float, float, float]:
 # --- The image ---------------------------------------------------------------------------------
 
 
-def _image_file(image: str, path: Path) -> tuple[Path, list[str]]:
-    """Return the image's file, and a note if it isn't where the YAML file says."""
+def _image_file(image: str, path: Path) -> Path:
+    """Return the image's file."""
     file = path.parent / image
     if _is_file(file):
-        return file, []
+        return file
     # A map that was copied from another computer may name its image by an absolute path.
     beside = path.parent / image.replace("\\", "/").rpartition("/")[2]
     if _is_file(beside):
-        note = f"there is no image {image}: {beside.name} beside {path.name} is used instead"
-        return beside, [note]
+        return beside
     raise FloorPlanError(
         f"there is no image {file}: put it there, or correct `image`, which is relative to the"
         " YAML file"
     )
+
+
+def _note_image(image: str, file: Path, path: Path) -> list[str]:
+    """Return a note if the image isn't where the YAML file says."""
+    if file == path.parent / image:
+        return []
+    return [f"there is no image {image}: {file.name} beside {path.name} is used instead"]
 
 
 def _is_file(path: Path) -> bool:

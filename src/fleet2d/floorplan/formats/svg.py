@@ -5,10 +5,10 @@ The published layout of CubiCasa5K is one of them: groups of the classes `Wall`,
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree.ElementTree import ParseError
 
 import numpy as np
 import shapely
@@ -22,8 +22,7 @@ from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.dxf import WALLS, WINDOWS
 from fleet2d.floorplan.formats.features import Draft, Feature
 from fleet2d.floorplan.formats.files import in_file, reading
-from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.kernels import F64
 
 # Words in the names of groups and layers, in several languages.
@@ -39,7 +38,7 @@ WALL_M = 0.1  # of walls that are drawn as lines
 
 
 @register("floorplan", "svg")
-class Svg(FloorPlanSource):
+class Svg(ForeignSource):
     """A drawing in SVG; needs the extra `svg`.
 
     Attributes:
@@ -55,7 +54,7 @@ class Svg(FloorPlanSource):
     scale: float | None = Field(default=None, gt=0)
     wall_m: PositiveLength = WALL_M
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the drawing.
 
         Shapes count by the class, label or id of the group or layer that they are in, or by their
@@ -67,7 +66,7 @@ class Svg(FloorPlanSource):
             FloorPlanError: The file can't be read, or has no such shapes.
             InputError: svgelements is not installed.
         """
-        content = _read(self.path)
+        content = _read(files[self.path], self.path)
         with in_file(self.path):
             notes: list[str] = []
             shapes = list(_shapes(content))
@@ -88,17 +87,15 @@ class Svg(FloorPlanSource):
             boxes = [f.shape.minimum_rotated_rectangle for f in windows]
             panes = [Feature("window", f.where, b, {}) for f, b in zip(windows, boxes, strict=True)]
             draft = Draft([*sound, *panes], self.wall_m, notes)
-            return draft.plan(self.path.stem, self.cell, f"SVG, {self.path.name}")
+            return draft.parts(self.path.stem, self.cell, f"SVG, {self.path.name}")
 
 
-def _read(path: Path) -> Any:
+def _read(content: bytes, path: Path) -> Any:
     """Return the groups of an SVG file."""
     with extra("svg", "reading SVG needs svgelements"):
         import svgelements
-    with reading(path, "SVG", ParseError, ValueError, LookupError, AttributeError, TypeError):
-        if b"<!ENTITY" in path.read_bytes():
-            raise FloorPlanError(f"{path} defines entities of XML: save it as plain SVG")
-        return svgelements.SVG.parse(str(path), reify=True, ppi=96)
+    with reading(path, "SVG"):
+        return svgelements.SVG.parse(BytesIO(content), reify=True, ppi=96)
 
 
 def _shapes(group: Any, name: str = "") -> Iterator[tuple[str, str, F64, bool]]:

@@ -1,7 +1,7 @@
 """Homes of Sweet Home 3D, as the Home.xml in their file has them."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree import ElementTree as ET
@@ -9,16 +9,14 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from shapely import LineString, Polygon, affinity
 
-from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
-from fleet2d.errors import FloorPlanError, os_errors_as
+from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M, in_file
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.furniture import FURNITURE, measured_height
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.room import room_type
-from fleet2d.floorplan.source import FloorPlanSource
 
 CM_PER_M = 100
 # What begins higher above the floor is a window or hangs on a wall [cm].
@@ -42,7 +40,7 @@ MIN_SIDE_CM = 1.0
 
 
 @register("floorplan", "sweethome")
-class SweetHome(FloorPlanSource):
+class SweetHome(ForeignSource):
     """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
 
     Attributes:
@@ -55,7 +53,7 @@ class SweetHome(FloorPlanSource):
     path: InputPath
     level: str | None = None
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the home.
 
         Free space is the rooms without the walls or, without rooms, what the walls enclose. Doors
@@ -64,7 +62,7 @@ class SweetHome(FloorPlanSource):
         Raises:
             FloorPlanError: The file can't be read, isn't such a home, or has no free space.
         """
-        root = _parse(self.path)
+        root = _parse(files[self.path], self.path)
         with in_file(self.path):
             if root.tag != "home":
                 raise FloorPlanError(f"no home of Sweet Home 3D: it begins with <{root.tag}>")
@@ -74,19 +72,15 @@ class SweetHome(FloorPlanSource):
             level = choose_level(named, self.level, notes)
             here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
             features = [feature for element in here for feature in _features(element)]
-            return Draft(features, 0.1, notes, scale=self.scale).plan(
+            return Draft(features, 0.1, notes, scale=self.scale).parts(
                 root.get("name") or self.path.stem, self.cell, f"Sweet Home 3D, {self.path.name}"
             )
 
 
-def _parse(path: Path) -> ET.Element:
-    """Return the root of an XML file without entities of its own, which could fill the memory."""
-    with os_errors_as(FloorPlanError, f"{path} can't be read"):
-        content = read_bytes(path, FILE_BYTES, FloorPlanError)
-    if b"<!ENTITY" in content or b"<!DOCTYPE" in content:
-        raise FloorPlanError(f"{path} declares entities, which no home of Sweet Home 3D does")
+def _parse(content: bytes, path: Path) -> ET.Element:
+    """Return the root of an XML file."""
     try:
-        return ET.fromstring(content)  # noqa: S314 - it declares no entities
+        return ET.fromstring(content)  # noqa: S314 - within the child's limits
     except (ET.ParseError, ValueError, LookupError) as error:
         raise FloorPlanError(f"{path} is not XML: {error}") from None
 

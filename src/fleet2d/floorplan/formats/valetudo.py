@@ -28,11 +28,13 @@ from fleet2d.floorplan.formats.files import (
     MAX_COORDINATE_M,
     Listed,
     in_file,
+    parse_json,
     read_json,
     shown_value,
     validate,
 )
 from fleet2d.floorplan.formats.occupancy import outline
+from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.formats.rand256 import (
     MAP_CLASS,
     MAX_PIXEL_NUMBER,
@@ -42,7 +44,7 @@ from fleet2d.floorplan.formats.rand256 import (
 )
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_names
-from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.plan import LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.kernels import F64, I64, Bool, label_parts, spread_labels, squared_distance
@@ -279,7 +281,7 @@ TINY = 1e-6
 
 
 @register("floorplan", "valetudo")
-class Valetudo(PixelSource):
+class Valetudo(PixelSource, ForeignSource):
     """A map of a robot vacuum that runs Valetudo.
 
     Attributes:
@@ -307,7 +309,7 @@ class Valetudo(PixelSource):
         """Return the side of the map's pixels."""
         return pixel_side(check_map(read_json(settings["path"]))) * settings["scale"]
 
-    def load(self) -> FloorPlan:
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the map.
 
         Free space is the pixels of floors and segments without those of walls, gaps at thresholds
@@ -317,7 +319,7 @@ class Valetudo(PixelSource):
         Raises:
             FloorPlanError: The file can't be read, isn't such a map, or has no floor.
         """
-        content = read_json(self.path)
+        content = parse_json(files[self.path], self.path)
         with in_file(self.path):
             content = check_map(content)
             pixel_m = pixel_side(content)
@@ -333,18 +335,17 @@ class Valetudo(PixelSource):
                 raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
             _note_entities(content, notes)
             regions = _regions(layers, free, box, (pixel_m, self.scrap_area_m2), notes)
-            return FloorPlan.build(
-                self.path.stem,
-                _in_metres(free, box, pixel_m),
-                regions,
-                pixel_m * (self.scale or 1.0) if self.cell is None else self.cell,
+            return PlanParts(
+                name=self.path.stem,
+                free=_in_metres(free, box, pixel_m),
+                regions=tuple(regions),
+                cell=pixel_m * (self.scale or 1.0) if self.cell is None else self.cell,
                 source=f"Valetudo map, {self.path.name}",
-                doorways=None,
                 regions_are=self.borders if regions else "vacuum",
-                objects=_charger(content, free, box),
-                no_go=areas,
+                objects=tuple(_charger(content, free, box)),
+                no_go=tuple(areas),
                 scale=self.scale,
-                notes=notes,
+                notes=tuple(notes),
             )
 
     def _clean(
