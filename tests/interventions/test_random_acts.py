@@ -91,11 +91,19 @@ HOME = {
     },
     "robots": {
         "astro": {
-            "battery": {"driving": "2 h", "standing": "10 h", "charging": "3 h", "charger": "hallway"},
+            "battery": {
+                "driving": "2 h",
+                "standing": "10 h",
+                "charging": "3 h",
+                "charger": "hallway",
+            },
             "camera": {"range": [0.3, 4.5], "angle_deg": 108, "detection": 0.95},
             "behaviors": [{"type": "dock"}, {"type": "come"}, {"type": "find"}, {"type": "patrol"}],
         },
-        "bolt": {"camera": {"range": [0.3, 4]}, "behaviors": [{"type": "hangout", "source": "ltp"}]},
+        "bolt": {
+            "camera": {"range": [0.3, 4]},
+            "behaviors": [{"type": "hangout", "source": "ltp"}],
+        },
         "live": {"perceives": "live", "type": "patrol"},
     },
     "algorithms": {"ltp": {"type": "long_term_presence", "estimator": "likelihood"}},

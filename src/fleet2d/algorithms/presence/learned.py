@@ -1,6 +1,5 @@
 """Learned models of real-time presence: networks over all places that correct `routine`."""
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from functools import cache
@@ -14,7 +13,7 @@ from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel, split
 from fleet2d.algorithms.presence.estimator import natural_log
-from fleet2d.bounds import one_line
+from fleet2d.bounds import WEIGHTS_BYTES, one_line
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
@@ -29,11 +28,11 @@ from fleet2d.kernels import (
     trace_evidence,
     trace_size,
 )
+from fleet2d.storage.archives import read_arrays
 from fleet2d.storage.files import partial_file
 
 WEIGHTS = Path(__file__).with_name("learned.npz")
 FORMAT = "fleet2d presence network 1"  # changes with the features, and with the network
-MAX_BYTES = 1_000_000
 MAX_HIDDEN = 256
 MIN_SHARE = 1e-9
 # Kinds of rooms that mean the same; other kinds are one more group, and being away another.
@@ -111,12 +110,9 @@ class Weights(NamedTuple):
             InputError: The file is damaged, no file of weights, or of another version.
         """
         try:
-            if path.stat().st_size > MAX_BYTES:
-                raise ValueError(f"it is larger than {MAX_BYTES:,} bytes")
-            if not zipfile.is_zipfile(path):
-                raise ValueError("it is no .npz archive")
-            with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
+            arrays = read_arrays(path, WEIGHTS_BYTES)
+        except InputError:
+            raise
         except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
             raise InputError(
                 f"{path} can't be read as weights of a model of presence ({one_line(error, 100)}):"
@@ -137,6 +133,8 @@ class Weights(NamedTuple):
             "bias": (hidden,),
             "score": (hidden,),
         }
+        if unknown := sorted(arrays.keys() - shapes.keys() - {"format"}):
+            raise InputError(f"{path} has {unknown[0]!r}, which is no part of a model: remove it")
         for name, shape in shapes.items():
             part = arrays.get(name, np.zeros(()))
             fits = part.shape == shape and part.dtype == np.float32 and 0 < hidden <= MAX_HIDDEN

@@ -8,11 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fleet2d.bounds import PIXELS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
+from fleet2d.floorplan.formats.files import MAX_COORDINATE_M
 from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.storage.bags import open_bag, planar
@@ -91,7 +93,13 @@ def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, st
             f"{path}: the map of {topic} is damaged: {len(cells)} cells for {columns} × {rows} of"
             f" {side:g} m"
         )
+    PIXELS.check(rows * columns, f"{path}: the map of {topic}", FloorPlanError)
     x, y, heading = planar(info.origin.position, info.origin.orientation)
+    if not max(abs(x), abs(y)) * scale <= MAX_COORDINATE_M or not math.isfinite(heading):
+        raise FloorPlanError(
+            f"{path}: the map of {topic} is damaged: its corner is at ({x:g}, {y:g}) m, turned by"
+            f" {math.degrees(heading):g} degrees"
+        )
     x, y, side, percent = x * scale, y * scale, round(side, 6), cells.reshape(rows, columns)
     free = (percent >= 0) & (percent < FREE_BELOW)
     return OccupancyMap(free, percent > OCCUPIED_ABOVE, side, (x, y), turn_by(heading)), (
