@@ -358,7 +358,7 @@ def test_broken_policy_file_is_named(tmp_path: Any) -> None:
     path.write_bytes(b"no network")
     content = flat()
     content["robots"]["astro"]["behaviors"] = [policy(rooms=7, file=str(path))]
-    with pytest.raises(fleet2d.ComponentError, match=r"policy\.onnx can't be read as an ONNX file"):
+    with pytest.raises(fleet2d.InputError, match=r"policy\.onnx is no ONNX model"):
         fleet2d.run(content)
 
 

@@ -32,6 +32,8 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError, may_be_ctrl_c, text_of
 
+NETWORK = ".onnx"
+"""Suffix of the file of a network."""
 # Files that a message lists, at most.
 _MAX_LISTED = 20
 
@@ -213,6 +215,9 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
     """
     code: dict[Path, list[str]] = {}
     for key, name in _class_paths(scenario, ()):
+        if _is_network(name):
+            code.setdefault((folder_of(name) / Path(name).expanduser()).resolve(), []).append(key)
+            continue
         folder, module, _ = _parts_of(name)
         try:
             files = _files_to_run((folder_of(name) / folder).resolve(), module)
@@ -226,7 +231,7 @@ def code_of(scenario: object) -> dict[Path, list[str]]:
 
 
 def _class_paths(value: object, keys: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Yield every text that may be the path of a user's own component, after its key."""
+    """Yield every text that may be the path of an own component or a network, after its key."""
     if isinstance(value, Mapping):
         for key, entry in value.items():
             if key != "extends":  # a file of data, such as bundled:base, which is merged already
@@ -234,8 +239,13 @@ def _class_paths(value: object, keys: tuple[str, ...]) -> Iterator[tuple[str, st
     elif isinstance(value, list | tuple):
         for index, entry in enumerate(value):
             yield from _class_paths(entry, (*keys, str(index)))
-    elif isinstance(value, str) and _is_class_path(value):
+    elif isinstance(value, str) and (_is_network(value) or _is_class_path(value)):
         yield ".".join(keys), value
+
+
+def _is_network(text: str) -> bool:
+    """Whether a text is the path of a network, which may compute for ever."""
+    return text.endswith(NETWORK)
 
 
 def _is_class_path(text: str) -> bool:

@@ -15,6 +15,7 @@ from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel,
 from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.bounds import WEIGHTS_BYTES, one_line
 from fleet2d.configuration.components import register
+from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.floorplan.home import Home
@@ -33,6 +34,8 @@ from fleet2d.storage.files import partial_file
 
 WEIGHTS = Path(__file__).with_name("learned.npz")
 FORMAT = "fleet2d presence network 1"  # changes with the features, and with the network
+INPUTS = ("features", "places")
+"""The names of the inputs of a model in a file."""
 MAX_HIDDEN = 256
 MIN_SHARE = 1e-9
 # Kinds of rooms that mean the same; other kinds are one more group, and being away another.
@@ -297,7 +300,7 @@ class OnnxModel(CorrectedRoutine):
         Raises:
             InputError: It isn't, or onnxruntime is missing.
         """
-        _session(Path(self.file))
+        open_network(self.file, INPUTS)
 
     def correct(self, features: F64) -> F64:
         """Return the probability of each place by the network.
@@ -309,7 +312,7 @@ class OnnxModel(CorrectedRoutine):
             "features": features.astype(np.float32),
             "places": self.facts.features.astype(np.float32),
         }
-        output = np.asarray(_session(Path(self.file)).run(None, inputs)[0], np.float64)
+        output = compute(self.file, inputs).astype(np.float64)
         if output.shape != features.shape[:2] or not np.isfinite(output).all():
             raise ComponentError(
                 f"{self.file} returned an array of shape {output.shape}, expected finite numbers of"
@@ -319,30 +322,3 @@ class OnnxModel(CorrectedRoutine):
             output = np.exp(output - output.max(axis=1, keepdims=True))
         output = np.maximum(output, 0)
         return output / np.maximum(output.sum(axis=1, keepdims=True), 1e-12)
-
-
-@cache
-def _session(path: Path) -> Any:
-    """Return a model that is ready to run, on one thread."""
-    try:
-        import onnxruntime
-    except ImportError:
-        raise InputError(
-            'models in ONNX files need onnxruntime: pip install "fleet2d[onnx]"'
-        ) from None
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    try:
-        session = onnxruntime.InferenceSession(
-            path.read_bytes(), options, providers=["CPUExecutionProvider"]
-        )
-    except Exception as error:  # noqa: BLE001 - the runtime's own errors have no public base
-        raise InputError(f"{path} is no ONNX model: {one_line(error, 120)}") from None
-    names = tuple(sorted(part.name for part in session.get_inputs()))
-    if names != ("features", "places"):
-        raise InputError(
-            f"{path} has the inputs {', '.join(names)}, expected features (bins, places,"
-            f" {TRACE_FEATURES}) and places (places, {PLACE_FEATURES})"
-        )
-    return session
