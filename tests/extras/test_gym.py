@@ -125,6 +125,8 @@ def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name() -> None:
     ("vary", "message"),
     [
         ({"floorplan.seed": {"train": {"range": [0, 1.5]}}}, "whole numbers, first < end"),
+        ({"floorplan.seed": {"train": {"range": [0, 10**12]}}}, "more than 1,000,000 values"),
+        ({"floorplan.seed": {"train": {"range": [0, 10**8]}}}, "FLEET2D_MAX_VARIANTS"),
         ({"floorplan.seed": {"train": {"range": 5}}}, "expected a list of values, or {range"),
         ({"floorplan.seed": {"train": {"range": [5, 5]}}}, "whole numbers, first < end"),
         ({"floorplan.seed": {"train": []}}, "vary.floorplan.seed.train: expected a list of length"),

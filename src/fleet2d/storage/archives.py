@@ -83,5 +83,5 @@ def _array(name: str, content: bytearray) -> NDArray[Any]:
     shape, is_transposed, kind = read(header)
     if kind.kind not in "biufU" or min(shape, default=0) < 0:
         raise ValueError(f"{name!r} is not an array of numbers, truth values or texts")
-    order = "F" if is_transposed else "C"
-    return np.ndarray(shape, kind, content, header.tell(), order=order)
+    at = header.tell()
+    return np.ndarray(shape, kind, content, at, order="F" if is_transposed else "C")
