@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.options import TrustFiles, TrustFolders, restrict_to, split
+from fleet2d.options import TrustFiles, TrustFolders, restrict_to, resume_hint, split
 
 
 def live(  # noqa: PLR0913 - options of the command line
@@ -77,6 +77,8 @@ def live(  # noqa: PLR0913 - options of the command line
     place = f", stored in {out}" if out else ""
     typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
     if run.status != "complete":
+        if out is not None:
+            tell(resume_hint(simulation.time, out))
         raise typer.Exit(130)
 
 
