@@ -89,7 +89,7 @@ def whole(runs: int, days: int) -> None:
         begin = used()
         made = dataset(source(ROUNDS, runs, days), Path(folder) / "made", workers=1)
         took = used() - begin
-        size = sum(file["bytes"] for file in made.manifest["files"].values())
+        size = sum(file.bytes for file in made.manifest.files.values())
     print(f"whole data set of {runs} runs: {runs * days / took:.1f} days/s of processor time;")
     print(f"  {size / runs / days / 1000:.0f} kB a day")
 

@@ -85,6 +85,10 @@ PICTURE_BYTES = Bound("PICTURE_BYTES", 256 << 20, "bytes")
 """Size of a picture of a floor plan."""
 LOG_BYTES = Bound("LOG_BYTES", 1 << 30, "bytes")
 """Size of a log."""
+CHUNK_BYTES = Bound("CHUNK_BYTES", 256 << 20, "bytes when unpacked")
+"""Size of a message in a bag, or of a chunk of messages, unpacked."""
+METADATA_BYTES = Bound("METADATA_BYTES", 1 << 20, "bytes")
+"""Size of the description of a bag, which is read slowly."""
 DEPTH = Bound("DEPTH", 64, "lists in lists")
 """Depth of YAML."""
 YAML_VALUES = Bound("VALUES", 200_000, "values")
@@ -122,6 +126,8 @@ LOG_DAYS = Bound("LOG_DAYS", 3_660, "days from its first to its last row")
 """Days from the first to the last row of a log: ten years."""
 LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
 """Size of what an algorithm has learned, unpacked."""
+WEIGHTS_BYTES = Bound("WEIGHTS_BYTES", 1_000_000, "bytes when unpacked")
+"""Size of the weights of a network, unpacked."""
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 """Size of a table, unpacked, that is read at once."""
 READ_SECONDS = Bound("READ_SECONDS", 6, "seconds")

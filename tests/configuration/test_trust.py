@@ -90,7 +90,8 @@ SERIAL = ("--executor", "serial")
 def test_own_files_run_what_they_name(fleet2d: Cli, command: tuple[str, ...]) -> None:
     """`study run` refused one's own file while `run` had just executed its components."""
     code, _, err = fleet2d(*command)
-    assert (0, True) == (code, Path("ran").exists()), err
+    expected = 2 if command[0] == "validate" else 0  # a room of this home can't be reached
+    assert (expected, True) == (code, Path("ran").exists()), err
 
 
 def test_an_own_scenario_that_is_watched_runs_what_it_names(fleet2d: Cli) -> None:

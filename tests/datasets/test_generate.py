@@ -24,7 +24,7 @@ from fleet2d.errors import Fleet2DError, InputError
 
 
 def records(data: Dataset) -> dict[str, str]:
-    return {name: file["sha256"] for name, file in data.manifest["files"].items()}
+    return {name: file.sha256 for name, file in data.manifest.files.items()}
 
 
 @pytest.mark.slow
@@ -94,9 +94,11 @@ def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
     shutil.copytree(data.root, out)
     (out / "dataset.json").unlink()
     parts.mkdir()
-    (parts / "plan.txt").write_text(f"{data.manifest['plan']} {fleet2d.__version__}")
-    files = data.manifest["files"]
-    whole = {name: files[name] for name in files if "train" not in name or "00001" in name}
+    (parts / "plan.txt").write_text(f"{data.manifest.plan} {fleet2d.__version__}")
+    files = data.manifest.files
+    whole = {
+        name: files[name].model_dump() for name in files if "train" not in name or "00001" in name
+    }
     for record in ("train-00001", "test-00000"):
         (parts / f"{record}.json").write_text(json.dumps(whole))
     (parts / "train-00000.json").write_text('{"../secret": {"bytes": 0}}')
@@ -191,8 +193,8 @@ def test_a_day_takes_little_room(data: Dataset) -> None:
     table = data.arrow("labels", "train")
     assert table.nbytes > 0
     size = sum(
-        file["bytes"]
-        for name, file in data.manifest["files"].items()
+        file.bytes
+        for name, file in data.manifest.files.items()
         if name.startswith(("train/evidence", "train/labels"))
     )
     days = sum(data.arrow("runs", "train")["days"].to_pylist())

@@ -125,6 +125,8 @@ def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name() -> None:
     ("vary", "message"),
     [
         ({"floorplan.seed": {"train": {"range": [0, 1.5]}}}, "whole numbers, first < end"),
+        ({"floorplan.seed": {"train": {"range": [0, 10**12]}}}, "more than 1,000,000 values"),
+        ({"floorplan.seed": {"train": {"range": [0, 10**8]}}}, "FLEET2D_MAX_VARIANTS"),
         ({"floorplan.seed": {"train": {"range": 5}}}, "expected a list of values, or {range"),
         ({"floorplan.seed": {"train": {"range": [5, 5]}}}, "whole numbers, first < end"),
         ({"floorplan.seed": {"train": []}}, "vary.floorplan.seed.train: expected a list of length"),
@@ -358,7 +360,7 @@ def test_broken_policy_file_is_named(tmp_path: Any) -> None:
     path.write_bytes(b"no network")
     content = flat()
     content["robots"]["astro"]["behaviors"] = [policy(rooms=7, file=str(path))]
-    with pytest.raises(fleet2d.ComponentError, match=r"policy\.onnx can't be read as an ONNX file"):
+    with pytest.raises(fleet2d.InputError, match=r"policy\.onnx is no ONNX model"):
         fleet2d.run(content)
 
 

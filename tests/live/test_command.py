@@ -1,11 +1,16 @@
 """The command `fleet2d live`: addresses, schema, the stored run."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 import typer
 from tests.live.scenes import LIVE, place
+from tests.scenes import fleet2d_process
 from typer.testing import CliRunner
 
 import fleet2d
@@ -65,3 +70,29 @@ def test_the_schema_of_messages_is_printed() -> None:
 def test_a_program_has_to_be_named() -> None:
     with pytest.raises(InputError, match="name at least one other program by --with"):
         CliRunner().invoke(APP, [], catch_exceptions=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_run_that_was_ended_is_continued_by_resume(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    """Nothing said so: the same command only asked for another folder."""
+    (tmp_path / "lab.yaml").write_text("extends: bundled:base\nsimulation: {duration: 2 h}\n")
+    arguments = ["live", str(tmp_path / "lab.yaml"), "--with", "udp://127.0.0.1:0"]
+    arguments += ["--speed", "60", "--out", str(tmp_path / "run")]
+    command = [sys.executable, "-m", "fleet2d.cli", *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert "listens at" in process.stderr.readline()
+    time.sleep(1)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=20)
+    hint = f"continue it by `fleet2d resume {tmp_path / 'run'}`"
+    assert (hint in errors) == (number == signal.SIGINT)
+
+    again = fleet2d_process(*arguments)
+
+    assert 2 == again.returncode
+    assert f"{tmp_path / 'run'} exists and has an unfinished run: {hint}, choose" in again.stderr
+    assert "complete" == fleet2d.resume(tmp_path / "run").status

@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from fleet2d.errors import RunDirectoryError
-from fleet2d.storage.files import FolderLock, path_in, refuse_links, replacing, write_atomically
+from fleet2d.storage.files import (
+    FolderLock,
+    new_folder,
+    path_in,
+    refuse_links,
+    replacing,
+    write_atomically,
+)
 
 LOCK_NAME = "run.lock"
 
@@ -119,3 +126,45 @@ def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
     outputs = sorted(process.communicate(timeout=60)[0].strip() for process in processes)
     assert 1 == outputs.count("mine")
     assert 4 == outputs.count("RunDirectoryError")
+
+
+def test_a_folder_that_could_not_be_made_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), new_folder(tmp_path / "bag") as made:  # noqa: PT012
+        made.mkdir()
+        (made / "half").touch()
+        raise KeyboardInterrupt
+    assert [] == list(tmp_path.iterdir())
+
+
+def test_what_a_killed_process_left_of_a_folder_is_replaced(tmp_path: Path) -> None:
+    left = tmp_path / "bag.partial" / "bag"
+    left.mkdir(parents=True)
+    (left / "half").touch()
+    with new_folder(tmp_path / "bag") as made:
+        made.mkdir()
+        (made / "whole").touch()
+    assert ["bag", "bag/whole"] == sorted(
+        path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")
+    )
+
+
+def test_a_link_in_place_of_what_was_left_is_removed_and_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "file").touch()
+    (tmp_path / "bag.partial").symlink_to(tmp_path / "mine")
+    with new_folder(tmp_path / "bag") as made:
+        made.mkdir()
+    assert (tmp_path / "mine" / "file").exists()
+    assert not (tmp_path / "bag.partial").is_symlink()
+
+
+@pytest.mark.parametrize("kind", ["folder", "file", "link"])
+def test_a_folder_that_is_there_is_not_replaced(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "bag"
+    if kind == "link":
+        path.symlink_to(tmp_path / "nowhere")
+    else:
+        path.mkdir() if kind == "folder" else path.touch()
+    with pytest.raises(FileExistsError), new_folder(path):
+        raise AssertionError
+    assert ["bag"] == [entry.name for entry in tmp_path.iterdir()]

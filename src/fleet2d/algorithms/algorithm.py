@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, ClassVar
-from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fleet2d.algorithms.history import History
-from fleet2d.bounds import LEARNED_BYTES, check_file, one_line
+from fleet2d.bounds import LEARNED_BYTES, one_line
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, PositiveDuration
@@ -19,6 +18,7 @@ from fleet2d.errors import ComponentError, InputError
 from fleet2d.floorplan.home import Home, HomeChanges
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.storage.archives import read_arrays
 
 # Joins the names of nested mappings in the names of the file's arrays.
 SEPARATOR = "/"
@@ -54,13 +54,7 @@ def load_learned(path: Path) -> dict[str, Any]:
     """
     state: dict[str, Any] = {}
     try:
-        check_file(path, LEARNED_BYTES)
-        with path.open("rb") as opened, ZipFile(opened) as file:
-            unpacked = sum(entry.file_size for entry in file.infolist())
-            LEARNED_BYTES.check(unpacked, path)
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as content:
-            arrays = {name: _plain(content[name], name) for name in content.files}
-        for name, array in arrays.items():
+        for name, array in read_arrays(path, LEARNED_BYTES).items():
             *parents, last = name.split(SEPARATOR)
             mapping = state
             for key in parents:
@@ -74,13 +68,6 @@ def load_learned(path: Path) -> dict[str, Any]:
             " the folder learned/ of a run"
         ) from None
     return state
-
-
-def _plain(value: Any, name: str) -> NDArray[Any]:
-    """Return an array of plain values; refuse other entries of the archive."""
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "biufU":
-        raise ValueError(f"{name!r} is not an array of numbers, truth values or texts")
-    return value
 
 
 def run_state(component: Any) -> dict[str, Any]:

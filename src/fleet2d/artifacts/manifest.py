@@ -284,13 +284,13 @@ TableName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
 FileName = Annotated[str, Field(pattern=r"^(learned/)?[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
 
 
-class _Record(BaseModel):
+class Record(BaseModel):
     """A part of a manifest: plain values of the right type, and no others."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class ColumnRecord(_Record):
+class ColumnRecord(Record):
     """A column of a table."""
 
     name: str
@@ -298,7 +298,7 @@ class ColumnRecord(_Record):
     unit: str = ""
 
 
-class TableRecord(_Record):
+class TableRecord(Record):
     """A table: its rows, the digest of its content, and its columns in order."""
 
     rows: Count
@@ -312,28 +312,28 @@ def table_record(spec: TableSpec, rows: int, digest: str) -> TableRecord:
     return TableRecord(rows=rows, digest=digest, columns=columns)
 
 
-class InputRecord(_Record):
+class InputRecord(Record):
     """A file that the run read."""
 
     path: str
     sha256: Sha256
 
 
-class FileRecord(_Record):
+class FileRecord(Record):
     """The size and the digest of a file of the run directory."""
 
     bytes: Count
     sha256: Sha256
 
 
-class Entities(_Record):
+class Entities(Record):
     """Names of the people and robots in the home."""
 
     users: list[str] = []
     robots: list[str] = []
 
 
-class Seal(_Record):
+class Seal(Record):
     """Digests of a whole run; see `fleet2d.artifacts.seal`.
 
     Attributes:
@@ -484,7 +484,7 @@ class Manifest(BaseModel):
             manifest = cls.model_validate(content)
             ManifestParts.model_validate(content)
         except ValidationError as error:
-            raise _damaged(path, _problems(error)) from None
+            raise _damaged(path, problems_of(error)) from None
         # Tables that no simulation stored have no scenario, and no times.
         reason = time_problem(manifest.start, manifest.step_us, manifest.steps)
         if manifest.scenario and reason:
@@ -513,7 +513,7 @@ def json_of(path: Path, text: bytes) -> Any:
         raise _damaged(path, str(error)) from error
 
 
-def _problems(error: ValidationError) -> str:
+def problems_of(error: ValidationError) -> str:
     """Return a message that names the wrong fields and what is wrong with each."""
     lines = []
     for line in error.errors(include_url=False)[:_MAX_PROBLEMS]:

@@ -15,6 +15,7 @@ from pydantic import BeforeValidator
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status, TableRecord, table_record
 from fleet2d.artifacts.seal import TableDigest, make_seal, run_digest
 from fleet2d.artifacts.table import FLUSH_ROWS, Batch, Chunk, TableBuffer, TableSpec, rows_of
+from fleet2d.artifacts.unfinished import FOLDER as UNFINISHED
 from fleet2d.artifacts.unfinished import (
     LOCK_NAME,
     Commit,
@@ -204,8 +205,11 @@ class RunStore:
                     "choose another --out or remove it"
                 )
             if directory.is_dir() and any(directory.iterdir()):  # is_dir refuses impossible names
+                state = "is not empty: "
+                if (directory / UNFINISHED).is_dir():
+                    state = f"has an unfinished run: continue it by `fleet2d resume {directory}`, "
                 raise RunDirectoryError(
-                    f"{directory} exists and is not empty: choose another --out or remove it"
+                    f"{directory} exists and {state}choose another --out or remove it"
                 )
         except OSError as error:
             raise cannot_write(directory, error) from error

@@ -23,6 +23,9 @@ from fleet2d.configuration.code_files import (
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import RunDirectoryError, ScenarioError, printable
 
+NETWORK = ".onnx"
+"""Suffix of the file of a network."""
+
 _MAY_RUN: ContextVar[bool] = ContextVar("may_run", default=True)
 _MAX_KEYS = 3
 
@@ -114,7 +117,7 @@ def code_of(content: object) -> dict[str, list[str]]:
     """Return what a scenario would run and isn't loaded, with the keys that name it.
 
     That is: the files of its own components and what these import from beside them; programs with
-    all their arguments; and files that it extends, which may name more.
+    all their arguments; networks; and files that it extends, which may name more.
 
     Args:
         content: Plain data, such as the scenario of a manifest.
@@ -166,6 +169,8 @@ def _files_named(text: str, *, is_extended: bool) -> Sequence[Path]:
     """Return the files of code that a text would run."""
     if is_extended and (file := _file(text)):
         return [file]
+    if text.endswith(NETWORK):  # it may compute for ever, and fill the memory
+        return [(folder_of(text) / Path(text).expanduser()).resolve()]
     if not is_class_path(text):
         return []
     folder, module, _ = parts_of(text)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, printable
 from fleet2d.options import Workers
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ def _make(source: Path, out: Path, workers: int | None) -> None:
 
 
 def _print_size(made: "Dataset") -> None:
-    size = sum(file["bytes"] for file in made.manifest["files"].values())
-    runs = ", ".join(f"{name} {count}" for name, count in made.manifest["splits"].items())
+    size = sum(file.bytes for file in made.manifest.files.values())
+    runs = ", ".join(f"{name} {count}" for name, count in made.manifest.splits.items())
     typer.echo(f"{made.root}: {runs} runs, {size / 1e6:.2f} MB")
 
 
@@ -181,5 +181,7 @@ def _print_scores(entries: "Sequence[LeaderboardEntry]", split: str) -> None:
         own = [entry for entry in entries if entry.task == name]
         typer.echo(f"{name} ({own[0].cases:,} cases of {split})")
         for metric in own[0].scores:
-            cells = "  ".join(f"{entry.model} {entry.scores[metric]:.3f}" for entry in own)
+            cells = "  ".join(
+                f"{printable(entry.model)} {entry.scores[metric]:.3f}" for entry in own
+            )
             typer.echo(f"  {metric:22} {cells}")

@@ -17,7 +17,15 @@ import yaml
 
 from fleet2d import __version__
 from fleet2d.algorithms.presence.belief import AWAY
-from fleet2d.datasets.reader import FORMAT, MANIFEST, Dataset, open_dataset
+from fleet2d.artifacts.manifest import read_json, versions
+from fleet2d.bounds import FILE_BYTES, read_bytes
+from fleet2d.datasets.reader import (
+    MANIFEST,
+    Dataset,
+    DatasetManifest,
+    ShardRecord,
+    open_dataset,
+)
 from fleet2d.datasets.specification import (
     PARTS,
     PICTURES,
@@ -29,7 +37,7 @@ from fleet2d.datasets.specification import (
 )
 from fleet2d.datasets.tables import SCHEMAS, tables_of
 from fleet2d.errors import InputError
-from fleet2d.storage.files import FolderLock, partial_file, write_atomically
+from fleet2d.storage.files import FolderLock, partial_file, refuse_links, write_atomically
 from fleet2d.studies.api import map_runs
 from fleet2d.studies.progress import progress_bar
 
@@ -121,7 +129,7 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
     rooms = {
         (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
     }
-    files, evidence = data.manifest["files"], f"{split}/evidence-"
+    files, evidence = data.manifest.files, f"{split}/evidence-"
     kinds: Counter[str] = Counter()
     for run, place, count in labels.collect().iter_rows():
         kinds[rooms.get((run, place), AWAY)] += count
@@ -130,7 +138,7 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
         "days": sum(runs["days"].to_pylist()),
         "homes": len(set(runs["home"].to_pylist())),
         "labels": kinds.total(),
-        "evidence": sum(files[name]["rows"] for name in files if name.startswith(evidence)),
+        "evidence": sum(files[name].rows for name in files if name.startswith(evidence)),
         "household": Counter(runs["household"].to_pylist()),
         "varied": Counter(filter(None, "; ".join(runs["varied"].to_pylist()).split("; "))),
         "place": kinds,
@@ -227,9 +235,10 @@ def dataset(
     """
     plan, root = plan_dataset(source), Path(out)
     parts, made = root / PARTS, None
+    refuse_links(root, (PARTS, PICTURES, *plan.file.splits))
     if (root / MANIFEST).is_file():
         made = open_dataset(root)
-        if made.manifest["plan"] != plan.digest:
+        if made.manifest.plan != plan.digest:
             raise InputError(f"{root} holds another data set: choose another folder, or delete it")
         if not made.lacking():
             return made
@@ -247,7 +256,7 @@ def dataset(
     finally:
         lock.release()
     shutil.rmtree(parts)
-    if made is not None and files != made.manifest["files"]:
+    if made is not None and files != made.manifest.files:
         raise InputError(
             f"{root}: files that were lacking differ now from those that were written, by other"
             " versions of libraries (see --verify): delete the data set, and make it again"
@@ -257,29 +266,29 @@ def dataset(
 
 def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
     """Record the shards of a complete data set, so that only those that lack a file are made."""
-    version = made.manifest["versions"]["fleet2d"]
+    version = made.manifest.versions.get("fleet2d")
     if version != __version__:
         raise InputError(
             f"{made.root} lacks {made.lacking()[0]}, which Fleet2D {version} can make again; this"
             f" is {__version__}"
         )
     for shard in plan.shards():
-        record = {name: made.manifest["files"][name] for name in _files_of(shard).values()}
-        write_atomically(_record_path(made.root, shard), json.dumps(record).encode())
+        record = {name: made.manifest.files[name] for name in _files_of(shard).values()}
+        _write_record(made.root, shard, record)
 
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:
     """Refuse to continue a data set of another file or version; begin one."""
-    path, identity = parts / PLAN, f"{plan.digest} {__version__}"
-    if path.is_file() and path.read_text() != identity:
+    path, identity = parts / PLAN, f"{plan.digest} {__version__}".encode()
+    if path.is_file() and read_bytes(path, FILE_BYTES) != identity:
         raise InputError(
             f"{parts.parent} holds the unfinished data set of another file, or another version of"
             " Fleet2D: choose another folder, or delete it"
         )
-    write_atomically(path, identity.encode())
+    write_atomically(path, identity)
 
 
-def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[str, dict[str, Any]]:
+def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[str, ShardRecord]:
     """Simulate the runs that are lacking, block by block; return the record of each file."""
     records = {shard: _record_of(root, shard) for shard in plan.shards()}
     lacking = [shard for shard, record in records.items() if not record]
@@ -307,15 +316,22 @@ def _record_path(root: Path, shard: Shard) -> Path:
     return root / PARTS / f"{shard.split}-{shard.number:05}.json"
 
 
-def _record_of(root: Path, shard: Shard) -> dict[str, dict[str, Any]]:
+def _record_of(root: Path, shard: Shard) -> dict[str, ShardRecord]:
     """Return the record of a shard that was written whole, else nothing."""
     try:
-        stored = json.loads(_record_path(root, shard).read_text())
-        record = {name: stored[name] for name in _files_of(shard).values()}
-        is_whole = all((root / n).stat().st_size == file["bytes"] for n, file in record.items())
+        stored = read_json(read_bytes(_record_path(root, shard), FILE_BYTES))
+        names = _files_of(shard).values()
+        record = {name: ShardRecord.model_validate(stored[name]) for name in names}
+        is_whole = all((root / n).stat().st_size == file.bytes for n, file in record.items())
     except (OSError, ValueError, LookupError, TypeError):
         return {}
     return record if is_whole else {}
+
+
+def _write_record(root: Path, shard: Shard, record: Mapping[str, ShardRecord]) -> None:
+    """Record that the files of a shard are whole."""
+    content = {name: file.model_dump() for name, file in record.items()}
+    write_atomically(_record_path(root, shard), json.dumps(content).encode())
 
 
 def _files_of(shard: Shard) -> dict[str, str]:
@@ -348,16 +364,18 @@ def write_part(
                 stream.write_table(tables[name])
 
 
-def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, dict[str, Any]]:
+def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, ShardRecord]:
     """Turn the parts of some runs into the files of a shard; return a record of each file."""
     tables: dict[str, list[pa.Table]] = {name: [] for name in SCHEMAS}
     parts = [_part_path(root, run) for run in runs]
     for part in parts:
         try:
             with pa.OSFile(str(part), "rb") as file:
-                for name in SCHEMAS:
-                    tables[name].append(pa.ipc.open_stream(file).read_all())
-        except (OSError, pa.ArrowException) as error:
+                for name, schema in SCHEMAS.items():
+                    table = pa.ipc.open_stream(file).read_all()
+                    table.cast(schema)
+                    tables[name].append(table)
+        except (OSError, ValueError, pa.ArrowException) as error:
             part.unlink(missing_ok=True)
             raise InputError(
                 f"{part} was damaged, and is deleted ({error}): run the same command again"
@@ -371,8 +389,8 @@ def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, dic
             pq.write_table(table, partial, **_encoding(table))
         content = path.read_bytes()
         digest = hashlib.sha256(content).hexdigest()
-        record[name] = {"rows": table.num_rows, "bytes": len(content), "sha256": digest}
-    write_atomically(_record_path(root, shard), json.dumps(record).encode())
+        record[name] = ShardRecord(rows=table.num_rows, bytes=len(content), sha256=digest)
+    _write_record(root, shard, record)
     for part in parts:
         part.unlink()
     return record
@@ -401,18 +419,15 @@ def _encoding(table: pa.Table) -> dict[str, Any]:
     }
 
 
-def _finish(root: Path, plan: DatasetPlan, files: Mapping[str, Mapping[str, Any]]) -> None:
+def _finish(root: Path, plan: DatasetPlan, files: Mapping[str, ShardRecord]) -> None:
     """Write the data card, then the manifest: a data set with one is complete."""
-    from fleet2d.artifacts.manifest import versions
-
-    manifest = {
-        "format": FORMAT,
-        "name": plan.file.name,
-        "plan": plan.digest,
-        "versions": versions(),
-        "splits": {name: split.runs for name, split in plan.file.splits.items()},
-        "file": plan.file.model_dump(mode="json"),
-        "files": files,
-    }
+    manifest = DatasetManifest(
+        name=plan.file.name,
+        plan=plan.digest,
+        versions=versions(),
+        splits={name: split.runs for name, split in plan.file.splits.items()},
+        file=plan.file.model_dump(mode="json"),
+        files=dict(files),
+    )
     write_card(Dataset(root, manifest), plan.file)
-    write_atomically(root / MANIFEST, json.dumps(manifest, indent=1, default=str).encode())
+    write_atomically(root / MANIFEST, manifest.model_dump_json(indent=1).encode())

@@ -13,6 +13,7 @@ Baselines learn from `train` and are scored on another split.
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,7 +25,7 @@ from fleet2d.configuration.problems import check_known
 from fleet2d.datasets.reader import Dataset
 from fleet2d.datasets.training import predict
 from fleet2d.datasets.windows import PRIOR, Windows, windows_of
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, errors_as
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.rtp_score import GAP_ENDS, GAPS, calibration_error, log_loss, top_k
 from fleet2d.studies.intervals import estimate
@@ -62,7 +63,20 @@ def windows(data: Dataset, split: str, worker: int = 0, workers: int = 1) -> Ite
         workers: Among how many the shards are shared.
     """
     for number in range(worker, data.shards(split), workers):
-        yield from windows_of(data.shard(split, number))
+        with _agreeing(data, split):
+            yield from windows_of(data.shard(split, number))
+
+
+@contextmanager
+def _agreeing(data: Dataset, split: str) -> Iterator[None]:
+    """Refuse a data set whose tables don't fit together, such as a label in a room without a row.
+
+    Raises:
+        InputError: What is computed in the block failed, as it can't with the tables of a run.
+    """
+    place = f"{data.root}: its tables of {split!r} don't fit together, make the data set again"
+    with errors_as(InputError, place, of=(ArithmeticError, LookupError, ValueError)):
+        yield
 
 
 def leaderboard(
@@ -85,11 +99,12 @@ def leaderboard(
     for task in tasks:
         check_known(task, "task", TASKS, InputError)
     names = tasks or [t for t in TASKS if t == "rtp" or TRAIN in data.splits]
-    return [
-        LeaderboardEntry(task, model, scores, cases)
-        for task in names
-        for model, (scores, cases) in TASKS[task](data, split, models or {}).items()
-    ]
+    with _agreeing(data, split):
+        return [
+            LeaderboardEntry(task, model, scores, cases)
+            for task in names
+            for model, (scores, cases) in TASKS[task](data, split, models or {}).items()
+        ]
 
 
 def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:

@@ -11,10 +11,11 @@ from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.algorithms.presence.learned import PlaceFacts
+from fleet2d.bounds import ENTRIES, TABLE_BYTES
 from fleet2d.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.datasets.tables import tables_of
 from fleet2d.errors import InputError
-from fleet2d.kernels import F64, I64, TracedEvidence, trace_evidence, trace_size
+from fleet2d.kernels import F64, I64, TRACE_FEATURES, TracedEvidence, trace_evidence, trace_size
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
         if beliefs is None or PRIOR not in beliefs["model"]:
             raise InputError(f"run {number} has no beliefs of {PRIOR}: list it under beliefs")
         names = rooms["room"].tolist()
+        ENTRIES.check(len(names), f"the home of run {number}")
         xy = np.stack([rooms["x"], rooms["y"]], axis=1).tolist()
         facts = PlaceFacts.of(rooms["kind"].tolist(), rooms["area_m2"], xy)
         start = np.datetime64(run["start"][0], "us")
@@ -114,8 +116,10 @@ class _Dense:
         self.labels, self.beliefs, self.facts = labels, beliefs, facts
         step_us = int((labels["time"][0] - start) / MICROSECOND) // max(int(labels["step"][0]), 1)
         self.bin_steps = steps_of_bin(step_us)
-        count = int(max(evidence["step"].max(initial=0), labels["step"].max()) + 1)
-        count //= self.bin_steps
+        last = max(int(evidence["step"].max(initial=0)), int(labels["step"].max()))
+        count = (last + 1) // self.bin_steps
+        size = count * (len(rooms) + 1) * TRACE_FEATURES * np.float64().itemsize
+        TABLE_BYTES.check(size, "the evidence of a run")
         self.rooms = {name: k for k, name in enumerate(rooms)}
         self.step = (np.arange(count) + 1) * self.bin_steps - 1
         bin_ = (evidence["step"] + 1) // self.bin_steps - 1

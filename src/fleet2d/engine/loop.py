@@ -22,7 +22,7 @@ from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
-from fleet2d.errors import InputError, blame
+from fleet2d.errors import ComponentError, InputError, blame
 from fleet2d.floorplan.home import HomeChanges
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.memory import rare_collections
@@ -64,16 +64,17 @@ def intervene(state: State, span: Span) -> None:
         return
     world = EngineWorld(state, span.first)
     for item in state.interventions.take(span.first):
-        if item.ends:
-            item.act.end(world)
-            continue
         try:
-            item.act.check(world)
-            item.act.begin(world)
-        except InputError as error:
+            if item.ends:
+                item.act.end(world)
+            else:
+                item.act.check(world)
+                item.act.begin(world)
+        except (ComponentError, InputError) as error:
             state.interventions.forget(item.act)
             source = item.by or f"the intervention {item.act.type_name}"
-            state.store.manifest.notes.append(f"step {span.first}: {source} was left out: {error}")
+            what = f"the end of {source}" if item.ends else source
+            state.store.manifest.notes.append(f"step {span.first}: {what} was left out: {error}")
     if state.interventions.waiting:  # maybe for fewer events now
         state.wait_for(state.requested)
 

@@ -309,14 +309,23 @@ class DoActivity(Trip):
     activity: str
     place: RoomChoice | Point | None
 
+    def decide(self, now: Situation) -> Plan | None:
+        """Do it; it is over if the behavior that did it has changed and does it no more."""
+        is_possible = self.place is not None or self._performer(now) is not None
+        return super().decide(now) if is_possible else None
+
     def go(self, now: Situation, plan: Plan) -> None:
         """Go to where it is done, and begin."""
+        performer = self._performer(now)
         if self.place is not None:
             plan.come_home().go_to(self.place, "send")
-        else:
-            capable = (b for b in now.actor.behaviors if self.activity in b.activities())
-            next(capable).perform(plan, self.activity)
+        elif performer is not None:
+            performer.perform(plan, self.activity)
         plan.note("activity", self.activity)
+
+    def _performer(self, now: Situation) -> Behavior | None:
+        capable = (b for b in now.actor.behaviors if self.activity in b.activities())
+        return next(capable, None)
 
 
 # Without a plan from any behavior, stand still this long, then ask again.

@@ -21,6 +21,7 @@ from fleet2d.errors import InputError, ScenarioError
 from fleet2d.floorplan.home import HOME_CACHE
 from fleet2d.floorplan.source import PLAN_CACHE
 from fleet2d.scenario.model import Scenario, explain, load_scenario
+from fleet2d.studies.axes import check_count
 
 FOLDER = Path(__file__).with_name("tasks")
 Split = Literal["train", "test"]
@@ -56,6 +57,7 @@ class Values(Settings):
             return value
         match value:
             case {"range": [int(first), int(end)], **others} if first < end and not others:
+                check_count(end - first)
                 return tuple(range(first, end))
         raise problem(
             "expected a list of values, or {range: [first, end]} with whole numbers, first < end"

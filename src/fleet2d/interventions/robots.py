@@ -114,6 +114,7 @@ class KeepOut(RobotIntervention, Lasting):
     """
 
     of: tuple[str, ...] | str
+    _told: tuple[int, ...] = ()  # the rooms when it began: kinds may change until it ends
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot or room."""
@@ -122,18 +123,20 @@ class KeepOut(RobotIntervention, Lasting):
 
     def begin(self, world: World) -> None:
         """Tell it, and let it leave."""
-        for room in self._rooms(world):
+        rooms = self._rooms(world)
+        self._told = tuple(room.index for room in rooms)
+        for room in rooms:
             world.emit(self.entity, EventKind.BANNED, room.name)
             self.actor(world).keep_out(room.index, world.step, NEVER, room.name)
 
     def end(self, world: World) -> None:
         """Let it in again, unless another one of these interventions doesn't."""
         actor = self.actor(world)
-        others = {room.index for act in self.active(world) for room in act._rooms(world)}
-        for room in self._rooms(world):
-            if room.index not in others:
-                actor.bans = {r: until for r, until in actor.bans.items() if r != room.index}
-                world.emit(self.entity, EventKind.ALLOWED, room.name)
+        others = {room for act in self.active(world) for room in act._told}
+        for room in self._told:
+            if room not in others:
+                actor.bans = {r: until for r, until in actor.bans.items() if r != room}
+                world.emit(self.entity, EventKind.ALLOWED, world.home.rooms[room].name)
         actor.decide_again(world.step)
 
     def _rooms(self, world: World) -> list[Room]:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from fleet2d.errors import InputError
-from fleet2d.options import split
+from fleet2d.options import resume_hint, split
 
 
 def live(
@@ -79,6 +79,8 @@ def live(
         place = f", stored in {out}" if out else ""
         typer.echo(f"{run.status}, digest {(run.digest or '')[:8]}{place}")
     if run.status != "complete":
+        if out is not None:
+            tell(resume_hint(simulation.time, out))
         raise typer.Exit(130)
 
 

@@ -10,6 +10,7 @@ import errno
 import json
 import os
 import platform
+import shutil
 import stat
 import struct
 import zlib
@@ -199,6 +200,46 @@ def partial_file(path: Path) -> Iterator[Path]:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """Yield the path of a folder to be made, which appears whole or not at all.
+
+    It is made in a folder beside it, with its own name, and moved in the end. What a killed process
+    has left there is replaced.
+
+    Raises:
+        OSError: It can't be written, or is there already.
+
+    Example:
+        >>> import tempfile
+        >>> bag = Path(tempfile.mkdtemp()) / "bag"
+        >>> with new_folder(bag) as made:
+        ...     made.mkdir()
+        ...     _ = (made / "messages").write_text("…")
+        ...     bag.exists()
+        False
+        >>> [path.name for path in bag.parent.rglob("*")]
+        ['bag', 'messages']
+    """
+    if os.path.lexists(path):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    beside = path.with_name(f"{path.name}{PARTIAL}")
+    if beside.is_dir() and not beside.is_symlink():
+        shutil.rmtree(beside)
+    beside.unlink(missing_ok=True)
+    beside.mkdir(parents=True)
+    try:
+        made = beside / path.name
+        yield made
+        for file in filter(Path.is_file, made.rglob("*")):
+            with file.open("rb") as opened:
+                sync(opened.fileno())
+        sync_directory(made)
+        replace(path, made)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
 
 
 def is_disk_full(error: OSError) -> bool:

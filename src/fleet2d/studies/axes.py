@@ -112,14 +112,14 @@ Number = TypeVar("Number", int, float)
 
 
 def check_count(count: Number) -> Number:
-    """Return a count, unless it is too large for one study.
+    """Return a number of values, unless it is too large for one axis.
 
     Raises:
-        PydanticCustomError: They are.
+        PydanticCustomError: It is.
     """
     if count > VARIANTS.limit:
         raise problem(
-            f"more than {VARIANTS.limit:,} values are too many for one study; to allow more, set"
+            f"more than {VARIANTS.limit:,} values are too many for one axis; to allow more, set"
             f" {VARIANTS.variable} in the environment"
         )
     return count

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import yaml
 
-from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.errors import InputError, RunDirectoryError, os_errors_as
 from fleet2d.options import Workers
+from fleet2d.storage.files import new_folder
 
 if TYPE_CHECKING:
     from fleet2d.testing.search import FailingPoint, FailureSearch, SearchSpace, TryJob
@@ -54,8 +55,9 @@ def falsify(
     from fleet2d.studies.api import make_executor
     from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
-    if out.exists():
-        raise RunDirectoryError(f"{out} exists already: name another file by --out")
+    for path in (out, out.with_suffix("")):  # the scenario, and the folder of its run
+        if path.exists():
+            raise RunDirectoryError(f"{path} exists already: name another file by --out")
     tries, seconds = parse_budget(budget)
     job = job_of(target, read_space(parse_over(over)))
     job.check()
@@ -149,8 +151,11 @@ def describe_failure(
     point = job.space.text(failure.point)
     lines = [f"fails at try {failure.number}: {point}, seed {failure.seed}"]
     folder = out.with_suffix("")
-    folder.mkdir(parents=True, exist_ok=True)
-    lines += describe_trial(trial, job.body(), folder, shrink, command)
+    refusal = os_errors_as(RunDirectoryError, f"{folder} can't be written")
+    with refusal, new_folder(folder) as made:
+        made.mkdir()
+        report = describe_trial(trial, job.body(), made, shrink, command)
+        lines += [line.replace(str(made), str(folder)) for line in report]
     reason = trial.failures[0].text.splitlines()[0]
     out.write_text(_scenario_text(failure, job, target, out, reason), encoding="utf-8")
     return [*lines, "", f"written: {out}"]

@@ -1,6 +1,7 @@
 """What ROS's own libraries read from exported files is what the run stored."""
 
 import json
+import signal
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.runs.exporters.worlds import END, FIRST, day, part, poses, rows
+from tests.scenes import process
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.runs.exporters.bags import export_mcap, export_rosbag2
@@ -247,3 +249,42 @@ def test_place_that_can_not_be_written_is_named(
     (tmp_path / "file").touch()
     with pytest.raises(RunDirectoryError, match=f"{name} can't be written"):
         export(day(), tmp_path / "file" / name, part())
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rosbags.rosbag2 import Writer
+from fleet2d.runs.exporters.bags import export_rosbag2
+from tests.runs.exporters.worlds import day, part
+
+written = []
+write = Writer.write
+
+def write_some(*arguments):
+    written.append(0)
+    if len(written) == 1000:
+        os.kill(os.getpid(), signal.SIGKILL)
+    write(*arguments)
+
+Writer.write = write_some
+export_rosbag2(day(), Path(sys.argv[1]), part())
+"""
+
+
+def test_a_killed_export_leaves_no_bag_and_the_same_command_makes_it(tmp_path: Path) -> None:
+    """Half of a bag stayed, and the same command refused to replace it."""
+    from rosbags.highlevel import AnyReader
+
+    path = tmp_path / "bag"
+    killed = process("-c", KILLED, str(path))
+    assert -signal.SIGKILL == killed.returncode
+    assert ["bag.partial"] == [entry.name for entry in tmp_path.iterdir()]
+
+    export_rosbag2(day(), path, part())
+
+    assert ["bag"] == [entry.name for entry in tmp_path.iterdir()]
+    with AnyReader([path]) as reader:
+        assert reader.message_count > 1000
+    with pytest.raises(RunDirectoryError, match="bag exists: name another folder"):
+        export_rosbag2(day(), path, part())

@@ -1,6 +1,5 @@
 """Learned models of real-time presence: networks over all places that correct `routine`."""
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from functools import cache
@@ -14,8 +13,9 @@ from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel, split
 from fleet2d.algorithms.presence.estimator import natural_log
-from fleet2d.bounds import one_line
+from fleet2d.bounds import WEIGHTS_BYTES, one_line
 from fleet2d.configuration.components import register
+from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.floorplan.home import Home
@@ -29,11 +29,13 @@ from fleet2d.kernels import (
     trace_evidence,
     trace_size,
 )
+from fleet2d.storage.archives import read_arrays
 from fleet2d.storage.files import partial_file
 
 WEIGHTS = Path(__file__).with_name("learned.npz")
 FORMAT = "fleet2d presence network 1"  # changes with the features, and with the network
-MAX_BYTES = 1_000_000
+INPUTS = ("features", "places")
+"""The names of the inputs of a model in a file."""
 MAX_HIDDEN = 256
 MIN_SHARE = 1e-9
 # Kinds of rooms that mean the same; other kinds are one more group, and being away another.
@@ -111,12 +113,9 @@ class Weights(NamedTuple):
             InputError: The file is damaged, no file of weights, or of another version.
         """
         try:
-            if path.stat().st_size > MAX_BYTES:
-                raise ValueError(f"it is larger than {MAX_BYTES:,} bytes")
-            if not zipfile.is_zipfile(path):
-                raise ValueError("it is no .npz archive")
-            with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
+            arrays = read_arrays(path, WEIGHTS_BYTES)
+        except InputError:
+            raise
         except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
             raise InputError(
                 f"{path} can't be read as weights of a model of presence ({one_line(error, 100)}):"
@@ -137,6 +136,8 @@ class Weights(NamedTuple):
             "bias": (hidden,),
             "score": (hidden,),
         }
+        if unknown := sorted(arrays.keys() - shapes.keys() - {"format"}):
+            raise InputError(f"{path} has {unknown[0]!r}, which is no part of a model: remove it")
         for name, shape in shapes.items():
             part = arrays.get(name, np.zeros(()))
             fits = part.shape == shape and part.dtype == np.float32 and 0 < hidden <= MAX_HIDDEN
@@ -299,7 +300,7 @@ class OnnxModel(CorrectedRoutine):
         Raises:
             InputError: It isn't, or onnxruntime is missing.
         """
-        _session(Path(self.file))
+        open_network(self.file, INPUTS)
 
     def correct(self, features: F64) -> F64:
         """Return the probability of each place by the network.
@@ -311,7 +312,7 @@ class OnnxModel(CorrectedRoutine):
             "features": features.astype(np.float32),
             "places": self.facts.features.astype(np.float32),
         }
-        output = np.asarray(_session(Path(self.file)).run(None, inputs)[0], np.float64)
+        output = compute(self.file, inputs).astype(np.float64)
         if output.shape != features.shape[:2] or not np.isfinite(output).all():
             raise ComponentError(
                 f"{self.file} returned an array of shape {output.shape}, expected finite numbers of"
@@ -321,30 +322,3 @@ class OnnxModel(CorrectedRoutine):
             output = np.exp(output - output.max(axis=1, keepdims=True))
         output = np.maximum(output, 0)
         return output / np.maximum(output.sum(axis=1, keepdims=True), 1e-12)
-
-
-@cache
-def _session(path: Path) -> Any:
-    """Return a model that is ready to run, on one thread."""
-    try:
-        import onnxruntime
-    except ImportError:
-        raise InputError(
-            'models in ONNX files need onnxruntime: pip install "fleet2d[onnx]"'
-        ) from None
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    try:
-        session = onnxruntime.InferenceSession(
-            path.read_bytes(), options, providers=["CPUExecutionProvider"]
-        )
-    except Exception as error:  # noqa: BLE001 - the runtime's own errors have no public base
-        raise InputError(f"{path} is no ONNX model: {one_line(error, 120)}") from None
-    names = tuple(sorted(part.name for part in session.get_inputs()))
-    if names != ("features", "places"):
-        raise InputError(
-            f"{path} has the inputs {', '.join(names)}, expected features (bins, places,"
-            f" {TRACE_FEATURES}) and places (places, {PLACE_FEATURES})"
-        )
-    return session

@@ -7,10 +7,8 @@ robot's own pose, clock and battery, the plan of the home, the beliefs of an alg
 robot's sightings (`SightingMemory`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import datetime, timedelta
-from functools import lru_cache
-from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +16,7 @@ from pydantic import Field
 
 from fleet2d import kernels
 from fleet2d.configuration.components import register
+from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.entities.behavior import Actor, Situation
@@ -25,7 +24,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots import approach
 from fleet2d.entities.robots.approach import ANYONE, BeliefBehavior
 from fleet2d.entities.robots.find import Sites
-from fleet2d.errors import ComponentError, InputError, PlacementError, errors_as, extra
+from fleet2d.errors import ComponentError, InputError, PlacementError
 from fleet2d.floorplan.plan import FloorPlan, Room, read_only
 from fleet2d.floorplan.space import PointDistances
 from fleet2d.kernels import F32, F64, I32, I64, TURN, UNIT, Bool, RoomMemory, ShownMemory
@@ -65,6 +64,9 @@ COLUMNS = (
 """The columns of an observation, in their order: see docs/gym.md."""
 _AT = {name: number for number, name in enumerate(COLUMNS)}
 HERE, WAY = _AT["here"], _AT["way"]
+
+INPUTS = ("observation", "action_mask")
+"""The names of the inputs of a policy in a file."""
 
 # The rows of `ShownMemory.fresh_rows` and its like: first the visits, then the person.
 PERSON = 2
@@ -262,7 +264,10 @@ class Policy(BeliefBehavior):
         Raises:
             ScenarioError: The robot has no camera.
             PlacementError: The home has more rooms than an observation.
+            InputError: The file is no policy.
         """
+        if self.file is not None:
+            open_network(self.file, INPUTS)
         approach.check_has_camera(actor, "policy")
         count = len(actor.home.rooms)
         if count > self.rooms:
@@ -391,14 +396,15 @@ class Policy(BeliefBehavior):
             mask: bool (rooms + 1,), the possible actions.
 
         Raises:
-            ComponentError: There is no policy.
+            ComponentError: There is no policy; or it fails, or returns NaN.
         """
         if self.file is None:
             raise ComponentError(
                 "the policy has no file: give one, as file: hangout.onnx, derive a class from"
                 " Policy that overrides act, or use fleet2d.gym"
             )
-        scores = _model(str(self.file), self.file.stat().st_mtime_ns)(observation, mask)
+        output = compute(self.file, {INPUTS[0]: observation[None], INPUTS[1]: mask[None]})
+        scores = output[0] if output.ndim else output
         if scores.shape != mask.shape:
             raise ComponentError(
                 f"{self.file.name} returned scores of the shape {scores.shape}, expected"
@@ -456,28 +462,3 @@ class Policy(BeliefBehavior):
         overdue_s = (now.step - begun) * now.actor.clock.step_us / 1e6
         self._tally["overdue_h"] += min(overdue_s / HOUR_S, MAX_OVERDUE_H)
         return plan.turn_by(1.0).stay(self.dwell)
-
-
-@lru_cache(maxsize=8)
-def _model(path: str, _: int) -> Callable[[F32, Bool], F32]:
-    """Return a function that scores all actions by an ONNX file."""
-    with extra("onnx", "a policy from a file needs onnxruntime"):
-        import onnxruntime as ort
-    options = ort.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    with errors_as(ComponentError, f"{path} can't be read as an ONNX file", of=Exception):
-        session = ort.InferenceSession(
-            Path(path).read_bytes(), options, providers=["CPUExecutionProvider"]
-        )
-    names = [item.name for item in session.get_inputs()]
-
-    def scores(observation: F32, mask: Bool) -> Any:
-        values = {"observation": observation[None], "action_mask": mask[None]}
-        unknown = [name for name in names if name not in values]
-        if unknown:
-            raise ComponentError(
-                f"{path} has the input {unknown[0]!r}; a policy has 'observation' and 'action_mask'"
-            )
-        return session.run(None, {name: values[name] for name in names})[0][0]
-
-    return scores

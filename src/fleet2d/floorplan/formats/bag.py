@@ -8,13 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fleet2d.bounds import LOG_BYTES, check_file
+from fleet2d.bounds import LOG_BYTES, PIXELS, check_file
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.apart import apart
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
+from fleet2d.floorplan.formats.files import MAX_COORDINATE_M
 from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.formats.parts import PlanParts
 from fleet2d.storage.bags import headings_of, numbers_of, open_bag
@@ -104,9 +105,15 @@ def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, st
             f"{path}: the map of {topic} is damaged: {len(cells)} cells for {columns} × {rows} of"
             f" {side:g} m"
         )
+    PIXELS.check(rows * columns, f"{path}: the map of {topic}", FloorPlanError)
     corner = numbers_of(info.origin.position, info.origin.orientation)
     heading = float(np.nan_to_num(headings_of(np.array([corner[3:]])))[0])  # many leave it out
     x, y = corner[0] * scale, corner[1] * scale
+    if not max(abs(x), abs(y)) <= MAX_COORDINATE_M:
+        raise FloorPlanError(
+            f"{path}: the map of {topic} is damaged: its corner is at ({corner[0]:g},"
+            f" {corner[1]:g}) m"
+        )
     side = round(side, 6)
     percent = cells.reshape(rows, columns)
     free = (percent >= 0) & (percent < FREE_BELOW)

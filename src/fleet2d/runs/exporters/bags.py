@@ -15,6 +15,7 @@ from fleet2d.kernels import I64, U8
 from fleet2d.runs.exporters import Records, Selection, new_file
 from fleet2d.runs.ros import Block, RosMessages, Topic
 from fleet2d.runs.run import Run
+from fleet2d.storage.files import new_folder
 
 MAGIC = b"\x89MCAP0\r\n"
 # The codes of records of the format, https://mcap.dev/spec.
@@ -322,7 +323,7 @@ def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
     messages = RosMessages(Records(run, part))
     count = 0
     try:
-        with Writer(path, version=8) as writer:
+        with new_folder(path) as made, Writer(made, version=8) as writer:
             connections = {
                 topic.name: writer.add_connection(
                     topic.name,
@@ -335,6 +336,8 @@ def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
             for time, name, data in messages:
                 writer.write(connections[name], time, data)
                 count += 1
+    except FileExistsError:
+        raise RunDirectoryError(f"{path} exists: name another folder, or remove it") from None
     except (OSError, WriterError) as error:
         raise RunDirectoryError(f"{path} can't be written: {error}") from error
     return f"{count:,} messages in {path}"

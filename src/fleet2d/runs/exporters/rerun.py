@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.errors import RunDirectoryError, extra
+from fleet2d.errors import RunDirectoryError, errors_as, extra, os_errors_as
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import WALL_COLOR, body_color, deep_color
-from fleet2d.runs.exporters import Chunk, Records, Selection, new_file
+from fleet2d.runs.exporters import Chunk, Records, Selection
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
+from fleet2d.storage.files import partial_file
 
 # Lengths of the arrows that show headings, and radii of points [m].
 _ARROW, _BODY, _SIGHTING = 0.4, 0.15, 0.06
@@ -38,15 +39,14 @@ def export_rerun(run: Run, path: Path, part: Selection) -> str:
     with extra("rerun", "recordings for Rerun need rerun-sdk"):
         import rerun as rr
     records = Records(run, part)
-    with new_file(path):  # that it can be written is found out before the work
-        pass
     stream = rr.RecordingStream("fleet2d", recording_id=str(run.digest or path.name))
-    try:
-        stream.save(path)
-    except RuntimeError as error:
-        raise RunDirectoryError(f"{path} can't be written: {error}") from error
-    _Writer(rr, stream, records).write()
-    stream.disconnect()
+    failure = f"{path} can't be written"
+    with os_errors_as(RunDirectoryError, failure), partial_file(path) as partial:
+        partial.touch()  # that it can be written is found out before the work
+        with errors_as(RunDirectoryError, failure, of=RuntimeError):
+            stream.save(partial)
+        _Writer(rr, stream, records).write()
+        stream.disconnect()
     return f"{path}, {path.stat().st_size / 1e6:.1f} MB"
 
 

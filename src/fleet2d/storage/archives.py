@@ -1,0 +1,87 @@
+"""Packed content from anybody: what it unpacks to is bounded before it is in memory."""
+
+import io
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.bounds import Bound, read_bytes
+
+_BLOCK_BYTES = 1 << 20
+# The list of members of a ZIP archive: some ten thousand take so much [bytes].
+_LIST_BYTES = 1 << 20
+# The end of a ZIP archive has a mark, the size of that list, and a comment.
+_END_MARK, _LIST_SIZE_AT, _END_BYTES = b"PK\5\6", 12, 22
+
+
+def unpacked(packed: object, compression: str) -> Iterator[bytes]:
+    """Yield what packed content unpacks to, block by block, so that a caller can stop.
+
+    Args:
+        packed: Bytes, or the path of a file.
+        compression: bz2, gzip, lz4 (with frames) or zstd.
+
+    Raises:
+        OSError: It is damaged, or the file can't be read.
+
+    Example:
+        >>> import gzip
+        >>> b"".join(unpacked(gzip.compress(b"home"), "gzip"))
+        b'home'
+    """
+    import pyarrow as pa
+
+    source = packed if isinstance(packed, Path) else pa.BufferReader(packed)
+    with pa.input_stream(source, compression=compression) as stream:
+        while block := stream.read(_BLOCK_BYTES):
+            yield block
+
+
+def read_arrays(path: Path, bound: Bound) -> dict[str, NDArray[Any]]:
+    """Read a .npz file, without pickle: its arrays of numbers, truth values and texts, by name.
+
+    Args:
+        path: The file.
+        bound: On its bytes, also when they are unpacked.
+
+    Raises:
+        Exception: It is damaged or forged: a damaged archive raises almost anything.
+        InputError: It is beyond the bound, or no regular file.
+    """
+    content = read_bytes(path, bound)
+    end = content.rfind(_END_MARK)
+    if end < 0 or len(content) < end + _END_BYTES:
+        raise ValueError("it is no .npz archive")
+    if struct.unpack_from("<I", content, end + _LIST_SIZE_AT)[0] > _LIST_BYTES:
+        raise ValueError("it has too many arrays")
+    arrays = {}
+    with ZipFile(io.BytesIO(content)) as file:
+        members = file.infolist()
+        bound.check(sum(member.file_size for member in members), path)
+        for member in members:
+            name = member.filename.removesuffix(".npy")
+            # Of other compressions, some bytes can unpack to gigabytes before anybody counts.
+            if member.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+                raise ValueError(f"{name!r} is compressed in another way than NumPy does it")
+            if name in arrays:
+                raise ValueError(f"it has {name!r} twice")
+            arrays[name] = _array(name, bytearray(file.read(member)))
+    return arrays
+
+
+def _array(name: str, content: bytearray) -> NDArray[Any]:
+    """Return an array whose values are all there: its header may state any shape."""
+    header = io.BytesIO(content)
+    version = np.lib.format.read_magic(header)
+    read = np.lib.format.read_array_header_1_0
+    read = read if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, is_transposed, kind = read(header)
+    if kind.kind not in "biufU" or min(shape, default=0) < 0:
+        raise ValueError(f"{name!r} is not an array of numbers, truth values or texts")
+    at = header.tell()
+    return np.ndarray(shape, kind, content, at, order="F" if is_transposed else "C")

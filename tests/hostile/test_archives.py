@@ -1,0 +1,473 @@
+"""Packed files that unpack to gigabytes, or lie about it: weights, learned state, bags."""
+
+import io
+import os
+import pickle
+import shutil
+import sqlite3
+import struct
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from fleet2d.algorithms.algorithm import load_learned
+from fleet2d.algorithms.presence.learned import WEIGHTS, Weights
+from fleet2d.errors import InputError
+from fleet2d.floorplan.formats.bag import BagMap
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.logs.bags import read_bag
+from fleet2d.logs.detections import read_detections
+
+BOMBS = Path(__file__).parent / "bombs"
+Reader = Callable[[Path], Any]
+
+
+def peak_mb(code: str, path: Path) -> tuple[str, float]:
+    """Run code in a process of its own; return its output, and the most memory that it had."""
+    lines = (
+        "from pathlib import Path",
+        f"path = Path({str(path)!r})",
+        code,
+        "status = Path('/proc/self/status').read_text()",
+        "print(status.partition('VmHWM:')[2].split()[0])",
+    )
+    command = [sys.executable, "-c", "\n".join(lines)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    said, _, peak = done.stdout.strip().rpartition("\n")
+    return said, int(peak) / 1024
+
+
+# Arrays
+
+GOOD = dict(np.load(WEIGHTS))
+
+
+def npy(shape: str, descr: str = "'<f4'", data: bytes = b"", version: int = 1) -> bytes:
+    """An array whose header says anything."""
+    head = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H", len(head)) + head.encode() + data
+
+
+def members(**changes: bytes | None) -> dict[str, bytes]:
+    """The files of good weights, with some changed or left out."""
+    files: dict[str, bytes] = {}
+    for name, value in GOOD.items():
+        buffer = io.BytesIO()
+        np.lib.format.write_array(buffer, np.asanyarray(value))
+        files[f"{name}.npy"] = buffer.getvalue()
+    files |= {f"{name}.npy": new for name, new in changes.items() if new is not None}
+    return {name: data for name, data in files.items() if changes.get(name[:-4], b"") is not None}
+
+
+def packed(path: Path, files: dict[str, bytes], method: int = zipfile.ZIP_STORED) -> Path:
+    with zipfile.ZipFile(path, "w", method) as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+    return path
+
+
+ZEROS = npy(f"({2 << 20},)", "'|u1'") + bytes(2 << 20)
+DEEP = "{'descr': " + "(" * 4000 + "'f4'" + ")" * 4000 + "}"
+ARRAYS: dict[str, dict[str, bytes | None]] = {
+    "pickle": {"o": npy("(1,)", "'|O'", pickle.dumps([os.getpid]))},
+    "pickle-weight": {"bias": npy("(32,)", "'|O'", pickle.dumps(np.zeros(32, object)))},
+    "hugeshape": {"bias": npy("(100000000000,)")},
+    "hugeshape2": {"bias": npy("(1000000000,)", data=bytes(64))},
+    "overflowshape": {"bias": npy("(4611686018427387904, 4)")},
+    "negshape": {"bias": npy("(-1,)")},
+    "descr-bomb": {"bias": npy("(1,)", "'V2000000000'")},
+    "text-bomb": {"bias": npy("(1,)", "'<U500000000'")},
+    "badversion": {"bias": npy("(1,)", version=9)},
+    "nonnpy": {"bias": b"hello"},
+    "header-long": {"bias": b"\x93NUMPY\2\0" + struct.pack("<I", 2**31 - 1) + b" " * 100},
+    "descr-deep": {"bias": b"\x93NUMPY\2\0" + struct.pack("<I", len(DEEP)) + DEEP.encode()},
+}
+
+
+@pytest.mark.parametrize("read", [Weights.read, load_learned])
+@pytest.mark.parametrize("name", ARRAYS)
+def test_a_forged_array_is_refused(tmp_path: Path, name: str, read: Reader) -> None:
+    path = packed(tmp_path / f"{name}.npz", members(**ARRAYS[name]))
+    with pytest.raises(InputError, match=str(path)) as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("read", [Weights.read, load_learned])
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_archive_that_unpacks_to_more_than_the_bound_is_refused(
+    tmp_path: Path, method: int, read: Reader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_LEARNED_BYTES", str(1 << 20))
+    path = packed(tmp_path / "bomb.npz", members(z=ZEROS), method)
+    with pytest.raises(InputError, match=r"at most|compressed in another way"):
+        read(path)
+
+
+def test_a_directory_that_states_less_than_a_member_unpacks_to_is_refused(tmp_path: Path) -> None:
+    path = packed(tmp_path / "forged-size.npz", {"z.npy": ZEROS}, zipfile.ZIP_DEFLATED)
+    content = bytearray(path.read_bytes())
+    at = content.rfind(b"PK\1\2")
+    content[at + 24 : at + 28] = struct.pack("<I", 100)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="is not a file of learned state"):
+        load_learned(path)
+
+
+def test_an_archive_with_a_hundred_thousand_arrays_is_refused(tmp_path: Path) -> None:
+    path = packed(tmp_path / "many.npz", {f"{n}.npy": b"" for n in range(30_000)})
+    with pytest.raises(InputError, match="too many arrays"):
+        load_learned(path)
+
+
+def test_an_array_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    path = packed(tmp_path / "dup.npz", members())
+    with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("bias.npy", npy("(32,)", data=np.full(32, np.nan, "<f4").tobytes()))
+    with pytest.raises(InputError, match="'bias' twice"):
+        Weights.read(path)
+
+
+def test_an_array_that_is_no_weight_is_refused(tmp_path: Path) -> None:
+    path = packed(tmp_path / "more.npz", members(z=npy("(1,)", data=bytes(4))))
+    with pytest.raises(InputError, match="has 'z', which is no part of a model"):
+        Weights.read(path)
+
+
+@pytest.mark.parametrize("read", [Weights.read, load_learned])
+@pytest.mark.parametrize("kind", ["fifo", "dev", "dir", "empty", "text", "trunc", "encrypted"])
+def test_what_is_no_archive_is_refused(tmp_path: Path, kind: str, read: Reader) -> None:
+    path = tmp_path / f"{kind}.npz"
+    match kind:
+        case "fifo":
+            os.mkfifo(path)
+        case "dev":
+            path.symlink_to("/dev/zero")
+        case "dir":
+            path.mkdir()
+        case "encrypted":
+            content = bytearray(WEIGHTS.read_bytes())
+            content[content.find(b"PK\3\4") + 6] |= 1
+            content[content.find(b"PK\1\2") + 8] |= 1
+            path.write_bytes(content)
+        case _:
+            whole = WEIGHTS.read_bytes()
+            path.write_bytes({"empty": b"", "text": b"hello", "trunc": whole[:-200]}[kind])
+    with pytest.raises(InputError, match=str(path)):
+        read(path)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory isn't known")
+def test_bomb_bz2_is_refused_before_it_fills_the_memory() -> None:
+    """19 kB took 4.6 GB."""
+    code = (
+        "from fleet2d.algorithms.presence.learned import Weights\n"
+        "try: Weights.read(path)\nexcept Exception as error: print(error)"
+    )
+    said, peak = peak_mb(code, BOMBS / "bomb-bz2.npz")
+    assert "compressed in another way" in said or "at most 1000000 are read" in said
+    assert peak < 600
+
+
+# Bags
+
+rosbags = pytest.importorskip("rosbags")
+POSE, GRID = "geometry_msgs/msg/PoseStamped", "nav_msgs/msg/OccupancyGrid"
+
+
+@cache
+def messages() -> Any:
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def pose_message(types: Any, x: float, y: float) -> Any:
+    kinds = types.types
+    point = kinds["geometry_msgs/msg/Point"](x=x, y=y, z=0.0)
+    turn = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    return kinds["geometry_msgs/msg/Pose"](position=point, orientation=turn)
+
+
+def stamp(types: Any, second: int) -> Any:
+    return types.types["builtin_interfaces/msg/Time"](sec=second, nanosec=0)
+
+
+def poses(types: Any) -> list[tuple[str, str, int, bytes]]:
+    rows = []
+    for second in range(1, 100):
+        header = types.types["std_msgs/msg/Header"](stamp=stamp(types, second), frame_id="map")
+        message = types.types[POSE](header=header, pose=pose_message(types, 1.0, 2.0))
+        rows.append(("/pose", POSE, second, bytes(types.serialize_cdr(message, POSE))))
+    return rows
+
+
+def grid(types: Any, side: int, x: float = 0.0, y: float = 0.0) -> tuple[str, str, int, bytes]:
+    kinds = types.types
+    info = kinds["nav_msgs/msg/MapMetaData"](
+        map_load_time=stamp(types, 0),
+        resolution=0.05,
+        width=side,
+        height=side,
+        origin=pose_message(types, x, y),
+    )
+    header = kinds["std_msgs/msg/Header"](stamp=stamp(types, 1), frame_id="map")
+    cells = np.zeros(side * side, np.int8)
+    message = kinds[GRID](header=header, info=info, data=cells)
+    return "/map", GRID, 1, bytes(types.serialize_cdr(message, GRID))
+
+
+def bag(path: Path, rows: list[tuple[str, str, int, bytes]], storage: str = "SQLITE3") -> Path:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    types = messages()
+    with Writer(path, version=8, storage_plugin=StoragePlugin[storage]) as writer:
+        connections: dict[str, Any] = {}
+        for topic, kind, second, data in rows:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=types)
+            writer.write(connections[topic], second * 10**9, data)
+    return path
+
+
+@pytest.fixture(params=["SQLITE3", "MCAP"])
+def storage(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> Path:
+    return bag(tmp_path / "bag", poses(messages()))
+
+
+def database(folder: Path) -> Path:
+    return next(folder.glob("*.db3"))
+
+
+def tamper(folder: Path, *statements: str) -> None:
+    connection = sqlite3.connect(database(folder))
+    for statement in statements:
+        connection.execute(statement)
+    connection.commit()
+    connection.close()
+
+
+def compress(folder: Path, mode: str) -> None:
+    """Say that messages, or files, are compressed."""
+    path = folder / "metadata.yaml"
+    text = path.read_text()
+    text = text.replace("compression_format: ''", "compression_format: zstd")
+    path.write_text(text.replace("compression_mode: ''", f"compression_mode: {mode}"))
+
+
+def refusal(path: Path, read: Reader = read_bag) -> str:
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def read_map(path: Path) -> Any:
+    return BagMap(path=path).load()
+
+
+def test_a_good_bag_is_read_packed_and_not(tmp_path: Path, good: Path, storage: str) -> None:
+    assert 99 == len(read_bag(bag(tmp_path / storage, poses(messages()), storage)).time_us)
+    connection = sqlite3.connect(database(good))
+    for number, data in connection.execute("SELECT id, data FROM messages").fetchall():
+        packed_data = pa.compress(data, "zstd", asbytes=True)
+        connection.execute("UPDATE messages SET data=? WHERE id=?", (packed_data, number))
+    connection.commit()
+    connection.close()
+    compress(good, "message")
+    assert 99 == len(read_bag(good).time_us)
+
+
+def test_a_good_bag_whose_file_is_packed_is_read(good: Path) -> None:
+    file = database(good)
+    packed_file = good / f"{file.name}.zstd"
+    packed_file.write_bytes(pa.compress(file.read_bytes(), "zstd", asbytes=True))
+    file.unlink()
+    compress(good, "file")
+    text = (good / "metadata.yaml").read_text()
+    (good / "metadata.yaml").write_text(text.replace(file.name, packed_file.name))
+    assert 99 == len(read_bag(good).time_us)
+
+
+@pytest.mark.parametrize("read", [read_bag, read_detections, load_floorplan])
+def test_bomb_mcap_is_refused(read: Reader) -> None:
+    assert "FLEET2D_MAX_CHUNK_BYTES" in refusal(BOMBS / "bomb-mcap.mcap", read)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory isn't known")
+def test_bomb_mcap_is_refused_before_it_fills_the_memory() -> None:
+    """48 kB took 3.1 GB."""
+    code = (
+        "from fleet2d.logs.bags import read_bag\n"
+        "try: read_bag(path)\nexcept Exception as error: print(error)"
+    )
+    said, peak = peak_mb(code, BOMBS / "bomb-mcap.mcap")
+    assert "FLEET2D_MAX_CHUNK_BYTES" in said
+    assert peak < 900
+
+
+@pytest.mark.parametrize("mode", ["message", "file"])
+def test_bomb_of_zstd_in_sqlite_is_refused(
+    good: Path, mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_LOG_BYTES", str(64 << 20))
+    monkeypatch.setenv("FLEET2D_MAX_CHUNK_BYTES", str(64 << 20))
+    zeros = pa.compress(bytes(65 << 20), "zstd", asbytes=True)
+    if mode == "message":
+        connection = sqlite3.connect(database(good))
+        connection.execute("UPDATE messages SET data=?", (zeros,))
+        connection.commit()
+        connection.close()
+    else:
+        file = database(good)
+        file.unlink()
+        (good / f"{file.name}.zstd").write_bytes(zeros)
+    compress(good, mode)
+    assert "at most 67108864 are read" in refusal(good)
+
+
+def test_many_messages_that_each_unpack_to_little_less_than_the_bound_are_refused(
+    good: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_LOG_BYTES", str(4 << 20))
+    connection = sqlite3.connect(database(good))
+    zeros = pa.compress(bytes(100 << 10), "zstd", asbytes=True)
+    connection.execute("UPDATE messages SET data=?", (zeros,))
+    connection.commit()
+    connection.close()
+    compress(good, "message")
+    message = refusal(good)
+    assert "can't be read as a bag" in message or "FLEET2D_MAX_LOG_BYTES" in message
+
+
+def test_a_blob_of_hundreds_of_megabytes_is_refused(
+    good: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_CHUNK_BYTES", str(1 << 20))
+    tamper(good, "UPDATE messages SET data=zeroblob(2000000) WHERE id=1")
+    assert "has 2000000 bytes when unpacked, and at most 1048576" in refusal(good)
+
+
+REBUILT = {
+    "sqlx-endless": (
+        "CREATE VIEW messages AS WITH RECURSIVE r(n) AS (SELECT 1 UNION ALL SELECT n+1 FROM r)"
+        " SELECT n AS id, 1 AS topic_id, n AS timestamp, x'00' AS data FROM r",
+    ),
+    "sqlx-generated": (
+        "CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,"
+        " data BLOB AS (zeroblob(900000000)))",
+        "INSERT INTO messages (topic_id, timestamp) VALUES (1, 1)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REBUILT)
+def test_a_database_that_computes_its_rows_is_refused(good: Path, name: str) -> None:
+    """A view of endless rows was read for ever."""
+    tamper(good, "ALTER TABLE messages RENAME TO m0", *REBUILT[name])
+    assert "has more than the tables of a bag" in refusal(good)
+
+
+TAMPERED = {
+    "nulldata": ("UPDATE messages SET data=zeroblob(0)",),
+    "textdata": ("UPDATE messages SET data='hello', timestamp='x'",),
+    "badtopic": ("UPDATE messages SET topic_id=99",),
+    "badtype": ("UPDATE topics SET type='evil/msg/Evil'",),
+    "typepath": ("UPDATE topics SET type='../../../etc/passwd'",),
+    "notables": ("DROP TABLE messages", "DROP TABLE topics"),
+}
+
+
+@pytest.mark.parametrize("name", TAMPERED)
+def test_a_tampered_database_is_refused(good: Path, name: str) -> None:
+    tamper(good, *TAMPERED[name])
+    assert str(good) in refusal(good)
+
+
+@pytest.mark.parametrize("name", ["trunc", "flip", "text", "zero"])
+def test_a_damaged_bag_is_refused(tmp_path: Path, storage: str, name: str) -> None:
+    folder = bag(tmp_path / "bag", poses(messages()), storage)
+    path = next(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap"))
+    whole = path.read_bytes()
+    flipped = bytes(b ^ 0x55 if 16 < i < 4000 else b for i, b in enumerate(whole))
+    content = {"trunc": whole[: len(whole) // 2], "flip": flipped, "text": b"hello", "zero": b""}
+    path.write_bytes(content[name])
+    assert str(folder) in refusal(folder)
+
+
+METADATA: dict[str, Callable[[str], str]] = {
+    "empty": lambda text: "",
+    "list": lambda text: "[1, 2]",
+    "deep": lambda text: "[" * 5000 + "]" * 5000,
+    "big": lambda text: text + "\nz: [" + ",".join(["1"] * 3_000_000) + "]",
+    "passwd": lambda text: text.replace("bag.db3", "/etc/passwd"),
+    "outside": lambda text: text.replace("bag.db3", "../../../../../../etc/passwd"),
+    "tag": lambda text: '!!python/object/apply:os.system ["id"]\n' + text,
+}
+
+
+@pytest.mark.parametrize("name", METADATA)
+def test_forged_metadata_is_refused(good: Path, name: str) -> None:
+    path = good / "metadata.yaml"
+    path.write_text(METADATA[name](path.read_text()))
+    assert str(good) in refusal(good)
+
+
+@pytest.mark.parametrize("name", ["metadata.yaml", "bag.db3"])
+@pytest.mark.parametrize("trick", ["link", "dev", "fifo"])
+def test_a_link_or_a_pipe_in_a_bag_is_refused(
+    tmp_path: Path, good: Path, name: str, trick: str
+) -> None:
+    path = good / name
+    shutil.move(path, tmp_path / name)
+    if trick == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to(tmp_path / name if trick == "link" else "/dev/zero")
+    assert f"{path} is " in refusal(good)
+
+
+def test_mapfar_is_refused() -> None:
+    """An origin of (1e300, NaN) ended in a traceback."""
+    assert "its corner is at (1e+300, nan) m" in refusal(BOMBS / "mcap-mapfar", read_map)
+
+
+@pytest.mark.parametrize("x", [np.inf, -1e300, np.nan])
+def test_a_map_far_away_is_refused(tmp_path: Path, storage: str, x: float) -> None:
+    folder = bag(tmp_path / "bag", [grid(messages(), 80, x)], storage)
+    assert "the map of /map is damaged" in refusal(folder, read_map)
+
+
+def test_a_map_of_many_cells_is_refused(tmp_path: Path, storage: str) -> None:
+    folder = bag(tmp_path / "bag", [grid(messages(), 8000)], storage)
+    assert "has 64000000 pixels, and at most 16777216" in refusal(folder, read_map)
+
+
+def test_a_bomb_of_bz2_in_a_bag_of_ros_1_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    path = tmp_path / "old.bag"
+    store = get_typestore(Stores.ROS1_NOETIC)
+    writer = Writer(path)
+    writer.set_compression(Writer.CompressionFormat.BZ2)
+    with writer:
+        connection = writer.add_connection("/map", GRID, typestore=store)
+        writer.write(connection, 10**9, bytes(2 << 20))
+    monkeypatch.setenv("FLEET2D_MAX_CHUNK_BYTES", str(1 << 20))
+    assert "FLEET2D_MAX_CHUNK_BYTES" in refusal(path, load_floorplan)
