@@ -126,7 +126,7 @@ LOG_DAYS = Bound("LOG_DAYS", 3_660, "days from its first to its last row")
 """Days from the first to the last row of a log: ten years."""
 LEARNED_BYTES = Bound("LEARNED_BYTES", 256 << 20, "bytes when unpacked")
 """Size of what an algorithm has learned, unpacked."""
-WEIGHTS_BYTES = Bound("WEIGHTS_BYTES", 1_000_000, "bytes when unpacked")
+WEIGHTS_BYTES = Bound("WEIGHTS_BYTES", 1 << 20, "bytes when unpacked")
 """Size of the weights of a network, unpacked."""
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 """Size of a table, unpacked, that is read at once."""

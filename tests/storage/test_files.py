@@ -129,10 +129,14 @@ def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_could_not_be_made_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), new_folder(tmp_path / "bag") as made:  # noqa: PT012
-        made.mkdir()
-        (made / "half").touch()
-        raise KeyboardInterrupt
+    def make() -> None:
+        with new_folder(tmp_path / "bag") as made:
+            made.mkdir()
+            (made / "half").touch()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make()
     assert [] == list(tmp_path.iterdir())
 
 

@@ -7,7 +7,10 @@ may lead to a full disk, a terminal that is gone, or an encoding without all cha
 import gc
 import io
 import os
+import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NoReturn, TextIO
 
 from fleet2d.errors import Fleet2DError, InputError, ctrl_c_watch
@@ -24,7 +27,7 @@ def main() -> NoReturn:
     open_streams()
     code: str | int | None = 0
     try:
-        with ctrl_c_watch(), rare_collections():
+        with ctrl_c_watch(), rare_collections(), named_extras():
             from fleet2d.cli.__main__ import app
 
             gc.freeze()  # modules live to the end: the collector needn't scan them
@@ -50,6 +53,38 @@ def main() -> NoReturn:
             sys.stderr.write(f"error: the output can't be written ({problem})\n")
         code = code or 1
     sys.exit(code)
+
+
+@contextmanager
+def named_extras() -> Iterator[None]:
+    """Name the extra that installs a module that is imported in the block and isn't there.
+
+    Raises:
+        InputError: An extra has it.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        name = (error.name or "").partition(".")[0]
+        if extra := extra_with(name):
+            raise InputError(f'this needs {name}: pip install "fleet2d[{extra}]"') from None
+        raise
+
+
+def extra_with(module: str) -> str:
+    """Return the extra of Fleet2D that installs a module's package; empty if none does.
+
+    Example:
+        >>> extra_with("starlette"), extra_with("yaml")
+        ('view', '')
+    """
+    from importlib.metadata import requires
+
+    for line in requires("fleet2d") or ():
+        package, _, marker = line.partition(";")
+        if re.match(rf"{re.escape(module)}\b(?!-)", package.replace("_", "-")):
+            return marker.partition('extra == "')[2].rstrip('"')
+    return ""
 
 
 class _StandardStream(io.FileIO):

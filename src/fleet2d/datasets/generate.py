@@ -125,14 +125,14 @@ def _head(data: Dataset, file: DatasetFile) -> dict[str, Any]:
 def _count(data: Dataset, split: str) -> dict[str, Any]:
     """Return how much there is in a split, and how it is distributed."""
     runs = data.arrow("runs", split)
-    labels = data.polars("labels", split).group_by("run", "place", maintain_order=True).len()
+    labels = data.arrow("labels", split).group_by(["run", "place"], use_threads=False)
     rooms = {
         (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
     }
     files, evidence = data.manifest.files, f"{split}/evidence-"
     kinds: Counter[str] = Counter()
-    for run, place, count in labels.collect().iter_rows():
-        kinds[rooms.get((run, place), AWAY)] += count
+    for row in labels.aggregate([([], "count_all")]).to_pylist():
+        kinds[rooms.get((row["run"], row["place"]), AWAY)] += row["count_all"]
     return {
         "runs": len(runs),
         "days": sum(runs["days"].to_pylist()),

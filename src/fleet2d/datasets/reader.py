@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, ValidationError
 from fleet2d.artifacts.manifest import Count, FileRecord, Record, Sha256, problems_of, read_json
 from fleet2d.bounds import FILE_BYTES, TABLE_BYTES, read_bytes, unpacked_bytes
 from fleet2d.datasets.tables import SCHEMAS
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, extra
 from fleet2d.storage.files import path_in
 
 if TYPE_CHECKING:
@@ -134,8 +134,13 @@ class Dataset:
         return {name: _read(self.files(name, split)[number], name) for name in SCHEMAS}
 
     def polars(self, table: str, split: str) -> "pl.LazyFrame":
-        """Return a table of a split as a lazy frame of polars."""
-        import polars as pl
+        """Return a table of a split as a lazy frame of polars.
+
+        Raises:
+            InputError: There is no such table or split, or polars isn't installed.
+        """
+        with extra("polars", "lazy frames need polars"):
+            import polars as pl
 
         return pl.scan_parquet(self.files(table, split))
 

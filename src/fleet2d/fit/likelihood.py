@@ -12,14 +12,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import binomtest
 
-from fleet2d.errors import extra
 from fleet2d.kernels import F64, Bool
-
-with extra("calibrate", "calibration needs scipy"):
-    from scipy.optimize import brentq
-    from scipy.stats import binomtest
-
 
 CHI_SQUARE_95 = 3.8414588206941236  # one degree of freedom
 PROBABILITY_MARGIN = 1e-12  # minimum distance of probabilities from 0 and 1

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import FrameType
 from urllib.parse import urlsplit
 
+import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
@@ -23,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fleet2d import __version__
 from fleet2d.bounds import one_line
-from fleet2d.errors import InputError, end_by_signal, extra
+from fleet2d.errors import InputError, end_by_signal
 from fleet2d.runs.run import Run
 from fleet2d.storage.secret_files import UnusableSecretError, user_secret
 from fleet2d.viewer.contract import SessionFacts
@@ -176,11 +177,6 @@ def page_app(
         Route("/{name}", file),
     ]
     return Guard(Starlette(routes=routes), token, port, seen_at)
-
-
-with extra("view", "watching needs a server"):
-    import starlette  # noqa: F401 - the server needs it, too
-    import uvicorn
 
 
 HOST = "127.0.0.1"

@@ -1,0 +1,161 @@
+"""Commands without the packages of an extra: one line, with the extra and how to install it."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from tests.datasets.small import SOURCE, make
+from tests.hostile.test_archives import BOMBS
+from tests.scenes import TESTS, process
+from tests.thorough import some
+
+import fleet2d
+from fleet2d.cli import extra_with
+
+PROJECT = tomllib.loads((TESTS.parent / "pyproject.toml").read_text())["project"]
+EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
+HIDDEN = """
+import sys
+
+hidden = set(sys.argv.pop(1).split(","))
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in hidden:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Absent())
+import fleet2d.cli
+fleet2d.cli.main()
+"""
+OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun", "mlflow-skinny": "mlflow"}
+"""Modules whose names aren't those of their packages."""
+TOOLS = ("test", "browser", "page", "lint", "docs", "build", "cluster")
+
+
+def packages(extra: str) -> list[str]:
+    """The packages that an extra installs by itself."""
+    names = [line.partition(">")[0].partition("[")[0] for line in EXTRAS[extra]]
+    return [name for name in names if name != "fleet2d"]
+
+
+def modules() -> str:
+    """All modules of all extras, as a list with commas."""
+    names = {name for extra in EXTRAS if extra not in TOOLS for name in packages(extra)}
+    return ",".join(sorted(OTHERS.get(name, name) for name in names))
+
+
+SCENARIO = {"extends": "bundled:base", "simulation": {"duration": "5 min"}}
+FILES: dict[str, Any] = {
+    "home.yaml": SCENARIO,
+    "network.yaml": {
+        **SCENARIO,
+        "robots": {"astro": {"behaviors": [{"type": "policy", "file": "net.onnx", "rooms": 30}]}},
+    },
+    "study.yaml": {"base": SCENARIO, "axes": {"robots.astro.speed": [0.3, 0.5]}},
+    "tune.yaml": {
+        "base": SCENARIO,
+        "axes": {"home": {"synthetic": 2}},
+        "tune": {
+            "search": {"speed": {"key": "robots.astro.speed", "low": 0.2, "high": 0.8}},
+            "objectives": {"distance.astro.metres": "maximize"},
+            "held_out": {"home": [1]},
+        },
+    },
+    "people.yaml": SOURCE,
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run, a study, a data set and the files that commands need."""
+    root = tmp_path_factory.mktemp("extras")
+    for name, content in FILES.items():
+        (root / name).write_text(yaml.safe_dump(content))
+    (root / "net.onnx").write_bytes((BOMBS / "pol-good.onnx").read_bytes())
+    (root / "log.csv").write_text("distance,bearing,detected\n1,0,1\n" * 60)
+    for name in ("plan.svg", "plan.dxf", "plan.ifc"):
+        (root / name).write_text("")
+    fleet2d.run(SCENARIO, out=root / "run")
+    fleet2d.study(root / "study.yaml", out=root / "st", workers=1)
+    make(root / "data")
+    return root
+
+
+MAP = f"floorplan.path={BOMBS / 'bomb-mcap.mcap'}"
+# A command, the modules that aren't there (none: all of all extras), and the extra that it names.
+LACKING = [
+    ("view run --no-browser", "", "view"),
+    ("view run --no-browser", "uvicorn", "view"),
+    ("view home.yaml --no-browser", "", "view"),
+    ("film run --out run.mp4", "", "viz"),
+    ("film run --out run.mp4", "av", "film"),
+    ("report run", "", "viz"),
+    ("show run --out run.png", "", "viz"),
+    ("show bundled:base --out plan.png", "", "viz"),
+    ("export run run.mcap", "", "ros"),
+    ("export run bag", "", "ros"),
+    ("export run run.rrd", "", "rerun"),
+    ("study report st", "", "viz"),
+    ("study report st", "polars", "polars|study"),
+    ("study track st --to mlflow", "", "mlflow"),
+    ("study track st --to wandb", "", "wandb"),
+    ("study run study.yaml --out ray --executor ray", "", "ray"),
+    ("study run study.yaml --out slurm --executor slurm", "", "slurm"),
+    ("tune tune.yaml --out tuned", "", "tune"),
+    ("leaderboard data --picture forecasts.png", "", "viz"),
+    ("live home.yaml --with ws://127.0.0.1:0 --speed 0", "", "live"),
+    ("live home.yaml --with rosbridge://127.0.0.1:9 --speed 0", "", "rosbridge"),
+    ("live home.yaml --with mqtt://127.0.0.1:9/x --speed 0", "", "mqtt"),
+    ("mcp .", "", "mcp"),
+    ("mcp .", "mcp", "mcp"),
+    ("run network.yaml --out net", "", "onnx"),
+    ("calibrate perception log.csv", "", "calibrate"),
+    ("validate floorplan.type=svg floorplan.path=plan.svg", "", "svg"),
+    ("validate floorplan.type=dxf floorplan.path=plan.dxf", "", "cad"),
+    ("validate floorplan.type=ifc floorplan.path=plan.ifc", "", "ifc"),
+    (f"validate floorplan.type=bag {MAP}", "", "ros"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("command", "hidden", "extra"), LACKING)
+def test_a_command_says_in_one_line_what_to_install(
+    folder: Path, command: str, hidden: str, extra: str
+) -> None:
+    """`view` printed a traceback of 41 lines."""
+    before = sorted(folder.rglob("*"))
+    done = process("-c", HIDDEN, hidden or modules(), *command.split(), cwd=folder)
+    assert 2 == done.returncode
+    (line,) = done.stderr.splitlines()
+    assert re.fullmatch(rf'error: .*: pip install "fleet2d\[({extra})\]"', line)
+    left = {path.name for path in folder.rglob("*") if path not in before}
+    assert left <= {"run.notes.json", "tables", "report", "figures"}  # of the run and the study
+
+
+PLAIN = (
+    "run home.yaml --out plain", "validate home.yaml", "test home.yaml", "reproduce run",
+    "verify run", "export run run.csv", "export run --html run.html", "components", "schema",
+    "study run study.yaml --out plain-study --workers 1", "study status st", "study rerun st 0",
+    "dataset people.yaml --out plain-data --workers 1", "leaderboard data",
+    "train rtp --on data --out weights.npz --epochs 1",
+    "live home.yaml --with udp://127.0.0.1:0 --speed 0",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", some(PLAIN, 3))
+def test_a_command_that_needs_no_extra_runs_without_any(folder: Path, command: str) -> None:
+    """`dataset` simulated everything, and then failed as polars wasn't there."""
+    done = process("-c", HIDDEN, modules(), *command.split(), cwd=folder)
+    assert 0 == done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("extra", [extra for extra in EXTRAS if extra not in TOOLS])
+def test_the_extra_of_every_module_is_known(extra: str) -> None:
+    for package in packages(extra):
+        if package not in OTHERS:
+            assert package in map(str.lower, packages(extra_with(package)))
