@@ -430,6 +430,7 @@ class Actor(Body):
         self.displacements: list[Displacement] = []
         with blame(self.path, None):
             self._state = self._first_pose()
+            self._note_lost_rooms()
             battery = getattr(self.entity, "battery", None)
             self.charge = None if battery is None else Charge(battery, self)
             for behavior in self.behaviors:
@@ -452,7 +453,7 @@ class Actor(Body):
 
     def banned(self, step: int) -> frozenset[int]:
         """Return the indices of the rooms that it is told to keep out of at a step."""
-        return frozenset(room for room, until in self.bans.items() if until > step)
+        return self.forbidden.union(room for room, until in self.bans.items() if until > step)
 
     def ask(self, step: int | None) -> None:
         """Set the step at which it decides next; None: never."""
@@ -485,6 +486,21 @@ class Actor(Body):
         if plan is None or not (plan.postures or plan.posture != "stand"):
             return 0
         return plan.posture_at(time_us)
+
+    def _note_lost_rooms(self) -> None:
+        """Note the rooms that it can't get to, as every way there leads through forbidden ones."""
+        if not self.forbidden or self._state.away:
+            return
+        whole = self.home.space(
+            self.entity.radius,
+            opens_doors=self.entity.opens_doors,
+            uses_portals=self.entity.uses_portals,
+        )
+        within_reach = whole.rooms_of(whole.part_at(self._state.x, self._state.y))
+        lost = within_reach - self.space.rooms_of(self.part) - self.forbidden
+        if lost:
+            names = ", ".join(self.home.rooms[index].name for index in sorted(lost))
+            self.notes.append(f"keep_out: no way is left to {names}")
 
     def _first_pose(self) -> Pose:
         """Return the pose at step 0."""

@@ -19,6 +19,7 @@ from fleet2d.entities.place import (
     Place,
     Point,
     RoomChoice,
+    forbidden_rooms,
     furniture_of,
     is_point,
     matching_rooms,
@@ -287,7 +288,8 @@ class Body:
         people: All users of the scenario by name; None for one that isn't built yet.
         notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
         part: The connected part of its space that it is in.
-        kept_out: Indices of the rooms that it was told to keep out of.
+        forbidden: Indices of the rooms that its configuration keeps it out of.
+        kept_out: Indices of the rooms that its ways avoid now: these, and those of bans.
         row: Its row among the bodies of the run.
         interrupts: The events that have ended, or may end, its plans so far: they are checked.
         drive: How it moves along routes; None: as `Differential`, which the core computes.
@@ -304,7 +306,8 @@ class Body:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self.kept_out: frozenset[int] = frozenset()
+        self.forbidden = forbidden_rooms(self, getattr(self.entity, "keep_out", ()))
+        self.kept_out = self.forbidden
         self._space: tuple[Arrangement, Space] = self.arrangement, self.space_without()
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
@@ -361,7 +364,7 @@ class Body:
     @property
     def may_block_routes(self) -> bool:
         """Whether routes may be closed to it that were open before, or will be."""
-        return self.home.may_block_routes or bool(self.kept_out)
+        return self.home.may_block_routes or self.kept_out != self.forbidden
 
     def space_without(self, rooms: frozenset[int] = frozenset()) -> Space:
         """Return where its body can be at present outside of some rooms, by their indices."""

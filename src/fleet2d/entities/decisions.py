@@ -370,7 +370,12 @@ class DecidingActor(Actor):
     def put(self, pose: Pose, step: int) -> None:
         """Move to a pose at a step, and replan there: a plan from elsewhere is void."""
         self.state, self._chosen, self.waiting = pose, None, None
-        self.is_displaced, self.part = True, self._present_part()
+        self.is_displaced = True
+        room, banned = self._room_index(), self.banned(step)
+        if not self.state.away and room in banned:
+            self.kept_out = banned - {room}  # its way out leads through this room
+            self.order = LeaveRoom("keep_out")
+        self.part = self._present_part()
         self.decide_again(step)
 
     def decide_again(self, step: int) -> None:
@@ -435,7 +440,7 @@ class DecidingActor(Actor):
         """
         if self._runs_down(now):
             return False
-        if self.bans or self.kept_out:  # they hold for its ways once it is outside of those rooms
+        if self.bans or self.kept_out != self.forbidden:  # they hold for its ways once it is outside of those rooms
             banned = self.banned(now.step)
             if banned != self.kept_out and self._room_index() not in banned:
                 self.kept_out = banned

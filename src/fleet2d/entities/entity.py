@@ -160,6 +160,8 @@ class Robot(Entity):
         battery: Its battery, for the behavior dock; null: its charge never ends.
         gives_way: How it keeps clear of people; null: it drives on, and people go round it.
         localization: The error of its estimate of its own pose; null: there is none.
+        keep_out: Rooms, or kinds of rooms if the home has them, that it never enters: it starts,
+            stops, passes and follows nowhere there. Put there by a person, it leaves.
     """
 
     radius: Length = Field(default=0.15, gt=0, le=2)
@@ -177,6 +179,7 @@ class Robot(Entity):
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None
+    keep_out: tuple[str, ...] = ()
     sight_events: ClassVar[tuple[str, str]] = ("user_lost", "user_seen")
     request_events: ClassVar[frozenset[str]] = REQUEST_EVENTS
 

@@ -287,6 +287,30 @@ def avoided_rooms(body: "Body", key: str, names: tuple[str, ...]) -> frozenset[i
     return frozenset(room.index for room in available_rooms(body, key, names, needed=False))
 
 
+def forbidden_rooms(body: "Body", names: tuple[str, ...]) -> frozenset[int]:
+    """Return the indices of the rooms, or kinds of rooms, that a robot never enters.
+
+    Args:
+        body: The robot; its notes name the kinds of rooms that the home lacks.
+        names: The rooms and kinds of rooms.
+
+    Raises:
+        PlacementError: There is no such room.
+    """
+    rooms = body.home.rooms
+    forbidden: set[int] = set()
+    for name in names:
+        try:
+            _, matches = matching_rooms((name,), rooms, rooms)
+        except PlacementError as error:
+            if not is_kind(body, (name,)):
+                raise PlacementError(f"keep_out: {error}") from None
+            body.notes.append(f"keep_out: this home has no {name}")
+            continue
+        forbidden |= {room.index for room in matches}
+    return frozenset(forbidden)
+
+
 def lies_in(body: "Body", point: tuple[int, int], rooms: frozenset[int]) -> bool:
     """Return whether a lattice point lies in one of some rooms, by their indices."""
     room = body.home.plan.room_of_point(*point) if rooms else None
