@@ -112,6 +112,8 @@ PIXELS = Bound("PIXELS", 1 << 24, "pixels")
 """Pixels of a picture of a floor plan."""
 POLYGONS = Bound("POLYGONS", 5_000, "polygons and lines")
 """Polygons of a floor plan: rooms, furniture, features, doorways."""
+ROOMS = Bound("ROOMS", 500, "rooms")
+"""Rooms that the file of a floor plan names, each of which takes time of its own."""
 CORNERS = Bound("CORNERS", 25_000, "corners")
 """Corners of the free space and the furniture of a floor plan, or of all polygons of a drawing."""
 ROOM_CORNERS = Bound("ROOM_CORNERS", 100_000, "corners of rooms")

@@ -192,6 +192,24 @@ def crossing_walls(folder: Path) -> Path:
     return path
 
 
+def crossing_parts(folder: Path) -> Path:
+    """Write free space of thin parts, each of which crosses a quarter of the others."""
+    ends = np.random.default_rng(0).random((2_500, 2, 2)).round(4) * 60
+    parts = [[a, b, [b[0], b[1] + 0.02], [a[0], a[1] + 0.02]] for a, b in ends.tolist()]
+    path = folder / "home.json"
+    plan = {"format": "fleet2d-floorplan", "version": 1, "free": parts}
+    path.write_text(json.dumps(plan), encoding="utf-8")
+    return path
+
+
+def too_many_boxes(folder: Path) -> Path:
+    boxes = np.random.default_rng(0).random((4_900, 4)).round(3) * 60
+    square = [[0, 0], [60, 0], [60, 60], [0, 60]]
+    path = folder / "home.json"
+    path.write_text(json.dumps({"verts": square, "room_category": {"Kitchen": boxes.tolist()}}))
+    return path
+
+
 SLOW = "(READ_SECONDS|READ_MB|CORNERS|POLYGONS)"
 ATTACKS = [
     (uses_of_svg, SLOW),
@@ -200,6 +218,8 @@ ATTACKS = [
     (shapes_of_svg, SLOW),
     (walls_of_sweet_home, SLOW),
     (crossing_walls, SLOW),
+    (crossing_parts, "FLEET2D_MAX_CROSSINGS"),
+    (too_many_boxes, "FLEET2D_MAX_ROOMS"),
     (white, "FLEET2D_MAX_PIXELS"),
     (too_many_teeth, "FLEET2D_MAX_CORNERS"),
     (one_row, "FLEET2D_MAX_PIXELS"),
@@ -215,7 +235,7 @@ ATTACKS = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("make", "answer"), ATTACKS if THOROUGH else ATTACKS[:8])
+@pytest.mark.parametrize(("make", "answer"), ATTACKS if THOROUGH else ATTACKS[:10])
 def test_no_plan_takes_long_or_much(
     tmp_path: Path, make: Callable[[Path], Path], answer: str
 ) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.bounds import CORNERS, POLYGONS, ROOM_CORNERS
+from fleet2d.bounds import CORNERS, POLYGONS, ROOM_CORNERS, ROOMS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice, unit_hint
 from fleet2d.floorplan.mesh import (
@@ -266,6 +266,7 @@ class FloorPlan:
             entrance, doorways = _scaled(entrance, scale), _scaled(doorways, scale)
         lines = list(doorways or ())
         POLYGONS.check(len(regions) + len(objects) + len(lines), "it", FloorPlanError)
+        ROOMS.check(len(regions), "it", FloorPlanError)
         for bound, shapes in (
             (CORNERS, [free, *(thing.footprint for thing in objects)]),
             (ROOM_CORNERS, [region.shape for region in regions]),

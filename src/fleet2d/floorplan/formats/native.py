@@ -29,6 +29,7 @@ from pydantic import (
 from pydantic_core import core_schema
 from shapely import MultiPolygon, Polygon
 
+from fleet2d.bounds import CROSSINGS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath
@@ -108,11 +109,19 @@ Area = Annotated[
 
 
 def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
-    """Return the union of parts [m], which may touch and overlap."""
+    """Return the union of parts [m], which may touch and overlap.
+
+    Raises:
+        FloorPlanError: Too many overlap.
+    """
+    shapes = [part.polygon for part in parts]
+    tree, meeting = shapely.STRtree(shapes), 0
+    for shape in shapes:
+        meeting += len(tree.query(shape))
+        CROSSINGS.check(meeting, "it", FloorPlanError, prefix="at least ")
     if are_apart(parts):
-        shapes = [part.polygon for part in parts]
         return shapes[0] if len(shapes) == 1 else MultiPolygon(shapes)
-    united = shapely.union_all([part.polygon for part in parts])
+    united = shapely.union_all(shapes)
     assert isinstance(united, Polygon | MultiPolygon)
     return united
 
