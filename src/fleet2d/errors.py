@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 # A longer line of a message quotes input, and is shortened to its head and tail [characters].
-_LONGEST, _HEAD, _TAIL = 1000, 600, 300
+_LONGEST = 1000
+_HEAD = 600
+_TAIL = 300
 _MAX_LINES = 200
 
 
@@ -197,7 +199,8 @@ class blame:  # noqa: N801  (used as a function)
 
     def __enter__(self) -> None:
         """Make this the running component."""
-        self._outer, blame.now = blame.now, self
+        self._outer = blame.now
+        blame.now = self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         """Replace an exception by one that names the component."""

@@ -94,8 +94,10 @@ def turned(x: I64, y: I64, angle: I64) -> tuple[I64, I64]:
         >>> turned(np.array([10, 10]), np.array([0, 5]), np.array([2048, -2048]))
         (array([0, 5]), array([ 10, -10]))
     """
-    sines, half = half_sines(), UNIT // 2
-    along, up = sines[(angle + 2 * QUARTER) % (2 * TURN)], sines[angle % (2 * TURN)]
+    sines = half_sines()
+    half = UNIT // 2
+    along = sines[(angle + 2 * QUARTER) % (2 * TURN)]
+    up = sines[angle % (2 * TURN)]
     return (x * along - y * up + half) // UNIT, (x * up + y * along + half) // UNIT
 
 

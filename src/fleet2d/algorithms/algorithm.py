@@ -208,7 +208,8 @@ class Outputs(Mapping[str, Any]):
     """
 
     def __init__(self, newest: Mapping[str, Any], known: Iterable[str]) -> None:
-        self._newest, self._known = newest, tuple(known)
+        self._newest = newest
+        self._known = tuple(known)
 
     def __getitem__(self, name: str) -> Any:
         """Return an output.

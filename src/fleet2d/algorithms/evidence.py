@@ -67,7 +67,8 @@ class Patches:
 
 def whole_rooms(plan: FloorPlan) -> Patches:
     """Return each room as one patch."""
-    rooms, count = plan.room_of_cell, len(plan.rooms)
+    rooms = plan.room_of_cell
+    count = len(plan.rooms)
     cells = np.bincount(rooms[rooms != NOWHERE], minlength=count)
     return Patches(rooms, read_only(np.arange(count)), read_only(cells), islands(plan))
 
@@ -85,7 +86,8 @@ def patches_of(plan: FloorPlan) -> Patches:
         >>> int(living.sum()), bool(patches.cells[living].sum() == plan.rooms[2].cells)
         (12, True)
     """
-    rooms, count = plan.room_of_cell, len(plan.rooms)
+    rooms = plan.room_of_cell
+    count = len(plan.rooms)
     row, column = np.nonzero(rooms != NOWHERE)
     room = rooms[row, column].astype(np.int64)
     total = np.bincount(room, minlength=count)
@@ -304,7 +306,8 @@ class Evidence:
 
     def between(self, begin: int, end: int) -> Self:
         """Return the evidence of the bins `begin` to `end` - 1."""
-        rows, patches = slice(begin, end), self.by_patch
+        rows = slice(begin, end)
+        patches = self.by_patch
         return replace(
             self,
             day=self.day[rows],

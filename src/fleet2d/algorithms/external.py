@@ -213,11 +213,14 @@ class ReplayedOutput(Algorithm, LogKeys):
         for name in pc.unique(texts).to_pylist():
             check_known(name, "room", rooms, LogError, f"{self.path}: ")
         room = pc.index_in(texts, value_set=pa.array(rooms)).to_numpy(zero_copy_only=False)
-        share, stamps, zone = table.numbers("share"), table.stamps(), self.time_zone
+        share = table.numbers("share")
+        stamps = table.stamps()
+        zone = self.time_zone
         usable = np.isfinite(share)
         local = stamps.local(self.path, "shares", usable, [], time_zone=zone, sort=self.sort)
         is_new = np.append(True, np.diff(local.time_us) > 0)
-        self._times, self._day = local.time_us[is_new], local.first_day
+        self._times = local.time_us[is_new]
+        self._day = local.first_day
         self._shares = np.zeros((len(self._times), len(rooms)))
         np.add.at(self._shares, (np.cumsum(is_new) - 1, room[local.row]), share[local.row])
 
@@ -266,7 +269,9 @@ class EvidenceTable(Algorithm):
         if not len(bins):
             return None
         order = np.lexsort((users, rooms, bins))
-        bins, rooms, users = bins[order], rooms[order], users[order]
+        bins = bins[order]
+        rooms = rooms[order]
+        users = users[order]
         return {
             "bin": evidence.begin + bins * evidence.bin_steps,
             "day": evidence.day[bins],

@@ -337,7 +337,8 @@ class Log:
         Entry 0 is the number of cells of each patch in view, summed over the steps of the bin;
         entry 1 the maximum over them.
         """
-        begin, self._next_bin = self._next_bin, self._next_bin + len(bins)
+        begin = self._next_bin
+        self._next_bin = self._next_bin + len(bins)
         self._bins.append(begin, self._next_bin, bins)
 
     def evidence(self, first: int, end: int) -> Evidence:
@@ -360,7 +361,8 @@ class Log:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
         seen = self.observations(first, end)
         patch = seen.room_in(self._nearest_patches).astype(np.int64)
-        observed, users = (seen.step, seen.user.astype(np.int64), patch), self.activities.users
+        observed = (seen.step, seen.user.astype(np.int64), patch)
+        users = self.activities.users
         return gather(self.clock, first, self.bin_steps, self.patches, bins, observed, users)
 
     def exposure(self, first: int, end: int) -> I64:

@@ -84,10 +84,12 @@ class SightingTable:
     def between(self, first: int, end: int) -> "SightingTable":
         """Return those of the steps from `first` to `end` - 1."""
         part = slice(*np.searchsorted(self.step, (first, end)).tolist())
-        index, distinct = self.index[part], self.distinct
+        index = self.index[part]
+        distinct = self.distinct
         if len(index) < len(distinct):
             used, of_used = np.unique(index, return_inverse=True)
-            index, distinct = of_used.astype(np.int32), distinct[used]
+            index = of_used.astype(np.int32)
+            distinct = distinct[used]
         return SightingTable(self.step[part], index, distinct)
 
     def rows(self) -> I64:

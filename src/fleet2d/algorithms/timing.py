@@ -67,7 +67,8 @@ class TimingPolicy(Component):
 
     def start(self, rooms: int) -> None:
         """Begin without experience in a home with a number of rooms."""
-        self.rooms, self.worth = rooms, 1.0
+        self.rooms = rooms
+        self.worth = 1.0
 
     def learn(self, asked: Asked) -> None:
         """Learn from an answer."""
@@ -101,7 +102,8 @@ class TimingChances:
     def to_columns(self, rooms: Sequence[str]) -> dict[str, NDArray[Any]]:
         """Return columns user, interaction, hour, room and chance, a row for each combination."""
         pairs = sorted(self.by_pair)
-        each, count = HOURS * len(rooms), len(pairs)
+        each = HOURS * len(rooms)
+        count = len(pairs)
         return {
             "user": np.repeat(np.array([user for user, _ in pairs], object), each),
             "interaction": np.repeat(np.array([name for _, name in pairs], object), each),
@@ -235,7 +237,9 @@ class LogisticTiming(TimingPolicy):
     def start(self, rooms: int) -> None:
         """Begin with even odds, slightly in favor."""
         super().start(rooms)
-        self.base, self.by_hour, self.by_room = 0.5, np.zeros(HOURS), np.zeros(rooms)
+        self.base = 0.5
+        self.by_hour = np.zeros(HOURS)
+        self.by_room = np.zeros(rooms)
 
     def learn(self, asked: Asked) -> None:
         """Make a step along the gradient of the log likelihood; neighboring hours share half."""
@@ -327,8 +331,10 @@ class TwoStageTiming(TimingPolicy):
     def start(self, rooms: int) -> None:
         """Begin with imagined answers only."""
         super().start(rooms)
-        yes, no = 0.6 * self.prior, 0.4 * self.prior
-        self.has_time, self.has_none = np.full((HOURS, rooms), yes), np.full((HOURS, rooms), no)
+        yes = 0.6 * self.prior
+        no = 0.4 * self.prior
+        self.has_time = np.full((HOURS, rooms), yes)
+        self.has_none = np.full((HOURS, rooms), no)
         self.agrees, self.declines = yes, no
 
     def learn(self, asked: Asked) -> None:
@@ -345,8 +351,10 @@ class TwoStageTiming(TimingPolicy):
         """Return the probability that a question is worth more than its price."""
         if not self.worth:
             return np.full((HOURS, self.rooms), self.min_chance)
-        total, answers = self.has_time + self.has_none, self.agrees + self.declines
-        time, yes = self.has_time / total, self.agrees / answers
+        total = self.has_time + self.has_none
+        answers = self.agrees + self.declines
+        time = self.has_time / total
+        yes = self.agrees / answers
         time_variance = time * (1 - time) / (total + 1)
         yes_variance = yes * (1 - yes) / (answers + 1)
         variance = time**2 * yes_variance + (yes**2 + yes_variance) * time_variance

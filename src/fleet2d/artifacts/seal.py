@@ -100,7 +100,8 @@ def _digest_parts(parts: Iterable[pa.Table], spec: TableSpec) -> tuple[int, str]
     """Return the number of rows and the digest of a table that comes in parts."""
     from fleet2d.artifacts.arrow import chunks_of
 
-    digest, words = TableDigest(spec), new_dictionaries(spec)
+    digest = TableDigest(spec)
+    words = new_dictionaries(spec)
     for part in parts:
         for chunk, rows in chunks_of(part, spec, words):
             digest.update(chunk, rows)
@@ -194,7 +195,8 @@ def verify_run(directory: Path | str) -> Verification:
     with os_errors_as(ArtifactError, f"{root} can't be read"):
         differing, notes = _differing_parts(root, manifest)
         for name, table in manifest.tables.items():
-            file, entry = f"{name}.parquet", f"{FILE_NAME}: tables.{name}"
+            file = f"{name}.parquet"
+            entry = f"{FILE_NAME}: tables.{name}"
             if not differing.keys() & {file, entry} and not _has_content(root, name, table):
                 differing[file] = "doesn't hold what the manifest says of it"
         digests = {name: table.digest or "" for name, table in manifest.tables.items()}

@@ -122,7 +122,8 @@ class TableWriter:
         Raises:
             OSError: They can't be written.
         """
-        first, buffer = self.logged, self.buffer
+        first = self.logged
+        buffer = self.buffer
         if unfinished is None or first == buffer.rows:
             return
         unfinished.add(buffer.spec, buffer.arrays(first), buffer.rows - first, buffer.words)
@@ -229,7 +230,8 @@ class RunStore:
         if self._is_open or self.directory is None or self.root is None:
             return
         self.check()
-        paths, unfinished = (self.root, *self.root.parents), self._unfinished_run()
+        paths = (self.root, *self.root.parents)
+        unfinished = self._unfinished_run()
         self._new_directories = [path for path in paths if not path.is_dir()]
         try:
             self.root.mkdir(parents=True, exist_ok=True)
@@ -260,7 +262,8 @@ class RunStore:
             ArtifactError: The journal is damaged, or the directory can't be written.
         """
         assert self.root is not None
-        self._unfinished, self._is_open = unfinished, True
+        self._unfinished = unfinished
+        self._is_open = True
         with self._writing("the directory"):
             self.manifest.status = "running"
             self.manifest.write(self.root)
@@ -414,9 +417,11 @@ class RunStore:
                     entry.file_in(self.root).publish()
             with self._writing("the directory"):
                 sync_directory(self.root)
-        digests, tables = dict[str, str](), dict[str, TableRecord]()
+        digests = dict[str, str]()
+        tables = dict[str, TableRecord]()
         for name, entry in self._tables.items():
-            digest, spec = entry.hashed(), entry.buffer.spec
+            digest = entry.hashed()
+            spec = entry.buffer.spec
             digests[name] = digest.hexdigest(entry.buffer.words)
             tables[name] = table_record(spec, digest.rows, digests[name])
         self.manifest.tables = dict(sorted(tables.items()))

@@ -29,7 +29,9 @@ DTYPES: dict[str, np.dtype[Any]] = {
 }
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
 
-TRACK, PLANNED, WALK = 0, 1, 2
+TRACK = 0
+PLANNED = 1
+WALK = 2
 KEY_KINDS = ("track", "planned", "walk")
 """The kinds of rows in the table key_frames: a breakpoint that the body reached, the planned end of
 a segment that was interrupted before, the state from which a random walk continues."""
@@ -294,9 +296,12 @@ class TableBuffer:
 
     def _copy(self, batch: Batch, start: int, stop: int) -> None:
         """Copy some rows of a batch behind those of the buffer, which doesn't count them yet."""
-        a, b = self.rows, self.rows + stop - start
+        a = self.rows
+        b = self.rows + stop - start
         for column in self.spec.columns:
-            name, values, valid = column.name, batch.values[column.name], batch.valid[column.name]
+            name = column.name
+            values = batch.values[column.name]
+            valid = batch.valid[column.name]
             if column.takes_strings:
                 values = values[start:stop] if isinstance(values, list) else [values] * (b - a)
                 if column.kind == "string":
@@ -325,7 +330,9 @@ class TableBuffer:
         if not reuse:
             # The next rows are likely to be as many.
             self._first_capacity = max(self._first_capacity, self._capacity)
-            self._capacity, self._values, self._valid = 0, {}, {}
+            self._capacity = 0
+            self._values = {}
+            self._valid = {}
         for strings in self._strings.values():
             strings.clear()
         return chunk
@@ -345,7 +352,8 @@ class TableBuffer:
 
     def _rows_of(self, column: Column, start: int) -> ColumnChunk:
         """Return what one column holds from row `start` on."""
-        name, rows = column.name, slice(start, self.rows)
+        name = column.name
+        rows = slice(start, self.rows)
         if column.kind == "string":
             return encode_strings(self._strings[name][rows], column.nullable)
         valid = self._valid[name][rows] if column.nullable else None

@@ -62,7 +62,8 @@ SYNC_S = 5.0
 # Rows in one frame at most: a few damaged bytes must not request all memory.
 _MAX_ROWS = 1 << 20
 # The years 1 to 9999 [us since 1970], which `datetime` can express.
-_FIRST_TIME, _END_OF_TIME = -62_135_596_800_000_000, 253_402_300_800_000_000
+_FIRST_TIME = -62_135_596_800_000_000
+_END_OF_TIME = 253_402_300_800_000_000
 _to_json = json.JSONEncoder(separators=(",", ":")).encode
 
 
@@ -146,7 +147,8 @@ def read_rows(path: Path, end: int) -> Iterator[LoggedRows]:
                 words.append(new_dictionaries(specs[-1]))
             if frame.kind == "rows":
                 number, rows, added_words = frame.description
-                spec, dictionaries = specs[number], words[number]
+                spec = specs[number]
+                dictionaries = words[number]
                 for name, column_words in added_words.items():
                     dictionaries[name].enter(column_words)
                 chunk = _chunk_of(spec, rows, frame.content, dictionaries)
@@ -230,7 +232,8 @@ class ArrayReader:
 
     def __init__(self, content: bytes) -> None:
         """Begin with the first array."""
-        self._content, self._position = content, 0
+        self._content = content
+        self._position = 0
         self._integers = np.empty(0, np.int64)
 
     def read(self, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
@@ -355,7 +358,8 @@ class UnfinishedRun:
         self.lock()
         self.folder.mkdir(exist_ok=True)
         self.checkpoint.unlink(missing_ok=True)
-        self._journal, self._tables = FrameWriter(self.folder / JOURNAL_NAME, JOURNAL), {}
+        self._journal = FrameWriter(self.folder / JOURNAL_NAME, JOURNAL)
+        self._tables = {}
 
     def resume(self, commit: Commit | None) -> Iterator[LoggedRows]:
         """Truncate the journal after a commit, and yield the rows before it.
@@ -393,7 +397,8 @@ class UnfinishedRun:
             self.journal.add("table", _to_json(asdict(spec)))
         added_words = {}
         for name, dictionary in words.items():
-            known, count = table.words.get(name, 0), len(dictionary) - (None in dictionary)
+            known = table.words.get(name, 0)
+            count = len(dictionary) - (None in dictionary)
             if count > known:
                 added_words[name] = dictionary.in_order()[known:]
                 table.words[name] = count
@@ -427,7 +432,8 @@ class UnfinishedRun:
         Raises:
             OSError: It can't be read.
         """
-        digest, rest = hashlib.sha256(), self.journal.end if end is None else end
+        digest = hashlib.sha256()
+        rest = self.journal.end if end is None else end
         with (self.folder / JOURNAL_NAME).open("rb") as file:
             while part := file.read(min(rest, 1 << 20)):
                 digest.update(part)

@@ -55,11 +55,15 @@ def watched(first_s: float = FIRST_S) -> Iterator[None]:
 
 
 def _watch(is_over: threading.Event, thread_id: int, first_s: float) -> None:
-    call, start_s, limit_s = blame.now, time.monotonic(), first_s
+    call = blame.now
+    start_s = time.monotonic()
+    limit_s = first_s
     while not is_over.wait(first_s / 6):
         time_s = time.monotonic()
         if blame.now is None or blame.now is not call:
-            call, start_s, limit_s = blame.now, time_s, first_s
+            call = blame.now
+            start_s = time_s
+            limit_s = first_s
         elif time_s - start_s >= limit_s:
             limit_s *= 2
             moment = "before the first step" if call.step is None else f"at step {call.step}"
@@ -139,7 +143,8 @@ def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
 
 def summary_of(run: "Run") -> dict[str, Any]:
     """Return the content of `--json`."""
-    manifest, verdicts = run.manifest, verdicts_of(run)
+    manifest = run.manifest
+    verdicts = verdicts_of(run)
     wall = {**manifest["wall_s"], "total": _since_start()}
     return {
         **({"verdict": verdict_line(run, verdicts)} if verdicts else {}),
@@ -177,7 +182,8 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
         f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
         f" save {wall['save']:.2f} s; whole process {wall['total']:.2f} s{memory})"
     )
-    table, hidden = Table("metric", "of", "value", "", show_edge=False), 0
+    table = Table("metric", "of", "value", "", show_edge=False)
+    hidden = 0
     for metric, result in summary["metrics"].items():
         configured = run.manifest["scenario"]["metrics"][metric]
         metric_class = cast("type[Metric]", lookup("metric", configured["type"]))
@@ -187,7 +193,8 @@ def print_summary(summary: dict[str, Any], run: "Run") -> None:
         for name, value in rows:
             unit = metric_class.units.get(name.rsplit(SEPARATOR, 1)[-1], metric_class.unit)
             table.add_row(metric, name, _text(value, unit), "" if unit == last_unit else unit)
-            metric, last_unit = "", unit
+            metric = ""
+            last_unit = unit
     if table.row_count:
         console.print(table, soft_wrap=False)
     lines = [f"{hidden} more numbers are in the run: --json shows them"] if hidden else []
@@ -293,7 +300,9 @@ def _set_up(
 
 def _fresh_directory(name: str) -> Path:
     """Create and return runs/NAME-001, or the directory of the first free number."""
-    stem, number, advice = file_name(name) or "run", 1, "; name another directory by --out"
+    stem = file_name(name) or "run"
+    number = 1
+    advice = "; name another directory by --out"
     while True:
         directory = Path("runs") / f"{stem}-{number:03d}"
         refusal = os_errors_as(RunDirectoryError, f"{directory} can't be created", advice)

@@ -51,7 +51,8 @@ def validate(
     from fleet2d.engine.simulation import Simulation
 
     simulation = Simulation(scenario, *overrides)
-    plan, settings = simulation.home.plan, simulation.scenario.simulation
+    plan = simulation.home.plan
+    settings = simulation.scenario.simulation
     verdict = "wrong" if simulation.wrong else "ok"
     typer.echo(
         f"{verdict}: {counted(len(simulation.scenario.users), 'user')} and"

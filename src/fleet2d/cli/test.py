@@ -157,7 +157,8 @@ def print_cases(cases: "Sequence[ScenarioCase]") -> None:
     console.print(table, soft_wrap=False)
     notes = dict.fromkeys(note for verdict in all_verdicts for note in verdict.notes)
     failures = [line for case in cases for line in _failure_lines(case)]
-    failed, runs = sum(case.fails for case in cases), counted(len(cases), "run")
+    failed = sum(case.fails for case in cases)
+    runs = counted(len(cases), "run")
     end = f"{failed} of {runs} failed" if failed else f"all held: {runs}"
     console.print(*(f"note: {note}" for note in notes), *failures, end, sep="\n")
 

@@ -113,7 +113,8 @@ class DescribedModel(BaseModel):
         result = handler(schema)
         definition = handler.resolve_ref_schema(result)
         definition["description"] = summary(cls)
-        properties, texts = definition.get("properties", {}), descriptions(cls)
+        properties = definition.get("properties", {})
+        texts = descriptions(cls)
         for name, field in cls.model_fields.items():
             key = field.alias or name
             if key in properties and name in texts and not field.description:
@@ -431,7 +432,8 @@ def register(kind: str, name: str, *, aliases: Iterable[str] = ()) -> Callable[[
                 f"{cls.__qualname__} can't be a {kind}: derive it from the base class that "
                 f"declares `kind: ClassVar[str] = {kind!r}`"
             )
-        classes, names = _REGISTRY.setdefault(kind, {}), _ALIASES.setdefault(kind, {})
+        classes = _REGISTRY.setdefault(kind, {})
+        names = _ALIASES.setdefault(kind, {})
         for word in (name, *aliases):
             if word in classes or word in names:
                 raise ValueError(f"there is a {kind} named {word!r} already")

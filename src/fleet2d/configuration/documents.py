@@ -124,7 +124,8 @@ def _composed(loader: Any) -> yaml.Node | None:
 def _check_events(text: str, loader: Any) -> None:
     """Refuse a text of too many levels or values before its nodes are built."""
     depth = values = 0
-    most_depth, most_values = DEPTH.limit, YAML_VALUES.limit
+    most_depth = DEPTH.limit
+    most_values = YAML_VALUES.limit
     for event in yaml.parse(text, Loader=loader):
         if isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
@@ -170,7 +171,9 @@ class _Builder:
             places: Where the place of each value is added; None: nowhere.
         """
         self._folder, self._title, self._places = folder, title, places
-        self._values, self._most_values, self._most_depth = 0, YAML_VALUES.limit, DEPTH.limit
+        self._values = 0
+        self._most_values = YAML_VALUES.limit
+        self._most_depth = DEPTH.limit
         self._scalars = Loader("")
         self._pairs: dict[int, dict[str, Pair] | None] = {}
         self._parents: list[yaml.Node] = []
@@ -225,7 +228,8 @@ class _Builder:
         try:
             return self._scalars.construct_object(node)
         except (ValueError, LookupError, TypeError, AttributeError, OverflowError):
-            kind, text = node.tag.removeprefix(TAG), one_line(node.value)
+            kind = node.tag.removeprefix(TAG)
+            text = one_line(node.value)
             size = f" of {len(node.value)} characters" if len(node.value) > len(text) else ""
             raise NodeError(node, f"{text!r}{size} is not a valid {kind}") from None
 
@@ -284,7 +288,8 @@ class Document:
         nearest = next((parent for parent in parents if parent in self.places), None)
         if nearest is None:
             return ""
-        place, depth = self.places[nearest], len(nearest)
+        place = self.places[nearest]
+        depth = len(nearest)
         inner_places = [inner for key, inner in self.places.items() if key[:depth] == nearest]
         first = {_file(inner): inner for inner in reversed(inner_places)}
         changes = [inner for file, inner in first.items() if file not in ("", _file(place))][::-1]

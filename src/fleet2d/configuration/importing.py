@@ -106,8 +106,10 @@ def _importable(folder: Path) -> Iterator[None]:
 
     Two scenarios may each have a ``helpers.py``: each imports its own.
     """
-    old_modules, current_folder = set(sys.modules), Path.cwd()
-    writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    old_modules = set(sys.modules)
+    current_folder = Path.cwd()
+    writes_bytecode = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
     importlib.invalidate_caches()  # a file may be new
     sys.path.insert(0, str(folder))
     _SEARCHED.append(folder)

@@ -63,9 +63,11 @@ def rewrite(
     """Return the same error, its first lines only, with ``change`` applied to each of them."""
     from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError, core_schema
 
-    own_kinds, lines = get_args(core_schema.ErrorType), []
+    own_kinds = get_args(core_schema.ErrorType)
+    lines = []
     for line in error.errors(include_url=False)[:MAX_LINES]:
-        kind, context = line["type"], line.get("ctx", {})
+        kind = line["type"]
+        context = line.get("ctx", {})
         details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
         if kind not in own_kinds:
             # The message comes last: braces within it are not placeholders.

@@ -149,7 +149,8 @@ def _code_in(value: object, keys: tuple[str, ...]) -> Iterator[tuple[str, str]]:
 
 def _program_of(settings: Mapping[object, object]) -> str:
     """Return the command line of a component that runs a program; empty for others."""
-    command, arguments = settings.get("command"), settings.get("arguments", ())
+    command = settings.get("command")
+    arguments = settings.get("arguments", ())
     if not isinstance(command, str) or not (path := _file(command)):
         return ""  # no program, or one that can't be started
     rest = arguments if isinstance(arguments, list | tuple) else [arguments]

@@ -187,7 +187,8 @@ class Quantity:
         return number
 
     def _parse_text(self, text: str) -> Fraction:
-        total, position = Fraction(0), 0
+        total = Fraction(0)
+        position = 0
         while position < len(text) or not position:
             part = _PART.match(text, position)
             if part is None or (not part[2] and part.span() != (0, len(text))):

@@ -93,7 +93,8 @@ def rtp(
     if not out.absolute().parent.is_dir():
         raise InputError(f"--out {out}: there is no folder {out.absolute().parent}")
     if on.is_file():
-        file, on = on, out.with_name(f"{out.stem}_data")
+        file = on
+        on = out.with_name(f"{out.stem}_data")
         _make(file, on, None)
     began = time.process_time()
     train_on, check_on = _windows(on)
@@ -159,7 +160,8 @@ def leaderboard(
     if picture is not None:
         from fleet2d.pictures.charts import draw_forecasts
 
-        made, name = forecasts(open_dataset(directory), split, models), [*models, "learned"][0]
+        made = forecasts(open_dataset(directory), split, models)
+        name = [*models, "learned"][0]
         if made is None:
             raise InputError(f"{directory} has no windows in {split!r}: nothing to draw")
         draw_forecasts(name, made.beliefs[name], made.truth, picture)

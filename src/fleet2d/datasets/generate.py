@@ -129,7 +129,8 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
     rooms = {
         (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
     }
-    files, evidence = data.manifest.files, f"{split}/evidence-"
+    files = data.manifest.files
+    evidence = f"{split}/evidence-"
     kinds: Counter[str] = Counter()
     for row in labels.aggregate([([], "count_all")]).to_pylist():
         kinds[rooms.get((row["run"], row["place"]), AWAY)] += row["count_all"]
@@ -233,8 +234,10 @@ def dataset(
         >>> people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
         >>> made = fleet2d.dataset({"splits": {"train": people}}, "small")  # doctest: +SKIP
     """
-    plan, root = plan_dataset(source), Path(out)
-    parts, made = root / PARTS, None
+    plan = plan_dataset(source)
+    root = Path(out)
+    parts = root / PARTS
+    made = None
     refuse_links(root, (PARTS, PICTURES, *plan.file.splits))
     if (root / MANIFEST).is_file():
         made = open_dataset(root)
@@ -279,7 +282,8 @@ def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:
     """Refuse to continue a data set of another file or version; begin one."""
-    path, identity = parts / PLAN, f"{plan.digest} {__version__}".encode()
+    path = parts / PLAN
+    identity = f"{plan.digest} {__version__}".encode()
     if path.is_file() and read_bytes(path, FILE_BYTES) != identity:
         raise InputError(
             f"{parts.parent} holds the unfinished data set of another file, or another version of"

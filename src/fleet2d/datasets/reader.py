@@ -25,7 +25,8 @@ NULLABLE = frozenset({"next_place", "next_step", "activity"})
 LARGEST = 1e6
 """The largest absolute value of a number in a table that isn't whole, such as an area [m²]."""
 
-_SPLIT, _TABLE = "[A-Za-z0-9_]+", "|".join(SCHEMAS)
+_SPLIT = "[A-Za-z0-9_]+"
+_TABLE = "|".join(SCHEMAS)
 
 
 class ShardRecord(FileRecord):

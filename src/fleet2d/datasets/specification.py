@@ -27,8 +27,12 @@ from fleet2d.scenario.model import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
 
 NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")
-PARTS, PICTURES = "unfinished", "pictures"  # folders beside those of the splits
-EVIDENCE, STAYS, BELIEF = "evidence", "stays", "belief_"
+# folders beside those of the splits
+PARTS = "unfinished"
+PICTURES = "pictures"
+EVIDENCE = "evidence"
+STAYS = "stays"
+BELIEF = "belief_"
 MAX_SEED = 1 << 31
 MAX_PERIOD = timedelta(days=1)
 
@@ -161,11 +165,13 @@ class DatasetPlan:
 
     def run(self, split: str, k: int) -> PlannedRun:
         """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
-        settings, homes = self.file.splits[split], self.homes[split]
+        settings = self.file.splits[split]
+        homes = self.homes[split]
         draws = Draws(np.uint64(stream_key(self.file.seed, f"datasets.{split}", "run")), k)
         household = draws.choice(settings.households)
         varied = [draws.choice(axis.choices(name)) for name, axis in self.file.vary.items()]
-        home, number = homes[k % len(homes)], self._first_number(split) + k
+        home = homes[k % len(homes)]
+        number = self._first_number(split) + k
         scenario = self._scenario(home, household, varied)
         scenario["simulation"]["seed"] = (self.file.seed * 1_000_003 + number) % MAX_SEED
         labels = {
@@ -185,7 +191,8 @@ class DatasetPlan:
         varied = {name: axis.choices(name) for name, axis in self.file.vary.items()}
         usual = [choices[0] for choices in varied.values()]
         for split, settings in self.file.splits.items():
-            homes, households = self.homes[split], settings.households
+            homes = self.homes[split]
+            households = settings.households
             firsts = [axis.choices("home")[0] for axis in settings.homes]
             cases = [(f"homes: {home.words}", home, households[0], usual) for home in firsts]
             cases += [

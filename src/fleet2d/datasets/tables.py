@@ -67,8 +67,10 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         planned: What was planned for it.
         labels: Time between labels.
     """
-    manifest, rooms = run.manifest, run.plan.rooms
-    start, step_us = np.datetime64(manifest["start"], "us"), int(manifest["step_us"])
+    manifest = run.manifest
+    rooms = run.plan.rooms
+    start = np.datetime64(manifest["start"], "us")
+    step_us = int(manifest["step_us"])
     users = list(manifest["scenario"]["users"])
     every = max(1, labels // timedelta(microseconds=step_us))
     steps = np.arange(every - 1, int(manifest["steps"]), every)
@@ -133,15 +135,18 @@ def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
     """Return where a user truly was at some steps, where next and when, and what the user did."""
     stays = columns_of(run, STAYS, ["user", "place", "begin"])
     own = stays["user"] == user
-    place, begin = stays["place"][own], stays["begin"][own]
+    place = stays["place"][own]
+    begin = stays["begin"][own]
     is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
-    place, begin = place[is_new], begin[is_new]
+    place = place[is_new]
+    begin = begin[is_new]
     since: I64 = np.zeros(0, np.int64)
     activity: Any = np.zeros(0, object)
     if "events" in run.tables:
         events = columns_of(run, "events", ["event", "entity", "step", "detail"])
         is_own = (events["event"] == "activity") & (events["entity"] == user)
-        since, activity = events["step"][is_own], events["detail"][is_own]
+        since = events["step"][is_own]
+        activity = events["detail"][is_own]
     stay = np.searchsorted(begin, steps, side="right") - 1
     is_last = stay + 1 == len(begin)
     following = np.where(is_last, -1, stay + 1)

@@ -115,7 +115,8 @@ def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
         truth: int64 (n,).
         gap: float64 (n,), minutes since the newest sighting.
     """
-    loss, hit = log_loss(belief, truth), top_k(belief, truth, 1)
+    loss = log_loss(belief, truth)
+    hit = top_k(belief, truth, 1)
     scores = {
         "log_loss": float(loss.mean()),
         "accuracy": float(hit.mean()),
@@ -202,17 +203,20 @@ def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
 def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
     """Score shares of rooms from all evidence of a run, against the true ones."""
     errors: dict[str, list[float]] = {}
-    rooms, evidence = _groups(data, "rooms", split), _groups(data, "evidence", split)
+    rooms = _groups(data, "rooms", split)
+    evidence = _groups(data, "evidence", split)
     for (run, user), labels in _groups(data, "labels", split, "user").items():
         names = rooms[(run,)]["room"].tolist()
         at_home = labels["place"][labels["place"] != AWAY].tolist()
         if not at_home:
             continue
         truth = np.array([at_home.count(name) for name in names]) / len(at_home)
-        seen, watched = np.zeros(len(names)), np.zeros(len(names))
+        seen = np.zeros(len(names))
+        watched = np.zeros(len(names))
         if (rows := evidence.get((run,))) is not None:
             room = np.array([names.index(name) for name in rows["room"]])
-            is_look, is_user = rows["user"] == ANYONE, rows["user"] == user
+            is_look = rows["user"] == ANYONE
+            is_user = rows["user"] == user
             np.add.at(watched, room[is_look], rows["watched"][is_look])
             np.add.at(seen, room[is_user], rows["seen"][is_user] / 60)
         uniform = np.ones(len(names))
@@ -246,9 +250,11 @@ def _hours(times: Any) -> I64:
 
 def _returns(data: Dataset, split: str) -> tuple[I64, F64]:
     """Return the hour of each label of somebody away, and the time until the return [min]."""
-    hours, minutes = [np.zeros(0, np.int64)], [np.zeros(0)]
+    hours = [np.zeros(0, np.int64)]
+    minutes = [np.zeros(0)]
     for labels in _with_kinds(data, split):
-        time, step = labels["time"], labels["step"]
+        time = labels["time"]
+        step = labels["step"]
         if len(time) < 2:  # the length of a step is unknown
             continue
         until = labels["next_step"].astype(float) - step
@@ -283,7 +289,8 @@ def _score_shares(
     if not known or not asked:
         return {}
     outcomes = sorted({what for _, what in [*known, *asked]})
-    overall, counts = Counter(what for _, what in known), Counter(known)
+    overall = Counter(what for _, what in known)
+    counts = Counter(known)
     base = np.array([overall[what] + SMOOTHING for what in outcomes])
     base /= base.sum()
     tables = {}

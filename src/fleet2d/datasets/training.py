@@ -14,7 +14,9 @@ from fleet2d.kernels import TRACE_FEATURES, PlaceNetwork, place_probabilities
 FLOOR = 1e-6
 FACTORS = tuple(k / 10 for k in range(16))  # of the correction, of which fine-tuning tries each
 CAUTION = 0.05  # log loss that a factor of 0 or of 2 must gain
-BETA_1, BETA_2 = 0.9, 0.999  # of Adam
+# of Adam
+BETA_1 = 0.9
+BETA_2 = 0.999
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,9 @@ def train(
     values = _initial(random, settings.hidden) if start is None else _unfolded(start, mean, scale)
     anchor = {k: np.zeros_like(v) if start is None else v.copy() for k, v in values.items()}
     moments = {name: [np.zeros_like(v), np.zeros_like(v)] for name, v in values.items()}
-    best, best_loss, step = values, np.inf, 0
+    best = values
+    best_loss = np.inf
+    step = 0
     total = settings.epochs * len(batches)
     for epoch in range(settings.epochs):
         losses = []

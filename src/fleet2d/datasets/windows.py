@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 MIN_BELIEF = 1e-6
 PRIOR = "routine"  # the model whose belief is corrected
-FIRST_DAY, MICROSECOND = np.datetime64("0001-01-01", "D"), np.timedelta64(1, "us")
+FIRST_DAY = np.datetime64("0001-01-01", "D")
+MICROSECOND = np.timedelta64(1, "us")
 GAP = 18  # the feature that is ln(1 + minutes since the newest sighting)
 
 
@@ -67,8 +68,10 @@ def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
     """
     columns = {name: _by_run(table) for name, table in tables.items()}
     for number, run in columns["runs"].items():
-        rooms, evidence = columns["rooms"][number], columns["evidence"].get(number)
-        labels, beliefs = columns["labels"].get(number), columns["beliefs"].get(number)
+        rooms = columns["rooms"][number]
+        evidence = columns["evidence"].get(number)
+        labels = columns["labels"].get(number)
+        beliefs = columns["beliefs"].get(number)
         if labels is None or evidence is None:
             continue
         if beliefs is None or PRIOR not in beliefs["model"]:
@@ -138,7 +141,8 @@ class _Dense:
         since_us = (start - midnight) / MICROSECOND
         time = int(since_us) + (self.step + 1 - self.bin_steps) * step_us
         ordinal = int((midnight - FIRST_DAY) / np.timedelta64(1, "D")) + 1
-        self.day, self.minute = ordinal + time // DAY_US, time // 60_000_000 % DAY_MINUTES
+        self.day = ordinal + time // DAY_US
+        self.minute = time // 60_000_000 % DAY_MINUTES
 
     def of(self, user: str) -> TracedEvidence:
         """Return the evidence of a user, with a belief that is filled in later."""
@@ -148,7 +152,9 @@ class _Dense:
 
     def windows(self, number: int, home: str, user: str) -> Windows:
         """Return the windows of a user of the run."""
-        labels, beliefs, rooms = self.labels, self.beliefs, self.facts.rooms
+        labels = self.labels
+        beliefs = self.beliefs
+        rooms = self.facts.rooms
         own = labels["user"] == user
         place_of = {**self.rooms, AWAY: len(self.rooms)}
         truth = np.full(len(self.step), -1)
@@ -166,7 +172,8 @@ class _Dense:
         assert kept is not None, "there are beliefs"
         features = trace_evidence(np.zeros(trace_size(rooms)), rooms, self.of(user))[kept]
         features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
-        places, known = self.facts.features, features.astype(np.float32)
+        places = self.facts.features
+        known = features.astype(np.float32)
         return Windows(number, home, user, places, known, truth[kept], self.step[kept], stored)
 
 

@@ -46,7 +46,8 @@ class PlannedNote(NamedTuple):
 
 def notes_of(actor: DecidingActor, kind: str) -> list[PlannedNote]:
     """Return the notes of a kind in the plan of a body."""
-    step_of, notes = actor.clock.step_at_or_after, actor.plan.notes
+    step_of = actor.clock.step_at_or_after
+    notes = actor.plan.notes
     return [PlannedNote(step_of(n.time_us), actor.row, n.detail) for n in notes if n.event == kind]
 
 
@@ -171,7 +172,8 @@ def changed_inputs(manifest: Manifest) -> list[str]:
 
 def components_of(scenario: Scenario) -> Iterator[Component]:
     """Yield all components of a scenario, also those within others."""
-    robots, script = scenario.robots.values(), scenario.script
+    robots = scenario.robots.values()
+    script = scenario.script
     errors = [robot.perception for robot in robots]
     errors += [camera.perception for robot in robots for camera in robot.eyes.values()]
     errors += [getattr(entry.act, "errs", None) for entry in script]  # of faults

@@ -138,7 +138,8 @@ class Cameras(Watcher):
             ScenarioError: A period is not a multiple of the step, or an unknown body is named.
         """
         actors, users, self.method, self.radii, self.heights = self.shared = shared
-        self.owner, self.row = actors[row], row
+        self.owner = actors[row]
+        self.row = row
         self.event_names = self.owner.entity.sight_events
         is_robot = row >= users
         self.index = row - users if is_robot else row
@@ -160,7 +161,8 @@ class Cameras(Watcher):
 
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances, from the step on at which they look next."""
-        old, self.disturbances = self.disturbances, list(disturbances)
+        old = self.disturbances
+        self.disturbances = list(disturbances)
         others = [[d for d in each if d.injected is None] for each in (old, disturbances)]
         memory = self._inject() if others[0] == others[1] else self._set_up()
         self.memory = carry_over(memory, self.memory, self._forced())
@@ -183,7 +185,9 @@ class Cameras(Watcher):
         return forced
 
     def _set_up(self) -> SightMemory:
-        owner, lattice, clock = self.owner, self.owner.home.plan.lattice, self.owner.clock
+        owner = self.owner
+        lattice = self.owner.home.plan.lattice
+        clock = self.owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
         units = lattice.units_per_m
@@ -235,7 +239,8 @@ class Cameras(Watcher):
         ]
         rows = np.array(injected, np.int64).reshape(-1, 5)
         self.errors = self.errors._replace(injected=rows)
-        clock, count = self.owner.clock, len(self.others)
+        clock = self.owner.clock
+        count = len(self.others)
         bursts = count + MAX_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
         self.rule = DetectionRule(
             patience=self._patience,
@@ -250,7 +255,8 @@ class Cameras(Watcher):
 
     def _draw_streams(self) -> None:
         """Set the random stream of each draw, by names: another user doesn't change the others'."""
-        owner, errors = self.owner, self.errors
+        owner = self.owner
+        errors = self.errors
         for c, camera in enumerate(self.names):
             prefix = "" if len(self.names) == 1 and camera == "camera" else f"{camera}: "
             for u, other in enumerate(self.others):
@@ -274,7 +280,8 @@ class Cameras(Watcher):
     @property
     def ends(self) -> tuple[bool, bool]:
         """Whether a span ends at USER_LOST, when a body is lost, and at USER_SEEN."""
-        plan, awaited = self.owner.plan.interrupts, self.awaited
+        plan = self.owner.plan.interrupts
+        awaited = self.awaited
         lost, seen = (name in plan or name in awaited for name in self.event_names)
         return lost, seen
 
@@ -295,7 +302,8 @@ class Cameras(Watcher):
         seen = self.memory.seen.tolist()
         if 1 not in seen:  # a quick answer, as policies ask for it again and again
             return {}
-        xy_of, places = self.owner.home.plan.lattice.xy_of, self.perceived.tolist()
+        xy_of = self.owner.home.plan.lattice.xy_of
+        places = self.perceived.tolist()
         return {self.name_of(i): xy_of(*places[i]) for i, is_seen in enumerate(seen) if is_seen}
 
     def name_of(self, identity: int) -> str:
@@ -320,7 +328,8 @@ class Cameras(Watcher):
 
         Cameras that looked beyond `end`, before another watcher ended the span, look again.
         """
-        result, self._ahead = self._ahead, None
+        result = self._ahead
+        self._ahead = None
         if result is not None and result.looked != end:
             for array, old in zip(self.memory, result.old_memory, strict=True):
                 array[:] = old
@@ -337,7 +346,8 @@ class Cameras(Watcher):
             for identity, number in enumerate(result.newest):
                 if number >= 0:
                     self.perceived[identity] = places[number]
-        names, entity = self.event_names, self.owner.name
+        names = self.event_names
+        entity = self.owner.name
         return [
             new_event((step, entity, names[kind], self.name_of(identity)))
             for step, identity, kind in result.events
@@ -347,7 +357,8 @@ class Cameras(Watcher):
         """Yield the events of the last step that end its owner's plan."""
         if not events:
             return
-        stops, lattice = self.owner.plan.interrupts, self.owner.home.plan.lattice
+        stops = self.owner.plan.interrupts
+        lattice = self.owner.home.plan.lattice
         index = {other.name: i for i, other in enumerate(self.others)}
         for event in events:
             if event.step == self.next_step - 1 and event.event in stops:
@@ -357,7 +368,8 @@ class Cameras(Watcher):
 
     def collect(self) -> SightingTable:
         """Return the sightings since the last call, with the columns of observations."""
-        blocks, self._sightings = self._sightings, []
+        blocks = self._sightings
+        self._sightings = []
         if not blocks:
             return NOTHING
         seen = SightingTable.joined(blocks)
@@ -372,13 +384,16 @@ class Cameras(Watcher):
         may_redo = stop or self.sighting_errors is not None
         old_memory = [array.copy() for array in self.memory] if may_redo else []
         stops = self.ends if stop else (False, False)
-        home, window, points = self.owner.home, bodies.window(self.next_step, end), None
+        home = self.owner.home
+        window = bodies.window(self.next_step, end)
+        points = None
         if self.method is not None:
             block = bodies.block(self.next_step, end)
             others = slice(self._first, self._first + len(self.others))
             crowd = PoseBlock._make(column[others] for column in block)
             poses = poses_of(block, self.row)
-            first, step_us = self.next_step, self.owner.clock.step_us
+            first = self.next_step
+            step_us = self.owner.clock.step_us
             lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
             with blame("sight.method", first):
                 points = points_seen(self.method, home, lenses, poses, crowd, first, step_us)
@@ -399,9 +414,11 @@ class Cameras(Watcher):
         sightings = SightingTable(seen_at, index, distinct.T) if len(seen_at) else UNSEEN
         end = looked = self.next_step + count
         if self.sighting_errors is not None:
-            before, seen = SightMemory(*old_memory), sightings.rows()
+            before = SightMemory(*old_memory)
+            seen = sightings.rows()
             rows, differs = self.sighting_errors.change(seen, self.memory, before, window, looked)
-            sightings, newest = SightingTable.of_rows(rows), newest_of(rows, len(newest))
+            sightings = SightingTable.of_rows(rows)
+            newest = newest_of(rows, len(newest))
             if differs:
                 patience = self.rule.patience
                 events = sight_events(rows, self.memory, patience, self.next_step, looked)
@@ -414,7 +431,8 @@ def _drift_of(owner: Actor) -> Drift | None:
     settings: Localization | None = getattr(owner.entity, "localization", None)
     if settings is None:
         return None
-    units_per_m, step_us = owner.home.plan.lattice.units_per_m, owner.clock.step_us
+    units_per_m = owner.home.plan.lattice.units_per_m
+    step_us = owner.clock.step_us
     return Drift(settings, units_per_m, step_us, owner.seed, owner.path, owner.displacements)
 
 
@@ -430,7 +448,8 @@ class PerfectCameras(Cameras):
             latency=np.zeros_like(lenses.latency),
             errs=np.zeros_like(lenses.errs),
         )
-        self.rule, self.sighting_errors = self.rule._replace(patience=1), None
+        self.rule = self.rule._replace(patience=1)
+        self.sighting_errors = None
         return memory
 
     def look(self, bodies: Bodies, end: int) -> Sequence[Event]:

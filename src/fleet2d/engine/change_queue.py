@@ -53,7 +53,9 @@ class PeopleSwitches:
     """
 
     def __init__(self, basis: Basis) -> None:
-        self._home, self._clock, self._bodies = basis.home, basis.clock, basis.bodies
+        self._home = basis.home
+        self._clock = basis.clock
+        self._bodies = basis.bodies
         users = basis.scenario.users.values()
         sun = basis.clock.sun
         self._hours: dict[int, tuple[HoursSpan | Sun, ...]] = {
@@ -69,7 +71,8 @@ class PeopleSwitches:
         """Return the steps of a body's new plan at which it may switch a light."""
         if row not in self._hours or not isinstance(actor.motion, Track):
             return []
-        first, clock = actor.planned_at, self._clock
+        first = actor.planned_at
+        clock = self._clock
         over_at = actor.plan.over_at
         end = clock.steps if over_at is None else min(over_at, clock.steps)
         runs = self._bodies.runs(row, first, max(end, first + 1))
@@ -88,7 +91,9 @@ class PeopleSwitches:
         """Let a body switch lights where it is at a step; return the events."""
         if isinstance(actor, DecidingActor) and isinstance(actor.order, StandStill):
             return []
-        pose, clock, before = actor.state, self._clock, self._awake_in[row]
+        pose = actor.state
+        clock = self._clock
+        before = self._awake_in[row]
         is_awake = not pose.away and actor.posture_code(step * clock.step_us) != LYING
         room = self._home.plan.room_of_point(pose.x, pose.y)
         now = NOWHERE if room is None or not is_awake else room.index
@@ -96,7 +101,8 @@ class PeopleSwitches:
         events: list[Event] = []
         if before not in {NOWHERE, *self._awake_in.values()}:
             events += switch(self._home, [before], step, is_on=False)
-        hours, time = self._hours[row], clock.time(step)
+        hours = self._hours[row]
+        time = clock.time(step)
         begins = step > 0 and not holds(hours, clock.time(step - 1))
         if now != NOWHERE and holds(hours, time) and (now != before or begins):
             events += switch(self._home, [now], step, is_on=True)
@@ -120,11 +126,15 @@ def crossings(track: Breakpoints, line: Segment, *, jumps: bool = True) -> list[
     legs = np.flatnonzero(crosses if jumps else crosses & (np.diff(track.time) > 0))
     times: list[int] = []
     for i in legs.tolist():
-        px, py, qx, qy = int(x[i]), int(y[i]), int(x[i + 1]), int(y[i + 1])
+        px = int(x[i])
+        py = int(y[i])
+        qx = int(x[i + 1])
+        qy = int(y[i + 1])
         a = (qx - px) * (ay - py) - (qy - py) * (ax - px)
         b = (qx - px) * (by - py) - (qy - py) * (bx - px)
         if (a > 0) != (b > 0) or 0 in (a, b):
-            near, far = abs(int(side[i])), abs(int(side[i + 1]))
+            near = abs(int(side[i]))
+            far = abs(int(side[i + 1]))
             begin, end = int(track.time[i]), int(track.time[i + 1])
             times.append(begin + (end - begin) * near // max(near + far, 1))
     return times
@@ -198,7 +208,8 @@ class ChangeQueue:
 
     def slow(self, areas: Sequence[SlowArea], step: int) -> None:
         """Set the areas that slow robots down, besides those of the floor plan, at a step."""
-        lattice, before = self.home.plan.lattice, self.home.slows
+        lattice = self.home.plan.lattice
+        before = self.home.slows
         self.home.slows = tuple(area.on(lattice) for area in (*self._floor, *areas))
         robots = [actor for actor in self._actors if actor.entity.minds_floor]
         for region in {*before} ^ {*self.home.slows}:
@@ -241,7 +252,8 @@ class ChangeQueue:
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
             return
         for door in range(len(self.names)):
-            line, jumps = self.home.door_line(door), not self.home.plan.portals
+            line = self.home.door_line(door)
+            jumps = not self.home.plan.portals
             for moment in crossings(actor.motion.breakpoints, line, jumps=jumps):
                 step = max(actor.planned_at, (moment - OPENS_AHEAD_US) // self.clock.step_us)
                 plan = (row, actor.planned_at)
@@ -270,7 +282,8 @@ class ChangeQueue:
     # Changes that are due
 
     def _make_change(self, due: DueChange, change: HomeChange, step: int) -> list[Event]:
-        verb, target = change.verb, change.target
+        verb = change.verb
+        target = change.target
         if verb == "room":
             room = self.home.plan.room(target)
             self.home.use_room_as(room, usual_type(str(change.type)))
@@ -306,7 +319,8 @@ class ChangeQueue:
 
     def _close_unused(self, due: DueChange, step: int) -> list[Event]:
         """Shut a door that has not been used for its `closes_after`."""
-        door, after = due.door, self.doors[self.names[due.door]].closes_after
+        door = due.door
+        after = self.doors[self.names[due.door]].closes_after
         if after is None or step * self.clock.step_us < self._used_us[door] + micros(after):
             return []
         return [] if door in self.home.shut else self._turn(door, False, due, step)
@@ -408,15 +422,19 @@ class ChangeQueue:
         Raises:
             ScenarioError: There is no such thing; the message lists all names.
         """
-        noun, names = "door", self.names
+        noun = "door"
+        names = self.names
         rooms = self.home.rooms
         if change.verb == "room":
-            noun, names = "room", [room.name for room in rooms]
+            noun = "room"
+            names = [room.name for room in rooms]
         elif change.verb == "lights":
             kinds = dict.fromkeys(room.type for room in rooms)
-            noun, names = "room", [*(room.name for room in rooms), *kinds, ALL_ROOMS]
+            noun = "room"
+            names = [*(room.name for room in rooms), *kinds, ALL_ROOMS]
         elif change.verb == "move":
-            noun, names = "object in the floor plan", [item.name for item in self.home.objects]
+            noun = "object in the floor plan"
+            names = [item.name for item in self.home.objects]
         if change.target not in names:
             hint = door_hint(self.home.plan, change.target) if noun == "door" else ""
             raise ScenarioError(
@@ -431,11 +449,13 @@ class ChangeQueue:
             )
 
     def _check_move(self, change: HomeChange) -> None:
-        plan, old = self.home.plan, self.home.object(change.target)
+        plan = self.home.plan
+        old = self.home.object(change.target)
         assert change.to is not None
         with errors_as(ScenarioError, of=(PlacementError, OverflowError)):
             new = move_object(old, plan.lattice, change.to, change.turn_deg)
-        free, footprint = shapely.MultiPolygon(plan.polygons), lattice_footprint(plan, new)
+        free = shapely.MultiPolygon(plan.polygons)
+        footprint = lattice_footprint(plan, new)
         if shapely.intersection(free, footprint).area == 0:
             x, y = change.to
             raise ScenarioError(

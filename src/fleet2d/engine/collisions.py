@@ -66,7 +66,8 @@ class BlockedWays(Watcher):
 
     def __init__(self, basis: Basis) -> None:
         """Keep track of bodies if `simulation.people_block` says how long one waits for another."""
-        self._actors, self._users = basis.actors, basis.bodies.users
+        self._actors = basis.actors
+        self._users = basis.bodies.users
         patience = basis.scenario.simulation.people_block
         self._patience_us = 0 if patience is None else micros(patience)
         self._radii = np.array([actor.entity.radius for actor in self._actors])
@@ -100,13 +101,16 @@ class BlockedWays(Watcher):
 
     def plan(self, now: Situation, other: int) -> Plan | None:
         """Return a plan to wait for another body, or to go round it; None to squeeze past."""
-        row, lattice = now.actor.row, now.actor.home.plan.lattice
+        row = now.actor.row
+        lattice = now.actor.home.plan.lattice
         actor = self._actors[row]
         others = [a for a in self._actors if a.row != row and not a.state.away]
         reach = self._reach(row, np.array([a.row for a in others], np.int64))
         positions = np.array([a.state[:2] for a in others], np.int64).reshape(-1, 2)
         clear = np.column_stack([positions, reach + int(lattice.cell * lattice.units_per_m)])
-        step, step_us, wait = now.step, actor.clock.step_us, self._waits[row]
+        step = now.step
+        step_us = actor.clock.step_us
+        wait = self._waits[row]
         since = wait.since if wait.until == step else step
         # Of two who wait for each other, the later one in the scenario waits twice as long.
         is_later = other < row and self._avoids(other, row, step)
@@ -180,7 +184,9 @@ def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -
     other_dx, other_dy = (c[others, columns + 1] - c[others, columns] for c in (x, y))
     away_x, away_y = (c[others, columns] - c[row, columns] for c in (x, y))
     vx, vy = dx - other_dx, dy - other_dy
-    way, towards, near = (vx * vx + vy * vy), (away_x * vx + away_y * vy), reach * reach
+    way = vx * vx + vy * vy
+    towards = away_x * vx + away_y * vy
+    near = reach * reach
     ends = (away_x - vx) ** 2 + (away_y - vy) ** 2 < near
     beside = (away_x * vy - away_y * vx).astype(np.float64)
     passes = beside * beside < near.astype(np.float64) * way.astype(np.float64)
@@ -276,12 +282,17 @@ class Clearance(Watcher):
             return None
         units = robot.home.plan.lattice.units_per_m
         first_meeting: tuple[int, int] | None = None
-        now_x, now_y, next_x, next_y = x[moves], y[moves], x[moves + 1], y[moves + 1]
-        passes, polite_gap = first + moves < robot.passes_until, robot.entity.gives_way.distance
+        now_x = x[moves]
+        now_y = y[moves]
+        next_x = x[moves + 1]
+        next_y = y[moves + 1]
+        passes = first + moves < robot.passes_until
+        polite_gap = robot.entity.gives_way.distance
         gap = np.where(passes, TOUCHING_GAP_M, polite_gap)
         for number, user in enumerate(self._users):
             clearance = user.entity.radius + robot.entity.radius + gap
-            user_x, user_y = xs[number, moves], ys[number, moves]
+            user_x = xs[number, moves]
+            user_y = ys[number, moves]
             distance = (now_x - user_x) ** 2 + (now_y - user_y) ** 2
             next_distance = (next_x - user_x) ** 2 + (next_y - user_y) ** 2
             is_close = (next_distance <= (clearance * units) ** 2) & (next_distance < distance)

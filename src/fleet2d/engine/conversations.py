@@ -151,7 +151,8 @@ class Conversations(Watcher):
         steps += [start[0] for start in self._starts] + [ban[0] for ban in self._bans]
         if self._initiators:
             steps.append(self._day_begin(self._begun_days))
-        self._agenda, self._next = max(min(steps), self.next_step), None
+        self._agenda = max(min(steps), self.next_step)
+        self._next = None
         for row, queue in self.queues.items():
             changes = queue.next_changes().items()
             self._changes[row] = {k: max(self._step_of(t), self.next_step) for k, t in changes}
@@ -164,7 +165,8 @@ class Conversations(Watcher):
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take in the steps up to `end` - 1: only requests change before the last of them."""
-        first, self.next_step = self.next_step, end
+        first = self.next_step
+        self.next_step = end
         self._last = []
         if not self.queues or end == first:
             return ()
@@ -173,14 +175,16 @@ class Conversations(Watcher):
             for row, queue in self.queues.items()
             for at, text in queue.take_opportunities()
         ]
-        step, block = end - 1, None
+        step = end - 1
+        block = None
         is_quiet = self._next is not None and step < self._next
         if is_quiet and all(step < at for each in self._changes.values() for at in each.values()):
             return events
         for row, queue in self.queues.items():
             robot = self.actors[row]
             for change in queue.advance(self._clock.time(step)):
-                at, interaction = max(self._step_of(change.time), first), change.request.interaction
+                at = max(self._step_of(change.time), first)
+                interaction = change.request.interaction
                 text = f"{change.request.name} {interaction.to}"
                 events.append(Event(at, robot.name, change.event, text))
                 if change.event == "due":
@@ -218,7 +222,8 @@ class Conversations(Watcher):
         if interaction is None or user is None:
             self._note(question, "", "", None, None)
             return
-        person, state = self.actors[user], self.attitudes[user, question.row]
+        person = self.actors[user]
+        state = self.attitudes[user, question.row]
         answers = self.answers[user]
         now = self._circumstances(user, question, interaction, block)
         answers.months.pass_time(state, now.time)
@@ -276,10 +281,14 @@ class Conversations(Watcher):
     def _circumstances(
         self, user: int, question: PlannedNote, interaction: Interaction, block: PoseBlock
     ) -> Circumstances:
-        person, row = self.actors[user], question.row
-        home, walls, lattice = person.home, person.home.walls, person.home.plan.lattice
+        person = self.actors[user]
+        row = question.row
+        home = person.home
+        walls = person.home.walls
+        lattice = person.home.plan.lattice
         x, y = int(block.x[user, 0]), int(block.y[user, 0])
-        robot_x, robot_y = int(block.x[row, 0]), int(block.y[row, 0])
+        robot_x = int(block.x[row, 0])
+        robot_y = int(block.y[row, 0])
         gap = np.array([robot_x - x, robot_y - y], np.int64)
         off = (heading_of(robot_x - x, robot_y - y) - int(block.heading[user, 0])) % TURN
         rooms = [self._room(u, block) for u in range(self.users)]
@@ -309,7 +318,8 @@ class Conversations(Watcher):
 
     def _activity_at(self, row: int, step: int) -> str:
         """Return what a user does at a step of the present plan; empty if that is unknown."""
-        actor, time_us = self.actors[row], step * self.actors[row].clock.step_us
+        actor = self.actors[row]
+        time_us = step * self.actors[row].clock.step_us
         for note in reversed(actor.plan.notes):
             if note.event == EventKind.ACTIVITY and note.time_us <= time_us:
                 return note.detail
@@ -317,8 +327,11 @@ class Conversations(Watcher):
 
     def _give(self, pending: PendingReply, step: int, bodies: Bodies) -> list[Event]:
         """Give an answer: tell the robot, and let it keep to it."""
-        row, text, reply = pending.robot, pending.text, pending.reply
-        queue, time = self.queues[row], self.actors[row].clock.time(step)
+        row = pending.robot
+        text = pending.text
+        reply = pending.reply
+        queue = self.queues[row]
+        time = self.actors[row].clock.time(step)
         if (request := queue.find(text)) is not None:
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
@@ -346,7 +359,8 @@ class Conversations(Watcher):
         self, row: int, user: int, outcome: Outcome, text: str, step: int, bodies: Bodies
     ) -> Event:
         """Let a robot keep to what a person has said at a step; return the event."""
-        robot, answers = self.actors[row], self.answers[user]
+        robot = self.actors[row]
+        answers = self.answers[user]
         room = self._room(row, bodies.block(step, step + 1))
         lasts = {Outcome.SENT_AWAY: answers.away_for, Outcome.BANNED: answers.bans_for}.get(outcome)
         if lasts is not None and room is not None:
@@ -389,7 +403,8 @@ class Conversations(Watcher):
         while self._initiators and self._day_begin(self._begun_days) <= step:
             midnight = midnight_of(self._clock.start) + self._begun_days * DAY
             for user, row in self._initiators:
-                person, robot = self.actors[user], self.actors[row]
+                person = self.actors[user]
+                robot = self.actors[row]
                 key = stream_key(person.seed, person.path, f"initiative {robot.name}")
                 for start in self.answers[user].initiative.starts(Draws(key, self._begun_days)):
                     at = self._step_of(midnight + start.day_share * DAY)
@@ -404,11 +419,14 @@ class Conversations(Watcher):
 
     def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> Event | None:
         """Let a person call a robot, ask it something, or complain; None: it doesn't happen."""
-        person, robot, block = self.actors[user], self.actors[row], bodies.block(step, step + 1)
+        person = self.actors[user]
+        robot = self.actors[row]
+        block = bodies.block(step, step + 1)
         is_off = step < self._off_until.get(row, 0)
         if is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
             return None
-        lattice, point = robot.home.plan.lattice, (int(block.x[user, 0]), int(block.y[user, 0]))
+        lattice = robot.home.plan.lattice
+        point = (int(block.x[user, 0]), int(block.y[user, 0]))
         if kind == "call":
             near = robot.space.nearest(*point, robot.part) or (robot.state.x, robot.state.y)
             robot.receive(Command("come", place=lattice.xy_of(*near)), step + 1)
@@ -421,7 +439,8 @@ class Conversations(Watcher):
             asked = SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(*point))
             self._last.append((row, asked))
             return Event(step, robot.name, EventKind.QUESTION, person.name)
-        room, state = self._room(user, block), self.attitudes[user, row]
+        room = self._room(user, block)
+        state = self.attitudes[user, row]
         if room is None or room != self._room(row, block):
             return None
         self.answers[user].months.pass_time(state, self._clock.time(step))

@@ -88,7 +88,8 @@ class Pair:
 
     def _measure(self, block: PoseBlock, count: int) -> I64:
         """Return the squared distances; FAR if one is away or the person lies."""
-        u, r = self.user.row, self.robot.row
+        u = self.user.row
+        r = self.robot.row
         dx = block.x[u, :count] - block.x[r, :count]
         dy = block.y[u, :count] - block.y[r, :count]
         away = block.away[u, :count] | block.away[r, :count]
@@ -113,8 +114,10 @@ class Pair:
         limit = self.attention.notices
         is_armed = self._armed(limit, AGAIN_NEAR, self.near)
         candidates = np.flatnonzero((self.distances <= limit * limit) & is_armed)
-        u, r = self.user.row, self.robot.row
-        walls, checked = self.user.home.walls, None
+        u = self.user.row
+        r = self.robot.row
+        walls = self.user.home.walls
+        checked = None
         rows = (block.x[u], block.y[u], block.x[r], block.y[r])
         numbers = (row[candidates].tolist() for row in rows)
         for column, *places in zip(candidates.tolist(), *numbers, strict=True):
@@ -128,7 +131,9 @@ class Pair:
 
     def _first_coming(self, block: PoseBlock) -> int | None:
         """Return the first column in which the robot drives up to the person, who stands."""
-        limit, count, row = self.attention.in_way, len(self.distances), self.robot.row
+        limit = self.attention.in_way
+        count = len(self.distances)
+        row = self.robot.row
         is_armed = self._armed(limit, AGAIN_COMING, self.coming)
         is_inside = (self.distances <= limit * limit) & is_armed
         if not is_inside.any():
@@ -169,10 +174,12 @@ class Encounters(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first encounter, `end` if there is none."""
-        first, block = self.next_step, bodies.block(self.next_step, end)
+        first = self.next_step
+        block = bodies.block(self.next_step, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
         planned = [c for robot in self._robots for c in notes_of(robot, EventKind.CALLS)]
-        calls, self._calls = [*self._calls, *planned], []
+        calls = [*self._calls, *planned]
+        self._calls = []
         self._ahead += [
             Encounter(step - first, "robot_calls", pair.robot, pair)
             for step, row, user in calls

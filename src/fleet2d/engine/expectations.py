@@ -84,7 +84,8 @@ class RunExpectations:
             ScenarioError: It names something unknown or an impossible event, or lasts too long.
             InputError: It has no time, or there is another one of that name.
         """
-        expectation, scene = check_judged(expectation), self._scene(since)
+        expectation = check_judged(expectation)
+        scene = self._scene(since)
         text = str(expectation)
         expectation = expectation.resolved(scene)
         expectation.check(scene)
@@ -98,8 +99,10 @@ class RunExpectations:
 
     def _scene(self, since: int) -> Scene:
         """Return the names of the run that expectations from a step on may use."""
-        users, robots = self.actors[: self.bodies.users], self.actors[self.bodies.users :]
-        home, clock = self._run.home, self.clock
+        users = self.actors[: self.bodies.users]
+        robots = self.actors[self.bodies.users :]
+        home = self._run.home
+        clock = self.clock
         rooms = [name for room in home.rooms for name in (room.name, room.type)]
         names = {
             "users": [actor.name for actor in users],
@@ -152,10 +155,12 @@ class RunExpectations:
             observations: The observations of robots.
             readings: The readings of sensors.
         """
-        names, rest = self._sensors.names, [e for e in self._events if e.step >= end]
+        names = self._sensors.names
+        rest = [e for e in self._events if e.step >= end]
         states = [(row.step, names[row.sensor], row.on) for row in readings]
         events = sorted((e for e in self._events if e.step < end), key=lambda e: (e.step, e.rank))
-        home, bodies = self._run.home, self.bodies
+        home = self._run.home
+        bodies = self.bodies
         block = SignalBlock(self.first, end, bodies, home, observations, states, events)
         for gauge in self._gauges.values():
             gauge.take(block)
@@ -227,7 +232,8 @@ class RunExpectations:
         if not rows:
             return
         first, last, robustness, worst = zip(*(row[0] for row in rows), strict=True)
-        step, value = np.array(first, np.int64), np.array(robustness)
+        step = np.array(first, np.int64)
+        value = np.array(robustness)
         store.append(
             TABLE,
             step=step,

@@ -96,8 +96,10 @@ def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
         return
     yield corners, SEAT_M
     turn = round(thing.heading / float(in_radians(TURN)) * TURN) % TURN
-    ahead, left = np.array([cosine(turn), sine(turn)]), np.array([-sine(turn), cosine(turn)])
-    forward, across = corners @ ahead // UNIT, corners @ left // UNIT
+    ahead = np.array([cosine(turn), sine(turn)])
+    left = np.array([-sine(turn), cosine(turn)])
+    forward = corners @ ahead // UNIT
+    across = corners @ left // UNIT
     depths = forward.min() - 1, forward.min() + round(BACK_M * home.plan.lattice.units_per_m)
     sides = across.min() - 1, across.max() + 1
     box = [(depth * ahead + side * left) // UNIT for depth in depths for side in sides]

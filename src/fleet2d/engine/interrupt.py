@@ -72,7 +72,8 @@ class Interruptions(Watcher):
     """
 
     def __init__(self, basis: Basis) -> None:
-        self._actors, self._users = basis.actors, basis.bodies.users
+        self._actors = basis.actors
+        self._users = basis.bodies.users
         # Whether the condition held at the last step; None: the plan has not begun yet.
         self._held: dict[Wait, bool | None] = {}
         self._ahead: dict[Wait, Bool] = {}  # whether it holds in the present span
@@ -100,8 +101,10 @@ class Interruptions(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first interruption, `end` if there is none."""
-        first, steps = self.next_step, end - self.next_step
-        block, self._ahead = bodies.block(first, end), {}
+        first = self.next_step
+        steps = end - self.next_step
+        block = bodies.block(first, end)
+        self._ahead = {}
         for wait in self._held:
             row, name = wait
             span = SpanView(self._actors[row], self._actors, self._users, first, block)
@@ -114,7 +117,8 @@ class Interruptions(Watcher):
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Note which interrupts happen at step `end` - 1, and which conditions hold there."""
-        last, self.next_step = end - self.next_step - 1, end
+        last = end - self.next_step - 1
+        self.next_step = end
         self._last = [wait for wait in self._ahead if self._begins(wait)[last]]
         for wait, holds in self._ahead.items():
             self._held[wait] = bool(holds[last])
@@ -137,7 +141,8 @@ class Interruptions(Watcher):
 
     def _begins(self, wait: Wait) -> Bool:
         """Return at which steps of the present span a condition becomes true."""
-        holds, held = self._ahead[wait], self._held[wait]
+        holds = self._ahead[wait]
+        held = self._held[wait]
         before = np.concatenate([holds[:1] if held is None else [held], holds[:-1]])
         return holds & ~before
 

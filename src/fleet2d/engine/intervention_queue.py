@@ -272,7 +272,8 @@ def possible_events(
     sensors: Iterable[str],
 ) -> dict[str, frozenset[str]]:
     """Return the kinds of events that can happen to each entity, by name; "" is the home."""
-    users, robots = list(users), list(robots)
+    users = list(users)
+    robots = list(robots)
     may_block = bool(doors or home.costs_version)
     kinds: dict[str, frozenset[str]] = {"": frozenset(HOME_EVENTS)}
     kinds |= {u.name: _kinds_of(u, PERSON_EVENTS, bool(robots), may_block) for u in users}
@@ -312,8 +313,11 @@ def possible_details(
         robots: The robots.
         acts: The interventions that are scheduled or done: `fleet2d.interventions` as data.
     """
-    users, robots, acts = list(users), list(robots), list(acts)
-    people, names = [user.name for user in users], [robot.name for robot in robots]
+    users = list(users)
+    robots = list(robots)
+    acts = list(acts)
+    people = [user.name for user in users]
+    names = [robot.name for robot in robots]
     details: dict[str, list[str]] = {}
     if not any(_is_own(robot) for robot in robots):
         details |= dict.fromkeys(ABOUT_USERS, people)

@@ -79,13 +79,15 @@ class SeenArea(Watcher):
         self.robot, self.row, self.every, self._patches = robot, robot.row, every, patches
         self._bodies, self._bin_steps = bodies, bin_steps
         plan = robot.home.plan
-        lattice, step_us = plan.lattice, robot.clock.step_us
+        lattice = plan.lattice
+        step_us = robot.clock.step_us
         lenses = [c.lens(lattice.units_per_m, step_us) for c in robot.entity.eyes.values()]
         context = TableContext([], [], lattice, step_us, robot.path)
         self._names = tuple(robot.entity.eyes)
         self._lenses = stack_lenses(lenses, [False] * len(lenses), context)
         self._open_lenses = self._lenses
-        grid, none = (lattice.rows, lattice.columns), (0, 0)
+        grid = (lattice.rows, lattice.columns)
+        none = (0, 0)
         keeps_first = not layers.isdisjoint({"explored", "first_seen"})
         keeps_last = not layers.isdisjoint({"last_seen", "time_since_seen"})
         self._record = CoverageRecord(
@@ -105,7 +107,8 @@ class SeenArea(Watcher):
 
     def _set_walls(self, walls: Mesh) -> None:
         """Use other walls, and clear the cache of poses."""
-        step_us, of_cell = self.robot.clock.step_us, self._patches.of_cell
+        step_us = self.robot.clock.step_us
+        of_cell = self._patches.of_cell
         bin_steps = max(self._bin_steps, 1)
         self._setup = CoverageSetup(walls, self._lenses, of_cell, step_us, self.every, bin_steps)
         self._cache.last[:] = self._cache.settled[:] = NEVER
@@ -118,7 +121,8 @@ class SeenArea(Watcher):
             return
         self._settle()
         self._is_dark = is_dark
-        near, far = self._open_lenses.near_squared, self._open_lenses.far_squared
+        near = self._open_lenses.near_squared
+        far = self._open_lenses.far_squared
         self._lenses = self._open_lenses._replace(near_squared=np.where(is_dark, far + 1, near))
         self._set_walls(self.robot.home.walls)
 
@@ -129,10 +133,12 @@ class SeenArea(Watcher):
             self._settle()
             self._set_walls(walls)
         while self.next_step < end:
-            first, until = self.next_step, min(end, self.next_step + MAX_BATCH_STEPS)
+            first = self.next_step
+            until = min(end, self.next_step + MAX_BATCH_STEPS)
             self.next_step = until
             runs = bodies.runs(self.row, first, until)
-            record, bins = self._record, None
+            record = self._record
+            bins = None
             if self._bin_steps:
                 count = (until - 1) // self._bin_steps - first // self._bin_steps + 1
                 bins = np.empty((count, *self._bins.shape[1:]), np.int64)
@@ -174,7 +180,8 @@ class SeenArea(Watcher):
         """
         self.catch_up()
         count = end // self._bin_steps - self._first_bin
-        bins, self._bins = self._bins[:count], self._bins[count:]
+        bins = self._bins[:count]
+        self._bins = self._bins[count:]
         self._first_bin += count
         return bins
 
@@ -232,10 +239,13 @@ class LayerBook:
             ScenarioError: A period is not a multiple of the step.
             ComponentError: A component has an unknown need.
         """
-        self._home, self._store, self._clock = basis.home, basis.store, basis.clock
+        self._home = basis.home
+        self._store = basis.store
+        self._clock = basis.clock
         scenario = basis.scenario
         self._stored_at: dict[str, int] = {}
-        self._robots, self._first_robot = len(scenario.robots), len(scenario.users)
+        self._robots = len(scenario.robots)
+        self._first_robot = len(scenario.users)
         learners: dict[str, Algorithm | Metric] = {
             **{f"algorithms.{name}": learner for name, learner in scenario.algorithms.items()},
             **{f"metrics.{name}": learner for name, learner in scenario.metrics.items()},
@@ -260,7 +270,8 @@ class LayerBook:
     def expose(self, step: int, log: Log) -> None:
         """Add the parts of rooms that each robot has had in view before `step` to the log."""
         if self._bin_steps:
-            log.bin_steps, log.patches = self._bin_steps, self._patches
+            log.bin_steps = self._bin_steps
+            log.patches = self._patches
             bins_of_areas = [area.take_bins(step) for area in self.areas]
             count = step // self._bin_steps - self._logged_bins
             self._logged_bins += count
@@ -298,7 +309,8 @@ class LayerBook:
 
     def _open_areas(self, basis: Basis, names: Set[str]) -> list[SeenArea]:
         """Return the area that each robot with a camera has seen, before the first step."""
-        every, step_us = basis.scenario.sight.seen_every, self._clock.step_us
+        every = basis.scenario.sight.seen_every
+        step_us = self._clock.step_us
         steps = 1 if every is None else whole_steps(every, step_us, "sight.seen_every")
         shared = self._patches, basis.bodies, names, steps, self._bin_steps
         return [SeenArea(robot, *shared) for robot in basis.robots if robot.entity.eyes]

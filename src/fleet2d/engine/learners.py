@@ -89,7 +89,8 @@ class Learners:
     def __init__(self, basis: Basis) -> None:
         self.home, self.clock, self.seed = basis.home, basis.clock, basis.seed
         self.store = basis.store if basis.scenario.artifacts.outputs else None
-        algorithms, metrics = basis.scenario.algorithms, basis.scenario.metrics
+        algorithms = basis.scenario.algorithms
+        metrics = basis.scenario.metrics
         self.users, self.robots = tuple(basis.scenario.users), tuple(basis.scenario.robots)
         self.outputs: dict[str, Any] = {}
         self.fresh: dict[str, Any] = {}
@@ -223,7 +224,8 @@ class Learners:
         step_us = self.clock.step_us
         with blame(path, None):
             every = 0 if component.on else whole_steps(component.period, step_us, f"{path}.period")
-        origin, component = component, component.model_copy(deep=True)
+        origin = component
+        component = component.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
             if isinstance(component, Algorithm) and component.learned is not None:

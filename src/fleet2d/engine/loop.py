@@ -90,12 +90,15 @@ def change_home(state: State, span: Span) -> None:
 
 def decide(state: State, span: Span) -> None:
     """Ask bodies that have no plan left, and robots about to hit a person, for a decision."""
-    step, clearance, blocking = span.first, state.clearance, state.blocking
+    step = span.first
+    clearance = state.clearance
+    blocking = state.blocking
     for row in _asked(state, step):
         actor = state.actors[row]
         if clearance.looks(row, step):
             state.bodies.ask_at[row] = step
-        due, in_way = bool(state.bodies.ask_at[row] <= step), None
+        due = bool(state.bodies.ask_at[row] <= step)
+        in_way = None
         if due:
             situation = state.situation(row, step)
             state.pending.pop(row, None)
@@ -123,13 +126,16 @@ def decide(state: State, span: Span) -> None:
 
 def _asked(state: State, step: int) -> Sequence[int]:
     """Return the rows of the bodies that may begin a plan at a step, in order."""
-    rows, giving_way, blocking = state.bodies.due(step), state.clearance.robots, state.blocking.rows
+    rows = state.bodies.due(step)
+    giving_way = state.clearance.robots
+    blocking = state.blocking.rows
     return sorted({*rows, *giving_way, *blocking}) if giving_way or blocking else rows
 
 
 def _follow_plan(state: State, row: int) -> None:
     """Let a body follow its plan from the present step on."""
-    actor, plan = state.actors[row], state.actors[row].plan
+    actor = state.actors[row]
+    plan = state.actors[row].plan
     state.bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
 
 
@@ -142,7 +148,8 @@ def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool
         step: The present step.
         begins: Whether it begins a new plan at this step.
     """
-    actor, blocking = state.actors[row], state.blocking
+    actor = state.actors[row]
+    blocking = state.blocking
     if (other := blocking.in_way(state.bodies, row)) is None:
         return False
     situation = Situation(actor, step, (), state.learners.readable_outputs)
@@ -207,7 +214,8 @@ def learn(state: State, span: Span) -> None:
 
 
 def _update(state: State, log: Log, end: int) -> None:
-    learners, awaited = state.learners, state.learners.awaited
+    learners = state.learners
+    awaited = state.learners.awaited
     events = log.happened(end - 1) if awaited else []
     if learners.next_due() == end or any(event.event in awaited for event in events):
         state.count_looks()
@@ -249,7 +257,8 @@ class Loop:
         self.pace = Pace(speedup) if speedup else None
         self.has_failed = self._is_stopping = False
         self.simulate_s = self.save_s = 0.0
-        self._step_us, self._keeper = clock.step_us, keeper
+        self._step_us = clock.step_us
+        self._keeper = keeper
         self.runs_code = may_run_code()  # also what a plan names, which is imported when it begins
         self._began: float | None = None  # set while it simulates
 
@@ -312,7 +321,8 @@ class Loop:
     @contextmanager
     def _timed(self, state: State) -> Iterator[None]:
         """Measure the time of simulating and storing, and note a failure in between."""
-        stored_s, self._began = state.recorder.wall_s, perf_counter()
+        stored_s = state.recorder.wall_s
+        self._began = perf_counter()
         try:
             yield
         except BaseException:
@@ -325,7 +335,8 @@ class Loop:
             self._began = None
 
     def _simulate(self, state: State, end: int, on_progress: Progress, spans: int | None) -> None:
-        reported, bodies = perf_counter(), state.bodies
+        reported = perf_counter()
+        bodies = state.bodies
         while bodies.step < end and not self._is_stopping and spans != 0:
             most = self.pace.steps(self._step_us) if self.pace else end
             span = Span(bodies.step, min(end, bodies.step + most))

@@ -40,7 +40,8 @@ class RealSight(Cameras):
 
     def receive(self, step: int, sightings: Sequence[FalseSighting]) -> None:
         """Take in what a real robot perceived at a step that it has not looked at."""
-        source, lattice = self.source, self.owner.home.plan.lattice
+        source = self.source
+        lattice = self.owner.home.plan.lattice
         assert isinstance(source, LiveDetections)
         index = {other.name: row for row, other in enumerate(self.others)} | {"": NOBODY}
         rows = np.zeros((len(sightings), SIGHTING), np.int64)

@@ -41,8 +41,10 @@ def table_specs(
         sensors: The sensors of the home.
         activities: Whether robots perceive activities.
     """
-    scenario, settings = basis.scenario, basis.scenario.artifacts
-    users, robots = tuple(scenario.users), tuple(scenario.robots)
+    scenario = basis.scenario
+    settings = basis.scenario.artifacts
+    users = tuple(scenario.users)
+    robots = tuple(scenario.robots)
     rooms = tuple(room.name for room in basis.home.rooms)
     entity = Column("entity", "category", categories=(*users, *robots))
     room = Column("room", "category", nullable=True, categories=rooms)
@@ -57,7 +59,8 @@ def table_specs(
     if settings.observations and users and robots:
         specs.append(_observation_table(basis, room, cameras, activities))
     if settings.events:
-        event, detail = Column("event", "category"), Column("detail", "string")
+        event = Column("event", "category")
+        detail = Column("detail", "string")
         user = Column("user", "category", nullable=True, categories=users)
         user_columns = (user,) if users else ()
         entities = entity
@@ -71,7 +74,8 @@ def table_specs(
     if settings.decisions:
         specs.append(TableSpec("decisions", (STEP, TIME, entity, *DECISION)))
     if sensors.names:  # in the layout of the CASAS smart homes
-        where, state = Column("room", "category"), Column("state", "category")
+        where = Column("room", "category")
+        state = Column("state", "category")
         sensor = Column("sensor", "category", categories=tuple(sensors.names))
         activity = Column("activity", "string", description="what the person does, if known")
         specs.append(TableSpec("sensors", (STEP, TIME, where, sensor, state, activity)))
@@ -93,7 +97,8 @@ def _observation_table(
 ) -> TableSpec:
     """Return the table of what was perceived, with the truth if that can differ."""
     cameras = camera_names(groups)
-    users, robots = tuple(basis.scenario.users), tuple(basis.scenario.robots)
+    users = tuple(basis.scenario.users)
+    robots = tuple(basis.scenario.robots)
     robot = Column("robot", "category", categories=robots)
     user = Column("user", "category", nullable=bool(cameras), categories=users)
     columns = [STEP, TIME, robot, user, X, Y, room]
@@ -156,7 +161,8 @@ class Recorder:
             cameras: The cameras of robots.
             sensors: The sensors of the home.
         """
-        self.store, self.clock = basis.store, basis.clock
+        self.store = basis.store
+        self.clock = basis.clock
         self.home, self.bodies = basis.home, basis.bodies
         self._samples, self._keys = Samples(basis), KeyFrames(basis)
         senses = {(g.index, c): s for g in cameras for c, s in enumerate(g.activity_senses)}
@@ -173,7 +179,8 @@ class Recorder:
         self._actors = basis.actors
         self._decisions: list[tuple[int, int, str, str, int | None]] = []
         self._observations: ImmutableRows[SightingTable] = ImmutableRows()
-        self._sensors, self._readings = sensors, list[SensorRow]()
+        self._sensors = sensors
+        self._readings = list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
         names = camera_names(cameras)
         self._camera_codes = {g.index: [names.index(n) for n in g.names] for g in cameras if names}
@@ -257,7 +264,8 @@ class Recorder:
         self.wall_s += time.perf_counter() - began
 
     def _store_observations(self) -> None:
-        blocks, self._observations = self._observations, ImmutableRows()
+        blocks = self._observations
+        self._observations = ImmutableRows()
         while blocks:  # so many rows at a time that their columns take little memory
             counts = accumulate(map(len, blocks))
             size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), len(blocks))
@@ -350,7 +358,8 @@ class Recorder:
             return
         step, sensor, on, activity = zip(*self._readings, strict=True)
         self._readings = []
-        rooms, words = self._sensors.rooms, self._sensors.words
+        rooms = self._sensors.rooms
+        words = self._sensors.words
         self.store.append(
             "sensors",
             **self._times(np.array(step, np.int64)),

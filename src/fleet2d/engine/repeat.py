@@ -165,7 +165,8 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
         simulation = repeat_until(run.manifest, step, out)
     interval = timedelta(microseconds=step * run.manifest["step_us"])
     for name in simulation.actors if step and "key_frames" in run.tables else ():
-        path, state = run.path(name, interval), simulation.state[name]
+        path = run.path(name, interval)
+        state = simulation.state[name]
         if not np.allclose((path.x[1], path.y[1]), (state["x"], state["y"]), atol=1e-6):
             simulation.finish("failed")
             raise ArtifactError(
@@ -197,7 +198,8 @@ def decisions_of(run: Run) -> Any:
         simulation = _simulation(run.manifest, None, ONLY_DECISIONS)
     simulation.advance(int(run.manifest["steps"]))
     new = simulation.finish()
-    old, poses = run.manifest["tables"], "trajectories"
+    old = run.manifest["tables"]
+    poses = "trajectories"
     if poses in old and old[poses] != new.manifest["tables"][poses]:
         raise ArtifactError(
             "the run can't be repeated: its poses would differ; `fleet2d reproduce` says what has"

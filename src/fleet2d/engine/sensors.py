@@ -51,7 +51,8 @@ class Sensors(Watcher):
     """
 
     def __init__(self, basis: Basis, doors: Sequence[str]) -> None:
-        home, step_us = basis.home, basis.clock.step_us
+        home = basis.home
+        step_us = basis.clock.step_us
         self.home, self.users = home, basis.bodies.users
         self.stuck: dict[str, SensorFault] = {}
         self.awaited = False
@@ -93,7 +94,8 @@ class Sensors(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first in which a sensor reports something."""
-        first, last_poses = self.next_step, self._last_poses
+        first = self.next_step
+        last_poses = self._last_poses
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
             self._last_poses = last_poses
@@ -104,7 +106,8 @@ class Sensors(Watcher):
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Read the sensors; `collect` returns the readings."""
-        first, self.next_step = self.next_step, end
+        first = self.next_step
+        self.next_step = end
         if not self.sensors or first == end:
             return ()
         with blame("objects", first):
@@ -125,7 +128,8 @@ class Sensors(Watcher):
             steps = np.arange(view.first, end)
             users = np.full(len(steps), -1)
         elif fault == "off":
-            steps, users = steps[:0], users[:0]
+            steps = steps[:0]
+            users = users[:0]
         readings = state.read(steps, users, end)
         return [] if fault == "silent" else readings
 
@@ -134,12 +138,15 @@ class Sensors(Watcher):
 
         The events up to their steps must be known by then: activities are among them.
         """
-        rows, self._readings = self._readings, []
+        rows = self._readings
+        self._readings = []
         return [SensorRow(r.step, i, r.on, self._activity(r.user, r.step)) for i, r in rows]
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
         """Return readings as events, with the sensor and its state in the words of the table."""
-        names, words, kind = self.names, self.words, EventKind.SENSOR
+        names = self.names
+        words = self.words
+        kind = EventKind.SENSOR
         return [Event(r.step, names[r.sensor], kind, words[r.sensor][not r.on]) for r in rows]
 
     def take_events(self, events: Sequence[Event]) -> None:

@@ -53,7 +53,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     with _locate_errors(scenario, "objects"):
         sensors = Sensors(basis, changes.names)
     recorder = Recorder(basis, cameras, sensors)
-    layers, learners = LayerBook(basis), Learners(basis)
+    layers = LayerBook(basis)
+    learners = Learners(basis)
     interventions = InterventionQueue(clock)
     conversations = Conversations(basis, interventions)
     log = _log(basis, cameras, recorder, conversations) if learners.all else None
@@ -98,7 +99,8 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
 
 def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
     """Return the cameras of users and those of robots; none without both users and robots."""
-    actors, users = basis.actors, basis.bodies.users
+    actors = basis.actors
+    users = basis.bodies.users
     real = [actor for actor in actors if getattr(actor.entity, "perceives", None)]
     if real and not users:
         raise ScenarioError(
@@ -107,8 +109,11 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
         )
     if not 0 < users < len(actors):
         return [], []
-    home, sight = basis.home, basis.scenario.sight
-    method, radii, heights = sight.method.model_copy(), None, None
+    home = basis.home
+    sight = basis.scenario.sight
+    method = sight.method.model_copy()
+    radii = None
+    heights = None
     with blame("sight.method", None):
         method.start(home)
     if sight.people_occlude:
@@ -156,7 +161,8 @@ def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basi
 def _home_with_doors(scenario: Scenario) -> Home:
     """Return the home, with a door in every doorway that the scenario names."""
     plan = scenario.floorplan.plan()
-    doors, door_names = [], dict[int, str]()
+    doors = []
+    door_names = dict[int, str]()
     for name, door in scenario.objects.items():
         if isinstance(door, Door):
             with _locate_errors(scenario, f"objects.{name}"):

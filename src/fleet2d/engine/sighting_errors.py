@@ -55,7 +55,8 @@ def sight_events(
         else:
             events.append((int(steps[0]), identity, USER_SEEN))
         breaks = np.flatnonzero(np.diff(steps) > patience)
-        losses, returns = steps[breaks] + patience, steps[breaks + 1]
+        losses = steps[breaks] + patience
+        returns = steps[breaks + 1]
         last = int(steps[-1])
         is_lost = last + patience < end
         losses = np.append(losses, last + patience) if is_lost else losses
@@ -121,9 +122,12 @@ class SightingErrors:
     def __init__(self, cameras: "Cameras", perceptions: Sequence[Perception | None]) -> None:
         """Take the errors of the cameras of a body; `perceptions` has one for each camera."""
         owner = self._owner = cameras.owner
-        self._row, self._drift, self._lenses = cameras.row, cameras.drift, cameras.lenses
+        self._row = cameras.row
+        self._drift = cameras.drift
+        self._lenses = cameras.lenses
         self._users = tuple(other.name for other in cameras.others)
-        common, only = getattr(owner.entity, "perception", None), "camera" in cameras.names
+        common = getattr(owner.entity, "perception", None)
+        only = "camera" in cameras.names
         self._cameras = []
         for name, perception in zip(cameras.names, perceptions, strict=True):
             part = "" if perception is common else ".camera" if only else f".cameras.{name}"

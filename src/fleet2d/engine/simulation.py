@@ -224,7 +224,8 @@ class Simulation(InterventionMethods):
         """What is odd in the floor plan or won't work in it, and about bodies and their sources."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
-        wrong, sensors = (f"wrong: {text}" for text in self.wrong), self._state.sensors.notes
+        wrong = (f"wrong: {text}" for text in self.wrong)
+        sensors = self._state.sensors.notes
         plan = self.home.plan.notes
         return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
 
@@ -331,7 +332,8 @@ class Simulation(InterventionMethods):
             >>> steps == run.tables["events"]["step"].to_pylist()
             True
         """
-        state, known = self._state, self._event_kinds()
+        state = self._state
+        known = self._event_kinds()
         names = known if kinds is None else frozenset(kinds)
         for name in names:
             check_known(name, "event", sorted(known), InputError)
@@ -529,7 +531,8 @@ class Simulation(InterventionMethods):
         """
         from fleet2d.expectations.temporal import eventually
 
-        after, steps = copy.deepcopy(self), 60
+        after = copy.deepcopy(self)
+        steps = 60
         name = after.expect(expectation if expectation.is_judged else eventually(expectation))
         before = after
         while after.step < end and (before is after or not after.verdicts()[name].decided):
@@ -571,7 +574,8 @@ class Simulation(InterventionMethods):
     def _run_until_event(
         self, event: str, entity: str | None, timeout: str | timedelta | None
     ) -> Event | None:
-        state, end = self._state, self._end_of_wait(timeout)
+        state = self._state
+        end = self._end_of_wait(timeout)
         check_known(event, "event", sorted(self._event_kinds()), InputError)
         if entity is not None:
             check_known(entity, "entity", [*self.actors, *self.scenario.objects], InputError)
@@ -953,11 +957,13 @@ class Simulation(InterventionMethods):
 
     def _describe_start(self, interventions: list[dict[str, Any]]) -> None:
         """Set the fields of the manifest that are known before the first step."""
-        manifest, scenario = self._store.manifest, self.scenario.resolved()
+        manifest = self._store.manifest
+        scenario = self.scenario.resolved()
         scenario["simulation"]["seed"] = self.seed
         manifest.scenario, manifest.seed = scenario, self.seed
         manifest.step_us, manifest.start = self.clock.step_us, self.clock.start.isoformat()
-        users, robots = list(self.scenario.users), list(self.scenario.robots)
+        users = list(self.scenario.users)
+        robots = list(self.scenario.robots)
         manifest.entities = Entities(users=users, robots=robots)
         manifest.versions = versions()
         manifest.inputs = [input_record(path) for path in input_files(self.scenario)]
@@ -968,9 +974,12 @@ class Simulation(InterventionMethods):
 
     def _describe_end(self, results: Mapping[str, Any]) -> None:
         """Set the fields that are known after the last step; tables and digest are set already."""
-        manifest, queue, pace = self._store.manifest, self._state.interventions, self._loop.pace
+        manifest = self._store.manifest
+        queue = self._state.interventions
+        pace = self._loop.pace
         simulated_s = self.step * self.clock.step_us / 1e6
-        manifest.steps, manifest.simulated_s = self.step, simulated_s
+        manifest.steps = self.step
+        manifest.simulated_s = simulated_s
         manifest.metrics, manifest.wall_s = dict(results), self._wall_s
         manifest.add_inputs(self._state.interruptions.files)
         manifest.interventions = queue.done if self.done else queue.records
@@ -984,7 +993,8 @@ class Simulation(InterventionMethods):
     def _measure(self, *, ended: bool) -> dict[str, Any]:
         """Return the results of the metrics, and store the verdicts on all expectations."""
         results: dict[str, Any] = {}
-        state, manifest = self._state, self._store.manifest
+        state = self._state
+        manifest = self._store.manifest
         if state.log:
             state.count_looks()
             try:

@@ -81,7 +81,8 @@ class UnstorableStateError(ArtifactError):
 
 def copy_state(state: State, constants: Constants) -> State:
     """Return an independent copy of a state, which shares only objects that never change."""
-    buffer, arrays = io.BytesIO(), list[pickle.PickleBuffer]()
+    buffer = io.BytesIO()
+    arrays = list[pickle.PickleBuffer]()
     copier = _StateCopier(buffer, constants, arrays)
     copier.dump(state)
     content = (a if (raw := a.raw()).readonly else bytearray(raw) for a in arrays)
@@ -178,7 +179,9 @@ class _SnapshotParts:
     """
 
     def __init__(self, write: Callable[[bytes], object], seal: hmac.HMAC) -> None:
-        self._write, self._seal, self._buffer = write, seal, bytearray()
+        self._write = write
+        self._seal = seal
+        self._buffer = bytearray()
         self.error: OSError | None = None
 
     def write(self, content: bytes) -> None:
@@ -195,7 +198,8 @@ class _SnapshotParts:
         self._flush()
 
     def _flush(self) -> None:
-        content, self._buffer = bytes(self._buffer), bytearray()
+        content = bytes(self._buffer)
+        self._buffer = bytearray()
         try:
             self._write(content)
         except OSError as error:
@@ -221,7 +225,8 @@ def open_snapshot(path: str | Path | BinaryIO, purpose: str) -> tuple[dict[str, 
             content = path.read()
     if not content.startswith(MAGIC + b"\n"):
         raise ArtifactError(f"{path} is not a {purpose}")
-    seal, view = signature(purpose), memoryview(content)
+    seal = signature(purpose)
+    view = memoryview(content)
     seal.update(view[:-SIGNATURE_CHARACTERS])
     if not hmac.compare_digest(seal.hexdigest().encode(), view[-SIGNATURE_CHARACTERS:]):
         raise ArtifactError(

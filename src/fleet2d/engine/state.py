@@ -76,7 +76,8 @@ class RecentEvents(deque[Event]):
 
     def __setstate__(self, state: tuple[bytes, list[str]]) -> None:
         """Restore the events."""
-        values, texts = array("q", state[0]), state[1]
+        values = array("q", state[0])
+        texts = state[1]
         count = len(values) // len(Event._fields)
         steps, *columns = (values[k * count : (k + 1) * count] for k in range(len(Event._fields)))
         codes = (map(texts.__getitem__, column) for column in columns)
@@ -128,7 +129,8 @@ class EventStream:
 
     def next_awaited(self, step: int) -> int | None:
         """Return the first step from `step` on with an awaited event that was emitted already."""
-        steps, self._awaited_steps = self._awaited_steps, []
+        steps = self._awaited_steps
+        self._awaited_steps = []
         return min((s for s in steps if s >= step), default=None)
 
     def deliver(self, end: int) -> None:
@@ -287,8 +289,10 @@ class State:
 
     def situation(self, row: int, step: int) -> Situation:
         """Return what a body knows at a step; the same object, as long as it knows the same."""
-        actor, events = self.actors[row], tuple(self.pending.get(row, ()))
-        now, outputs = self._situation, self.learners.readable_outputs
+        actor = self.actors[row]
+        events = tuple(self.pending.get(row, ()))
+        now = self._situation
+        outputs = self.learners.readable_outputs
         is_same = now is not None and now.actor is actor and now.outputs is outputs
         if now is None or not is_same or (now.step, now.events) != (step, events):
             now = self._situation = Situation(actor, step, events, outputs)
@@ -312,8 +316,11 @@ class State:
 
     def _due_notes(self, row: int, step: int) -> Sequence[Event]:
         """Return the notes of a body's plan up to a step, once, as events."""
-        actor, begin = self.actors[row], self.notes_emitted[row]
-        notes, step_us, name = actor.plan.notes, actor.clock.step_us, actor.name
+        actor = self.actors[row]
+        begin = self.notes_emitted[row]
+        notes = actor.plan.notes
+        step_us = actor.clock.step_us
+        name = actor.name
         if begin == len(notes) or notes[begin].time_us > step * step_us:
             return ()
         due = takewhile(lambda note: note.time_us <= step * step_us, islice(notes, begin, None))
@@ -359,7 +366,8 @@ class State:
         self.events.emit([event for row in rows for event in self._due_notes(row, end - 1)])
         for watcher in self.watchers:
             self.take(watcher, end)
-        observations, readings = self._observations(), self.sensors.collect()
+        observations = self._observations()
+        readings = self.sensors.collect()
         if readings:
             events = self.sensors.events_of(readings)
             self.events.keep(events)

@@ -34,8 +34,11 @@ class Samples:
         Raises:
             ScenarioError: The interval between samples is not a multiple of the step.
         """
-        self._store, self._clock, self._home = basis.store, basis.clock, basis.home
-        every, named = basis.scenario.artifacts.trajectories, {"off": 0, "every step": 1}
+        self._store = basis.store
+        self._clock = basis.clock
+        self._home = basis.home
+        every = basis.scenario.artifacts.trajectories
+        named = {"off": 0, "every step": 1}
         self._every = (
             named[every]
             if isinstance(every, str)
@@ -68,7 +71,8 @@ class Samples:
             return
         rows = np.concatenate(self._blocks)
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-        self._blocks, self.count = [], 0
+        self._blocks = []
+        self.count = 0
         step, entity, x, y, heading, away = rows.T
         plan = self._home.plan
         is_away = away.astype(bool)
@@ -117,13 +121,18 @@ class KeyFrames:
 
     def __init__(self, basis: Basis) -> None:
         """Start without key frames."""
-        self._store, self._clock, self._home = basis.store, basis.clock, basis.home
-        self._actors, self._bodies = basis.actors, basis.bodies
+        self._store = basis.store
+        self._clock = basis.clock
+        self._home = basis.home
+        self._actors = basis.actors
+        self._bodies = basis.bodies
         # A random walk is rebuilt by repeating it between the same walls; where these may change,
         # each of its steps is a key frame.
-        self._walk_kind, self._walk_every = WALK, max(1, WALK_KEY_US // basis.clock.step_us)
+        self._walk_kind = WALK
+        self._walk_every = max(1, WALK_KEY_US // basis.clock.step_us)
         if basis.may_change:
-            self._walk_kind, self._walk_every = TRACK, 1
+            self._walk_kind = TRACK
+            self._walk_every = 1
         # Collected breakpoints of the present plan; the plan before the first has none.
         count = len(basis.actors)
         self._emitted = [2] * count
@@ -143,7 +152,8 @@ class KeyFrames:
     def end_plan(self, row: int, step: int) -> None:
         """Collect the end of the plan that is replaced at `step`."""
         self.pass_by(row, step)
-        motion, self._complete_until[row] = self._actors[row].motion, -1
+        motion = self._actors[row].motion
+        self._complete_until[row] = -1
         if not isinstance(motion, Track):
             self._walk_on(row, step)
         elif self._emitted[row] < len(motion.breakpoints.time):
@@ -182,7 +192,8 @@ class KeyFrames:
         motion = self._actors[row].motion
         if not isinstance(motion, Track):
             return
-        moment, track = step * self._clock.step_us, motion.breakpoints
+        moment = step * self._clock.step_us
+        track = motion.breakpoints
         begin = self._emitted[row]
         if begin < len(track.time) and track.time[begin] <= moment:
             end = int(track.time.searchsorted(moment, side="right"))
@@ -192,7 +203,8 @@ class KeyFrames:
 
     def break_off(self, row: int, step: int) -> None:
         """Collect the planned end of the present segment."""
-        motion, begin = self._actors[row].motion, self._emitted[row]
+        motion = self._actors[row].motion
+        begin = self._emitted[row]
         if isinstance(motion, Track) and begin < len(motion.breakpoints.time):
             end = KeySegment(motion.breakpoints, begin, begin + 1, row, PLANNED, step)
             self._segments.append(end)
@@ -215,7 +227,8 @@ class KeyFrames:
         """Collect the states of a random walk up to step `end` - 1."""
         if isinstance(self._actors[row].motion, Track):
             return
-        every, first = self._walk_every, self._walked[row]
+        every = self._walk_every
+        first = self._walked[row]
         for step in range(-(-first // every) * every, end, every):
             moment = step * self._clock.step_us
             pose = self._bodies.pose_at(row, step)
@@ -227,7 +240,9 @@ class KeyFrames:
         self.collect()
         if not self._segments:
             return
-        segments, self._segments, self._rows = self._segments, ImmutableRows(), 0
+        segments = self._segments
+        self._segments = ImmutableRows()
+        self._rows = 0
         parts = [[column[s.begin : s.end] for column in s.track] for s in segments]
         time, x, y, heading, away = (np.concatenate(column) for column in zip(*parts, strict=True))
         numbers = np.array([(s.row, s.kind, s.step) for s in segments], np.int64)

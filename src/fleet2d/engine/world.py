@@ -84,7 +84,8 @@ class EngineWorld:
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances of the cameras of a robot from the present step on."""
         self._state.settle(self.step)
-        row, eyes = self.robots[robot].row, self.robots[robot].entity.eyes
+        row = self.robots[robot].row
+        eyes = self.robots[robot].entity.eyes
         for cameras in self._state.cameras:
             if cameras.row == row:
                 cameras.disturb(disturbances)
@@ -219,11 +220,16 @@ def _check(entry: Entry, world: EngineWorld) -> None:
 
 def _schedule(state: State, entry: Entry, world: EngineWorld, index: int | None = None) -> None:
     """Schedule an entry at its time or event, from the step of `world` on."""
-    interventions, first = state.interventions, world.step
+    interventions = state.interventions
+    first = world.step
     steps = steps_of(entry, world.clock, first) if entry.on is None else []
-    rank, number, by = SCRIPT, index, f"script.{index}"
+    rank = SCRIPT
+    number = index
+    by = f"script.{index}"
     if number is None:
-        rank, number, by = OUTSIDE, len(interventions.requests), ""
+        rank = OUTSIDE
+        number = len(interventions.requests)
+        by = ""
         content = entry.model_dump(mode="json", exclude_defaults=True)
         interventions.requests.append({"do": content.pop("do"), "step": first, **content})
     due = DueIntervention(first, rank, number, entry.act, by)
@@ -249,14 +255,18 @@ def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
         moments = [clock.elapsed(moment) for moment in time.moments(clock)]
         steps = [clock.step_at_or_after(moment) for moment in moments]
         steps = [step for step in steps if first <= step < clock.steps]
-        steps, text = steps if entry.each else steps[:1], time.text
+        steps = steps if entry.each else steps[:1]
+        text = time.text
     elif isinstance(time, datetime):
-        steps, text = [clock.step_at_or_after(clock.elapsed(time))], f"{time:%Y-%m-%d %H:%M:%S}"
+        steps = [clock.step_at_or_after(clock.elapsed(time))]
+        text = f"{time:%Y-%m-%d %H:%M:%S}"
     else:
         assert time is not None
-        steps, text = [clock.step_at_or_after(micros(time))], format_duration(time)
+        steps = [clock.step_at_or_after(micros(time))]
+        text = format_duration(time)
     if not steps or not first <= steps[0] < clock.steps:
-        begins, ends = clock.time(first), clock.time(clock.steps)
+        begins = clock.time(first)
+        ends = clock.time(clock.steps)
         raise ScenarioError(
             f"at: {text} is not within the run, which goes from {begins:%A %Y-%m-%d %H:%M:%S}"
             f" to {ends:%Y-%m-%d %H:%M:%S}"
@@ -270,7 +280,8 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
     Raises:
         ScenarioError: It can't happen; the message lists the events that can.
     """
-    users, robots = world.users.values(), world.robots.values()
+    users = world.users.values()
+    robots = world.robots.values()
     possible = possible_events(users, robots, world.home, world.doors, world.sensors)
     if trigger.entity is not None and (not trigger.entity or trigger.entity not in possible):
         names = [name for name in possible if name]

@@ -273,7 +273,8 @@ class Situation:
 
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
-        actor, lattice = self.actor, self.home.plan.lattice
+        actor = self.actor
+        lattice = self.home.plan.lattice
         at_x, at_y = lattice.point_at((x, y))
         if actor.space.part_at(at_x, at_y) != actor.part:
             near = actor.space.nearest(at_x, at_y, actor.part)

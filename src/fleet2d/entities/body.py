@@ -379,7 +379,8 @@ class Body:
 
     def _present_part(self) -> int:
         """Return the part of a changed space that it is in, or nearest to."""
-        space, position = self._space[1], (self.state.x, self.state.y)
+        space = self._space[1]
+        position = (self.state.x, self.state.y)
         x, y = self.home.approach_of(position) or position
         part = space.part_at(x, y)
         return part if part >= 0 else space.part_near(x, y)
@@ -412,14 +413,16 @@ class Body:
         Raises:
             PlacementError: There is no such object, or no place to use it from.
         """
-        space, objects = self.space, self.home.objects
+        space = self.space
+        objects = self.home.objects
         if self._places[0] is not space or self._places[1] is not objects:
             self._places = space, objects, {}
         name = thing if isinstance(thing, str) else thing.name
         known = self._places[2].get((name, place))
         if known is not None and (isinstance(thing, str) or known.thing is thing):
             return known
-        home, lattice = self.home, self.home.plan.lattice
+        home = self.home
+        lattice = self.home.plan.lattice
         thing = home.object(thing) if isinstance(thing, str) else thing
         if not thing.uses:
             raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")
@@ -458,7 +461,8 @@ class Body:
             ComponentError: The drive fails, or doesn't lead to the end of the route.
         """
         assert self.drive is not None
-        rates, units_per_m = (self.speed, self.turn_rate), self.home.plan.lattice.units_per_m
+        rates = (self.speed, self.turn_rate)
+        units_per_m = self.home.plan.lattice.units_per_m
         with self._blame_drive():
             rows = breakpoints(self.drive, route, heading, rates, units_per_m)
         rows[:, 0] += begin_us
@@ -584,7 +588,8 @@ class Body:
     ) -> PlacementError:
         """Return the error about a point; it names the nearest free one, in few decimals."""
         why = why or f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
-        lattice, free = self.home.plan.lattice, None
+        lattice = self.home.plan.lattice
+        free = None
         if near is not None:
             free = lattice.to_metres(near).round(2).tolist()
             if self.space.part_at(*lattice.point_at(free)) != self.part:

@@ -117,7 +117,8 @@ class Arbiter:
         """
         if fresh:
             self.own = plan.interrupts
-        times, events = list[datetime | None](), self.own
+        times = list[datetime | None]()
+        events = self.own
         if self.active is not None and not self.behaviors[self.active].busy():
             times.append(holds(self.behaviors[self.active].when, now.time))  # when its hours end
         for number, behavior in enumerate(self.behaviors[: self.active]):
@@ -146,7 +147,8 @@ class Arbiter:
 
     def _opens_at(self, number: int, now: Situation) -> datetime | None:
         """Return when a behavior may be asked next; None: now."""
-        when, time = self.behaviors[number].when, now.time
+        when = self.behaviors[number].when
+        time = now.time
         cool = self._cool_at.get(number)
         if cool is not None and cool > time:
             time = cool
@@ -156,7 +158,8 @@ class Arbiter:
 
     def _activate(self, number: int | None, now: Situation, plan: Plan) -> None:
         """Make a behavior the active one; the plan of the one before may be resumed later."""
-        last, self.active = self.active, number
+        last = self.active
+        self.active = number
         if last is None or last == number:
             return
         is_interrupted = number is not None and number < last and not plan.is_over(now.step)
@@ -275,7 +278,9 @@ class LeaveRoom:
 
     def decide(self, now: Situation) -> Plan | None:
         """Go to the nearest room that it may be in and isn't shut in by bans; once."""
-        actor, room, banned = now.actor, now.room, now.actor.banned(now.step)
+        actor = now.actor
+        room = now.room
+        banned = now.actor.banned(now.step)
         if self._has_tried or room is None or room.index not in banned:
             return None
         self._has_tried = True
@@ -359,7 +364,9 @@ class DecidingActor(Actor):
 
     def choose(self, plan: Plan) -> None:
         """Set the plan that its next decision, which is due now, results in."""
-        self._chosen, self.waiting, self.order = plan, None, None
+        self._chosen = plan
+        self.waiting = None
+        self.order = None
 
     def follow_order(self, order: Order | None, step: int) -> None:
         """Follow an order from a step on, in place of its behaviors; None: follow them again."""
@@ -369,9 +376,12 @@ class DecidingActor(Actor):
 
     def put(self, pose: Pose, step: int) -> None:
         """Move to a pose at a step, and replan there: a plan from elsewhere is void."""
-        self.state, self._chosen, self.waiting = pose, None, None
+        self.state = pose
+        self._chosen = None
+        self.waiting = None
         self.is_displaced = True
-        room, banned = self._room_index(), self.banned(step)
+        room = self._room_index()
+        banned = self.banned(step)
         if not self.state.away and room in banned:
             self.kept_out = banned - {room}  # its way out leads through this room
             self.order = LeaveRoom("keep_out")
@@ -414,7 +424,8 @@ class DecidingActor(Actor):
         """
         self.command = command
         takers = (i for i, behavior in enumerate(self.behaviors) if behavior.takes(command))
-        first, active = next(takers, None), self.arbiter.active
+        first = next(takers, None)
+        active = self.arbiter.active
         now = self.order is None and first is not None and (active is None or first <= active)
         if now:
             self.decide_again(step)
@@ -440,7 +451,9 @@ class DecidingActor(Actor):
         """
         if self._runs_down(now):
             return False
-        if self.bans or self.kept_out != self.forbidden:  # they hold for its ways once it is outside of those rooms
+        if (
+            self.bans or self.kept_out != self.forbidden
+        ):  # they hold for its ways once it is outside of those rooms
             banned = self.banned(now.step)
             if banned != self.kept_out and self._room_index() not in banned:
                 self.kept_out = banned
@@ -475,7 +488,8 @@ class DecidingActor(Actor):
         step, (plan, self._chosen) = now.step, (self._chosen, None)
         if self.is_stuck or (self.charge is not None and self.charge.is_empty):
             plan = now.plan().stay()
-        waiting, self.waiting = self.waiting, None
+        waiting = self.waiting
+        self.waiting = None
         if waiting is not None:
             self._waited = waiting.since, waiting.look_before(step) + self._just_waited
         if plan is None and waiting is not None and not now.events:
@@ -503,7 +517,8 @@ class DecidingActor(Actor):
 
     def reason(self) -> tuple[str, str]:
         """Return what its plan comes from, a behavior or `order`, and the last note of the plan."""
-        active, notes = self.arbiter.active, self.plan.notes
+        active = self.arbiter.active
+        notes = self.plan.notes
         note = f"{notes[-1].event} {notes[-1].detail}".strip() if notes else ""
         if self.order is not None:
             return "order", note
@@ -522,31 +537,37 @@ class DecidingActor(Actor):
             person: The name of the person.
             surroundings: Where people are.
         """
-        step, just = now.step, self._just_waited
+        step = now.step
+        just = self._just_waited
         since = self._waited[0] if step <= self._waited[1] else step
         wait = WaitForPeople(self.plan, step, since, self.arbiter.own, surroundings)
         people = surroundings.people
-        self._waited, self.passes_until = (since, step + just), step
+        self._waited = (since, step + just)
+        self.passes_until = step
         gives_way: GivesWay = self.entity.gives_way  # type: ignore[attr-defined]
-        waited, plan = (step - since) * self.clock.step_us, None
+        waited = (step - since) * self.clock.step_us
+        plan = None
         where = self.state, self.plan.root, people.tobytes()
         if waited >= micros(gives_way.patience) and where != self._no_way_round:
             plan = wait.go_around(now, people, gives_way.distance)
             self.passes_until = step + just if plan is not None else step
             self._no_way_round = where
         if plan is None and waited >= micros(max(gives_way.patience, gives_way.gives_up)):
-            plan, self._waited = wait.skip_stop(now, person), (0, -1)
+            plan = wait.skip_stop(now, person)
+            self._waited = (0, -1)
             if plan is None:
                 plan = wait.give_up(now, person)
                 if self.order is None and self.arbiter.active is not None:
                     self.behaviors[self.arbiter.active].give_up(now)
         if plan is None:
-            plan, self.waiting = wait.stand_still(now, person, gives_way), wait
+            plan = wait.stand_still(now, person, gives_way)
+            self.waiting = wait
         self.follow_instead(plan, now)
 
     def follow_instead(self, plan: Plan, now: Situation) -> None:
         """Follow a plan from now on in place of the present one, which may have begun just now."""
-        step, now_us = now.step, now.step * self.clock.step_us
+        step = now.step
+        now_us = now.step * self.clock.step_us
         self._runs_down(now)
         if self.plan.began[0] == step:  # its first rows happened, though it ends at once
             plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]
@@ -578,7 +599,8 @@ class DecidingActor(Actor):
         except (PlacementError, NoWayError) as error:
             if not (self.may_block_routes or self.home.version or self.is_displaced):
                 raise
-            plan, reason = now.plan(), str(error)
+            plan = now.plan()
+            reason = str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait
                 plan.note("way_blocked", reason)
             plan.stay(DOOR_WAIT)

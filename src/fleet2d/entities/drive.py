@@ -121,7 +121,9 @@ def breakpoints(
     Raises:
         ComponentError: The moments of the drive are not in order, or don't lead to the end.
     """
-    corners, ends, legs = points[:1].tolist(), [0.0], []
+    corners = points[:1].tolist()
+    ends = [0.0]
+    legs = []
     for (ax, ay), (bx, by) in pairwise(points.tolist()):
         dx, dy = bx - ax, by - ay
         if dx or dy:
@@ -210,7 +212,9 @@ class Differential(Drive):
 
     def moments(self, route: Route) -> Iterator[Moment]:
         """Yield the ends of turns and legs; the core computes the same, see `time_route` there."""
-        seconds, metres, heading = 0.0, 0.0, route.heading
+        seconds = 0.0
+        metres = 0.0
+        heading = route.heading
         for leg in route.legs:
             turn = abs(turn_between(heading, leg.direction))
             heading = leg.direction
@@ -220,7 +224,8 @@ class Differential(Drive):
             lasts = 0.0
             for lasts, driven in self.straight(leg.length, route.speed):
                 yield Moment(seconds + lasts, metres + driven, heading)
-            seconds, metres = seconds + lasts, metres + leg.length
+            seconds = seconds + lasts
+            metres = metres + leg.length
 
     def straight(self, length: float, speed: float) -> Iterable[tuple[float, float]]:
         """Return times [s] and distances [m] at which the speed changes on a leg, and its end."""
@@ -239,7 +244,9 @@ class Holonomic(Drive):
 
     def moments(self, route: Route) -> Iterator[Moment]:
         """Yield the ends of legs, and of the turns on them."""
-        seconds, metres, heading = 0.0, 0.0, route.heading
+        seconds = 0.0
+        metres = 0.0
+        heading = route.heading
         for leg in route.legs:
             lasts = leg.length / route.speed
             turn = turn_between(heading, leg.direction) if self.turns else 0
@@ -249,7 +256,8 @@ class Holonomic(Drive):
                 yield Moment(seconds + turning, metres + turning * route.speed, heading)
             elif turning:  # the leg is too short to turn all the way
                 heading += round(turn * (lasts / turning))
-            seconds, metres = seconds + lasts, metres + leg.length
+            seconds = seconds + lasts
+            metres = metres + leg.length
             yield Moment(seconds, metres, heading)
 
 

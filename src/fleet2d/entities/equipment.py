@@ -298,7 +298,8 @@ class Drift:
         x += np.repeat(runs.x, lengths)
         y += np.repeat(runs.y, lengths)
         heading = (np.repeat(runs.heading, lengths) + turn) % TURN
-        away, postures = np.repeat(runs.away, lengths), np.zeros(len(steps), np.int8)
+        away = np.repeat(runs.away, lengths)
+        postures = np.zeros(len(steps), np.int8)
         columns: tuple[NDArray[Any], ...] = (x, y, heading, away, postures)
         return Window(runs.first, *(column[np.newaxis] for column in columns))
 

@@ -52,7 +52,9 @@ def without_next_stop(plan: Plan, interrupted: Plan, step: int) -> Plan | None:
     motion = interrupted.finish()
     if not isinstance(motion, Track):
         return None
-    x, y, time = motion.breakpoints.x, motion.breakpoints.y, motion.breakpoints.time
+    x = motion.breakpoints.x
+    y = motion.breakpoints.y
+    time = motion.breakpoints.time
     stop = next_stop(plan.body, motion.breakpoints, step * plan.step_us)
     if stop is None:
         return None
@@ -92,7 +94,9 @@ def _rest(
 
 def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None:
     """Return the index of the breakpoint at which the body next stands still, or None."""
-    x, y, time = track.x, track.y, track.time
+    x = track.x
+    y = track.y
+    time = track.time
     at = max(int(np.searchsorted(time, interrupted_us, side="right")) - 1, 0)
     for i in range(at, len(time) - 1):
         still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > interrupted_us
@@ -104,7 +108,8 @@ def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None
 
 def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
     """Return the heading at a moment between a breakpoint and the next."""
-    times, headings = track.time, track.heading
+    times = track.time
+    headings = track.heading
     begin, end = int(times[stop]), int(times[stop + 1])
     turn = int(turn_between(int(headings[stop]), int(headings[stop + 1])))
     return (int(headings[stop]) + turn * (time_us - begin) // max(end - begin, 1)) % TURN
@@ -206,7 +211,9 @@ class WaitForPeople:
 
         At the latest it ends when the robot goes round the person, or gives up.
         """
-        plan, look, patience = now.plan(), self._look_after(now.step), micros(gives_way.patience)
+        plan = now.plan()
+        look = self._look_after(now.step)
+        patience = micros(gives_way.patience)
         if now.step == self.since:
             plan.note("gives_way", person)
         if self._waited(now.step) >= patience:  # it has already looked for a way round
@@ -229,10 +236,12 @@ class WaitForPeople:
             people: As `Surroundings.people`.
             distance: The gap to keep where there is room [m].
         """
-        actor, lattice = now.actor, now.actor.home.plan.lattice
+        actor = now.actor
+        lattice = now.actor.home.plan.lattice
         for gap in (max(distance, PASSING_GAP_M) + lattice.cell, PASSING_GAP_M):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
-            plan, detour = self._stand_for_a_step(now), RoutesAround(actor, around)
+            plan = self._stand_for_a_step(now)
+            detour = RoutesAround(actor, around)
             rest = resumed(plan, self.interrupted, self.step, detour)
             if rest is not None:
                 return self._with_interrupts(rest)
@@ -290,8 +299,10 @@ def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = (
         interrupted: The present plan.
         notes: Rows for the events table at the stop.
     """
-    begin_us, step_us = now.step * interrupted.step_us, interrupted.step_us
-    plan, motion = now.plan().stay_until(begin_us + step_us), interrupted.finish()
+    begin_us = now.step * interrupted.step_us
+    step_us = interrupted.step_us
+    plan = now.plan().stay_until(begin_us + step_us)
+    motion = interrupted.finish()
     plan.notes += notes
     if isinstance(motion, Track):
         first = int(np.searchsorted(motion.breakpoints.time, begin_us, side="right"))
@@ -313,14 +324,18 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
     Returns:
         The plan; None if there is no way round.
     """
-    motion, actor, begin_us = interrupted.finish(), now.actor, now.step * interrupted.step_us
+    motion = interrupted.finish()
+    actor = now.actor
+    begin_us = now.step * interrupted.step_us
     if not isinstance(motion, Track):
         return now.plan().turn_by(0.5)
     stop = next_stop(actor, motion.breakpoints, begin_us)
     if stop is None:
         return None
-    rows, detour = _rows(motion.breakpoints), RoutesAround(actor, bodies)
-    goal, rest = (int(rows[stop, 1]), int(rows[stop, 2])), rows[stop + 1 :]
+    rows = _rows(motion.breakpoints)
+    detour = RoutesAround(actor, bodies)
+    goal = (int(rows[stop, 1]), int(rows[stop, 2]))
+    rest = rows[stop + 1 :]
     if detour.cost[goal[1] // SUB, goal[0] // SUB] < 0:
         if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or interrupted.postures:
             return None
@@ -374,7 +389,8 @@ def _continue(
     if interrupted.postures:
         plan.posture = interrupted.posture
     plan.follow(rest).endless = interrupted.endless
-    plan.asks_us, plan.root = interrupted.asks_us, interrupted.root
+    plan.asks_us = interrupted.asks_us
+    plan.root = interrupted.root
     return plan
 
 
@@ -385,7 +401,8 @@ def _rows(track: Breakpoints) -> I64:
 
 def _beside(actor: Actor, goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
-    plan, space = actor.home.plan, actor.space
+    plan = actor.home.plan
+    space = actor.space
     room = plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
     free = (space.part_of_cell == actor.part) & (detour.cost != CLOSED)
     cells = np.argwhere(free & (plan.room_of_cell == room))

@@ -245,7 +245,9 @@ def available_places(
     Raises:
         PlacementError: The home lacks a single place, or no place remains.
     """
-    available, missing, last_error = [], [], None
+    available = []
+    missing = []
+    last_error = None
     for place in places:
         try:
             if not is_point(place):
@@ -322,7 +324,8 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     if is_point(place):
         return False
     things: tuple[Room | PlacedObject, ...] = (*body.home.rooms, *body.home.objects)
-    names, types = {thing.name for thing in things}, {thing.type for thing in things}
+    names = {thing.name for thing in things}
+    types = {thing.type for thing in things}
     return all(
         name not in names
         and not str(name)[-1:].isdigit()  # bathroom_7 is a single bathroom
@@ -343,7 +346,8 @@ def points_at_distance(
         distance: The distance [lattice].
         directions: How many directions are tried, evenly spaced.
     """
-    plan, space = body.home.plan, body.space
+    plan = body.home.plan
+    space = body.space
     room = plan.room_of_point(*center)
     for i in range(directions):
         heading = i * TURN // directions

@@ -114,7 +114,8 @@ class Plan:
         """
         self.come_home()
         self._check_goes_on()
-        body, space = self.body, self.body.space
+        body = self.body
+        space = self.body.space
         self.take("stand")
         off = body.step_off(self.x, self.y)
         if route is None and self._go_shortest(space, x, y, off):
@@ -136,7 +137,8 @@ class Plan:
 
     def _go_shortest(self, space: Space, x: int, y: int, off: tuple[int, int] | None) -> bool:
         """Step `off` an object and walk a shortest route, if that is all; return whether it was."""
-        body, routes = self.body, space.shortest
+        body = self.body
+        routes = space.shortest
         if routes is None or body.drive is not None or body.slows:
             return False
         now = self.time_us, self.x, self.y, self.heading
@@ -178,7 +180,8 @@ class Plan:
         if self.away or (self.x, self.y) != (at.x, at.y):
             self.go_to_point(*at.approach)
         self._check_goes_on()
-        body, now = self.body, (self.time_us, self.x, self.y, self.heading)
+        body = self.body
+        now = (self.time_us, self.x, self.y, self.heading)
         if body.drive is None:
             self.time_us, self.x, self.y, self.heading, _ = self.legs.settle(
                 *now, at.x, at.y, at.heading, body.speed, body.turn_rate
@@ -216,7 +219,8 @@ class Plan:
 
     def reaches(self, x: int, y: int) -> bool:
         """Return whether there is a way to a lattice point from where the plan ends so far."""
-        space, at = self.body.space, (self.x, self.y)
+        space = self.body.space
+        at = (self.x, self.y)
         return space.route(at, (x, y)) is not None or bool(space.passings(at, (x, y)))
 
     def follow(self, breakpoints: I64) -> Self:
@@ -262,9 +266,11 @@ class Plan:
     def _turn(self, headings: int) -> Self:
         self._check_goes_on()
         if headings:
-            now, rate = (self.time_us, self.x, self.y, self.heading), self.body.turn_rate
+            now = (self.time_us, self.x, self.y, self.heading)
+            rate = self.body.turn_rate
             turned = self.legs.turn(*now, self.away, headings, rate)
-            self.time_us, self.heading = turned[0], turned[3]
+            self.time_us = turned[0]
+            self.heading = turned[3]
         return self
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
@@ -322,7 +328,8 @@ class Plan:
         if len(self.legs) > 2 or self.time_us != self.began[0] * self.step_us:
             raise ComponentError(f"{self.body.path}: a plan that meanders can do nothing before")
         self.take("stand")
-        home, body = self.body.home, self.body
+        home = self.body.home
+        body = self.body
         # A random walk doesn't open doors: a shut one is a wall.
         self._motion = RandomWalk(home.barriers, home.space(body.entity.radius).mesh, rule)
         self.endless = True
@@ -367,7 +374,8 @@ class Plan:
 
     def ask_by(self, time: datetime) -> Self:
         """Ask the behavior again no later than a local time, even if the plan isn't over."""
-        asks_us, self._over = self.body.clock.elapsed(time), None
+        asks_us = self.body.clock.elapsed(time)
+        self._over = None
         self.asks_us = asks_us if self.asks_us is None else min(asks_us, self.asks_us)
         return self
 
@@ -377,7 +385,8 @@ class Plan:
         return self._over_at() if self._over is None else self._over[0]
 
     def _over_at(self) -> int | None:
-        end_us, asks_us = None if self.endless else self.time_us, self.asks_us
+        end_us = None if self.endless else self.time_us
+        asks_us = self.asks_us
         if asks_us is not None and (end_us is None or asks_us < end_us):
             end_us = asks_us
         if end_us is None:
@@ -479,7 +488,8 @@ def plan_of(body: Body, step: int, data: Mapping[str, Any]) -> Plan:
     plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
     plan.notes = [Note(*note) for note in data["notes"]]
     plan.interrupt_on(*data["interrupts"])
-    plan.asks_us, plan.endless = data["asks_us"], data["endless"]
+    plan.asks_us = data["asks_us"]
+    plan.endless = data["endless"]
     plan.postures = [(time, code) for time, code in data["postures"]]
     return plan
 

@@ -90,7 +90,8 @@ class ReplayedDetections(EvidenceSource, LogKeys):
 
     def _place(self, log: "RobotDetections", actor: Actor, users: Sequence[str]) -> I64:
         """Return the detections within the run as rows, and write the notes."""
-        clock, frame = actor.clock, self.frame.in_unit(log.unit_m)
+        clock = actor.clock
+        frame = self.frame.in_unit(log.unit_m)
         identity = identities(log.labels, log.counts, self.people, users)[log.label]
         begin_us, outside_notes = begin_of_run(log, self.day, clock)
         step = (log.time_us - begin_us) // clock.step_us
@@ -139,7 +140,8 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         far = metres > self.reach
         is_inside = np.ones(len(xy), bool)
         is_inside[off[far]] = False
-        outside, count = int(far.sum()), int(used.sum())
+        outside = int(far.sum())
+        count = int(used.sum())
         if count and outside > MAX_OUTSIDE * count:
             raise LogError(
                 f"the frame of {self.path} doesn't fit the home: {outside} of {count} detections"

@@ -159,7 +159,9 @@ class MotionSensor(Sensor):
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which somebody moved in view."""
         rows = slice(None) if self.robots else slice(view.users)
-        x, y, present = view.x[rows], view.y[rows], view.present[rows]
+        x = view.x[rows]
+        y = view.y[rows]
+        present = view.present[rows]
         moved = (np.diff(x) != 0) | (np.diff(y) != 0)
         near = moved & present[:, 1:] & present[:, :-1]
         dx, dy = x[:, 1:] - self.eye[0], y[:, 1:] - self.eye[1]
@@ -173,7 +175,8 @@ class MotionSensor(Sensor):
     def _in_view(self, points: I64, home: Home) -> Bool:
         x, y = self.eye
         if self.version != home.version:
-            self.version, self.walls = home.version, home.walls
+            self.version = home.version
+            self.walls = home.walls
             self.region = visible_region(self.walls, x, y)
         is_visible: Bool = region_contains_points(self.walls, x, y, *self.region, points)
         return is_visible & self._in_wedge(points[:, 0] - x, points[:, 1] - y)
@@ -250,7 +253,9 @@ class ReplaySensor(Sensor, LogKeys):
             decimal_comma=self.decimal_comma,
             day_first=self.day_first,
         )
-        stamps, zone, count = table.stamps(), self.time_zone, len(table.line)
+        stamps = table.stamps()
+        zone = self.time_zone
+        count = len(table.line)
         chosen = np.ones(count, bool)
         if "sensor" in table.named:
             chosen = table.rows_of("sensor", self.sensor)

@@ -142,7 +142,8 @@ def stepwise(first: int, value: float, changes: Iterable[tuple[int, float]], end
         >>> stepwise(0, 1.0, [(3, 2.0), (3, 4.0)], 9).value.tolist()
         [1.0, 4.0]
     """
-    starts, values = [first], [value]
+    starts = [first]
+    values = [value]
     for step, now in changes:
         if step > starts[-1]:
             starts.append(step)
@@ -538,6 +539,7 @@ def number_text(value: float, unit: str) -> str:
     ('0.5 m', '10 %', '3')
     """
     if unit == "share":
-        value, unit = round(100 * value, 10), "%"
+        value = round(100 * value, 10)
+        unit = "%"
     is_whole = value == int(value) and abs(value) < 1e15
     return f"{int(value) if is_whole else repr(value)} {unit}".rstrip()

@@ -187,7 +187,8 @@ class likeliest(WordSignal):
         number = next((c for c in columns.values() if c.dtype.kind == "f"), None)
         if "room" not in columns or number is None:
             raise ScenarioError(f"{self}: its output has no number for each room")
-        rooms, keep = columns["room"], np.ones(len(number), np.bool_)
+        rooms = columns["room"]
+        keep = np.ones(len(number), np.bool_)
         if self.user is not None:
             if "user" not in columns:
                 raise ScenarioError(

@@ -270,7 +270,8 @@ def _read_operator(value: Mapping[str, Any]) -> temporal.Temporal:
     for key in _REFUSED.get(name, ("of", "per")):
         if key in value:
             raise problem_at((key,), f"{key!r} can't be combined with {name}")
-    part, within = _condition(value, name), {"within": value.get("within")}
+    part = _condition(value, name)
+    within = {"within": value.get("within")}
     if name == "eventually" and "after" in value:
         return temporal.after(_part(value, "after"), part, **within)
     if name == "at_most":

@@ -364,16 +364,22 @@ class Signal(Term):
         """Return its values from the first judged step on."""
         raise NotImplementedError
 
-    __gt__, __ge__ = _comparison(">"), _comparison(">=")
-    __lt__, __le__ = _comparison("<"), _comparison("<=")
+    __gt__ = _comparison(">")
+    __ge__ = _comparison(">=")
+    __lt__ = _comparison("<")
+    __le__ = _comparison("<=")
     __eq__ = _comparison("==")  # type: ignore[assignment]
     __ne__ = _comparison("!=")  # type: ignore[assignment]
     __hash__ = object.__hash__
 
-    __add__, __radd__ = _arithmetic("+"), _arithmetic("+", is_mirrored=True)
-    __sub__, __rsub__ = _arithmetic("-"), _arithmetic("-", is_mirrored=True)
-    __mul__, __rmul__ = _arithmetic("*"), _arithmetic("*", is_mirrored=True)
-    __truediv__, __rtruediv__ = _arithmetic("/"), _arithmetic("/", is_mirrored=True)
+    __add__ = _arithmetic("+")
+    __radd__ = _arithmetic("+", is_mirrored=True)
+    __sub__ = _arithmetic("-")
+    __rsub__ = _arithmetic("-", is_mirrored=True)
+    __mul__ = _arithmetic("*")
+    __rmul__ = _arithmetic("*", is_mirrored=True)
+    __truediv__ = _arithmetic("/")
+    __rtruediv__ = _arithmetic("/", is_mirrored=True)
 
     def __neg__(self) -> "Signal":
         """Return the negated signal."""

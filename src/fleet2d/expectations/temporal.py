@@ -192,7 +192,8 @@ class eventually(Limited):
         low, high_end = run.reach(self.within)
         spans = self.part.robustness(run, False).spells  # first and last steps
         for step in steps:
-            first, deadline = step + low, step + high_end
+            first = step + low
+            deadline = step + high_end
             index = int(np.searchsorted(spans[:, 1], first))
             if index < len(spans):
                 slacks.append(deadline - max(int(spans[index, 0]), first))
@@ -226,7 +227,8 @@ class until(Limited):
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the maximum over later steps t of min(goal at t, minimum of `hold` before t)."""
-        hold, goal = self.hold.robustness(run, high), self.goal.robustness(run, high)
+        hold = self.hold.robustness(run, high)
+        goal = self.goal.robustness(run, high)
         after = self._beyond(run, -INFINITE, high)
         return _until(hold, goal, None if self.within is None else run.reach(self.within), after)
 
@@ -353,7 +355,8 @@ class after(Limited):
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the violations of each missed occasion, from the trigger to the deadline."""
-        steps, expected = self.triggered(run), self.consequence
+        steps = self.triggered(run)
+        expected = self.consequence
         values = expected.robustness(run, True).values(steps)
         violations = []
         for step, value in zip(steps[values < 0].tolist(), values[values < 0], strict=True):
@@ -563,7 +566,8 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
     """Return the steps at which new hours, days or weeks begin, after the first step."""
     if per is None:
         return []
-    clock, length = run.clock, PERIODS[per]
+    clock = run.clock
+    length = PERIODS[per]
     boundary = clock.time(run.first).replace(minute=0, second=0, microsecond=0)
     if per != "hour":
         boundary = boundary.replace(hour=0)

@@ -299,7 +299,8 @@ def check_judged(expectation: object) -> Expectation:
 
 def _sums_at_end(expectation: Expectation) -> Expectation:
     if isinstance(expectation, And):
-        one, other = _sums_at_end(expectation.one), _sums_at_end(expectation.other)
+        one = _sums_at_end(expectation.one)
+        other = _sums_at_end(expectation.other)
         return replace(expectation, one=one, other=other)
     if isinstance(expectation, Not):
         return ~_sums_at_end(expectation.part)
@@ -331,7 +332,8 @@ def duration_in_words(duration: timedelta) -> str:
     >>> duration_in_words(timedelta(seconds=40.5))
     '40.5 s'
     """
-    parts, remainder = [], duration
+    parts = []
+    remainder = duration
     for unit, length in (("d", DAY_S), ("h", HOUR_S), ("min", 60)):
         count, remainder = divmod(remainder, timedelta(seconds=length))
         parts += [f"{count} {unit}"] if count else []

@@ -108,7 +108,8 @@ class ProductLikelihood:
 
     def estimates(self, best: Fit) -> dict[str, ParameterEstimate]:
         """Return every parameter with its interval, by name."""
-        estimates, index = {}, 0
+        estimates = {}
+        index = 0
         for factor in self.factors:
             for i, name in enumerate(factor.names):
                 ends = [self._interval_end(best, index, side) for side in (-1, 1)]
@@ -121,7 +122,9 @@ class ProductLikelihood:
 
     def _model(self, theta: F64) -> tuple[F64, F64]:
         """Return the probabilities, and the derivatives of their logarithms."""
-        shares, slopes, index = np.ones(len(self.outcomes)), [], 0
+        shares = np.ones(len(self.outcomes))
+        slopes = []
+        index = 0
         for factor in self.factors:
             count = len(factor.names)
             share, slope = factor.shares(theta[index : index + count])
@@ -142,7 +145,8 @@ class ProductLikelihood:
         """Return the maximum over the free parameters, by damped Fisher scoring from `theta`."""
         theta = np.clip(theta, self.lower, self.upper)
         shares, slopes = self._model(theta)
-        value, damping = self._value(shares), 1e-3
+        value = self._value(shares)
+        damping = 1e-3
         for _ in range(MAX_ROUNDS):
             slopes = slopes[:, free]
             score = slopes.T @ ((self.outcomes - shares) / (1 - shares))
@@ -157,7 +161,10 @@ class ProductLikelihood:
                 damping = max(damping * 10, 1e-3)
                 slopes = self._model(theta)[1]
                 continue
-            theta, shares, slopes, value = trial, trial_shares, trial_slopes, value + gain
+            theta = trial
+            shares = trial_shares
+            slopes = trial_slopes
+            value = value + gain
             damping /= 10
             if gain < MIN_GAIN:
                 break
@@ -192,7 +199,8 @@ class ProductLikelihood:
                 return float(brentq(excess, inside, outside, xtol=1e-6))
             if outside == limit:
                 return None
-            inside, step = outside, 2 * step
+            inside = outside
+            step = 2 * step
 
 
 def wilson(hits: int, total: int) -> ParameterEstimate:
@@ -244,7 +252,8 @@ class Falling(Factor):
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
         """Return the factor of each row, and its derivatives by midpoint and log of width."""
-        midpoint, width = float(theta[0]), math.exp(float(theta[1]))
+        midpoint = float(theta[0])
+        width = math.exp(float(theta[1]))
         scaled = np.clip((self._x - midpoint) / width, -700, 700)
         share = 1 / (1 + np.exp(scaled))
         slope = share * (1 - share)
@@ -272,7 +281,8 @@ class Orientation(Factor):
 
     def shares(self, theta: F64) -> tuple[F64, F64]:
         """Return the factor of each row, and its derivatives by the two logits."""
-        side, back = share_of(float(theta[0])), share_of(float(theta[1]))
+        side = share_of(float(theta[0]))
+        back = share_of(float(theta[1]))
         share = (1 - self._side - self._back) + side * self._side + back * self._back
         slopes = [
             self._side * max(side * (1 - side), 1e-9),

@@ -309,7 +309,8 @@ class Calibration:
         if "bearing midpoint" in estimates:
             detection["bearing"] = _curve(estimates, "bearing", top=1.0)
         if "side" in estimates:
-            side, back = estimates["side"].value, estimates["back"].value
+            side = estimates["side"].value
+            back = estimates["back"].value
             detection["orientation"] = [[0, 1], [90, _short(side)], [180, _short(back)]]
         section: dict[str, Any] = {"detection": detection}
         if self.identity:
@@ -318,7 +319,8 @@ class Calibration:
 
     def _identity(self, recognition: Recognition) -> dict[str, Any]:
         """Return the section as tables of the same distances, whose sum is nowhere above 1."""
-        estimates, farthest = recognition.right.estimates, float(self.log.distance.max())
+        estimates = recognition.right.estimates
+        farthest = float(self.log.distance.max())
         # Dense enough for straight lines between rows to be within 0.3 % of the logistic curve.
         width = estimates["distance width"].value if "distance width" in estimates else farthest
         rows = min(MAX_ROWS, 2 + int(2 * farthest / width))
@@ -387,7 +389,8 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
     """Fit how users are recognized, if the log has identities; else add a note."""
     if log.identity is None or log.true_identity is None:
         return None
-    true, perceived = log.true_identity[log.detected], log.identity[log.detected]
+    true = log.true_identity[log.detected]
+    perceived = log.identity[log.detected]
     right = recognized(log)
     if len(true) < MIN_IDENTIFIED or right.all() or not right.any():
         notes.append(

@@ -29,11 +29,28 @@ BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
 QUANTILES = 21  # maximum number of quantiles of a law of durations
 # Words of activities that are done standing, lying and sitting; the first that fit decide.
 STAND = ("cook", "prepar", "wash", "dish", "clean", "transition", "hygiene", "bathing")
-LIE, SIT = ("sleep", "nap", "bed", "wake_up"), ("eat", "tv", "work", "read", "relax", "computer",
-    "breakfast", "lunch", "dinner", "snack", "music", "rest", "social", "toilet")  # fmt: skip
+LIE = ("sleep", "nap", "bed", "wake_up")
+SIT = (
+    "eat",
+    "tv",
+    "work",
+    "read",
+    "relax",
+    "computer",
+    "breakfast",
+    "lunch",
+    "dinner",
+    "snack",
+    "music",
+    "rest",
+    "social",
+    "toilet",
+)
 # A task is done on at least this share of the days, at most once a day. The standard deviation of
 # its beginning is at most SPREAD, and the gap to begins at other times more than APART [min].
-MIN_SHARE, SPREAD, APART = 0.8, 20, 60
+MIN_SHARE = 0.8
+SPREAD = 20
+APART = 60
 LONG = 10  # minimum mean duration of a task [min]
 MIN_TEMPLATE_DAYS = 4  # minimum number of days of a kind from which a template is fitted
 WORKDAYS = 5
@@ -215,7 +232,8 @@ class _Fitter:
         for day in days:
             for run in day.awake:
                 by_state[run.state].append((day.number, run))
-        tasks, rest = {}, []
+        tasks = {}
+        rest = []
         for state, done in sorted(by_state.items()):
             for number, cluster in enumerate(_clusters(done)):
                 longest: dict[int, Stretch] = {}
@@ -394,7 +412,8 @@ def _is_task(stretches: Sequence[Stretch], count: int, days: int) -> bool:
 
 def _timing(begins: Sequence[int]) -> dict[str, Any]:
     """Return mean, spread and window of times of day [min]."""
-    mean, std = float(np.mean(begins)), float(np.std(begins))
+    mean = float(np.mean(begins))
+    std = float(np.std(begins))
     first, last = min(begins), max(begins)
     return {
         "at": _clock(min(max(round(mean), first), last)),

@@ -23,7 +23,8 @@ LABELS = ("log", "persona", "Markov chain")
 LINES = ("#222222", "#c2410c", "#9aa5b1")
 BINS = 12
 MIN_ROWS_PER_BIN = 10  # the smallest mean number of rows per bin
-FIT_COLOR, OBSERVED_COLOR = "#2b6cb0", "#3d4148"
+FIT_COLOR = "#2b6cb0"
+OBSERVED_COLOR = "#3d4148"
 
 
 def draw_persona(
@@ -109,7 +110,8 @@ def _figure(calibration: "Calibration") -> Figure:
     """Return a figure with a panel for each quantity, and one of predicted against observed."""
     from fleet2d.fit.perception import recognized
 
-    log, shares = calibration.log, calibration.detection.fit.shares
+    log = calibration.log
+    shares = calibration.detection.fit.shares
     panels: list[tuple[str, str, F64, Bool, F64]] = []
     for label, values in (
         ("distance [m]", log.distance),
@@ -119,7 +121,8 @@ def _figure(calibration: "Calibration") -> Figure:
         if values is not None:
             panels.append(("noticed", label, values, log.detected, shares))
     if calibration.identity is not None:
-        distance, right = log.distance[log.detected], recognized(log)
+        distance = log.distance[log.detected]
+        right = recognized(log)
         fitted = calibration.identity.right.fit.shares
         panels.append(("recognized, if noticed", "distance [m]", distance, right, fitted))
     figure = Figure(figsize=(3.4 * (len(panels) + 1), 3.4), layout="constrained", dpi=150)

@@ -22,7 +22,9 @@ from fleet2d.runtime.determinism import Draws, stream_key
 # An activity of fewer days than this is left out: it would tell of these days.
 MIN_DAYS = 2
 # How far waking, and the length of a stay, is changed at most: [s], and relative to the length.
-WAKE_SHIFT_S, LENGTH_SHIFT_S, LENGTH_SHIFT = 600, 600, 0.25
+WAKE_SHIFT_S = 600
+LENGTH_SHIFT_S = 600
+LENGTH_SHIFT = 0.25
 # Beyond this shift of a day's times, lengths are changed in the direction that reduces it [s].
 MAX_SHIFT_S = 900
 DAYS_PER_DAY = 2  # how many days are made of each recorded one
@@ -64,11 +66,14 @@ def repeats(days: Sequence[RecordedDay], log: Sequence[RecordedDay]) -> Repeats:
 def _longest_run(day: RecordedDay, other: RecordedDay) -> int:
     """Return the number of successive changes that are in both days, to the minute."""
     after = {change: i for i, change in enumerate(_changes(other))}
-    run, longest, last = 0, 0, -1
+    run = 0
+    longest = 0
+    last = -1
     for change in _changes(day):
         at = after.get(change, -1)
         run = 0 if at < 0 else run + 1 if run and at == last + 1 else 1
-        longest, last = max(longest, run), at
+        longest = max(longest, run)
+        last = at
     return longest
 
 
@@ -130,7 +135,8 @@ def _draw(days: Sequence[RecordedDay], draws: Draws) -> RecordedDay:
     if episodes[-1].activity != SLEEP:
         episodes.append(Episode(SLEEP, episodes[-1].end, end))
     now = episodes[0].begin + _within(draws, WAKE_SHIFT_S)
-    begins, names = [], []
+    begins = []
+    names = []
     for episode in episodes:
         begins.append(now)
         names.append(episode.activity)

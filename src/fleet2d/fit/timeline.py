@@ -22,7 +22,8 @@ HOLD = timedelta(hours=3)
 MAX_STILLNESS = timedelta(hours=12)
 MIN_ABSENCE = timedelta(minutes=10)  # a longer silence at the front door counts as being out
 # An activity in a room with less time and fewer runs than this loses its name.
-RARE_MINUTES, RARE_RUNS = 30, 4
+RARE_MINUTES = 30
+RARE_RUNS = 4
 # Being up for up to this long in the night doesn't end the night [min].
 MAX_NIGHT_WAKING = 60
 SHORTEST_NIGHT = 120  # min
@@ -81,7 +82,8 @@ def read_timeline(log: ActivityLog) -> Timeline:
     minutes = _one_per_stay(pairs, by_minute(seconds, len(pairs)))
     seconds = _one_per_stay(pairs, seconds.reshape(-1, DAY_S))
     states, index = _without_rare(pairs, minutes, seconds)
-    minutes, seconds = index[minutes], index[seconds]
+    minutes = index[minutes]
+    seconds = index[seconds]
     if np.count_nonzero(minutes >= 0) < minutes.size // 4:
         raise LogError(
             f"{log.path} has no readings for most of its {log.days} days: there is nothing to fit"
@@ -179,7 +181,8 @@ def _without_rare(
     """
     flat = minutes.ravel()
     firsts = flat[np.append(True, flat[1:] != flat[:-1])]
-    run_counts, minute_counts = Counter(firsts.tolist()), Counter(flat.tolist())
+    run_counts = Counter(firsts.tolist())
+    minute_counts = Counter(flat.tolist())
     occur = set(np.unique(seconds).tolist()) | set(minute_counts)
     result: dict[ActivityPlace, int] = {}
     index = np.full(len(pairs) + 1, UNKNOWN_STATE, np.int16)
@@ -248,7 +251,9 @@ def find_days(timeline: Timeline) -> list[LivedDay]:
         awake = _runs(flat, before[1], after[0], midnight)
         night = _runs(flat, after[0], after[1], midnight)
         up = tuple(r for r in night if not asleep[midnight + r.begin])
-        wake, bed, next_wake = before[1] - midnight, after[0] - midnight, after[1] - midnight
+        wake = before[1] - midnight
+        bed = after[0] - midnight
+        next_wake = after[1] - midnight
         days.append(LivedDay(number, wake, bed, next_wake, awake, up))
     return days
 

@@ -30,7 +30,9 @@ EQUAL = 0.0005
 FOLDS = 3
 SAMPLED = 700  # the number of days drawn from a persona, whole weeks
 CHAIN_DAYS = 140  # the number of days drawn from the chain
-SAMPLED_BY_SECOND, CHAIN_DAYS_BY_SECOND = 140, 7  # the same where seconds are compared
+# the same where seconds are compared
+SAMPLED_BY_SECOND = 140
+CHAIN_DAYS_BY_SECOND = 7
 
 
 def sample_persona(
@@ -68,7 +70,8 @@ def sample_persona(
 def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[int, int]]:
     """Return begin and end [s] of each short trip during an activity, drawn as for residents."""
     assert activity.fetches is not None
-    wait, takes = exponential(seconds(activity.fetches)), activity.fetch_takes.table()
+    wait = exponential(seconds(activity.fetches))
+    takes = activity.fetch_takes.table()
     times = []
     now = episode.begin + wait.knots[draws.below(KNOTS)]
     while now < episode.end:
@@ -198,7 +201,8 @@ def _fold(
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
     rooms_by_second = sample_persona(fitted, timeline, SAMPLED_BY_SECOND, seed, to_second=True)[1]
     rest_days, held_days = ([day.number for day in part] for part in (rest, held))
-    places, activities = len(timeline.places), len(timeline.states)
+    places = len(timeline.places)
+    activities = len(timeline.states)
     seconds = timeline.places_of(timeline.seconds)
     result = []
     for sampled, of_log, count, chain_days in (

@@ -33,7 +33,8 @@ HOME_M2 = (8.0, 2000.0)
 LIKELY_M2 = (25.0, 400.0)
 # Area of a home and median area of its rooms from which on it may be in feet, unless doors are as
 # wide as usual.
-LARGE_M2, LARGE_ROOM_M2 = 350.0, 40.0
+LARGE_M2 = 350.0
+LARGE_ROOM_M2 = 40.0
 ROOM_M2 = (0.8, 200.0)  # median area of a home's rooms
 TINY_ROOM_M2 = 0.5
 SPECK_M2 = 0.02  # minimum area of a pillar
@@ -42,7 +43,9 @@ NEARLY_JOINED_M = 0.05  # parts so near to each other were likely meant to touch
 MAX_NO_GO_SHARE = 0.5  # share of the floor that robots keep out of, from which on it is reported
 DOOR_M = (0.5, 1.6)  # median width of a home's doors
 # Usual median, the fewest doors that tell a scale, and how near to the usual width they must be.
-USUAL_DOOR_M, FEWEST_DOORS, DOOR_FACTOR = 0.85, 3, 1.4
+USUAL_DOOR_M = 0.85
+FEWEST_DOORS = 3
+DOOR_FACTOR = 1.4
 WIDEST_DOOR_M = 2.0
 # How far labels may reach over the outer walls, and which share of them may lie farther out.
 MAX_OVER_WALLS_M = 0.3
@@ -110,7 +113,8 @@ def errors_in(home: Home, radii: Iterable[float]) -> list[str]:
         home: The home of the run.
         radii: The radii of its robots [m].
     """
-    plan, open_home = home.plan, Home(home.plan, home.doors)
+    plan = home.plan
+    open_home = Home(home.plan, home.doors)
     findings = [*_scale(plan), *_no_go(plan), *_doors(plan), *_standing_in_walls(plan)]
     for radius in sorted(set(radii)):
         findings += _routes(open_home, radius)
@@ -119,7 +123,8 @@ def errors_in(home: Home, radii: Iterable[float]) -> list[str]:
 
 def _scale(plan: FloorPlan) -> Iterator[Finding]:
     """Find an unlikely size of the home, its rooms or its doors, and the unit that explains it."""
-    area, widths = plan.area_m2, sorted(door.width_m for door in plan.doorways if door.leaf)
+    area = plan.area_m2
+    widths = sorted(door.width_m for door in plan.doorways if door.leaf)
     rooms = sorted(room.area_m2 for room in plan.rooms if room.type != UNKNOWN)
     door = widths[len(widths) // 2] if len(widths) >= FEWEST_DOORS else None
     room = rooms[len(rooms) // 2] if len(rooms) >= FEWEST_DOORS else None
@@ -192,7 +197,8 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
     parts = [part for part in parts if not part.intersects(ends)]
     for part in parts:
         if part.area >= PART_M2:
-            text, rest = f"nothing joins a part of {part.area:.2f} m2", " to the rest"
+            text = f"nothing joins a part of {part.area:.2f} m2"
+            rest = " to the rest"
             others = shapely.difference(plan.free_space, part)
             if (apart := shapely.distance(part, others)) <= NEARLY_JOINED_M:
                 near = shapely.get_point(shapely.shortest_line(part, others), 0)
@@ -219,7 +225,8 @@ def _specks(plan: FloorPlan) -> Iterator[Finding]:
     specks = [s for s in map(shapely.Polygon, holes) if s.area < SPECK_M2]
     if specks:
         size = f"of wall smaller than {SPECK_M2:g} m2 inside the home"
-        text, at = f"{counted(len(specks), 'piece')} {size}, the first", specks[0]
+        text = f"{counted(len(specks), 'piece')} {size}, the first"
+        at = specks[0]
         shape = shapely.MultiPolygon(specks)
         yield _found("specks", "odd", text, at.representative_point(), shape)
 
@@ -273,7 +280,8 @@ def _overlaps(regions: list[LabelledRegion]) -> Iterator[Finding]:
     shapes = np.array([region.shape for region in regions], dtype=object)
     first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
     for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True)):
-        one, other = regions[i], regions[j]
+        one = regions[i]
+        other = regions[j]
         if i >= j or set(one.types) == set(other.types):
             continue
         both = shapely.intersection(one.shape, other.shape)
@@ -311,7 +319,8 @@ def _along(door: DoorLine | Doorway) -> tuple[Point, shapely.LineString]:
 
 def _routes(home: Home, radius: float) -> Iterator[Finding]:
     """Find the places that a robot can't get to, because of walls or of furniture."""
-    plan, body = home.plan, f"a body of radius {radius:g} m"
+    plan = home.plan
+    body = f"a body of radius {radius:g} m"
     try:
         # A robot that is put on another storey lives there.
         space = home.space(radius, uses_portals=True)

@@ -109,7 +109,8 @@ class CostedSpace(Space):
         cells = base.radius / base.plan.lattice.cell + 0.5  # up to the border of a cell
         near = squared_distance(np.ascontiguousarray(cost >= 0)) <= cells * cells
         self._original_cost = cost
-        self.base, self.cost = base, np.where(near, CLOSED, cost).astype(np.int32)
+        self.base = base
+        self.cost = np.where(near, CLOSED, cost).astype(np.int32)
         self._cache_searches()
         # Cells of the space that share a side always belong to one part.
         part = label_parts((base.part_of_cell >= 0) & (self.cost >= 0), diagonal=False)

@@ -187,7 +187,8 @@ def _alone(kind: str, draws: Draws) -> list[FurnitureGroup]:
 
 def _row(kinds: tuple[str, ...], draws: Draws) -> FurnitureGroup:
     """Return pieces side by side along a wall."""
-    at, pieces = 0.0, []
+    at = 0.0
+    pieces = []
     for kind in kinds:
         width, depth = _size(kind, draws)
         pieces.append(Piece(kind, at, 0, width, depth))

@@ -20,7 +20,9 @@ from fleet2d.kernels import QUARTER, TURN, UNIT, cosine, in_radians, sine
 
 Range = tuple[float, float]
 
-LEFT, BACK, RIGHT = QUARTER, 2 * QUARTER, -QUARTER
+LEFT = QUARTER
+BACK = 2 * QUARTER
+RIGHT = -QUARTER
 
 
 @dataclass(frozen=True)
@@ -197,7 +199,8 @@ def stand_furniture(
     def place(ahead: float, left: float) -> Point:
         return x0 + ahead * dx - left * dy, y0 + ahead * dy + left * dx
 
-    ahead, left = depth / 2, width / 2
+    ahead = depth / 2
+    left = width / 2
     corners = [place(-ahead, left), place(-ahead, -left), place(ahead, -left), place(ahead, left)]
     uses = []
     for use in model.uses:

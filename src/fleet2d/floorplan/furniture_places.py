@@ -230,7 +230,8 @@ class RoomView:
         objects = []
         for piece in group.pieces:
             # Edges are rounded, not sizes: what is side by side stays so.
-            u0, v0 = count_cells(cell, piece.left), count_cells(cell, piece.ahead)
+            u0 = count_cells(cell, piece.left)
+            v0 = count_cells(cell, piece.ahead)
             u1 = count_cells(cell, piece.left + piece.width)
             v1 = count_cells(cell, piece.ahead + piece.depth)
             if u1 == u0 or v1 == v0:
@@ -378,7 +379,8 @@ class Interior:
         While groups are placed, spaces are cut out of each other, rounded against bodies: two small
         pieces of floor may in fact be connected, and too large to be cut off together.
         """
-        plan, fixed = self.plan, len(self.plan.objects)
+        plan = self.plan
+        fixed = len(self.plan.objects)
         solid = [_solid(plan, plan.objects), *(_solid(plan, group) for group in self.groups)]
 
         @cache
@@ -447,7 +449,8 @@ class Interior:
 
     def _usable(self, view: RoomView, things: list[PlacedObject]) -> list[PlacedObject] | None:
         """Return the objects with reachable places to use them, or None if one has none."""
-        usable, everything = [], [*self.objects, *things]
+        usable = []
+        everything = [*self.objects, *things]
         for thing in things:
             reachable = with_approaches(self.plan, thing, self._reached(view), everything)
             if thing.uses and not reachable.uses:
@@ -534,7 +537,8 @@ def _exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> li
 
 def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
     """Return whether thin bodies get to places, or between places, where large ones don't."""
-    wide, thin = _large(plan, spaces[BODY_RADIUS]), np.array(spaces[THIN_RADIUS], np.object_)
+    wide = _large(plan, spaces[BODY_RADIUS])
+    thin = np.array(spaces[THIN_RADIUS], np.object_)
     inside = np.asarray(shapely.point_on_surface(wide))
     if (shapely.contains(thin[:, None], inside).sum(axis=1) > 1).any():
         return True
@@ -569,7 +573,8 @@ def _split(before: Bool, after: Bool, pocket: int) -> bool:
     """Return whether a part of a mask was split, or one larger than a pocket was lost."""
     old, new = (label_parts(np.ascontiguousarray(mask), False) for mask in (before, after))
     parts = int(old.max()) + 1
-    old_part, new_part = old[after], new[after]
+    old_part = old[after]
+    new_part = new[after]
     becomes = np.full(parts, -1, np.int64)
     becomes[old_part] = new_part
     if bool((becomes[old_part] != new_part).any()):
@@ -607,13 +612,15 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
     beside): it is the doorway of a plan without doorways.
     """
     cell = plan.lattice.cell
-    reach, beside = count_cells(cell, DOOR_CLEARANCE), count_cells(cell, 2 * BODY_RADIUS)
+    reach = count_cells(cell, DOOR_CLEARANCE)
+    beside = count_cells(cell, 2 * BODY_RADIUS)
     cells = np.zeros_like(plan.free)
     for turn in range(4):
         rooms = np.ascontiguousarray(np.rot90(plan.room_of_cell, turn))
         can_stand = np.ascontiguousarray(np.rot90(standing, turn))
         free = np.ascontiguousarray(np.rot90(plan.free, turn))
-        zone, border = np.zeros_like(free), np.zeros_like(free)
+        zone = np.zeros_like(free)
+        border = np.zeros_like(free)
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
         crossed[1:] &= can_stand[1:] & can_stand[:-1]

@@ -147,7 +147,8 @@ class Home:
         if COSTMAP in self.layers:
             values = self.layers[COSTMAP].values
             if not np.array_equal(self._costs, values):
-                self._costs, self._costed = values.astype(np.int32), {}
+                self._costs = values.astype(np.int32)
+                self._costed = {}
                 self._costs_version += 1
         return self._costs_version
 

@@ -106,7 +106,8 @@ class Lattice:
             )
         if self.columns * self.rows > MAX_CELLS:
             fits = math.ceil(100 * math.sqrt(width * height / MAX_CELLS)) / 100
-            millions, most = self.columns * self.rows / 1e6, MAX_CELLS / 1e6
+            millions = self.columns * self.rows / 1e6
+            most = MAX_CELLS / 1e6
             raise FloorPlanError(
                 f"the floor plan is {width:.0f} m x {height:.0f} m: {millions:.0f} million cells of"
                 f" {self.cell:g} m, and at most {most:.0f} million fit into 1 GB of memory:"

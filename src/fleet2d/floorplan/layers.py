@@ -107,7 +107,8 @@ class Layer:
         self.name, self.settings = name, settings
         self.fill: float = settings.fill
         self.unit, self.description = settings.unit, settings.description
-        self.store, self.every = settings.store, settings.every
+        self.store = settings.store
+        self.every = settings.every
         self.dtype: np.dtype[Any] = np.dtype(settings.dtype)
         self._plan, self._source = plan, source
         shape = (plan.lattice.rows, plan.lattice.columns)

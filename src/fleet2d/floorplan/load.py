@@ -58,7 +58,8 @@ def load_floorplan(
         'family_home'
     """
     names = bundled_names()
-    path, usual = Path(plan), DEFAULT_CELL_M if cell is None else cell
+    path = Path(plan)
+    usual = DEFAULT_CELL_M if cell is None else cell
     if path.suffix.lower() in IMAGES and path.is_file():
         return _load_image(path, resolution, cell, scale)
     if resolution is not None:

@@ -35,7 +35,8 @@ def repair(shape: BaseGeometry) -> BaseGeometry:
     corners = [shapely.get_coordinates(outline) for outline in outlines]
     ends = [np.stack([c[:-1], c[1:]], axis=1) for c in corners]
     edges: Any = shapely.linestrings(np.concatenate(ends)) if ends else np.empty(0, object)
-    tree, count = shapely.STRtree(edges), 0
+    tree = shapely.STRtree(edges)
+    count = 0
     for begin in range(0, len(edges), _EDGES):
         pairs = tree.query(edges[begin : begin + _EDGES], predicate="crosses")
         count += pairs.shape[1] // 2  # each crossing is found from both edges
@@ -176,7 +177,8 @@ def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:
         ends = np.roll(ring, -1, axis=0)
         boxes = shapely.box(*np.minimum(ring, ends).T, *np.maximum(ring, ends).T)
         wall, near = tree.query(np.asarray(boxes))
-        along, offsets = (ends - ring)[wall], vertices[near] - ring[wall]
+        along = (ends - ring)[wall]
+        offsets = vertices[near] - ring[wall]
         distances = (offsets * along).sum(axis=1)
         on_line = along[:, 0] * offsets[:, 1] == along[:, 1] * offsets[:, 0]
         between = on_line & (distances > 0) & (distances < (along * along).sum(axis=1))
@@ -256,7 +258,8 @@ def _neighbors(triangles: I64, vertex_count: int, walls: I64) -> I32 | None:
     Returns:
         int32 (t, 3); None unless every edge is either shared by two triangles or is a wall.
     """
-    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    starts = triangles.ravel()
+    ends = np.roll(triangles, -1, axis=1).ravel()
     edges = starts * vertex_count + ends
     order = np.argsort(edges, kind="stable")
     ordered = edges[order]
@@ -364,7 +367,8 @@ def _crossing(
     """Return the inner edges that cross a segment, each once."""
     edges = np.fromiter(chain.from_iterable(owner), np.int64, 2 * len(owner)).reshape(-1, 2)
     edges = edges[edges[:, 0] < edges[:, 1]]
-    start, along = vertices[a], vertices[b] - vertices[a]
+    start = vertices[a]
+    along = vertices[b] - vertices[a]
     side = np.sign(along[0] * (vertices[:, 1] - start[1]) - along[1] * (vertices[:, 0] - start[0]))
     apart = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0].tolist()
     return [(p, q) for p, q in apart if (q, p) in owner and _cross(vertices, a, b, p, q)]
@@ -460,7 +464,10 @@ def glazed(
         >>> [pane.bounds for pane in panes], notes
         ([(2560.0, 768.0, 2944.0, 2048.0)], [])
     """
-    free, panes, notes, outer = MultiPolygon(list(polygons)), [], list[str](), 0
+    free = MultiPolygon(list(polygons))
+    panes = []
+    notes = list[str]()
+    outer = 0
     for area in areas:
         pane = Polygon(lattice.to_walls(np.asarray(area.exterior.coords)[:-1]))
         in_wall = shapely.difference(pane, free)

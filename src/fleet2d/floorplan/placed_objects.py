@@ -201,7 +201,8 @@ def move_object(
 
     def transform(xy: F64) -> F64:
         dx, dy = (lattice.to_lattice(xy) - pivot).T
-        c, s = cosine(turn), sine(turn)
+        c = cosine(turn)
+        s = sine(turn)
         half = UNIT // 2
         turned = np.stack([(c * dx - s * dy + half) // UNIT, (s * dx + c * dy + half) // UNIT], -1)
         return lattice.to_metres(goal + turned)

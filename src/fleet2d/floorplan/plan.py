@@ -263,7 +263,8 @@ class FloorPlan:
             free, regions, objects, no_go, glass = (
                 _scaled(part, scale) for part in (free, regions, objects, no_go, glass)
             )
-            entrance, doorways = _scaled(entrance, scale), _scaled(doorways, scale)
+            entrance = _scaled(entrance, scale)
+            doorways = _scaled(doorways, scale)
         lines = list(doorways or ())
         POLYGONS.check(len(regions) + len(objects) + len(lines), "it", FloorPlanError)
         ROOMS.check(len(regions), "it", FloorPlanError)

@@ -102,7 +102,8 @@ def slowed(rows: I64, regions: Sequence[SlowRegion]) -> I64:
     Returns:
         int64 (m, 5), from the first row on.
     """
-    result, time_us = [rows[0].tolist()], int(rows[0, 0])
+    result = [rows[0].tolist()]
+    time_us = int(rows[0, 0])
     x, y = (Fraction(int(value)) for value in rows[0, 1:3])
     within = [region.holds(x, y) for region in regions]
     for (t0, x0, y0, h0, _), (t1, x1, y1, h1, away) in pairwise(rows.tolist()):

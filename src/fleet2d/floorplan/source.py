@@ -112,7 +112,8 @@ def correct_rooms(plan: FloorPlan, corrections: Sequence[RoomCorrection]) -> Flo
             regions[index] = _rename(regions[index], correction)
     room_of_cell, rooms = make_rooms(plan.lattice, painted, regions)
     doors = zip(_door_lines(plan), doorway_segments(plan.lattice, plan.doorways), strict=True)
-    places, names = fill_from_neighbors(room_of_cell), [room.name for room in rooms]
+    places = fill_from_neighbors(room_of_cell)
+    names = [room.name for room in rooms]
     doorways = name_doorways(plan.lattice, places, names, list(doors))
     return replace(plan, room_of_cell=read_only(room_of_cell), rooms=rooms, doorways=doorways)
 

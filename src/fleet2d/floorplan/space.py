@@ -254,7 +254,8 @@ class Space:
                 break
         if len(cells) > most:
             is_near = away <= np.partition(away, most - 1)[most - 1]
-            cells, away = cells[is_near], away[is_near]
+            cells = cells[is_near]
+            away = away[is_near]
         return cells[np.argsort(away, kind="stable")[:most]]
 
     def _corners(self) -> Corners:
@@ -263,7 +264,8 @@ class Space:
         outlines = shapely.get_rings(self.polygons)
         rings = [shapely.get_coordinates(ring)[:-1].astype(np.int64) for ring in outlines]
         p, q, r = (np.concatenate([np.roll(v, k, axis=0) for v in rings]) for k in (1, 0, -1))
-        into, out = q - p, r - q
+        into = q - p
+        out = r - q
         # The free space lies to the left.
         reflex = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
         keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
@@ -297,7 +299,9 @@ class PointDistances:
     """
 
     def __init__(self, space: Space, points: I64) -> None:
-        self.space, self._points, self._measured = space, points, 0
+        self.space = space
+        self._points = points
+        self._measured = 0
         self._steps: NDArray[np.signedinteger] | None = None  # (rows, columns, points)
 
     def of(self, place: PointXY) -> F64:
@@ -341,7 +345,8 @@ class LinkedSpace(Space):
             portals: The portals of its plan.
         """
         self.__dict__.update(base.__dict__)
-        self.base, self.portals = base, tuple(portals)
+        self.base = base
+        self.portals = tuple(portals)
         self._cache_searches()
         self._passings: list[Passing] = []
         owner = np.arange(base.parts)
@@ -374,7 +379,8 @@ class LinkedSpace(Space):
 
         The way is the shortest, in straight lines and with the times of portals as metres.
         """
-        base, metre = self.base, self.plan.lattice.units_per_m
+        base = self.base
+        metre = self.plan.lattice.units_per_m
         goal_part = base.part_near(*goal)
         queue: list[tuple[float, int, PointXY, list[Passing]]] = [(0.0, 0, start, [])]
         best: dict[PointXY, float] = {}
@@ -454,7 +460,8 @@ def grow_shape(corners: F64, radius: float) -> BaseGeometry:
 
 def grow_polygons(polygons: Sequence[Polygon], radius: float) -> list[BaseGeometry]:
     """Grow polygons without holes [lattice] by the octagon of a body; see `grow_shape`."""
-    octagon, solid = _octagon(radius), np.array(polygons, np.object_)
+    octagon = _octagon(radius)
+    solid = np.array(polygons, np.object_)
     grown = np.empty(len(solid), np.object_)
     is_round = shapely.area(solid) >= shapely.area(shapely.convex_hull(solid)) * (1 - CONVEX_SLACK)
     corners, number = shapely.get_coordinates(solid[is_round], return_index=True)
@@ -530,7 +537,8 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
         The rows and columns of the smallest window that holds them, and which of its cells.
     """
     reach = radius * lattice.units_per_m + HALF + SLACK
-    a, b = int(np.ceil(reach)), int(np.ceil(reach * 0.41421357))
+    a = int(np.ceil(reach))
+    b = int(np.ceil(reach * 0.41421357))
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
     convex: BaseGeometry = footprint
     solid_area = footprint.convex_hull.area * (1 - CONVEX_SLACK)

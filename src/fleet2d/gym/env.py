@@ -216,7 +216,8 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         if not life.due:
             raise InputError("the life is over: call reset()")
         life.act({self.robot: self.allowed(action)})
-        step, clock = life.simulation.step, life.simulation.clock
+        step = life.simulation.step
+        clock = life.simulation.clock
         elapsed_s = (step - self._step) * clock.step_us / 1e6
         self._step = step
         reward = self.collect()
@@ -243,7 +244,8 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         """Return the reward since it was collected last."""
         if callable(self.reward):
             return float(self.reward(self))
-        before, self._terms = self._terms, self.present.terms(self.robot, self.reward)
+        before = self._terms
+        self._terms = self.present.terms(self.robot, self.reward)
         return sum(w * (self._terms[name] - before[name]) for name, w in self.reward.items())
 
     def branch(self) -> Self:
@@ -281,7 +283,8 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
     def observe(self, elapsed_s: float) -> tuple[F32, dict[str, Any]]:
         """Return the observation and the information of the present step."""
         life = self.present
-        now, policy = life.now(self.robot), life.policy(self.robot)
+        now = life.now(self.robot)
+        policy = life.policy(self.robot)
         info: dict[str, Any] = {
             "elapsed_s": float(elapsed_s),
             "action_mask": life.mask(self.robot).copy(),
@@ -413,7 +416,8 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
             InputError: The action of a robot that has to choose is missing, masked or out of range;
                 nothing has changed then.
         """
-        life, before = self.life, self.life.simulation.step
+        life = self.life
+        before = self.life.simulation.step
         for robot in life.due:
             if robot not in actions:
                 raise InputError(f"{robot} has to choose: give its action")

@@ -29,7 +29,8 @@ def life_figure(env: RobotEnv, scores: F32 | None = None) -> Figure:
             f"scores are of {len(actions)} actions, the rooms and to rest: got {np.shape(scores)}"
         )
     simulation = env.present.simulation
-    plan, figure = simulation.home.plan, Figure(figsize=figure_size(simulation.home.plan))
+    plan = simulation.home.plan
+    figure = Figure(figsize=figure_size(simulation.home.plan))
     with drawing_style():
         axes = figure.add_axes((0, 0, 1, 1))
         floorplan_axes(plan, axes, names=scores is None)

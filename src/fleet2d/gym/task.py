@@ -26,7 +26,8 @@ from fleet2d.studies.axes import check_count
 FOLDER = Path(__file__).with_name("tasks")
 Split = Literal["train", "test"]
 # Scenarios of one task that are kept, and their homes.
-KEPT, HOMES = 512, 128
+KEPT = 512
+HOMES = 128
 
 REWARDS = {
     "in_view_min": "minutes for which a person is perceived, summed over the people",

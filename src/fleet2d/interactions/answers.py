@@ -217,7 +217,8 @@ class ImportancePart(AnswerPart):
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
         """Add kind and value."""
-        do, worth = now.interaction.do, now.interaction.worth
+        do = now.interaction.do
+        worth = now.interaction.worth
         kind = self.kinds.get(do, KIND_LOGITS[do])
         return kind + self.worth * worth / (worth + self.half_worth)
 

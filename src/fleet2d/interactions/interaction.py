@@ -199,7 +199,8 @@ class RequestQueue:
 
     def take_opportunities(self) -> list[tuple[int, str]]:
         """Return and remove what was considered."""
-        taken, self.opportunities = self.opportunities, []
+        taken = self.opportunities
+        self.opportunities = []
         return taken
 
     def next_changes(self) -> dict[str, datetime]:
@@ -258,7 +259,9 @@ class RequestQueue:
             later: When the person wants to be asked again, if it was deferred.
         """
         if outcome == Outcome.ACCEPTED and not request.is_last_stage:
-            request.is_fetched, request.tries, request.not_before = True, 0, time
+            request.is_fetched = True
+            request.tries = 0
+            request.not_before = time
             return
         request.tries += 1
         may_retry = outcome in (Outcome.DEFERRED, Outcome.IGNORED, Outcome.MISTAKEN)

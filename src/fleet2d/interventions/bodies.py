@@ -239,7 +239,8 @@ class Decide(BodyIntervention):
 
         The body may have been put elsewhere at the same step, after the plan was made.
         """
-        actor, rows = self.actor(world), self.plan["rows"]
+        actor = self.actor(world)
+        rows = self.plan["rows"]
         plan = plan_of(actor, world.step, self.plan)
         if rows and rows[0][0] == world.step * world.clock.step_us:
             _, x, y, heading, away = rows[0]

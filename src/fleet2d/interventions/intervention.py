@@ -222,7 +222,8 @@ class Verb(Codec):
             return value
         if not isinstance(value, Mapping):
             raise problem(f"expected a mapping like {{put: ana, to: kitchen}}, got {value!r}")
-        fields, classes = dict(value), verbs()
+        fields = dict(value)
+        classes = verbs()
         if "do" in fields:
             name = fields.pop("do")
             check_known(name, "intervention", classes, partial(problem_at, ("do",), value=name))

@@ -76,7 +76,8 @@ class Call(RobotIntervention):
 
     def check(self, world: World) -> None:
         """Refuse a call that none of its behaviors responds to."""
-        actor, command = self.actor(world), self.order
+        actor = self.actor(world)
+        command = self.order
         if self.to is not None:
             self.check_reach(world, self.to)
         if not any(behavior.takes(command) for behavior in actor.behaviors):
@@ -504,13 +505,16 @@ class Kidnap(Trouble):
         before = actor.state
         self._put.begin(world)
         if getattr(actor.entity, "localization", None) is not None:
-            after, displacements = actor.state, actor.displacements
+            after = actor.state
+            displacements = actor.displacements
             x, y = before.x - after.x, before.y - after.y
             turn = turn_between(after.heading, before.heading)
             last = displacements[-1] if displacements else None
             if last is not None and last.end > world.step:  # carried off again before it knew
                 displacements[-1] = last._replace(end=world.step)
-                x, y, turn = x + last.x, y + last.y, turn + last.turn
+                x = x + last.x
+                y = y + last.y
+                turn = turn + last.turn
             displacements.append(Displacement(world.step, NEVER, x, y, turn))
         super().begin(world)
 
@@ -531,7 +535,8 @@ def check_camera(actor: Actor, camera: bool | str | None) -> None:
         ScenarioError: The robot doesn't have it, and the message lists those that it has; or it
             perceives what a log has.
     """
-    eyes, name = actor.entity.eyes, camera_name(camera)
+    eyes = actor.entity.eyes
+    name = camera_name(camera)
     if not eyes:
         raise ScenarioError(f"{actor.name} has no camera: give it one")
     source = getattr(actor.entity, "perceives", None)

@@ -146,7 +146,8 @@ class Workspace:
             InputError: It is wrong; the message says where and what to do.
         """
         simulation = self._simulation(scenario, [], None)
-        plan, settings = simulation.home.plan, simulation.scenario.simulation
+        plan = simulation.home.plan
+        settings = simulation.scenario.simulation
         return {
             "users": list(simulation.scenario.users),
             "robots": list(simulation.scenario.robots),

@@ -62,7 +62,8 @@ MAX_LATENESS = 100_000
 MAX_TOLD = 20
 MAX_TEXT = 300
 # A pose that is farther from the one before it was not reached on foot or wheels [m, m/s].
-JUMP_M, JUMP_M_PER_S = 1.0, 5.0
+JUMP_M = 1.0
+JUMP_M_PER_S = 5.0
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
@@ -243,7 +244,8 @@ class Bridge:
                     " fleet2d.live.open_peers(scenario)"
                 )
             self._sources[kind, name] = numbers[address]
-        self._lock, self._dropped = threading.Lock(), 0
+        self._lock = threading.Lock()
+        self._dropped = 0
         self._goals: dict[str, tuple[Sender, Any]] = {}  # who sent each body where
         self._inbox: queue.SimpleQueue[tuple[float, Sender, Any]] = queue.SimpleQueue()
         self._events: list[Event] = []
@@ -309,8 +311,10 @@ class Bridge:
         return post
 
     def _simulate(self) -> None:
-        simulation, step_s = self.simulation, self.simulation.clock.step_us / 1e6
-        began, first = time.monotonic(), simulation.step
+        simulation = self.simulation
+        step_s = self.simulation.clock.step_us / 1e6
+        began = time.monotonic()
+        first = simulation.step
         while not simulation.done:
             if self.speed:
                 due = began + (simulation.step - first) * step_s / self.speed
@@ -340,7 +344,8 @@ class Bridge:
         latest: dict[tuple[str, str], int] = {}
         gone: list[Sender] = []
         with self._lock:
-            dropped, self._dropped = self._dropped, 0
+            dropped = self._dropped
+            self._dropped = 0
         if dropped:
             self.counts["received"] += dropped
             self.counts["too many"] += dropped
@@ -427,7 +432,8 @@ class Bridge:
 
     def _compare(self, pose: PoseMessage, sender: Sender) -> None:
         """Tell a pose that doesn't follow from the one before it."""
-        name, step = pose.entity, self.simulation.step
+        name = pose.entity
+        step = self.simulation.step
         before, last, x, y = self._poses.get(name, (sender, step, pose.x, pose.y))
         self._poses[name] = sender, step, pose.x, pose.y
         passed_s = (step - last) * self.simulation.clock.step_us / 1e6
@@ -559,7 +565,8 @@ def _wait(until: float, lead_s: float) -> None:
 @contextmanager
 def _prompt_threads() -> Iterator[None]:
     """Let neither other threads nor garbage collection hold this one up for long."""
-    interval, was_enabled = sys.getswitchinterval(), gc.isenabled()
+    interval = sys.getswitchinterval()
+    was_enabled = gc.isenabled()
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()  # what is there stays to the end: looking through it takes 0.1 s

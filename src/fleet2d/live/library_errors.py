@@ -48,7 +48,8 @@ def libraries_told(tell: Callable[[str], object]) -> Iterator[None]:
             tell(printable(one_line(f"a thread ended: {_described(args.exc_value)}", MAX_TEXT)))
 
     for logger in loggers:
-        logger.handlers, logger.propagate = [handler], False
+        logger.handlers = [handler]
+        logger.propagate = False
     threading.excepthook = tell_thread
     try:
         yield

@@ -177,7 +177,8 @@ class WebSocketPeer(Peer):
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Begin to serve."""
-        self._hello, self._post = json.dumps(hello(simulation)), post
+        self._hello = json.dumps(hello(simulation))
+        self._post = post
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def _serve(self, connection: Any) -> None:
@@ -280,7 +281,8 @@ Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT
     """
     with errors_as(InputError, of=PydanticCustomError):
         parts = parse_peer_address(address)
-    host, port = parts.hostname or "127.0.0.1", parts.port
+    host = parts.hostname or "127.0.0.1"
+    port = parts.port
     if parts.scheme == "udp":
         return UdpPeer(host, port or 0)
     if parts.scheme == "ws":

@@ -89,7 +89,8 @@ class RosbridgePeer(Peer):
         self._topics[topic].subscribe(receive)
 
     def _map(self, simulation: Simulation) -> dict[str, Any]:
-        plan, lattice = simulation.home.plan, simulation.home.plan.lattice
+        plan = simulation.home.plan
+        lattice = simulation.home.plan.lattice
         info = {
             "map_load_time": self._stamp(0),
             "resolution": lattice.cell,
@@ -105,7 +106,9 @@ class RosbridgePeer(Peer):
         present = {name: body for name, body in frame.bodies.items() if not body["away"]}
         transforms = []
         for name, body in present.items():
-            x, y, heading = body["x"], body["y"], body["heading"]
+            x = body["x"]
+            y = body["y"]
+            heading = body["heading"]
             pose = _pose(x, y, heading)
             is_robot = name in self._robots
             parent, child = (f"{name}/odom", f"{name}/base_link") if is_robot else ("map", name)
@@ -131,7 +134,9 @@ class RosbridgePeer(Peer):
         }
 
     def _odometry(self, step: int, name: str, body: Any) -> dict[str, Any]:
-        x, y, heading = body["x"], body["y"], body["heading"]
+        x = body["x"]
+        y = body["y"]
+        heading = body["heading"]
         before = self._last.get(name, (x, y, heading))
         self._last[name] = x, y, heading
         speed = math.hypot(x - before[0], y - before[1]) / self._step_s
@@ -166,7 +171,8 @@ class RosbridgePeer(Peer):
         header = self._header(step, "map")
         detections = []
         for row in rows:
-            user, pose = row["user"] or "unknown", _pose(row["x"], row["y"], 0.0)
+            user = row["user"] or "unknown"
+            pose = _pose(row["x"], row["y"], 0.0)
             hypothesis = {"class_id": user, "score": 1.0}
             result = {"hypothesis": hypothesis, "pose": {"pose": pose, "covariance": EXACT}}
             box = {"center": pose, "size": {"x": 0.4, "y": 0.4, "z": 1.7}}
@@ -246,7 +252,8 @@ def contents_of(topic: str, name: str, kind: str, message: object) -> Iterator[C
         text = f"{topic} is in the frame {one_line(frame)!r}: only poses in {MAP!r} count"
         yield PeerFault("in other frames", text, is_message=True)
         return
-    position, turn = stamped.pose.position, stamped.pose.orientation
+    position = stamped.pose.position
+    turn = stamped.pose.orientation
     content: dict[str, Any] = {"type": kind, "entity": name}
     content |= {"to": [position.x, position.y]} if kind == "goal" else dict(position)
     stamp_ns = stamped.header.stamp.sec * 1_000_000_000 + stamped.header.stamp.nanosec

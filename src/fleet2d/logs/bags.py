@@ -101,7 +101,10 @@ def _poses(
 def _of_topic(reader: Any, path: Path, topic: str) -> tuple[StampedPoses, list[str]]:
     connections = [c for c in reader.connections if c.topic == topic and c.msgtype in _POSES]
     FIXES.check(sum(c.msgcount for c in connections), path, LogError)
-    stamps, recorded, frames, rows = list[int](), list[int](), list[str](), list[list[float]]()
+    stamps = list[int]()
+    recorded = list[int]()
+    frames = list[str]()
+    rows = list[list[float]]()
     bodies: dict[str, None] = {}
     for connection, time, data in reader.messages(connections):
         message = reader.deserialize(data, connection.msgtype)

@@ -110,7 +110,8 @@ def read_detections(
         )
         fixes, label, labels = _from_table(table)
     local = fixes.local(path, "detections", time_zone=time_zone, sort=sort)
-    xy, heading = np.stack([fixes.x, fixes.y], 1)[local.row], fixes.heading[local.row]
+    xy = np.stack([fixes.x, fixes.y], 1)[local.row]
+    heading = fixes.heading[local.row]
     log = (path, "detections", local.first_day, local.time_us, xy, heading, tuple(fixes.notes))
     return RobotDetections(*log, label=label[local.row], labels=labels, unit_m=fixes.unit_m)
 
@@ -122,7 +123,8 @@ _LabelledFixes = tuple[RawFixes, I64, tuple[str, ...]]
 def _from_table(table: LogTable) -> _LabelledFixes:
     if not table.rows.num_rows:
         raise LogError(f"{table.path} holds no detection")
-    label, labels = np.full(len(table.line), -1, np.int64), tuple[str, ...]()
+    label = np.full(len(table.line), -1, np.int64)
+    labels = tuple[str, ...]()
     if "user" in table.named:
         label, labels = _codes(table.texts("user"))
     return RawFixes.of(table), label, labels
@@ -146,7 +148,9 @@ def _from_bag(
         connection, fields = _topic(reader, path, topic, columns)
         FIXES.check(connection.msgcount, path, LogError)
         depth = {"z": f"{fields['x'][:-1]}z"} if fields["x"].endswith(".x") else {}
-        stamps, recorded, frames = list[int](), list[int](), list[str]()
+        stamps = list[int]()
+        recorded = list[int]()
+        frames = list[str]()
         rows: list[list[float]] = []
         users: list[str | None] = []
         number = 0

@@ -133,7 +133,8 @@ class FrameLink:
         if self.is_static:  # the last one counts
             return motions.where(np.full(len(time), len(self.rows) - 1))
         order = np.argsort(self.time, kind="stable")
-        own, motions = self.time[order], motions.where(order)
+        own = self.time[order]
+        motions = motions.where(order)
         before = np.maximum(np.searchsorted(own, time, side="right") - 1, 0)
         after = np.minimum(before + 1, len(own) - 1)
         share = np.clip((time - own[before]) / np.maximum(own[after] - own[before], 1), 0.0, 1.0)
@@ -154,7 +155,9 @@ class FrameTree:
 
     def __init__(self, reader: Any, path: Path) -> None:
         """Take an open bag."""
-        self._reader, self.path, self.notes = reader, path, list[str]()
+        self._reader = reader
+        self.path = path
+        self.notes = list[str]()
 
     @cached_property
     def links(self) -> dict[str, FrameLink]:
@@ -198,7 +201,8 @@ class FrameTree:
         Raises:
             LogError: A frame has two parents, or is its own ancestor.
         """
-        up, down = self._chain(frame), self._chain(target)
+        up = self._chain(frame)
+        down = self._chain(target)
         common = next((name for name in up if name in down), None)
         if common is None:
             return None
@@ -281,7 +285,8 @@ class StampedPoses(NamedTuple):
         Raises:
             LogError: No transforms lead from their frame to the target.
         """
-        place, turn = self.motions.place.copy(), self.motions.turn.copy()
+        place = self.motions.place.copy()
+        turn = self.motions.turn.copy()
         names = np.array(self.frames, object)
         is_known = np.ones(len(names), bool)
         for frame in dict.fromkeys(self.frames):

@@ -237,7 +237,8 @@ class _Row(NamedTuple):
         label = self.words[-1]
         activity = label if len(self.words) == 1 else ""
         room = AWAY if activity.lower() in LEAVING else label
-        begin_us, end_us = since(first_day, self.begin), since(first_day, self.end)
+        begin_us = since(first_day, self.begin)
+        end_us = since(first_day, self.end)
         return Reading(begin_us, end_us, room, activity, self.line)
 
 

@@ -236,7 +236,8 @@ def begin_of_run(
             f" {log.days - 1}{since}: by the calendar of the run, the log is from {of_log}, the run"
             f" from {of_run}; choose another 'day', or set simulation.start"
         )
-    early, late = np.count_nonzero(ends < begin_us), np.count_nonzero(begins >= end_us)
+    early = np.count_nonzero(ends < begin_us)
+    late = np.count_nonzero(begins >= end_us)
     if not early + late:
         return begin_us, ()
     return begin_us, (
@@ -319,12 +320,19 @@ def parse_time(text: str, path: Path, line: int, *, day_first: bool | None = Non
             f" {one_line(text)!r}"
         )
     if match[1]:
-        year, month, day = match[1], match[3], match[4]
+        year = match[1]
+        month = match[3]
+        day = match[4]
     elif match[6] == "." or day_first:
-        day, month, year = match[5], match[7], match[8]
+        day = match[5]
+        month = match[7]
+        year = match[8]
     else:
-        month, day, year = match[5], match[7], match[8]
-    hour, half = int(match[9]), (match[13] or "").upper()
+        month = match[5]
+        day = match[7]
+        year = match[8]
+    hour = int(match[9])
+    half = (match[13] or "").upper()
     micros = int((match[12] or "").ljust(6, "0")[:6])
     try:
         if half and not 1 <= hour <= 12:

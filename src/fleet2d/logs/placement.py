@@ -140,7 +140,10 @@ class LogFrame(Settings):
         (lx, ly), (px, py) = _mean(log), _mean(plan)
         ax = ay = size = 0.0
         for (x, y), (u, v) in zip(log, plan, strict=True):
-            x, y, u, v = x - lx, y - ly, u - px, v - py
+            x = x - lx
+            y = y - ly
+            u = u - px
+            v = v - py
             ax += x * u + y * v
             ay += x * v - y * u
             size += x * x + y * y

@@ -71,7 +71,9 @@ class RawFixes(NamedTuple):
     @classmethod
     def of(cls, table: LogTable, chosen: Bool | None = None) -> Self:
         """Return the fixes of a table; `chosen` are those that count, bool (n,)."""
-        x, y, unit = table.numbers("x"), table.numbers("y"), table.unit("x")
+        x = table.numbers("x")
+        y = table.numbers("y")
+        unit = table.unit("x")
         notes = [] if unit is None else [f"positions are in {unit}, as the names of columns say"]
         if chosen is not None and not chosen.all():
             notes.append(f"{np.count_nonzero(~chosen)} fixes of other ids were left out")
@@ -79,13 +81,15 @@ class RawFixes(NamedTuple):
 
     def local(self, path: Path, noun: str, *, time_zone: str | None, sort: bool) -> LocalTimes:
         """Return the local times of those with a position; see `Stamps.local`."""
-        chosen, is_placed = self.chosen, np.isfinite(self.x) & np.isfinite(self.y)
+        chosen = self.chosen
+        is_placed = np.isfinite(self.x) & np.isfinite(self.y)
         if chosen is None:
             chosen = np.ones(len(is_placed), bool)
         without = np.count_nonzero(chosen & ~is_placed)
         if without:
             self.notes.append(f"{without} {noun} without a position were left out")
-        usable, notes = chosen & is_placed, self.notes
+        usable = chosen & is_placed
+        notes = self.notes
         return self.stamps.local(path, noun, usable, notes, time_zone=time_zone, sort=sort)
 
 
@@ -110,7 +114,8 @@ def localize(
     last = np.append(np.diff(time_us) > 0, True)
     if not last.all():
         notes.append(f"of {np.count_nonzero(~last)} fixes at equal times the last counts")
-        time_us, row = time_us[last], row[last]
+        time_us = time_us[last]
+        row = row[last]
     xy = np.stack([x, y], 1)[row]
     columns = (first_day, time_us, xy, heading[row], tuple(notes))
     return PositionLog(path, layout, *columns, unit_m=unit_m)

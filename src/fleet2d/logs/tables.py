@@ -101,14 +101,16 @@ def read_table(path: Path) -> tuple[pa.Table, I64]:
 
 def _read_csv(path: Path) -> tuple[pa.Table, I64]:
     """Read a CSV file with commas, semicolons or tabs, in UTF-8 or UTF-16, all cells as text."""
-    content, encoding = read_bytes(path, LOG_BYTES, LogError), encoding_of(path)
+    content = read_bytes(path, LOG_BYTES, LogError)
+    encoding = encoding_of(path)
     if encoding == "utf-16":
         content = content.decode(encoding).encode()
     content = content.removeprefix(codecs.BOM_UTF8)
     head, _, rest = content.partition(b"\n")
     names_excel = head.lower().startswith(b"sep=")  # so Excel names the delimiter
     if names_excel:
-        delimiter, content = head.decode().strip()[4:] or "\t", rest
+        delimiter = head.decode().strip()[4:] or "\t"
+        content = rest
     else:
         delimiter = max("\t;,", key=re.sub('"[^"]*"', "", head.decode()).count)
     names: list[str] = next(_rows(content.partition(b"\n")[0], delimiter), [])
@@ -131,7 +133,8 @@ def _rows(content: bytes, delimiter: str) -> Any:
 
 def _first_lines(rows: Any) -> I64:
     """Return the line in which each row after the head begins; blank lines are no rows."""
-    lines, begin = [], 1
+    lines = []
+    begin = 1
     for row in rows:
         if row:
             lines.append(begin)
@@ -145,10 +148,12 @@ def _named_unit(column: str, quantity: str) -> tuple[str, str | None]:
     >>> _named_unit("Position X [mm]", "x"), _named_unit("pos_x", "x")
     (('position_x', 'mm'), ('pos_x', None))
     """
-    name, unit = column.strip().lower(), None
+    name = column.strip().lower()
+    unit = None
     match = _UNIT.fullmatch(name)
     if match and (told := match[2] or match[3] or match[4]) in UNITS.get(quantity, {}):
-        name, unit = match[1], told
+        name = match[1]
+        unit = told
     return re.sub(r"[\s-]+", "_", name.strip()), unit
 
 
@@ -197,7 +202,8 @@ class LogTable:
             LogError: It can't be read, a quantity is unknown, or one that is needed has no column.
         """
         rows, line = read_table(path)
-        known, named = rows.column_names, dict(columns)
+        known = rows.column_names
+        named = dict(columns)
         if len(set(known)) < len(known):
             twice = next(name for name in known if known.count(name) > 1)
             raise LogError(f"{path} has two columns {twice!r}: rename one of them")
@@ -245,7 +251,8 @@ class LogTable:
         Raises:
             LogError: It holds something else, so that different texts may have become equal.
         """
-        column, name = self.column(quantity), self.named[quantity]
+        column = self.column(quantity)
+        name = self.named[quantity]
         if pa.types.is_floating(column.type) or pa.types.is_temporal(column.type):
             raise LogError(
                 f"{self.path}: the column {name!r} holds {column.type}: write names and ids as text"
@@ -328,7 +335,8 @@ class LogTable:
         Raises:
             LogError: They tell different ones.
         """
-        unit, other = self.unit("x"), self.unit("y")
+        unit = self.unit("x")
+        other = self.unit("y")
         if unit != other:
             raise LogError(
                 f"{self.path}: x and y have different units: {self.named['x']} and"
@@ -344,7 +352,8 @@ class LogTable:
         """
         if "heading" not in self.named:
             return np.full(len(self.line), np.nan)
-        heading, unit = self.numbers("heading"), self.unit("heading")
+        heading = self.numbers("heading")
+        unit = self.unit("heading")
         wide = np.flatnonzero(np.abs(heading) > 2 * np.pi)
         if unit is None and len(wide):
             name = self.named["heading"]
@@ -358,8 +367,11 @@ class LogTable:
 
     def stamps(self) -> Stamps:
         """Return the times of the rows; those with a zone are UTC."""
-        column, path, line = self.column("time"), self.path, self.line
-        kind, unit = column.type, self.unit("time")
+        column = self.column("time")
+        path = self.path
+        line = self.line
+        kind = column.type
+        unit = self.unit("time")
         is_utc = unit in ZONES
         unit_s = None if unit is None or is_utc else float(UNITS["time"][unit])
         is_empty = pc.is_null(column)

@@ -20,7 +20,8 @@ from fleet2d.storage.bags import LATEST_SIMULATED_NS
 
 # A longer step forward is one of the clock, or a log of two stays [us].
 JUMP_US = 7 * DAY_US
-EARLIEST_US, LATEST_US = -2_208_988_800_000_000, 7_258_118_400_000_000
+EARLIEST_US = -2_208_988_800_000_000
+LATEST_US = 7_258_118_400_000_000
 """The years 1900 and 2200 [us since 1970]."""
 
 MAX_TIMESTAMP_NS = 8e18  # of nanoseconds since 1970
@@ -163,7 +164,8 @@ def _jumps(time_us: I64, line: I64) -> list[str]:
     steps = np.diff(time_us)
     if not len(steps) or (largest := int(steps.max())) < JUMP_US:
         return []
-    at, count = line[int(steps.argmax()) + 1], np.count_nonzero(steps >= JUMP_US)
+    at = line[int(steps.argmax()) + 1]
+    count = np.count_nonzero(steps >= JUMP_US)
     such = f" ({count} such lines)" if count > 1 else ""
     return [f"line {at}: the time jumps forward by {largest / DAY_US:.1f} days there{such}"]
 
@@ -191,7 +193,8 @@ def parse_texts(
         return Stamps(values, line, True, is_utc or kind.tz is not None)
     if day_first is None:
         day_first = _shown_order(texts, path, line)
-    epoch, moments = datetime(1970, 1, 1), []
+    epoch = datetime(1970, 1, 1)
+    moments = []
     for at, text in zip(line.tolist(), texts.to_pylist(), strict=True):
         moments.append(parse_time(text, path, at, day_first=day_first))
     zones = {moment.tzinfo is not None for moment in moments}

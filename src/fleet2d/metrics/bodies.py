@@ -88,7 +88,8 @@ class Travel(Metric):
             self.relocations.setdefault(robot, 0)
             changes = np.flatnonzero((np.diff(poses.xy, axis=0) != 0).any(axis=1)) + 1
             for begin, end in pairwise([0, *changes.tolist(), len(history)]):
-                place, steps = poses.at(begin), end - begin
+                place = poses.at(begin)
+                steps = end - begin
                 standing = place, steps + (standing[1] if standing[0] == place else 0)
                 if standing[1] >= rest_steps:
                     last = self.last_rest.setdefault(robot, place)

@@ -82,7 +82,8 @@ class Interactions(Metric):
         """Return {robot: {user: {number: value}}}."""
         result: dict[str, Any] = {}
         for robot, user in sorted(self.wanted.keys() | self.told):
-            count, numbers = self.wanted[robot, user], {}
+            count = self.wanted[robot, user]
+            numbers = {}
             if count:
                 records = self.records.get((robot, user), [])
                 numbers = _summary(records, count, float(self.worth[robot, user]))
@@ -241,7 +242,8 @@ class TimingRegret(Metric):
                 life.answers[user].months.pass_time(request.state, life.time(record.step))
                 states.append(request.state)
         if record.outcome:
-            name, outcome = record.text.rpartition(" ")[0], Outcome(record.outcome)
+            name = record.text.rpartition(" ")[0]
+            outcome = Outcome(record.outcome)
             for state in states:
                 life.answers[user].months.addressed(state, name, outcome, record.willingness)
 
@@ -258,8 +260,11 @@ class _LifeOfPeriod:
     """What users do in the steps of a history."""
 
     def __init__(self, history: History, state: Present, activities: dict[str, str]) -> None:
-        self.start, self.step_s, self.answers = state.start, history.step_s, history.answer_models
-        self._first, self._rooms = history.first, state.home.rooms
+        self.start = state.start
+        self.step_s = history.step_s
+        self.answers = history.answer_models
+        self._first = history.first
+        self._rooms = state.home.rooms
         self._poses = {user: history.poses(user) for user in state.users}
         self._activities = {user: ([-1], [activities.get(user, "")]) for user in state.users}
         for event in history.events:
@@ -279,7 +284,8 @@ class _LifeOfPeriod:
 
     def circumstances(self, wanted: Wanted, step: int) -> Circumstances | None:
         """Return how a well-placed robot would find the person; None: not at home."""
-        user, at = wanted.interaction.to, step - self._first
+        user = wanted.interaction.to
+        at = step - self._first
         poses = self._poses[user]
         if poses.away[at]:
             return None

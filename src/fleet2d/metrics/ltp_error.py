@@ -115,7 +115,8 @@ def rank_correlation(truth: F64, estimate: F64) -> F64:
     """
     true = np.sign(truth[..., :, None] - truth[..., None, :])
     signs = true * np.sign(estimate[..., :, None] - estimate[..., None, :])
-    pairs, balance = np.abs(true).sum(axis=(-2, -1)), signs.sum(axis=(-2, -1))
+    pairs = np.abs(true).sum(axis=(-2, -1))
+    balance = signs.sum(axis=(-2, -1))
     return np.where(pairs > 0, balance / np.maximum(pairs, 1), 1.0)
 
 
@@ -130,7 +131,8 @@ def steps_in_places(history: History, state: Present) -> I64:
 
 def steps_by_hour(history: History, state: Present) -> I64:
     """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
-    steps, step_us = len(history), round(history.step_s * 1e6)
+    steps = len(history)
+    step_us = round(history.step_s * 1e6)
     first_us = micros(state.start - datetime.min) + history.first * step_us  # since a Monday
     hours = np.arange(first_us // HOUR_US, -(-(first_us + steps * step_us) // HOUR_US))
     hour_begins = np.maximum(-((first_us - hours * HOUR_US) // step_us), 0)
@@ -335,7 +337,8 @@ class LtpError(LongTermMetric):
         home, _ = shares(counts, 1)
         weight = counts[:, :-1].sum(axis=1).astype(np.float64)
         some = weight > 0
-        weight, estimate = weight[some] / weight.sum(), presence.by_hour_of_week(user)[some]
+        weight = weight[some] / weight.sum()
+        estimate = presence.by_hour_of_week(user)[some]
         columns = self._distances(home[some], estimate)
         return {name: float((values * weight).sum()) for name, values in columns.items()}
 

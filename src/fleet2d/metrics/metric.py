@@ -209,7 +209,8 @@ def kaplan_meier(times: Sequence[float], happened: Sequence[bool]) -> list[tuple
         >>> kaplan_meier([1.0, 2.0, 2.0, 5.0], [True, False, True, False])
         [(1.0, 0.75), (2.0, 0.5)]
     """
-    share, curve = 1.0, list[tuple[float, float]]()
+    share = 1.0
+    curve = list[tuple[float, float]]()
     for time in sorted({t for t, h in zip(times, happened, strict=True) if h}):
         at_risk = sum(t >= time for t in times)
         events = sum(t == time and h for t, h in zip(times, happened, strict=True))

@@ -68,7 +68,8 @@ class ReachTime(Metric):
         step_us = round(history.step_s * 1e6)
         every = max(1, -(-micros(self.every) // step_us))
         calls = np.arange(-history.first % every, len(history), every)
-        space, lattice = state.home.space(self.radius), state.home.plan.lattice
+        space = state.home.space(self.radius)
+        lattice = state.home.plan.lattice
         for pair in pairs_of(history, state):
             key = (pair.robot, pair.user)
             seconds = self.seconds.setdefault(key, [])
@@ -193,7 +194,8 @@ class TimeToFind(Metric):
         self.done: dict[str, list[SearchRecord]] = {}
         self.driven: dict[str, float] = {}  # distance of each robot before the period [m]
         self.last: dict[str, tuple[float, float]] = {}
-        self.end, self.step_s = 0, 1.0
+        self.end = 0
+        self.step_s = 1.0
 
     def update(self, history: History, state: Present) -> Any:
         """Update the searches; return a row for each that ended."""
@@ -223,15 +225,20 @@ class TimeToFind(Metric):
         return self.driven.get(robot, 0.0) + np.cumsum(lengths)
 
     def _begin(self, history: History, state: Present, event: Event, metres: float) -> SearchRecord:
-        i, user = event.step - history.first, history.poses(event.detail)
-        robot, at_home, ideal = event.entity, not bool(user.away[i]), 0.0
+        i = event.step - history.first
+        user = history.poses(event.detail)
+        robot = event.entity
+        at_home = not bool(user.away[i])
+        ideal = 0.0
         if at_home:
             ideal = self._ideal(state.home, history.poses(robot).at(i), user.at(i))
         return SearchRecord(robot, event.detail, event.step, 0.0, "open", at_home, metres, ideal)
 
     def _end(self, history: History, event: Event, metres: float) -> SearchRecord:
-        search, end = self.open.pop(event.entity), event.event
-        i, user = event.step - history.first, history.poses(search.user)
+        search = self.open.pop(event.entity)
+        end = event.event
+        i = event.step - history.first
+        user = history.poses(search.user)
         gap = np.array(history.poses(event.entity).at(i)) - user.at(i)
         if end == "found" and (user.away[i] or float((gap * gap).sum()) > self.sight**2):
             end = "false"
@@ -240,15 +247,18 @@ class TimeToFind(Metric):
 
     def _ideal(self, home: Home, robot: tuple[float, float], user: tuple[float, float]) -> float:
         """Return the shortest distance to drive until a robot could see a user [m]."""
-        plan, space = home.plan, home.space(self.radius)
+        plan = home.plan
+        space = home.space(self.radius)
         lattice = plan.lattice
-        start, target = lattice.point_at(robot), lattice.point_at(user)
+        start = lattice.point_at(robot)
+        target = lattice.point_at(user)
         part = space.part_at(*start)
         route = None if part < 0 else _route(space, part, start, target)
         if route is None:
             return 0.0
         legs = _lengths(route)
-        total, along = float(legs.sum()), np.append(0.0, np.cumsum(legs))
+        total = float(legs.sum())
+        along = np.append(0.0, np.cumsum(legs))
         at = np.append(np.arange(0.0, total, lattice.units_per_m / 10), total)
         points = np.stack([np.interp(at, along, route[:, k]) for k in (0, 1)], axis=1)
         points = np.rint(points).astype(np.int64)
@@ -333,7 +343,8 @@ class Blocking(Metric):
         """Count the steps in which a user walks into a robot."""
         for pair in pairs_of(history, state):
             key = (pair.robot, pair.user)
-            is_near, xy = pair.distance < self.clearance, pair.user_poses.xy
+            is_near = pair.distance < self.clearance
+            xy = pair.user_poses.xy
             # A step leads from one pose to the next: the first from the last of the last period.
             start, was_near, was_blocked = self.last.get(
                 key, (pair.user_poses.at(0), bool(is_near[0]), False)
@@ -386,7 +397,8 @@ class Intrusion(Metric):
         """Count the steps in each zone; return a row for each robot and user."""
         rows = []
         for pair in pairs_of(history, state):
-            distance, key = pair.distance, (pair.robot, pair.user)
+            distance = pair.distance
+            key = (pair.robot, pair.user)
             near = np.flatnonzero(distance < max(ZONES.values()))
             near = near[in_sight(state.home.plan, pair, near)]
             counts, _ = np.histogram(distance[near], [0.0, *ZONES.values()])

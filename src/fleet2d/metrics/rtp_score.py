@@ -71,7 +71,8 @@ def top_k(probability: F64, truth: I64, k: int) -> F64:
         [1.0, 1.0]
     """
     true = _of(probability, truth)[:, np.newaxis]
-    above, equal = (probability > true).sum(axis=1), (probability == true).sum(axis=1)
+    above = (probability > true).sum(axis=1)
+    equal = (probability == true).sum(axis=1)
     return np.clip((k - above) / equal, 0, 1)
 
 
@@ -154,7 +155,8 @@ def murphy(probability: F64, truth: I64, masses: int = GROUP_COUNT) -> Murphy:
     count = max(len(truth), 1)
     reliability = uncertainty = 0.0
     for place in range(probability.shape[1]):
-        forecast, true = probability[:, place], (truth == place).astype(np.float64)
+        forecast = probability[:, place]
+        true = (truth == place).astype(np.float64)
         size, difference = _grouped(forecast, true, masses)
         reliability += float((difference * difference / np.maximum(size, 1)).sum()) / count
         share = float(true.sum()) / count
@@ -348,7 +350,8 @@ class RtpScore(Metric):
         """Return the probability of each scored place: rooms, and away unless `given_home`."""
         if shares is None:
             return None
-        home, away = shares[0], shares[1][..., np.newaxis]
+        home = shares[0]
+        away = shares[1][..., np.newaxis]
         return home if self.given_home else np.concatenate([home * (1 - away), away], axis=-1)
 
     def _sightings(self, user: str, row: int, history: History, ends: I64) -> tuple[I64, I64]:
@@ -366,8 +369,10 @@ class RtpScore(Metric):
     def _score(
         self, user: str, beliefs: list[F64 | None], gap: I64, last: I64, history: History, ends: I64
     ) -> ScoredBins:
-        poses, index = history.poses(user), ends - history.first
-        is_away, room = poses.away[index], poses.room[index].astype(np.int64)
+        poses = history.poses(user)
+        index = ends - history.first
+        is_away = poses.away[index]
+        room = poses.room[index].astype(np.int64)
         belief = beliefs[0]
         assert belief is not None
         reference = np.full_like(belief, np.nan)[:, : None if beliefs[1:] else 0]
@@ -401,7 +406,8 @@ class RtpScore(Metric):
         return results
 
     def _means(self, scored: ScoredBins) -> dict[str, float]:
-        belief, truth = scored.belief, scored.truth
+        belief = scored.belief
+        truth = scored.truth
         means = _mean_scores(belief, truth)
         guess = _mean_scores(self._naive(scored), truth)
         scores = {

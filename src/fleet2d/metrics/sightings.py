@@ -36,7 +36,8 @@ class Sightings(Metric):
         """Count detections by step."""
         observations = history.observations
         order = np.argsort(observations.user, kind="stable")  # of one user still in order of step
-        index, step = observations.user[order], observations.step[order]
+        index = observations.user[order]
+        step = observations.step[order]
         first = np.append(True, (index[1:] != index[:-1]) | (step[1:] != step[:-1]))[: len(step)]
         known = index[first & (index >= 0)]
         steps_seen = np.bincount(known, minlength=len(state.users)).tolist()
@@ -87,9 +88,11 @@ class Detections(Metric):
 
     def update(self, history: History, state: Present) -> Any:
         """Count looks and observations; return a row for each robot and user."""
-        robots, users = len(state.robots), len(state.users)
+        robots = len(state.robots)
+        users = len(state.users)
         self.names = state.robots, state.users
-        counts, observations = history.looks, history.observations
+        counts = history.looks
+        observations = history.observations
         looks = np.zeros((robots, users, 2), np.int64)
         np.add.at(looks, counts.robot, np.stack([counts.in_view, counts.detected], axis=-1))
         confusion = np.zeros((robots, users + 1, users + 1), np.int64)
@@ -127,7 +130,9 @@ class Detections(Metric):
         return {robot: self._numbers(r) for r, robot in enumerate(self.names[0])}
 
     def _numbers(self, robot: int) -> dict[str, Any]:
-        looks, counts, users = self.looks[robot], self.confusion[robot], self.names[1]
+        looks = self.looks[robot]
+        counts = self.confusion[robot]
+        users = self.names[1]
         real = counts[:-1].sum()
         ratios = {
             "precision": (real, counts.sum()),
@@ -185,7 +190,8 @@ class Coverage(Metric):
 
     def update(self, history: History, state: Present) -> Any:
         """Read the layers of first steps; return a row for each robot."""
-        self.step_s, inside = history.step_s, state.home.plan.room_of_cell >= 0
+        self.step_s = history.step_s
+        inside = state.home.plan.room_of_cell >= 0
         for robot in state.robots:
             layer = f"first_seen.{robot}"
             if layer in state.home.layers:

@@ -129,7 +129,8 @@ def run_months(name: str, options: PaperOptions) -> "Study":
         ComponentError: A month failed.
         InputError: polars or scipy is missing, or the folder can't be used.
     """
-    content, folder = study_content(name, *options.size(name)), options.folder / name
+    content = study_content(name, *options.size(name))
+    folder = options.folder / name
     executor = make_executor("serial" if options.workers == 1 else "local", options.workers)
     months = study(content, folder, executor=executor, fail_fast=True, changed="redo")
     if months.counts.failed:

@@ -74,7 +74,9 @@ def rows(options: PaperOptions, days: int) -> list[dict[str, Any]]:
 
     cases: list[dict[str, Any]] = []
     for row in read_table()["rows"]:
-        is_real, frames, users = row["case"] == REAL_MAP, row.get("frames"), row.get("users")
+        is_real = row["case"] == REAL_MAP
+        frames = row.get("frames")
+        users = row.get("users")
         if (is_real and options.map is None) or (options.quick and not row.get("quick", True)):
             continue
         overrides = [] if frames else [f"simulation.duration.days={row.get('months', 1) * days}"]
@@ -96,7 +98,8 @@ def rows(options: PaperOptions, days: int) -> list[dict[str, Any]]:
 def measure_rows(options: PaperOptions) -> Result:
     """Measure all rows, one process at a time."""
     runs, days = options.size(SPEED)
-    content, cases = read_table(), rows(options, days)
+    content = read_table()
+    cases = rows(options, days)
     with _one_core(), progress_bar(show=sys.stderr.isatty()) as progress:
         shown = progress.track(cases, description=SPEED)
         measured = [{**row, **measure(row, runs)} for row in shown]
@@ -165,7 +168,8 @@ def _one_core() -> Iterator[None]:
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     if "failed" in row:
         return row["case"], "failed", "", "", "", row["failed"]
-    times, peak = row["seconds"], row.get("peak_mb")
+    times = row["seconds"]
+    peak = row.get("peak_mb")
     middle = f"{median(times):.2f}"
     spread = f" ({min(times):.2f} to {max(times):.2f})" if len(times) > 1 else ""
     return (

@@ -30,7 +30,9 @@ MONDAY = date(2026, 1, 5)
 INTERRUPTION_ROLES = (INTERRUPTS, FINISHES)
 # End of a strip [hours]: a day lasts from waking up to the next waking up.
 HOURS = 34
-SLEEP_COLOR, AWAY_COLOR, NEED_COLOR = "#3b4a63", "#e3e3e3", "#111111"
+SLEEP_COLOR = "#3b4a63"
+AWAY_COLOR = "#e3e3e3"
+NEED_COLOR = "#111111"
 GREYS = (14, 15)  # indices of the palette: grey is for activities away from home
 
 Days = Sequence[tuple[date, Sequence[Episode]]]
@@ -114,7 +116,8 @@ def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:
     return colors | {n: AWAY_COLOR for n in sorted(names) if persona.activity(n).away}
 
 
-LIKELIEST_COLOR, EVERY_COLOR = "#b5305c", "#2c6fb0"
+LIKELIEST_COLOR = "#b5305c"
+EVERY_COLOR = "#2c6fb0"
 
 
 class Forecasts(NamedTuple):
@@ -140,7 +143,8 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
         ArtifactError: The run has no such table, or it isn't of presence.
     """
     table = run.arrow(algorithm)
-    users, places = run.manifest["entities"]["users"], len(run.plan.rooms) + 1
+    users = run.manifest["entities"]["users"]
+    places = len(run.plan.rooms) + 1
     # An update has a row for each place of each user, and of anyone; the last place is away.
     if not {"user", "room", "share"} <= set(table.column_names) or ANYONE not in set(
         table["user"][: places * (len(users) + 1)].to_pylist()
@@ -153,11 +157,14 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
     at = "at" if "at" in table.column_names else "step"  # of `belief_table`, of the others
     steps = table[at].to_numpy().reshape(shares.shape)[:, 0, 0]
     every = timedelta(microseconds=run.manifest["step_us"])
-    beliefs, truths = [], []
+    beliefs = []
+    truths = []
     for row, user in enumerate(users):
         path = rebuild_path(run, run.plan, user, every)
-        room, is_away = path.room[steps].astype(np.int64), path.away[steps]
-        home, away = shares[:, row, :-1], shares[:, row, -1]
+        room = path.room[steps].astype(np.int64)
+        is_away = path.away[steps]
+        home = shares[:, row, :-1]
+        away = shares[:, row, -1]
         belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
         has_place = is_away | (room >= 0)  # some cells belong to no room
         beliefs.append(belief[has_place])
@@ -202,7 +209,8 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
         InputError: The file name has another suffix, or the file can't be written.
     """
     places = np.arange(belief.shape[1])
-    highest, is_right = belief.max(axis=1), top_k(belief, truth, 1)
+    highest = belief.max(axis=1)
+    is_right = top_k(belief, truth, 1)
     is_true = (truth[:, None] == places).astype(np.float64)
     with picture(path, 5.2, 6.4) as figure:
         curve, counts = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
@@ -242,7 +250,8 @@ SHOWN_AS = {
 }
 # Events by which a robot is no longer with the person whom it addressed.
 ENDS_TALK = frozenset({"delivered", "collects", "withdraws", "interaction_over"})
-MOOD_COLOR, EXPIRED_COLOR = "#aa3377", "#9a9a9a"
+MOOD_COLOR = "#aa3377"
+EXPIRED_COLOR = "#9a9a9a"
 WEEKLY_FROM = 70  # days of a run from which on bars are weeks
 
 
@@ -363,7 +372,8 @@ def _draw_annoyance(run: Run, robot: str, user: str, axes: Axes) -> None:
     tables = run.tables
     if "interactions" not in tables or "annoyance" not in tables["interactions"].column_names:
         return
-    table, hours_of = tables["interactions"], _hours_of(run)
+    table = tables["interactions"]
+    hours_of = _hours_of(run)
     columns = (table[name].to_pylist() for name in ("asked_at", "robot", "addressed", "annoyance"))
     pairs = zip(*columns, strict=True)
     rows = [(hours_of(at) / 24, value) for at, *pair, value in pairs if pair == [robot, user]]

@@ -149,7 +149,8 @@ def _fit(space: tuple[float, float], width: float, height: float, most: float) -
     Its width and height are in multiples of its size. It is upright if it would be too small.
     """
     across, up = space
-    flat, upright = min(across / width, up / height), min(up / width, across / height)
+    flat = min(across / width, up / height)
+    upright = min(up / width, across / height)
     is_upright = flat < min(upright, SMALL_PT)
     return min(upright if is_upright else flat, most), 90 * is_upright
 
@@ -159,8 +160,10 @@ def _symbol(item: PlacedObject) -> list[F64]:
     forward = np.array([np.cos(item.heading), np.sin(item.heading)])
     left = np.array([-forward[1], forward[0]])
     corners = shapely.get_coordinates(item.footprint)
-    along, across = corners @ forward, corners @ left
-    width, depth = float(np.ptp(across)), float(np.ptp(along))
+    along = corners @ forward
+    across = corners @ left
+    width = float(np.ptp(across))
+    depth = float(np.ptp(along))
     middle = (across.min() + width / 2) * left + (along.min() + depth / 2) * forward
     lines = []
     for shape in SYMBOLS.get(item.type, ()):
@@ -177,7 +180,9 @@ def _symbol(item: PlacedObject) -> list[F64]:
 
 def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
     """Draw doors with their swing, as plans do, and openings without a door as dotted lines."""
-    leaves, swings, openings = [], [], []
+    leaves = []
+    swings = []
+    openings = []
     for door in plan.doorways:
         start, end = np.array(door.start), np.array(door.end)
         if not door.leaf:
@@ -393,7 +398,8 @@ def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
         runs = np.stack([np.stack([first, line + 1], 1), np.stack([end + 1, line + 1], 1)], 1)
         lines.append(runs[..., ::-1] if flip else runs)
     corners = plan.lattice.to_metres(np.concatenate(lines) * UNITS_PER_CELL)
-    color, dashes = BORDER_COLOR, (0, (4, 3))
+    color = BORDER_COLOR
+    dashes = (0, (4, 3))
     axes.add_collection(LineCollection(list(corners), lw=0.6, color=color, ls=dashes, zorder=1.5))
 
 

@@ -115,7 +115,8 @@ class Overlay:
     def legend(self, x: float, y: float, lines: Sequence[Sequence[Chip]], size: float) -> None:
         """Draw lines of chips from (x, y) downwards."""
         for number, chips in enumerate(lines):
-            left, middle = x, y - number * LINE_IN
+            left = x
+            middle = y - number * LINE_IN
             for chip in chips:
                 self._picture(chip, left, middle)
                 style = {"color": QUIET_COLOR, "va": "center_baseline"}
@@ -127,7 +128,8 @@ class Overlay:
 
     def _picture(self, chip: Chip, x: float, y: float) -> None:
         """Draw the picture of a chip, its left middle at (x, y)."""
-        side, axes = CHIP_IN, self.axes
+        side = CHIP_IN
+        axes = self.axes
         low = y - side / 2
         middle = (x + side / 2, y)
         if chip.kind in ("room", "seen"):
@@ -218,7 +220,8 @@ def trace_of(run: Run, plan: FloorPlan, name: str, number: int, *, robot: bool) 
     color = bucket.get(name, {}).get("color")
     if not (isinstance(color, str) and is_color_like(color)):
         color = body_color(number, robot=robot)
-    reason, trace = "no key frames were stored", partial(BodyTrace, name, color, robot)
+    reason = "no key frames were stored"
+    trace = partial(BodyTrace, name, color, robot)
     if "key_frames" in run.tables:
         try:
             return _from_key_frames(run, plan, name, trace)
@@ -228,7 +231,8 @@ def trace_of(run: Run, plan: FloorPlan, name: str, number: int, *, robot: bool) 
 
 
 def _from_key_frames(run: Run, plan: FloorPlan, name: str, trace: NewTrace) -> BodyTrace:
-    step_us, steps = run.manifest["step_us"], run.manifest["steps"]
+    step_us = run.manifest["step_us"]
+    steps = run.manifest["steps"]
     stride = max(1, min(SAMPLE_US, steps * step_us // SAMPLES) // step_us)
     every_us = stride * step_us
     path = rebuild_path(run, plan, name, timedelta(microseconds=every_us))
@@ -244,7 +248,8 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
     """
     keys = _rows(run, "key_frames", name, ("x", "y", "heading", "away"), "kind")
     if (keys["kind"] == "walk").any():
-        step_us, steps = run.manifest["step_us"], run.manifest["steps"]
+        step_us = run.manifest["step_us"]
+        steps = run.manifest["steps"]
         if steps > WALKED_STEPS or step_us > MAX_LEG_GAP_US:
             return NO_LEGS, ""
         path = rebuild_path(run, plan, name, timedelta(microseconds=step_us))
@@ -312,7 +317,9 @@ def _are_ends(xy: F64, state: F64) -> Bool:
         xy: Positions [m], float64 (n, 2).
         state: What else differs at the ends of ways, (n, k).
     """
-    to, on, way = xy[1:-1] - xy[:-2], xy[2:] - xy[1:-1], xy[2:] - xy[:-2]
+    to = xy[1:-1] - xy[:-2]
+    on = xy[2:] - xy[1:-1]
+    way = xy[2:] - xy[:-2]
     beside = np.abs(to[:, 0] * way[:, 1] - to[:, 1] * way[:, 0])
     is_straight = ((to * on).sum(axis=1) > 0) & (beside <= STRAIGHT_M * np.hypot(*way.T))
     is_same = (state[1:] == state[:-1]).all(axis=1)
@@ -501,8 +508,11 @@ def best_view(
     sector_area = (far**2 - near**2) * np.deg2rad(camera["angle_deg"]) / 2
     scored: list[tuple[float, CameraView]] = []
     for i in index[robot.room[index] >= 0].tolist():
-        step, xy, heading = int(robot.step[i]), robot.xy[i], float(robot.heading[i])
-        region, users = field_of_view(plan, xy, heading, camera), seen_xy[seen_at == step]
+        step = int(robot.step[i])
+        xy = robot.xy[i]
+        heading = float(robot.heading[i])
+        region = field_of_view(plan, xy, heading, camera)
+        users = seen_xy[seen_at == step]
         score = region.area * (1.0 if region.area < 0.97 * sector_area else 0.3)
         if len(users):
             score *= min(1.0, float(np.hypot(*(users - xy).T).max()) / FAR_APART_M)

@@ -258,7 +258,8 @@ class _Picture:
     """The picture of a run: its data are collected, then drawn part by part."""
 
     def __init__(self, run: Run) -> None:
-        self.run, self.plan = run, run.plan
+        self.run = run
+        self.plan = run.plan
         clock = run.clock
         self.start, self.step_us, self.steps = clock.start, clock.step_us, clock.steps
         self.notes: list[str] = []

@@ -30,10 +30,14 @@ SCALE = "scale"
 """Label of an image whose colours stand for numbers: they are the same in both themes."""
 
 # Lightness of Oklab: white becomes the dark background of the page, the darkest ink almost white.
-BACKGROUND, INK, DARKEST = 0.207, 0.93, 0.31
+BACKGROUND = 0.207
+INK = 0.93
+DARKEST = 0.31
 # Colours between these chromas are blended: below they are inverted, above they become brighter.
-PALE, STRONG = 0.118, 0.14
-LEAST, LIFT = 0.44, 0.5
+PALE = 0.118
+STRONG = 0.14
+LEAST = 0.44
+LIFT = 0.5
 
 # Björn Ottosson, "A perceptual color space for image processing" (2020).
 _CONES = np.array(
@@ -108,7 +112,8 @@ def _dark(rgb: F64) -> F64:
     """Convert colours of the light theme to the dark one: RGB, float64 (n, 3)."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     lab = np.cbrt(linear @ _CONES.T) @ _LAB.T
-    light, chroma = lab[:, 0], np.hypot(lab[:, 1], lab[:, 2])
+    light = lab[:, 0]
+    chroma = np.hypot(lab[:, 1], lab[:, 2])
     inverted = np.clip(BACKGROUND + (1 - light) * (INK - BACKGROUND) / (1 - DARKEST), 0, 1)
     strong = np.clip((chroma - PALE) / (STRONG - PALE), 0, 1)
     lab[:, 0] = (1 - strong) * inverted + strong * (LEAST + LIFT * light)

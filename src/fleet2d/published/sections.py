@@ -197,7 +197,8 @@ def convert_simulation(reader: ConfigReader, step: timedelta) -> dict[str, Any]:
     duration = reader.duration("duration")
     if duration is None:
         raise reader.wrong("missing; add the duration of the run", "duration")
-    length, step_length = format_duration(duration), format_duration(step)
+    length = format_duration(duration)
+    step_length = format_duration(step)
     if duration < step:
         raise reader.wrong(f"{length} is shorter than one step, delta: {step_length}", "duration")
     if duration % step:
@@ -497,7 +498,8 @@ def _range(reader: ConfigReader, *, ignores_limits: bool) -> list[float]:
         reader.remark(f"missing; {distance:g} m is used", "distance")
     limits = ("min_distance", "max_distance")
     lowest, highest = (reader.number(limit, minimum=0) for limit in limits)
-    near, far = lowest or 0.0, distance if highest is None else highest
+    near = lowest or 0.0
+    far = distance if highest is None else highest
     if near >= far:
         raise reader.wrong(
             f"the camera would see from {near:g} m to {far:g} m: the farthest distance must be"

@@ -76,7 +76,8 @@ class Distribution(NamedTuple):
             return low if low >= self.knots[-1] else high
         at = first + draws.below(last - first)
         i = at >> _BITS
-        below, above = self.knots[i], self.knots[i + 1]
+        below = self.knots[i]
+        above = self.knots[i + 1]
         value = below + ((above - below) * (at & (_ONE - 1)) >> _BITS)
         return min(max(value, low), high)
 
@@ -86,11 +87,14 @@ class Distribution(NamedTuple):
         >>> uniform(0, 80).quantiles(4)
         [10, 30, 50, 70]
         """
-        first, wide, last = self.first, self.last - self.first, len(self.knots) - 1
+        first = self.first
+        wide = self.last - self.first
+        last = len(self.knots) - 1
         values = []
         for k in range(count):
             i, part = divmod(first + wide * (2 * k + 1) // (2 * count), _ONE)
-            below, above = self.knots[i], self.knots[min(i + 1, last)]
+            below = self.knots[i]
+            above = self.knots[min(i + 1, last)]
             value = below + ((above - below) * part >> _BITS)
             values.append(min(max(value, self.shortest), self.longest))
         return values
@@ -200,11 +204,15 @@ def log(x: float) -> float:
     """
     halvings = 0
     while x > 1.5:
-        x, halvings = x / 2, halvings + 1
+        x = x / 2
+        halvings = halvings + 1
     while x < 0.75:
-        x, halvings = x * 2, halvings - 1
+        x = x * 2
+        halvings = halvings - 1
     ratio = (x - 1) / (x + 1)
-    square, power, total = ratio * ratio, ratio, 0.0
+    square = ratio * ratio
+    power = ratio
+    total = 0.0
     for n in range(1, 40, 2):
         total += power / n
         power *= square

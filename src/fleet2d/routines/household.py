@@ -101,7 +101,8 @@ def with_absences(
     absences = [period.seconds_since(midnight) for period in away]
     if visits is not None:
         stays = sorted(period.seconds_since(midnight) for period in visits)
-        lasts, firsts = [begin, *(b for _, b in stays)], [*(a for a, _ in stays), end]
+        lasts = [begin, *(b for _, b in stays)]
+        firsts = [*(a for a, _ in stays), end]
         absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
     for leaves, returns in absences:
         first, last = max(leaves, begin), min(returns, end)

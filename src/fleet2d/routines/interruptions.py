@@ -257,7 +257,8 @@ def interrupt(
         private: The rooms that others may use; None: nobody does.
     """
     rows = [(rules.numbers[name], begin, end, room) for name, begin, end, _, room, _ in day]
-    use, rooms = None, list[Sequence[int]]()
+    use = None
+    rooms = list[Sequence[int]]()
     if private is not None:
         use = private.use
         rooms = [private.of(name) if name in rules.exclusive else () for name in rules.names]

@@ -27,7 +27,8 @@ Days = tuple[int, int]
 
 FOREVER = date.max.toordinal()
 # When those who are away leave on the first day, and are back on the last.
-LEAVES, RETURNS = timedelta(hours=10), timedelta(hours=18)
+LEAVES = timedelta(hours=10)
+RETURNS = timedelta(hours=18)
 
 
 class Year:
@@ -64,7 +65,8 @@ class Year:
 
     def template(self, base: Persona, ordinal: int, usual: str) -> str:
         """Return the name of the plan of a day among `base.plans`, given the usual one."""
-        name, event = usual, self._becomes(ordinal)
+        name = usual
+        event = self._becomes(ordinal)
         if event is not None:
             name = f"{event}.{self.persona(base, ordinal).day(date.fromordinal(ordinal))}"
         for each in self.on(ordinal):
@@ -121,7 +123,9 @@ def _draw(event: YearEvent, key: np.uint64, year: int) -> list[Days]:
 
 
 def _by_chance(every: timedelta, event: YearEvent, draws: Draws, year: int) -> list[Days]:
-    gap, now_s, found = exponential(seconds(every)), 0, list[Days]()
+    gap = exponential(seconds(every))
+    now_s = 0
+    found = list[Days]()
     first, last = date(year, 1, 1).toordinal(), date(year, 12, 31).toordinal()
     while True:
         now_s += gap.draw(draws)
@@ -151,7 +155,8 @@ def _date(day: str, year: int) -> int:
 
 
 # The number of days that are kept after they were drawn, of a person and of a household.
-CACHED_DAYS, CACHED_HOUSEHOLD_DAYS = 3, 8
+CACHED_DAYS = 3
+CACHED_HOUSEHOLD_DAYS = 8
 # The shortest absence after which a member is welcomed [s].
 LONG_GONE_S = 1800
 WELCOME = "welcome"
@@ -209,7 +214,8 @@ class Life:
 
     def wake(self, ordinal: int) -> int:
         """Return when a day begins [s since its midnight]."""
-        plan, draws = self.template(ordinal), Draws(self._wake, ordinal)
+        plan = self.template(ordinal)
+        draws = Draws(self._wake, ordinal)
         if plan.recorded is not None:
             return plan.recorded.days[planner.draw_source(plan.recorded, draws)].begins[0]
         return plan.wake.draw(draws)
@@ -407,8 +413,10 @@ class Lives:
         visits = self.household.visits.get(name)
         if not isinstance(visits, RandomVisits):
             return visits or None
-        key, found = stream_key(self._seed, self._path, f"visits {name}"), []
-        begins, takes = starts(visits, 0), visits.takes.table()
+        key = stream_key(self._seed, self._path, f"visits {name}")
+        found = []
+        begins = starts(visits, 0)
+        takes = visits.takes.table()
         for day in (ordinal - 1, ordinal, ordinal + 1):
             draws = Draws(key, day)
             if draws.below(visits.every // SECOND) < DAY_S:
@@ -464,7 +472,8 @@ class Lives:
             activity = joint.activity or name
             begin = starts(joint, 0).draw(draws)
             takes = (joint.takes or find_activity(activity, {}).takes).table().draw(draws)
-            at, duration = uniform(begin, begin), uniform(takes, takes)
+            at = uniform(begin, begin)
+            duration = uniform(takes, takes)
             job = Job(name, activity, at, duration, until=planner.NEVER, needed=False)
             jobs.append((job, joint.who))
         return jobs

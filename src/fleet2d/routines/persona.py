@@ -88,7 +88,8 @@ class Manners(Settings):
 
 
 FOLDER = Path(__file__).parent
-BUNDLED, PARTS = FOLDER / "personas", FOLDER / "parts"
+BUNDLED = FOLDER / "personas"
+PARTS = FOLDER / "parts"
 Dates = tuple[date | tuple[date, date], ...]
 
 
@@ -129,7 +130,8 @@ class Timing(Settings):
         """Refuse a mean outside of its limits."""
         if self.at is not None and self.between is not None:
             first, last = self.between
-            at, last = self.at - first, last - first
+            at = self.at - first
+            last = last - first
             if at % DAY > last % DAY:
                 raise problem(
                     f"'at' {units.format_time_of_day(self.at)} is not within 'between'"
@@ -263,7 +265,9 @@ def holds_on(dates: Dates, day: date) -> bool:
     return any(first <= day <= last for first, last in spans)
 
 
-FIRST_YEAR, LAST_YEAR = 2000, 2050  # whose public holidays are looked up
+# whose public holidays are looked up
+FIRST_YEAR = 2000
+LAST_YEAR = 2050
 
 
 class YearEvent(Settings):
@@ -357,7 +361,8 @@ class Persona(Settings):
         """Require that every activity, day and event that is named exists."""
         named: list[tuple[tuple[str, ...], str]] = []
         for name, day in self.days.items():
-            of_day, recorded = ("days", name), [n for r in day.recorded for n in r.activities]
+            of_day = ("days", name)
+            recorded = [n for r in day.recorded for n in r.activities]
             named += [((*of_day, "do", key), task.activity or key) for key, task in day.do.items()]
             named += [((*of_day, "recorded"), activity) for activity in recorded]
             named += [((*of_day, "leisure", pastime), pastime) for pastime in day.leisure or ()]

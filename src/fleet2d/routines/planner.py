@@ -36,8 +36,10 @@ from fleet2d.runtime.determinism import Draws
 
 MILLION = 1_000_000
 NEVER = 1 << 40  # later than any time [s]
-PLANNED, INTERRUPTS = Role.PLANNED.value, Role.INTERRUPTS.value
-RESUMES, FINISHES = Role.RESUMES.value, Role.FINISHES.value
+PLANNED = Role.PLANNED.value
+INTERRUPTS = Role.INTERRUPTS.value
+RESUMES = Role.RESUMES.value
+FINISHES = Role.FINISHES.value
 REST = "rest"
 SLEEP = "sleep"
 
@@ -150,7 +152,8 @@ class DayPlan:
     @cached_property
     def activities(self) -> tuple[str, ...]:
         """The activities by their numbers in the core."""
-        jobs, pastimes = (job.activity for job in self.jobs), (p.activity for p in self.pastimes)
+        jobs = (job.activity for job in self.jobs)
+        pastimes = (p.activity for p in self.pastimes)
         return tuple(dict.fromkeys((REST, SLEEP, *jobs, *pastimes)))
 
     @cached_property
@@ -186,9 +189,11 @@ def plan_day(
     Raises:
         RuntimeError: The tasks fit in no order.
     """
-    use, rooms = None, list[Sequence[int]]()
+    use = None
+    rooms = list[Sequence[int]]()
     if private is not None:
-        use, own = private.use, private.rooms
+        use = private.use
+        own = private.rooms
         rooms = [
             private.of(job.activity) if job.exclusive or job.activity in own else ()
             for job in plan.jobs
@@ -199,7 +204,9 @@ def plan_day(
             f"the tasks of day {plan.name!r} fit in no order between waking and bedtime:"
             " shorten some, widen their times, or give some a probability below 1"
         )
-    names, tasks = plan.activities, [*(job.task for job in plan.jobs), ""]  # the last is job -1
+    # the last is job -1
+    names = plan.activities
+    tasks = [*(job.task for job in plan.jobs), ""]
     return [
         new_episode((names[activity], begin, end, tasks[job], room, PLANNED))
         for activity, begin, end, job, room in rows
@@ -208,7 +215,8 @@ def plan_day(
 
 # Probability of a switch to another day where one is possible [in 16ths], and the largest distance
 # between the times of both days [s].
-CROSSING, REACH_S = 6, 1200
+CROSSING = 6
+REACH_S = 1200
 # An episode that lasts at least this many times the shift ends at its recorded time.
 TAKES_UP = 4
 MIN_EPISODE_S = 30  # minimum duration of an episode that was recorded with at least as much
@@ -241,7 +249,8 @@ def parse_day(value: Any) -> RecordedDay:
         return value
     if not isinstance(value, str):
         raise problem(f"expected a recorded day like '07:00 wash, …, 30:45 end', got {value!r}")
-    times, names = [], []
+    times = []
+    names = []
     for entry in value.split(","):
         time, _, name = entry.strip().partition(" ")
         parts = time.split(":")
@@ -328,9 +337,11 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
     Returns:
         The episodes until `next_wake`, without a gap; the last one is sleep.
     """
-    d, i = first, 0
+    d = first
+    i = 0
     day = recording.days[d]
-    now, shift = day.begins[0], 0
+    now = day.begins[0]
+    shift = 0
     result: list[Episode] = []
     while i < len(day.activities) - 1 and now < next_wake - MIN_EPISODE_S:
         over = day.begins[i + 1]
@@ -379,12 +390,14 @@ def in_free_rooms(
     """
     if private is None:
         return list(day)
-    alone, result = {*exclusive, *private.rooms}, list[Episode]()
+    alone = {*exclusive, *private.rooms}
+    result = list[Episode]()
     begin = day[0].begin
     for episode in day:
         room = ANY_ROOM
         if episode.activity in alone:
-            rooms, duration = private.of(episode.activity), episode.end - episode.begin
+            rooms = private.of(episode.activity)
+            duration = episode.end - episode.begin
             slot = private.use.free(rooms, episode.begin, episode.begin, duration, episode.end)
             if slot is None or slot[1] < episode.end:
                 continue  # the episode before lasts longer, or the next one begins earlier

@@ -199,7 +199,8 @@ def draw_episodes(
     """
     first = date.fromordinal(ordinal).weekday() * DAY_STEPS
     now, age = state
-    begin, blocks = DAWN_S, []
+    begin = DAWN_S
+    blocks = []
     for k in range(DAY_STEPS):
         age = min(age + 1, AGES)
         if draws.below(ONE) >= group.leave[first + k, now, age - 1]:
@@ -210,7 +211,9 @@ def draw_episodes(
             continue
         end = DAWN_S + k * STEP_S + 1 + draws.below(STEP_S)
         blocks.append(SurveyEpisode(CATEGORIES[now], begin, end))
-        now, age, begin = goal, 0, end
+        now = goal
+        age = 0
+        begin = end
     blocks.append(SurveyEpisode(CATEGORIES[now], begin, DAWN_S + DAY_STEPS * STEP_S))
     if blocks[-1].begin == blocks[-1].end:
         blocks.pop()
@@ -273,7 +276,8 @@ def _add_pastimes(
 ) -> None:
     """Fill an episode of 'other' with pastimes, by their shares in the survey."""
     pastimes = group.facts["other"]
-    names, shares = list(pastimes), [share for share, _ in pastimes.values()]
+    names = list(pastimes)
+    shares = [share for share, _ in pastimes.values()]
     while begin < end:
         name = names[draw_weighted(draws, shares)]
         mean_s = pastimes[name][1] * 60

@@ -54,7 +54,8 @@ def _day_plan(persona: "Persona", name: str, day: "DayTemplate") -> DayPlan:
     if day.recorded:
         wakes = [recorded.begins[0] for recorded in day.recorded]
         beds = [recorded.begins[-1] for recorded in day.recorded]
-        wake, sleep = uniform(min(wakes), max(wakes)), uniform(min(beds), max(beds))
+        wake = uniform(min(wakes), max(wakes))
+        sleep = uniform(min(beds), max(beds))
         return DayPlan(name, wake, sleep, 0, (), (), to_recording(day.recorded))
     wake = starts(day.wake, 0)
     dawn = wake.shortest
@@ -125,7 +126,8 @@ def starts(timing: "Timing", dawn: int) -> Distribution:
     first, last = (dawn, dawn + DAY_S) if timing.between is None else window(timing.between, dawn)
     if timing.at is None:
         return uniform(first, last)
-    spread, at = seconds(timing.spread), seconds_of_day(timing.at, first)
+    spread = seconds(timing.spread)
+    at = seconds_of_day(timing.at, first)
     if timing.between is None:
         reach = int(REACH * spread)
         first, last = max(at - reach, 0), at + reach
@@ -214,7 +216,8 @@ def _check_appointments(name: str, plan: DayPlan) -> None:
 def _check_room(name: str, plan: DayPlan, next_wake: int) -> None:
     """Refuse a template whose needed tasks don't fit in the shortest day."""
     needed = [job.needed for job in plan.jobs]
-    wake, key = plan.wake.longest, np.uint64(0)
+    wake = plan.wake.longest
+    key = np.uint64(0)
     first: tuple[list[int], list[int]] | None = None
     for trial in range(TRIALS):
         order, latest, fits = plan.core.draw_order(
@@ -241,7 +244,9 @@ def _conflict(jobs: Sequence[Job], latest: Sequence[int], wake: int) -> tuple[tu
     for i, job in enumerate(jobs):
         now = now if job.starts is None else max(now, job.starts.shortest)
         if now > latest[i]:
-            until, takes = i, 0  # the first job from here on whose own window limits its beginning
+            # the first job from here on whose own window limits its beginning
+            until = i
+            takes = 0
             while latest[until] == latest[until + 1] - jobs[until].takes.shortest:
                 takes += jobs[until].takes.shortest
                 until += 1

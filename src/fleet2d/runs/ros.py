@@ -21,7 +21,9 @@ from fleet2d.storage.bags import ros_types
 if TYPE_CHECKING:
     import pyarrow as pa
 
-MAP, TRANSFORMS, STATIC = "/map", "/tf", "/tf_static"
+MAP = "/map"
+TRANSFORMS = "/tf"
+STATIC = "/tf_static"
 UNKNOWN = "unknown"
 """The class of a detected person who wasn't recognized."""
 PERSON_M = 0.4
@@ -118,7 +120,8 @@ class RosMessages:
         for blocks in self.blocks():
             messages = []
             for topic, times, sizes, data in blocks:
-                ends, content = np.cumsum(sizes), data.tobytes()
+                ends = np.cumsum(sizes)
+                content = data.tobytes()
                 places = zip(times.tolist(), (ends - sizes).tolist(), ends.tolist(), strict=True)
                 messages += [Message(t, topic, content[a + self._margin : b]) for t, a, b in places]
             messages.sort(key=itemgetter(0))
@@ -167,8 +170,10 @@ class RosMessages:
         return bytes(self.types.serialize_cdr(message, message.__msgtype__))
 
     def _map(self, time: int) -> bytes:
-        plan, header = self._run.plan, self._header(time, "map")
-        lattice, corner = plan.lattice, self._pose(*plan.lattice.origin, 0.0, 1.0)
+        plan = self._run.plan
+        header = self._header(time, "map")
+        lattice = plan.lattice
+        corner = self._pose(*plan.lattice.origin, 0.0, 1.0)
         size = lattice.cell, lattice.columns, lattice.rows
         info = self._new("nav_msgs/msg/MapMetaData", header.stamp, *size, corner)
         grid = np.where(plan.free, 0, 100).astype(np.int8).ravel()
@@ -240,7 +245,8 @@ class RosMessages:
         dx, dy = np.diff(path.x, prepend=before[0]), np.diff(path.y, prepend=before[1])
         turned = np.diff(path.heading, prepend=before[2])
         turned = (turned + np.pi) % (2 * np.pi) - np.pi
-        cos, sin = np.cos(path.heading), np.sin(path.heading)
+        cos = np.cos(path.heading)
+        sin = np.sin(path.heading)
         speeds = ((dx * cos + dy * sin) / passed, (dy * cos - dx * sin) / passed, turned / passed)
         at = np.flatnonzero(~path.away)
         stamps = self._start_ns + path.step[at] * self._step_ns
@@ -363,7 +369,8 @@ class Template:
 
     def fill(self, topic: str, times: I64, values: Sequence[F64], margin: int) -> Block:
         """Return messages with other times [ns] and numbers, each an array (n,)."""
-        count, size = len(times), margin + len(self._bytes)
+        count = len(times)
+        size = margin + len(self._bytes)
         filled = np.empty((count, size), np.uint8)
         filled[:, margin:] = self._bytes
         for part, numbers in enumerate(np.divmod(times, 1_000_000_000)):

@@ -426,7 +426,8 @@ def layer_table(layer: Layer) -> TableSpec:
 
 def layer_rows(layer: Layer) -> dict[str, NDArray[Any]]:
     """Return the present values of a layer as rows: columns row, column and value."""
-    values, fill = layer.values, np.array(layer.fill)
+    values = layer.values
+    fill = np.array(layer.fill)
     differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
     row, column = np.nonzero(differs)
     kind = DTYPES[LAYER_KINDS[layer.dtype.kind]]

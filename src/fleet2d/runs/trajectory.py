@@ -125,7 +125,8 @@ class PathReader:
             raise ArtifactError(
                 f"every: expected a timedelta like timedelta(seconds=10), got {every!r}"
             )
-        clock, plan = self.clock, self._plan
+        clock = self.clock
+        plan = self._plan
         stride = whole_steps(every, clock.step_us, "every", ArtifactError)
         end = min(end, clock.steps)
         before = -(-first // stride)  # the number of poses before the first one
@@ -149,12 +150,14 @@ class PathReader:
                 " damaged; `fleet2d verify` says which files have changed"
             )
         xs, ys = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1)).T
-        is_away, room = out.away.astype(bool), np.where(out.away, -1, plan.room_of_place[cells])
+        is_away = out.away.astype(bool)
+        room = np.where(out.away, -1, plan.room_of_place[cells])
         return Trajectory(steps, clock.times(steps), xs, ys, in_radians(out.heading), is_away, room)
 
     def _trace(self, begin: int, end: int, stop: int, steps: I64, out: Poses) -> None:
         """Fill in poses of the segment of some key frames, which ends before the step `stop`."""
-        keys, step_us = self._keys, self.clock.step_us
+        keys = self._keys
+        step_us = self.clock.step_us
         if keys["kind"][begin] != WALK:
             part = Breakpoints(*(keys[name][begin:end] for name in Breakpoints._fields))
             apart = int(steps[1] - steps[0]) if len(steps) > 1 else 1

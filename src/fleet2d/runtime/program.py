@@ -65,11 +65,14 @@ class ExternalProgram:
             timeout_s: An answer that takes longer ends the run.
             start: The content of its first message.
         """
-        self._program, self._arguments = program.absolute(), list(arguments)
-        self._timeout_s, self._start = timeout_s, dict(start)
+        self._program = program.absolute()
+        self._arguments = list(arguments)
+        self._timeout_s = timeout_s
+        self._start = dict(start)
         self._state: bytes | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self.wall_s, self.asked = 0.0, 0
+        self.wall_s = 0.0
+        self.asked = 0
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy needs, with the state that the program saves."""
@@ -123,7 +126,8 @@ class ExternalProgram:
             raise ComponentError(
                 f"{self._program} can't be started: {error.strerror or error}"
             ) from error
-        self._process, self._unread = process, bytearray()
+        self._process = process
+        self._unread = bytearray()
         assert process.stdin is not None
         assert process.stdout is not None
         self._ends = process.stdin.fileno(), process.stdout.fileno()
@@ -161,7 +165,8 @@ class ExternalProgram:
             raise self._failure(
                 f"ended with code {process.poll()} instead of answering {content['type']!r}"
             )
-        kind, text = answer.content.get("type", answer.content), answer.content.get("text", "")
+        kind = answer.content.get("type", answer.content)
+        text = answer.content.get("text", "")
         if kind == "error":
             raise self._failure(f"reports: {text}")
         if expected and kind != expected:
@@ -182,7 +187,8 @@ class ExternalProgram:
         poll = select.poll()
         poll.register(from_program, select.POLLIN)
         poll.register(to_program, select.POLLOUT)
-        deadline, needed = time.monotonic() + self._timeout_s, 0
+        deadline = time.monotonic() + self._timeout_s
+        needed = 0
         answer: Answer | None = None
         while True:
             if message:

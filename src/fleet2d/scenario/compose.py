@@ -126,7 +126,8 @@ def _load(
         document = read_document(path, title)
         sizes.append(len(document.places))
         YAML_VALUES.check(sum(sizes), "the scenario", ScenarioError, prefix="more than ")
-        folder, chain = path.parent, (*chain, real)
+        folder = path.parent
+        chain = (*chain, real)
     extended = document.data.pop("extends", None) or []
     parents = extended if isinstance(extended, list) else [extended]
     result = Document()
@@ -283,7 +284,8 @@ def _type_fields(kind: str, name: Any) -> set[str]:
 
 def _refuse_unknown_deletions(base: Document, change: Document) -> None:
     for section in ENTRIES:
-        entries, names = change.data.get(section), base.data.get(section) or {}
+        entries = change.data.get(section)
+        names = base.data.get(section) or {}
         for name, value in entries.items() if isinstance(entries, Mapping) else ():
             if value is None and name not in names:
                 place = change.place((section, name))

@@ -326,11 +326,14 @@ def load_scenario(
     """
     folder = Path.cwd()
     if isinstance(source, str) and "=" in source and not _is_path(source):
-        overrides, source = (source, *overrides), None  # as on the command line
+        # as on the command line
+        overrides = (source, *overrides)
+        source = None
     if isinstance(source, Scenario):
         if not overrides and not settings:
             return source
-        folder, source = source.folder, source.resolved()
+        folder = source.folder
+        source = source.resolved()
     elif isinstance(source, str | Path) and not str(source).startswith("bundled:"):
         folder = Path(source).absolute().parent
     document = compose(source, overrides, {_key(name): v for name, v in settings.items()})
@@ -444,7 +447,8 @@ def describe(*lines: ErrorDetails) -> str:
     expected: list[str] = []
     choices: list[str] = []
     for line in lines:
-        kind, context = line["type"], line.get("ctx", {})
+        kind = line["type"]
+        context = line.get("ctx", {})
         text = next((text for name, text in _EXPECTED.items() if kind.startswith(name)), None)
         if text is not None:
             limits = {k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()}

@@ -199,7 +199,8 @@ def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription
     schema = cls.model_json_schema(schema_generator=_SchemaGenerator)
     if "$ref" in schema:  # it is nested in itself
         schema = schema["$defs"][schema["$ref"].rpartition("/")[2]]
-    properties, required = schema.get("properties", {}), schema.get("required", ())
+    properties = schema.get("properties", {})
+    required = schema.get("required", ())
     return ComponentDescription(
         kind,
         name,

@@ -68,7 +68,8 @@ class Lens(NamedTuple):
     def body(self, radius: float) -> list[tuple[int, int]]:
         """Return the points of a body of `radius` [lattice units] to look at: its centre first."""
         steps = [round(i * TURN / self.points) for i in range(self.points)]
-        along, half = round(radius), UNIT // 2
+        along = round(radius)
+        half = UNIT // 2
         ways = ((kernels.cosine(step), kernels.sine(step)) for step in steps)
         circle = [(int(along * x + half) // UNIT, int(along * y + half) // UNIT) for x, y in ways]
         return [(0, 0), *circle]
@@ -200,7 +201,8 @@ def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableCon
     """Return the cameras of a robot as the kernel's arrays."""
     shape = (len(lenses), len(context.users))
     bodies = np.zeros((*shape, max(lens.points for lens in lenses) + 1, 2), np.int64)
-    reach, widest = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    reach = np.zeros(shape, np.int64)
+    widest = np.zeros(shape, np.int64)
     pans = np.zeros((len(lenses), max(1, *(len(lens.pans) for lens in lenses), 0)), np.int64)
     for c, lens in enumerate(lenses):
         pans[c, : len(lens.pans)] = lens.pans
@@ -240,7 +242,8 @@ def error_tables(
         ScenarioError: A user is unknown, probabilities add up to more than 1, or a rate is above
             one false positive per look.
     """
-    cameras, users = len(lenses), len(context.users)
+    cameras = len(lenses)
+    users = len(context.users)
     models = [errors or Perception() for errors in perceptions]
     sources = 1 + max(len(model.false_positives.spots) for model in models)
     # If no camera errs, no table is ever read.
@@ -368,7 +371,8 @@ def _fill_false_positives(
             f" the limit of one per look ({float(1 / hours):g} per hour at this period)"
         )
     # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
-    term, total = perception.decay(mean), 0.0
+    term = perception.decay(mean)
+    total = 0.0
     for count in range(kernels.MAX_GHOSTS):
         total += term
         tables.ghosts[camera, count] = perception.chance(min(total, 1.0))

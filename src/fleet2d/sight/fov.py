@@ -73,7 +73,8 @@ class VisibleRegion:
         Raises:
             PlacementError: The eye is outside free space or on a wall.
         """
-        self._mesh, self._lattice = plan.sight_mesh, plan.lattice
+        self._mesh = plan.sight_mesh
+        self._lattice = plan.lattice
         self.eye = self._lattice.point_at((x, y))
         self.right, self.wall = visible_region_fast(self._mesh, *self.eye)
         if len(self.right) == 0:
@@ -291,7 +292,8 @@ def _numbers(triangles: I32) -> I32:
 
 def _shared_regions(home: Home, folder: Path) -> Regions:
     """Return the regions of all cells from the file for these walls; create it if missing."""
-    lattice, walls = home.plan.lattice, home.walls
+    lattice = home.plan.lattice
+    walls = home.walls
     digest = hashlib.sha256(f"{FORMAT} {lattice.rows} {lattice.columns}".encode())
     for array in (walls.vertices, walls.triangles, walls.neighbors):
         digest.update(np.ascontiguousarray(array).astype("<i8").tobytes())
@@ -311,7 +313,8 @@ def _shared_regions(home: Home, folder: Path) -> Regions:
         raise ScenarioError(
             f"sight.method.path: {file} is damaged: remove it, and it is created again"
         )
-    start, rest = numbers[: cells + 1], numbers[cells + 1 :]
+    start = numbers[: cells + 1]
+    rest = numbers[cells + 1 :]
     return Regions(_numbers(triangles), start, rest[:pieces], rest[pieces:])
 
 
@@ -363,7 +366,8 @@ class Flashlight(FieldOfView):
 
     def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells are in view: bool (rows, columns)."""
-        cells, lattice = self._lookup(home, x, y, heading, reach), home.plan.lattice
+        cells = self._lookup(home, x, y, heading, reach)
+        lattice = home.plan.lattice
         mask = np.zeros((lattice.rows, lattice.columns), np.bool_)
         box = np.unpackbits(cells.bits, count=cells.rows * cells.columns)
         part = mask[cells.row : cells.row + cells.rows, cells.column : cells.column + cells.columns]

@@ -170,7 +170,8 @@ def cumulative(weights: Mapping[Any, float], order: Sequence[Any]) -> list[int]:
     >>> [x / 2**31 for x in cumulative({"a": 0.25, "c": 0.5}, "abc")]
     [0.25, 0.25, 0.75]
     """
-    total, sums = 0.0, []
+    total = 0.0
+    sums = []
     for name in order:
         total += weights.get(name, 0.0)
         sums.append(chance(total))
@@ -419,7 +420,8 @@ class TakenFor(PerceptionError):
         """Give sightings of these users the names of others."""
         steps = max(1, round(micros(self.lasts) / 1e6 / sightings.step_s))
         at = sightings.step // steps
-        draw, which = sightings.uniform("whether", at=at), sightings.uniform("for whom", at=at)
+        draw = sightings.uniform("whether", at=at)
+        which = sightings.uniform("for whom", at=at)
         user = sightings.user.copy()
         for name, confusable in self.users.items():
             number = self._number(sightings, name)

@@ -188,7 +188,8 @@ class CameraSightings:
         turns = self._numbers("turn_deg", turn_deg, MAX_VALUE) / 360 * (2 * TURN)
         factor = self._numbers("scale", scale, MAX_VALUE)
         added = self._numbers("offset", offset, MAX_VALUE)
-        distance, sines = self.distance, kernels.half_sines()
+        distance = self.distance
+        sines = kernels.half_sines()
         target = np.maximum(0.0, distance * factor + added)
         stretch = target / np.where(distance > 0, distance, 1.0)
         angle = np.rint(turns).astype(np.int64)
@@ -228,7 +229,8 @@ class CameraSightings:
             return draws
         for person in np.unique(self.true_user).tolist():
             rows = np.flatnonzero(self.true_user == person)
-            name, addresses = FALSE_POSITIVE, steps[rows]
+            name = FALSE_POSITIVE
+            addresses = steps[rows]
             if person == NOBODY:  # a look may have several
                 first = np.searchsorted(self.step[rows], self.step[rows])
                 addresses = addresses * MAX_DRAWS_PER_LOOK + (np.arange(len(rows)) - first)

@@ -16,7 +16,9 @@ _BLOCK_BYTES = 1 << 20
 # The list of members of a ZIP archive: some ten thousand take so much [bytes].
 _LIST_BYTES = 1 << 20
 # The end of a ZIP archive has a mark, the size of that list, and a comment.
-_END_MARK, _LIST_SIZE_AT, _END_BYTES = b"PK\5\6", 12, 22
+_END_MARK = b"PK\5\6"
+_LIST_SIZE_AT = 12
+_END_BYTES = 22
 
 
 def unpacked(packed: object, compression: str) -> Iterator[bytes]:

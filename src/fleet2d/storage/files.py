@@ -423,7 +423,8 @@ class FrameWriter:
         Raises:
             OSError: The frames so far can't be written.
         """
-        text, number = description.encode(), self._kinds.index(kind)
+        text = description.encode()
+        number = self._kinds.index(kind)
         header = _HEADER.pack(number, len(text), len(content), _checksum(number, text, content))
         self._buffer += [header, text, content]
         self._size += len(text) + len(content)
@@ -460,13 +461,15 @@ class FrameWriter:
             return
         if undo:
             self.undo()
-        handle, self._handle = self._handle, -1
+        handle = self._handle
+        self._handle = -1
         with suppress(OSError):  # what has to be on the disk was synced before
             os.close(handle)
 
     def _write(self) -> None:
         content = b"".join(self._buffer)
-        self._buffer, self._size = [], 0
+        self._buffer = []
+        self._size = 0
         write_all(self._handle, content)
         self._written += len(content)
 
@@ -495,14 +498,16 @@ def read_frames(path: Path, form: JournalFormat, start: int = 0) -> Iterator[Fra
 
 
 def _complete_frames(file: BinaryIO, kinds: tuple[str, ...]) -> Iterator[Frame]:
-    size, start = os.fstat(file.fileno()).st_size, file.tell()
+    size = os.fstat(file.fileno()).st_size
+    start = file.tell()
     while len(header := file.read(_HEADER.size)) == _HEADER.size:
         number, text_bytes, content_bytes, checksum = _HEADER.unpack(header)
         end = start + _HEADER.size + text_bytes + content_bytes
         # Before anything is read: a damaged size must not request all memory.
         if number >= len(kinds) or end > size:
             return
-        text, content = file.read(text_bytes), file.read(content_bytes)
+        text = file.read(text_bytes)
+        content = file.read(content_bytes)
         if _checksum(number, text, content) != checksum:
             return
         try:

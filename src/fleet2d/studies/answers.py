@@ -97,8 +97,10 @@ class StudyAnswers:
         """
         import polars as pl
 
-        frame, units = self.with_metric(metric, variants), self._units(by, against)
-        limits, better = difference_limits(self.limits(metric)), self.better(metric)
+        frame = self.with_metric(metric, variants)
+        units = self._units(by, against)
+        limits = difference_limits(self.limits(metric))
+        better = self.better(metric)
         ((axis, reference),) = against.items()
         check_axes((axis, *within), self.columns)
         if axis in (*units, *within):
@@ -246,7 +248,8 @@ class StudyAnswers:
         """
         import polars as pl
 
-        frame, units = self.with_metric(metric), self._units(by)
+        frame = self.with_metric(metric)
+        units = self._units(by)
         limits = difference_limits(self.limits(metric))
         rows = []
         for axis in (column for column in self.columns if column not in self.populations):
@@ -345,7 +348,8 @@ def holm(p_values: Sequence[float]) -> list[float]:
     [0.03, 0.06, 0.06, nan]
     """
     known = sorted((p, i) for i, p in enumerate(p_values) if not math.isnan(p))
-    corrected, largest = [math.nan] * len(p_values), 0.0
+    corrected = [math.nan] * len(p_values)
+    largest = 0.0
     for rank, (p, i) in enumerate(known):
         largest = max(largest, min(1.0, p * (len(known) - rank)))
         corrected[i] = largest
@@ -362,8 +366,10 @@ def _difference(pairs: "pl.DataFrame", by: Sequence[str], limits: Limits) -> dic
     """Return the columns of a comparison."""
     units = by_units(pairs, by, "metric", "reference_metric", "difference")
     difference = estimate_units(units, by, "difference", limits)
-    values, references = units["metric"].to_numpy(), units["reference_metric"].to_numpy()
-    reference_mean, differences = float(references.mean()), values - references
+    values = units["metric"].to_numpy()
+    references = units["reference_metric"].to_numpy()
+    reference_mean = float(references.mean())
+    differences = values - references
     deviation = float(differences.std(ddof=1)) if len(differences) > 1 else math.nan
     needed = [
         f"{n} values of {level} (now {difference.spread.units[level]})"
@@ -412,7 +418,8 @@ def variance_ratio(values: Any, references: Any) -> float:
     >>> variance_ratio([1.0, 2.0, 4.0], [1.1, 2.2, 4.0]) > 10
     True
     """
-    first, second = np.asarray(values, np.float64), np.asarray(references, np.float64)
+    first = np.asarray(values, np.float64)
+    second = np.asarray(references, np.float64)
     if len(first) < 2:
         return math.nan
     unpaired = float(first.var(ddof=1) + second.var(ddof=1))

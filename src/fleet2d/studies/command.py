@@ -298,7 +298,8 @@ def _print_plan(checked: "CheckedStudy", workers: int | None, begin_s: float) ->
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
     expected = forecast(checked, executor, checked_s, NoteObserver())
-    variants, homes = len(plan.variants), len(plan.variants.home_keys)
+    variants = len(plan.variants)
+    homes = len(plan.variants.home_keys)
     _print(
         f"\n{variants} variant{'s' * (variants != 1)}, {homes} home{'s' * (homes != 1)},"
         f" {in_words(expected.simulated)} of simulated time: {in_words(expected.shortest)} to"

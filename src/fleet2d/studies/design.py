@@ -105,7 +105,8 @@ def scenario_hashes(content: dict[str, Any], seeds: Sequence[int]) -> Iterator[s
     mark = "a seed stands here"
     marked = {**content, "simulation": {**content["simulation"], SEED: mark}}
     before, _, after = json.dumps(marked, separators=(",", ":")).partition(json.dumps(mark))
-    common, rest = hashlib.sha256(before.encode()), after.encode()
+    common = hashlib.sha256(before.encode())
+    rest = after.encode()
     for seed in seeds:
         digest = common.copy()
         digest.update(str(seed).encode() + rest)

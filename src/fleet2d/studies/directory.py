@@ -41,11 +41,14 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 MISSING = "missing"
-COMPLETE, FAILED = 1, 2  # statuses of variants with results
+# Statuses of variants with results.
+COMPLETE = 1
+FAILED = 2
 LOCK = "lock"
-META, PLAN, SCENARIOS, VARIANTS = (
-    "study.json", "plan.parquet", "scenarios.parquet", "variants.parquet",
-)  # fmt: skip
+META = "study.json"
+PLAN = "plan.parquet"
+SCENARIOS = "scenarios.parquet"
+VARIANTS = "variants.parquet"
 _STATE = b"fleet2d.parts"
 _PLAN_ONLY = ("identity", "scenario", "template", "home_key")  # no columns of `variants`
 
@@ -244,7 +247,8 @@ class StudyDirectory:
                 count = f"the {part.variants} variants of that part"
             except RunDirectoryError as error:
                 self.storage.path(record)  # refuses a link
-                problem, count = str(error).partition(":")[0], "its variants"
+                problem = str(error).partition(":")[0]
+                count = "its variants"
             if part is not None and problem is None:
                 intact.append(part)
                 continue

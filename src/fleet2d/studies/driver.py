@@ -87,7 +87,8 @@ class AdaptiveSchedule(TaskSchedule):
             on_note: Receives a remark for each decision.
         """
         super().__init__(())
-        self._settings, self._design = settings, plan.design
+        self._settings = settings
+        self._design = plan.design
         self._directory, self._on_note = directory, on_note
         self._planned = plan.variants
         self._is_missing = np.zeros(len(plan.variants), np.bool_)
@@ -131,7 +132,8 @@ class AdaptiveSchedule(TaskSchedule):
 
     def _decide(self) -> None:
         """Give up values that are clearly worse, and all further rounds if intervals are narrow."""
-        settings, study = self._settings, Study(self._directory)
+        settings = self._settings
+        study = Study(self._directory)
         ((axis, _),) = settings.against.items()
         # Not those of later rounds, which an interrupted or larger study may have.
         numbers = self._planned.number[self._places].tolist()
@@ -296,7 +298,8 @@ def run_study(
         ArtifactError: Results can't be written; stored results are kept.
         KeyboardInterrupt: Ctrl-C; all workers have ended, and finished variants are stored.
     """
-    observer, directory = observer or Observer(), StudyDirectory(location)
+    observer = observer or Observer()
+    directory = StudyDirectory(location)
     directory.check_empty()
     if not directory.exists():
         check_setups(checked.plan, executor, observer.on_check)
@@ -315,7 +318,8 @@ def run_study(
         keeper = _ResultKeeper(directory, parts)
         counts = Counts(len(variants), len(variants) - len(missing), 0)
         observer.on_start(counts, executor.workers)
-        failed, is_checked = 0, False
+        failed = 0
+        is_checked = False
         schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
         try:
             if adapt is not None:

@@ -279,7 +279,8 @@ class CrewExecutor(ABC, Generic[AnyWorker]):
         """Process the message of a worker; return the event of a task that has ended."""
         match message:
             case Ready():
-                worker.is_ready, self._failed_starts = True, 0
+                worker.is_ready = True
+                self._failed_starts = 0
             case Broken(trace):
                 raise InputError(f"a worker can't be set up:\n{trace}")
             case Done(payload, rss_mb):
@@ -378,7 +379,8 @@ def _worker_environment() -> Iterator[None]:
     Ctrl-C is for the driver, which ends its workers. `spawn` would import the main module, which
     may start a study itself.
     """
-    main, threads = sys.modules["__main__"], os.environ.get("OPENBLAS_NUM_THREADS")
+    main = sys.modules["__main__"]
+    threads = os.environ.get("OPENBLAS_NUM_THREADS")
     sys.modules["__main__"] = ModuleType("__main__")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # there is a worker for each core
     signals = hasattr(signal, "pthread_sigmask") and signal.pthread_sigmask(

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from fleet2d.studies.reader import Study
 
 
-VALUE, DAY = "value", "day"
+VALUE = "value"
+DAY = "day"
 _CLOCK = (VARIANT, "step", "time")
 
 
@@ -44,7 +45,8 @@ def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
     if end in numbers:
         column, selectors = end, middle
     elif numbers:
-        column, selectors = numbers[0], [*middle, end]
+        column = numbers[0]
+        selectors = [*middle, end]
     else:
         return None
     for selector in selectors:
@@ -71,7 +73,8 @@ DPI = 120
 COLORS = (
     "#2c6fb0", "#b5305c", "#3f8a4f", "#c26a12", "#8153b5", "#1f8a8c", "#8a6d3b", "#5b6770",
 )  # fmt: skip
-DARK, PALE = "#2d3138", "#c4c9d0"
+DARK = "#2d3138"
+PALE = "#c4c9d0"
 MAX_LINES = 8
 MAX_LABELS = 24
 MOMENTS = 60  # maximum number of points of a line over time
@@ -153,7 +156,8 @@ def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
     """Draw the mean of a metric by the values of each axis, one panel for each axis."""
     figure, panels = _panels(2.8, len(tables))
     for panel, (axis, table) in zip(panels, tables.items(), strict=True):
-        labels, means = table[axis].to_list(), table["mean"].to_numpy()
+        labels = table[axis].to_list()
+        means = table["mean"].to_numpy()
         ends = _ends(table)
         is_numeric = all(isinstance(label, int | float) for label in labels)
         x = np.array(labels, np.float64) if is_numeric else np.arange(len(labels))

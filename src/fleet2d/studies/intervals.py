@@ -241,12 +241,14 @@ def _codes(levels: Mapping[str, Sequence[Any]], count: int) -> dict[str, I64]:
 
 def _analyse(data: F64, codes: Mapping[str, I64]) -> tuple[Spread, float, float, float]:
     """Return variance components; variance, degrees of freedom and third moment of the mean."""
-    count, units = len(data), {name: int(numbers.max()) + 1 for name, numbers in codes.items()}
+    count = len(data)
+    units = {name: int(numbers.max()) + 1 for name, numbers in codes.items()}
     unit_means = {
         name: np.bincount(numbers, data) / np.bincount(numbers) for name, numbers in codes.items()
     }
     third = sum_in_order(_third_moment(means) / len(means) ** 2 for means in unit_means.values())
-    residuals, squares = data - data.mean(), {}
+    residuals = data - data.mean()
+    squares = {}
     for name, numbers in codes.items():
         means = unit_means[name]
         squares[name] = float(means.var(ddof=1)) / len(means)
@@ -254,7 +256,8 @@ def _analyse(data: F64, codes: Mapping[str, I64]) -> tuple[Spread, float, float,
     residual_freedom = max(count - 1 - sum(n - 1 for n in units.values()), 1)
     residual = float((residuals**2).sum()) / residual_freedom
     share = residual / count
-    variance, freedom = sum_in_order(squares.values()), min(units.values()) - 1.0
+    variance = sum_in_order(squares.values())
+    freedom = min(units.values()) - 1.0
     if len(codes) > 1:
         variance = max(variance - (len(codes) - 1) * share, share)
         parts = [(square, units[name] - 1.0) for name, square in squares.items()]

@@ -138,8 +138,10 @@ def doubly_robust(
         InputError: An action was drawn that the log says can't be, the log has no opportunity, or
             `target` isn't a probability for each.
     """
-    weights, probability = _weights(log, target), np.asarray(target, np.float64)
-    asked, waited = np.asarray(if_asked, np.float64), np.asarray(if_not, np.float64)
+    weights = _weights(log, target)
+    probability = np.asarray(target, np.float64)
+    asked = np.asarray(if_asked, np.float64)
+    waited = np.asarray(if_not, np.float64)
     expected = probability * asked + (1 - probability) * waited
     predicted = np.where(log.asked, asked, waited)
     return _mean_of_days(log, expected + weights * (log.reward - predicted))

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from fleet2d.studies.records import Journal
 
 
-RECORDS, RESULTS, TABLES = "parts", "results", "tables"
+RECORDS = "parts"
+RESULTS = "results"
+TABLES = "tables"
 ROWS_PER_GROUP = 250_000
 GROUPS_IN_MEMORY = 2  # of rows of results
 
@@ -136,7 +138,8 @@ def write_part(storage: Storage, scratch: Path, number: int, journal: "Journal")
     Raises:
         ArtifactError: It can't be written; the journal still holds everything.
     """
-    name, files = part_name(number), []
+    name = part_name(number)
+    files = []
     with writing(storage.location):
         scratch.mkdir(parents=True, exist_ok=True)
         for file in scratch.iterdir():  # left by a crash
@@ -157,7 +160,8 @@ def _write_files(scratch: Path, name: str, journal: "Journal") -> dict[str, Path
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    results, schemas = scratch / f"{name}-results", dict[str, pa.Schema]()
+    results = scratch / f"{name}-results"
+    schemas = dict[str, pa.Schema]()
     rows = journal.results()
     first = next(rows)
     with pq.ParquetWriter(results, first.schema, compression="zstd") as file:
@@ -319,7 +323,8 @@ class ResultRows:
 
         rows = self._row[np.where(numbers < len(self._row), numbers, -1)]
         groups = np.searchsorted(self._first, rows, side="right") - 1
-        places, before = np.full(len(numbers), -1), 0
+        places = np.full(len(numbers), -1)
+        before = 0
         tables = [pa.Table.from_batches([], self._schema)]
         for group in np.unique(groups[rows >= 0]).tolist():
             here = np.flatnonzero(groups == group)
@@ -334,7 +339,8 @@ class ResultRows:
         if group == len(self._groups):
             return self._newest
         part, number = self._groups[group]
-        name, schema = self._parts[part].results, _results_schema(self._storage, self._parts[part])
+        name = self._parts[part].results
+        schema = _results_schema(self._storage, self._parts[part])
         with self._storage.parquet(name) as file:
             table = file.read_row_group(number, use_threads=False)
             return table.select(schema.names).cast(schema)

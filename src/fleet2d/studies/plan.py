@@ -210,7 +210,8 @@ class KnownNames:
                 message = f"no variant has a table {name!r}{hint}"
                 raise specification.error(("keep", "tables", i), message)
         for location, metric in file.named_metrics():
-            problem, must_be_kept = self._problem(metric), location[0] in ("compare", "adapt")
+            problem = self._problem(metric)
+            must_be_kept = location[0] in ("compare", "adapt")
             if not problem and must_be_kept and not is_kept(metric, file.keep.metrics):
                 problem = f"the metric {metric!r} isn't kept: add it to keep.metrics"
             if problem:
@@ -248,10 +249,13 @@ def make_plan(
     Raises:
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
-    count, seeds = len(design.combinations), len(design.seeds)
+    count = len(design.combinations)
+    seeds = len(design.seeds)
     identities, scenarios = np.zeros((2, count, seeds), HASH)
-    templates, simulated_s = np.zeros(count, HASH), np.zeros(count)
-    homes, home_keys = np.zeros(count, np.int32), dict[str, int]()
+    templates = np.zeros(count, HASH)
+    simulated_s = np.zeros(count)
+    homes = np.zeros(count, np.int32)
+    home_keys = dict[str, int]()
     problems: list[str] = []
     first_of = dict[tuple[str, str], int]()
     repeated = _repeated(design.seeds)  # two variants with the same scenario
@@ -313,14 +317,16 @@ class PlannedTasks(deque[WorkerTask]):
         """Remove the first task, one that was put back if there is one, and return it."""
         if super().__len__():
             return super().popleft()
-        place, self._places = self._places[0], self._places[1:]
+        place = self._places[0]
+        self._places = self._places[1:]
         return self._variants.task(place)
 
     def pop(self) -> WorkerTask:  # type: ignore[override]
         """Remove the last task and return it."""
         if not len(self._places):
             return super().pop()
-        place, self._places = self._places[-1], self._places[:-1]
+        place = self._places[-1]
+        self._places = self._places[:-1]
         return self._variants.task(place)
 
 
@@ -494,21 +500,25 @@ def reconcile(
     count = 1 + int(stored_number.max(initial=-1))
     has_result = np.append(finished, np.zeros(count, np.bool_))[stored_number]
     has_result[place[is_stored]] = False  # only those that are gone are left
-    stale, same = np.flatnonzero(has_result), np.full(len(variants), -1, np.int32)
+    stale = np.flatnonzero(has_result)
+    same = np.full(len(variants), -1, np.int32)
     if len(stale):
         _, stored_scenario = _stored(directory, "scenario")
         same = np.where(is_stored, -1, _find(stored_scenario[stale], variants.scenario))
     if len(stale) and changed is None:
         recomputed = np.count_nonzero(same >= 0)
         raise RunDirectoryError(_refusal(directory.location, int(recomputed), len(stale)))
-    reused, identity = np.zeros(len(variants), np.bool_), variants.identity
+    reused = np.zeros(len(variants), np.bool_)
+    identity = variants.identity
     if changed == "keep":
-        reused, identity = same >= 0, identity.copy()
+        reused = same >= 0
+        identity = identity.copy()
         number[reused] = stored_number[stale[same[reused]]]
         identity[reused] = stored_identity[stale[same[reused]]]
     is_new = ~is_stored & ~reused
     number[is_new] = np.arange(count, count + np.count_nonzero(is_new))
-    new, set_aside = np.count_nonzero(is_new), len(stale) - np.count_nonzero(reused)
+    new = np.count_nonzero(is_new)
+    set_aside = len(stale) - np.count_nonzero(reused)
     if 0 < new < len(variants) and notes_new:
         on_note(f"{new} variants are new in {directory.location}")
     if set_aside:
@@ -518,9 +528,11 @@ def reconcile(
 
 def _stored(directory: StudyDirectory, column: str) -> tuple[I32, Hashes]:
     """Return the numbers of the variants of the stored plan, and a column of hashes: (n,) each."""
-    count, end = sum(directory.storage.row_groups(PLAN)), 0
+    count = sum(directory.storage.row_groups(PLAN))
+    end = 0
     with directory.storage.reading(PLAN):
-        numbers, hashes = np.empty(count, np.int32), np.empty(count, HASH)
+        numbers = np.empty(count, np.int32)
+        hashes = np.empty(count, HASH)
         for batch in directory.plan_batches((VARIANT, column)):
             begin, end = end, end + len(batch)
             numbers[begin:end] = numbers_of(batch)
@@ -560,14 +572,16 @@ def plan_batches(plan: StudyPlan) -> "Iterator[pa.Table]":
 
     from fleet2d.artifacts.arrow import number_array
 
-    design, variants = plan.design, plan.variants
+    design = plan.design
+    variants = plan.variants
     labels = {}  # by column: the number of its axis, and the label of each choice, of none last
     for number, axis in enumerate(design.axes):
         used = set(np.unique(design.combinations[:, number]).tolist())
         for column in axis.columns:
             texts = (c.labels[column] if i in used else None for i, c in enumerate(axis.choices))
             labels[column] = number, label_array([*texts, None])
-    homes, seeds = array_of(variants.home_keys, pa.string()), np.array(design.seeds, np.int64)
+    homes = array_of(variants.home_keys, pa.string())
+    seeds = np.array(design.seeds, np.int64)
     for begin in range(0, max(len(variants), 1), PLAN_BATCH):
         index = variants.index[begin : begin + PLAN_BATCH]
         combination, seed = np.divmod(index, len(design.seeds))

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 MIN_RUNS = 5  # that have finished before the time left is estimated
 CONFIDENCE = 2.0  # standard errors: 95 %
-MIN_SAMPLES, MAX_SAMPLES = 4, 24  # variants that are measured for a forecast
+# variants that are measured for a forecast
+MIN_SAMPLES = 4
+MAX_SAMPLES = 24
 WARM_UP_S = 0.3  # processor time until a worker is as fast as in the middle of a study
 MEASURING_S = 15.0  # wall time after which MIN_SAMPLES are enough
 PRECISION = 0.1  # relative error at which they are enough, too
@@ -85,7 +87,10 @@ class SpeedJob(StudyJob):
 
     def __call__(self, task: WorkerTask) -> Any:
         """Return the sample of a variant; None if it fails."""
-        home, is_first, first_s, warm_s = self.homes[task.number], not self._built, 0.0, 0.0
+        home = self.homes[task.number]
+        is_first = not self._built
+        first_s = 0.0
+        warm_s = 0.0
         try:
             if home not in self._built:
                 first_s = self._measure(task, max_s=0.0)[0].setup_s
@@ -122,15 +127,22 @@ def forecast(
     Raises:
         ComponentError: All measured variants fail.
     """
-    variants, begin_s, start_s = checked.plan.variants, time.perf_counter(), 0.0
+    variants = checked.plan.variants
+    begin_s = time.perf_counter()
+    start_s = 0.0
     strata = Strata(variants)
     places = strata.places()
     planned = [variants.task(place) for place in places]
     # Groups of one task each start in their order.
     tasks = [replace(task, number=i, home=str(i)) for i, task in enumerate(planned)]
-    finished, tried = dict[int, SpeedSample | None](), 0
-    measured, total_s, error_s = dict[int, SpeedSample](), 0.0, 0.0  # samples by place
-    job, homes = checked.job, [task.home for task in planned]
+    finished = dict[int, SpeedSample | None]()
+    tried = 0
+    # samples by place
+    measured = dict[int, SpeedSample]()
+    total_s = 0.0
+    error_s = 0.0
+    job = checked.job
+    homes = [task.home for task in planned]
     speed_job = SpeedJob(job.design, job.metrics, job.tables, homes)
     with closing(executor.run(speed_job, TaskSchedule(tasks))) as events:
         for number, event in enumerate(events):
@@ -190,7 +202,8 @@ class Strata:
 
     def places(self) -> list[int]:
         """Return the places of at most MAX_SAMPLES variants, of all blocks in turn."""
-        random, count = np.random.Generator(np.random.Philox(0)), len(self._sizes)
+        random = np.random.Generator(np.random.Philox(0))
+        count = len(self._sizes)
         # By reversed bits the first few blocks are far apart.
         order = sorted(range(count), key=lambda i: f"{i:b}".zfill(count.bit_length())[::-1])
         begins = np.cumsum(self._sizes) - self._sizes
@@ -213,15 +226,19 @@ class Strata:
         Args:
             measured: The samples of the measured variants, by their places.
         """
-        places, fixed_s = list(measured), _fixed_s(measured)
-        lengths_s, seconds = self._lengths_s[places], self.seconds(measured)
+        places = list(measured)
+        fixed_s = _fixed_s(measured)
+        lengths_s = self._lengths_s[places]
+        seconds = self.seconds(measured)
         fixed_mean_s = float(fixed_s.mean())
         ratio = float((seconds - fixed_s).sum() / lengths_s.sum())
         residuals_s = seconds - fixed_mean_s - ratio * lengths_s
-        stratum, sizes = self._stratum[places], self._sizes
+        stratum = self._stratum[places]
+        sizes = self._sizes
         counts = np.bincount(stratum, minlength=len(sizes))
         means_s = np.bincount(stratum, residuals_s, len(sizes)) / np.maximum(counts, 1)
-        within_s, freedom = residuals_s - means_s[stratum], len(places) - int((counts > 0).sum())
+        within_s = residuals_s - means_s[stratum]
+        freedom = len(places) - int((counts > 0).sum())
         deviation_s = float(np.linalg.norm(residuals_s)) / math.sqrt(max(len(places) - 2, 1))
         within = np.linalg.norm(within_s) / math.sqrt(max(freedom, 1))
         of_measured_s = float(within) if freedom >= MIN_FREEDOM else deviation_s
@@ -247,7 +264,8 @@ def _storing_s(samples: Sequence[SpeedSample]) -> float:
     storing_s = 0.0
     for part in (samples[:1], samples):  # the first loads all code
         with tempfile.TemporaryDirectory() as folder:
-            directory, begin_s = StudyDirectory(folder), time.perf_counter()
+            directory = StudyDirectory(folder)
+            begin_s = time.perf_counter()
             journal = directory.open_journal(())
             for sample in part:
                 journal.append(sample.record)
@@ -296,7 +314,8 @@ class TimeLeft:
         Args:
             elapsed_s: The wall time since the first run began.
         """
-        n, rest = self.finished, self.missing - self.finished
+        n = self.finished
+        rest = self.missing - self.finished
         if n < MIN_RUNS or not self._sum_s:
             return None
         mean_s = self._sum_s / n

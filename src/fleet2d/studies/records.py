@@ -58,7 +58,9 @@ class VariantRecord:
         """Return the tables by name, not yet read."""
         import pyarrow as pa
 
-        body, start, readers = pa.py_buffer(self.body), 0, {}
+        body = pa.py_buffer(self.body)
+        start = 0
+        readers = {}
         for name, size in self.header["tables"]:
             readers[name] = pa.ipc.open_stream(body.slice(start, size))
             start += size
@@ -239,7 +241,8 @@ class Journal:
             yield rows.take(number_array(newest[begin : begin + GROUP_ROWS], pa.int64()))
 
     def _add(self, record: VariantRecord, start: int) -> None:
-        number, layout = record.number, tuple(record.header["metrics"])
+        number = record.number
+        layout = tuple(record.header["metrics"])
         self.offsets[number] = start
         if record.header["tables"]:
             self.with_tables.add(number)

@@ -29,7 +29,9 @@ MAX_METRICS = 12
 MAX_SHARES = 8
 MAX_INTERACTIONS = 3  # pairs of axes with a table of cell means, for each metric
 MAX_CELLS = 60  # of such a table
-LONG_NAME, SHORT_NAME = 16, 6  # from how many characters on names are shortened, and to how many
+# from how many characters on names are shortened, and to how many
+LONG_NAME = 16
+SHORT_NAME = 6
 INTERVAL = f"{LEVEL:.0%} interval"
 HEADINGS = {"p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL}
 # Columns that stand elsewhere on the page.
@@ -87,7 +89,9 @@ class _Page:
     """The sections of a report; figures and tables are written to files on the way."""
 
     def __init__(self, study: "Study", folder: Path) -> None:
-        self.study, self.meta, self.folder = study, study.meta, folder
+        self.study = study
+        self.meta = study.meta
+        self.folder = folder
         labels = {
             column: study.complete[column].unique(maintain_order=True).drop_nulls().to_list()
             for column in study.columns
@@ -115,7 +119,8 @@ class _Page:
             yield f"<h2>The study file</h2><pre>{html.escape(self.meta.source)}</pre>"
 
     def _head(self) -> Iterator[str]:
-        counts, meta = self.study.counts, self.meta
+        counts = self.study.counts
+        meta = self.meta
         yield f"<h1>{html.escape(meta.name)}</h1>"
         for text in filter(None, (meta.description, meta.notes)):
             yield f"<p>{html.escape(text)}</p>"
@@ -165,7 +170,9 @@ class _Page:
     def _comparison(self, number: int, comparison: PairedComparison) -> Iterator[str]:
         from fleet2d.studies.figures import draw_comparison, draw_unit_differences
 
-        metric, against, name = comparison.metric, comparison.against, f"compare-{number + 1}"
+        metric = comparison.metric
+        against = comparison.against
+        name = f"compare-{number + 1}"
         ((axis, reference),) = against.items()
         yield f"<h2>{html.escape(f'{metric} by {axis}, against {_text(reference)}')}</h2>"
         yield self._describe(metric)
@@ -207,7 +214,9 @@ class _Page:
     def _metric(self, metric: str) -> Iterator[str]:
         from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
 
-        study, name, label = self.study, _file_name(metric), self._label(metric)
+        study = self.study
+        name = _file_name(metric)
+        label = self._label(metric)
         frame = self._shortened(study.with_metric(metric))
         if not len(frame):
             return
@@ -301,7 +310,8 @@ class _Page:
 
     def _describe(self, metric: str) -> str:
         """Return a paragraph of what a metric is, and its unit."""
-        facts, unit = self.meta.metrics.get(metric.split(".")[0]), self.meta.unit(metric)
+        facts = self.meta.metrics.get(metric.split(".")[0])
+        unit = self.meta.unit(metric)
         description = facts.description if facts else ""
         text = f"{description} {f'Unit: {unit}.' if unit else ''}".strip()
         return f"<p>{html.escape(text)}</p>" if text else ""

@@ -196,7 +196,8 @@ def measure(
     Raises:
         Fleet2DError: The scenario is wrong, or a component failed.
     """
-    start_s, start_core_s = time.perf_counter(), time.process_time()
+    start_s = time.perf_counter()
+    start_core_s = time.process_time()
     scenario = build()
     built_s = time.perf_counter()
     simulation = Simulation(scenario)
@@ -206,7 +207,8 @@ def measure(
         simulation.advance(min(hour, simulation.clock.steps - simulation.step))
     moving_s = time.perf_counter() - ready_s
     outcome = _outcome_of(simulation.finish("interrupted"), metrics, tables, start_s)
-    wall_s, core_s = time.perf_counter() - start_s, time.process_time() - start_core_s
+    wall_s = time.perf_counter() - start_s
+    core_s = time.process_time() - start_core_s
     simulated_s = simulation.step * simulation.clock.step_us / 1e6
     speed = RunSpeed(
         wall_s - moving_s, moving_s, simulated_s, ready_s - built_s, min(core_s / wall_s, 1.0)

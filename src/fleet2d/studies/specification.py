@@ -317,10 +317,12 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
         return source
     path: Path | None = None
     if isinstance(source, Mapping):
-        document, folder = Document(dict(source)), Path.cwd()
+        document = Document(dict(source))
+        folder = Path.cwd()
     else:
         path = Path(source)
-        document, folder = read_document(path), path.absolute().parent
+        document = read_document(path)
+        folder = path.absolute().parent
     try:
         file = StudyFile.model_validate(document.data)
     except ValidationError as error:

@@ -67,7 +67,8 @@ def from_json(kind: Any, value: Any) -> Any:
         >>> from_json(tuple[int, ...], [1, 2])
         (1, 2)
     """
-    origin, of = get_origin(kind) or kind, get_args(kind)
+    origin = get_origin(kind) or kind
+    of = get_args(kind)
     hints = get_type_hints(kind) if is_dataclass(kind) else None
     expected = {tuple: list, Mapping: dict}.get(origin, origin) if hints is None else dict
     if expected not in (type(value), Any):
@@ -271,8 +272,11 @@ class Storage:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        local, first = scratch / f"{PurePosixPath(name).name}{PARTIAL}", next(tables)
-        group, rows, written = list[pa.Table](), 0, 0
+        local = scratch / f"{PurePosixPath(name).name}{PARTIAL}"
+        first = next(tables)
+        group = list[pa.Table]()
+        rows = 0
+        written = 0
         with writing(self.location):
             scratch.mkdir(parents=True, exist_ok=True)
             with pq.ParquetWriter(local, first.schema, compression="zstd") as file:

@@ -101,7 +101,8 @@ def _mlflow_name(name: str) -> str:
 def _to_wandb(study: Study, project: str) -> int:
     with extra("wandb", "this needs Weights & Biases"):
         import wandb
-    meta, rows = study.meta, study.complete.to_dicts()
+    meta = study.meta
+    rows = study.complete.to_dicts()
     columns = ["variant", *study.columns, "digest", *study.metrics]
     try:
         run = wandb.init(

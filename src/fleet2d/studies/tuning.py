@@ -53,9 +53,13 @@ if TYPE_CHECKING:
     import optuna
 
 
-SEARCH, TRIALS, HELD_OUT = "search.json", "trials.log", "held_out"
+SEARCH = "search.json"
+TRIALS = "trials.log"
+HELD_OUT = "held_out"
 INPUTS = "input files"
-SETTING, BEFORE, TUNED = "setting", "base", "tuned"
+SETTING = "setting"
+BEFORE = "base"
+TUNED = "tuned"
 MAX_JUDGED_SETTINGS = 5  # settings to judge after a search for several objectives
 MAX_RUNS = 40  # unfinished runs that a worker holds for the next stage of their trial
 FAILURE = "failure"  # the attribute of a failed trial that holds the error
@@ -251,8 +255,10 @@ class TrialSchedule(TaskSchedule):
             self._start_stage(running)
 
     def _start_stage(self, running: _RunningTrial) -> None:
-        until_s, number = self._stages[running.stage], running.trial.number
-        running.objectives, running.unfinished = {}, len(self._variants)
+        until_s = self._stages[running.stage]
+        number = running.trial.number
+        running.objectives = {}
+        running.unfinished = len(self._variants)
         for index, home in self._variants:
             self._task_count += 1
             self._tasks.append(

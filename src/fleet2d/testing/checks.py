@@ -68,10 +68,12 @@ def _problems(cls: type[Algorithm], settings: Mapping[str, Any]) -> Iterator[str
         yield str(error)
         return
     scenario = _scenario(algorithm).model_copy(update={"algorithms": {}})
-    tables, expected = run.manifest["tables"], Simulation(scenario).run().manifest["tables"]
+    tables = run.manifest["tables"]
+    expected = Simulation(scenario).run().manifest["tables"]
     if any(tables[name] != expected[name] for name in ("key_frames", "events", "observations")):
         yield "users and robots behave differently with it: it changes its arguments"
-    draw, spans = "state.random(purpose)", "use nothing but history and state"
+    draw = "state.random(purpose)"
+    spans = "use nothing but history and state"
     yield from _repeat_problems(lambda **keys: _run(cls(**settings), **keys), run, draw, spans)
     yield from _copy_problems(cls(**settings), run)
     yield from _state_problems(algorithm, cls, settings)
@@ -185,6 +187,7 @@ def _run_with_error(error: PerceptionError, **simulation: Any) -> Run:
         "perception": {"errors": {"checked": error}, "false_positives": {"per_hour": 60}},
     }
     times = {**SCENARIO["simulation"], "duration": "1 h", **simulation}
-    users, robots = {"ana": "meander", "ben": "meander"}, {"astro": robot, "bolt": robot}
+    users = {"ana": "meander", "ben": "meander"}
+    robots = {"astro": robot, "bolt": robot}
     content = {**SCENARIO, "simulation": times, "users": users, "robots": robots}
     return Simulation(load_scenario(content)).run()

@@ -16,13 +16,16 @@ from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.model import Scenario, load_scenario
 
 MAX_SEEDS = 10_000
-BISECTIONS, INTERVAL_BISECTIONS = 14, 40
+BISECTIONS = 14
+INTERVAL_BISECTIONS = 40
 MAX_SEARCHED_SEEDS = 2_000
-MIN_SHOWN, MAX_FAILURE_RATIO = 0.5, 10.0
+MIN_SHOWN = 0.5
+MAX_FAILURE_RATIO = 10.0
 """A claim shows nothing if it can't refuse a robot that holds half as often, or fails ten times."""
 ATTRIBUTE = "fleet2d_claim"
 """The attribute of a test function that holds its claim."""
-HOME, HOUSEHOLD = "home", "household"
+HOME = "home"
+HOUSEHOLD = "household"
 
 
 class RateTest(NamedTuple):
@@ -152,7 +155,8 @@ def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, f
 
     def at_least(count: int, rate: float) -> float:
         """Return the probability that at least so many trials hold, at a given rate."""
-        log_rate, log_rest = math.log(rate), math.log1p(-rate)
+        log_rate = math.log(rate)
+        log_rest = math.log1p(-rate)
         terms = (logs[k] + k * log_rate + (number - k) * log_rest for k in counts[count:])
         return math.fsum(map(math.exp, terms))
 
@@ -185,7 +189,8 @@ def nested_rate_interval(
         >>> round(low, 2), round(high, 2)
         (0.64, 1.0)
     """
-    number, homes = sum(map(len, outcomes)), len(outcomes)
+    number = sum(map(len, outcomes))
+    homes = len(outcomes)
     rate = sum(map(sum, outcomes)) / number
     effective = float(number)
     if 1 < homes < number:
@@ -212,15 +217,18 @@ def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
         success = float(np.log(holds / other)) if other > 0 else math.inf
     threshold = math.log(2 / error)
     if math.isinf(success):  # one success refutes a rate of 0
-        accept, refuse = np.full(seeds + 1, -1), number + 1
+        accept = np.full(seeds + 1, -1)
+        refuse = number + 1
     else:
-        slope, shift = success / (success + failure), threshold / (success + failure)
+        slope = success / (success + failure)
+        shift = threshold / (success + failure)
         accept = np.floor(slope * number - shift).astype(np.int64).clip(-1)
         refuse = np.minimum(np.ceil(slope * number + shift), seeds + 1).astype(np.int64)
     accept[seeds] = -1
     refuse[seeds] = seeds + 2
     steps = steps_of(accept, refuse, holds)
-    refused, last = sum(now for _, now, _ in steps[:-1]), steps[-1][2]
+    refused = sum(now for _, now, _ in steps[:-1])
+    last = steps[-1][2]
     # The fewest failures to refuse at the last seed so that refusals stay within the error.
     tail = refused + np.cumsum(last[::-1])[::-1]  # refusals if that many failures refuse
     most = int(np.argmax(np.append(tail, 0.0) <= error)) - 1
@@ -238,7 +246,8 @@ def steps_of(accept: I64, refuse: I64, rate: float) -> "list[tuple[float, float,
     for number in range(1, len(accept)):
         mass = undecided * rate
         mass[1:] += undecided[:-1] * (1 - rate)
-        is_accepted, is_refused = failures <= accept[number], failures >= refuse[number]
+        is_accepted = failures <= accept[number]
+        is_refused = failures >= refuse[number]
         steps.append((float(mass[is_accepted].sum()), float(mass[is_refused].sum()), mass))
         undecided = np.where(is_accepted | is_refused, 0.0, mass)
     return steps
@@ -380,7 +389,8 @@ class Claim:
         from fleet2d.studies.design import build_design
         from fleet2d.studies.specification import read_specification
 
-        base, axes = self.scenario.resolved(), dict(self.axes)
+        base = self.scenario.resolved()
+        axes = dict(self.axes)
         if self.households:
             base = {**base, "users": {}}
             options = {name: {"users": dict(users)} for name, users in self.households.items()}

@@ -112,7 +112,8 @@ class Shrinker:
         """Move the start of the run as close to the failure as possible, to the minute."""
         if case.variant.scenario.algorithms or case.failure.kind == MISSED_BY_THE_END:
             return case  # what they have learned by then may be the cause
-        whole, short = case, timedelta(0)
+        whole = case
+        short = timedelta(0)
         for lead in LEAD_TIMES:
             if smaller := self._started(whole, lead):
                 case = smaller
@@ -214,10 +215,12 @@ def _script_within(
     clock = Clock(start, simulation.step_us, (end - start) // simulation.step)
     entries: list[dict[str, Any] | None] = []
     for entry, content in zip(scenario.script, scenario.resolved()["script"], strict=True):
-        at, is_in = entry.at, True
+        at = entry.at
+        is_in = True
         if isinstance(at, timedelta):  # from the start on
             at = at - (start - simulation.start)
-            is_in, content = timedelta(0) <= at < end - start, {**content, "at": at}
+            is_in = timedelta(0) <= at < end - start
+            content = {**content, "at": at}
         elif isinstance(at, datetime):
             is_in = start <= at < end
         elif at is not None:

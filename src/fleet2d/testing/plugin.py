@@ -79,7 +79,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     __tracebackhide__ = _is_error
     claim = _with_options(claim, pyfuncitem.config)
     body = _body(pyfuncitem)
-    problem, result = "", None
+    problem = ""
+    result = None
     try:
         claim.prepare()
         result = run_claim(claim, body)

@@ -96,7 +96,8 @@ def read_space(content: Mapping[str, Any]) -> SearchSpace:
     Raises:
         InputError: An axis is wrong.
     """
-    ranges, choices = dict[str, Parameter](), dict[str, tuple[Choice, ...]]()
+    ranges = dict[str, Parameter]()
+    choices = dict[str, tuple[Choice, ...]]()
     if not content:
         raise InputError("nothing to search over: name an axis, such as home={synthetic: 20}")
     for name, axis in content.items():
@@ -249,7 +250,8 @@ class FailureSearch(TaskSchedule):
         """Prepare a search; with is_guided=False all points are random, for comparison."""
         super().__init__()
         self._job, self._budget, self._seed, self._finds = job, budget, seed, finds
-        self._started, self._deadline = 0, math.inf
+        self._started = 0
+        self._deadline = math.inf
         self._returned: list[WorkerTask] = []
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
         self._random = max(MIN_RANDOM_POINTS, round(RANDOM_SHARE * budget)) if is_guided else budget

@@ -26,7 +26,8 @@ from fleet2d.testing.claim import Claim, SetUpError, Variant, nested_rate_interv
 
 TEST = "test"
 """The name of a test that tests nothing among its expectations."""
-MISSED, MISSED_BY_THE_END = "missed", "missed by the end"
+MISSED = "missed"
+MISSED_BY_THE_END = "missed by the end"
 """Kinds of violation of what never came about: in its time, or by the end of the run."""
 ASSERT = "assert"
 """The name of a failed `assert` of a test among its expectations."""
@@ -147,9 +148,11 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
     if verdict.violations:
         first = verdict.violations[0]
         step = first.first if verdict.expectation.startswith(LASTING) else first.last
-    value, unit = verdict.robustness, verdict.unit
+    value = verdict.robustness
+    unit = verdict.unit
     if not math.isfinite(value) and verdict.slack_s is not None:
-        value, unit = verdict.slack_s, "s"
+        value = verdict.slack_s
+        unit = "s"
     margin = comparable(value, SCALES.get(unit, 1.0))
     if (margin > 0) != (verdict.holds is not False):  # fulfilled just in time, or just too late
         margin = -math.copysign(SMALLEST_MARGIN, margin)
@@ -227,7 +230,8 @@ class TrialResult:
         if self.error is None:
             return failed
         step = max(0, self.steps - 1)
-        text, line = str(self.error) or ASSERT, _line_of(self.error)
+        text = str(self.error) or ASSERT
+        line = _line_of(self.error)
         return (*failed, ExpectationResult(ASSERT, text, False, -1.0, step, kind=line))
 
     @property
@@ -274,8 +278,10 @@ class ClaimResult:
     @property
     def text(self) -> str:
         """The decision, and the number of trials that it is based on."""
-        number, failures = len(self.trials), len(self.failed)
-        rate, unit = self.claim.rate, "run" if self.claim.varies else "seed"
+        number = len(self.trials)
+        failures = len(self.failed)
+        rate = self.claim.rate
+        unit = "run" if self.claim.varies else "seed"
         held = f"held in {number - failures} of {counted(number, unit)}"
         if rate.seeds == 1:
             return "held" if self.holds else "failed"
@@ -309,7 +315,9 @@ def run_claim(claim: Claim, body: Body) -> ClaimResult:
     for cache in (HOME_CACHE, PLAN_CACHE):
         cache.grow(min(len(claim.variants), MAX_HOMES))
     __tracebackhide__ = True
-    rate, trials, failures = claim.rate, list[TrialResult](), 0
+    rate = claim.rate
+    trials = list[TrialResult]()
+    failures = 0
     for variant in claim.trials():
         trial = run_trial(variant, body)
         if claim.may_be_untested:

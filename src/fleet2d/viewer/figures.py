@@ -42,7 +42,8 @@ HEIGHT_IN = 7.0
 
 # Pictures of failures: signals drawn, their height, and that of the text; seconds shown around.
 MAX_COURSES = 4
-COURSE_IN, HEAD_IN = 1.05, 0.75
+COURSE_IN = 1.05
+HEAD_IN = 0.75
 COURSE_S = 180
 MARK_RGB = (0.84, 0.15, 0.16)
 
@@ -111,7 +112,8 @@ def _mark(plan: FloorPlan, stage: Stage, evidence: VerdictEvidence, axes: Axes) 
     draw_cells(plan, image, axes, zorder=2.2)
     poses = {b.facts["name"]: (b.path.x[-1], b.path.y[-1]) for b in stage.bodies}
     for body, other in evidence.distances:
-        here, there = poses.get(body), other if isinstance(other, tuple) else poses.get(other)
+        here = poses.get(body)
+        there = other if isinstance(other, tuple) else poses.get(other)
         if here is not None and there is not None:
             (x0, y0), (x1, y1) = here, there
             axes.plot([x0, x1], [y0, y1], ls="--", lw=1.2, color=MARK_RGB, zorder=5)
@@ -244,7 +246,8 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
 
 
 def _hours_per_m2(run: Run, plan: FloorPlan, names: list[str]) -> F64:
-    step_us, steps = run.manifest["step_us"], run.manifest["steps"]
+    step_us = run.manifest["step_us"]
+    steps = run.manifest["steps"]
     interval = timedelta(microseconds=int(step_us * -(-steps // SAMPLES)))
     lattice = plan.lattice
     time = np.zeros((lattice.rows, lattice.columns))

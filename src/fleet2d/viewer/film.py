@@ -97,7 +97,8 @@ class TextStamps:
 
     def _advance(self, text: Text) -> float:
         """Return the distance from the start of a text to the start of the next [pixels]."""
-        content, font = text.get_text(), text.get_fontproperties()
+        content = text.get_text()
+        font = text.get_fontproperties()
         key = (content, float(text.get_fontsize()))
         if key not in self._advances:
             # Measured between bars: blanks at the end of a text have no width.
@@ -165,7 +166,8 @@ def write_film(
     stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MAX_FRAMES_PER_S))
     rate = Fraction(speed).limit_denominator(1000) * 1_000_000
     rate /= run.manifest["step_us"] * stride
-    kind, total = path.suffix.lower()[1:], -(-(end - first) // stride)
+    kind = path.suffix.lower()[1:]
+    total = -(-(end - first) // stride)
     with drawing_style():
         stage = stage_of(run, first, end, stride, height)
         moments = np.flatnonzero(stage.changes())
@@ -255,7 +257,9 @@ def _write_mp4(path: Path, frames: Iterator[tuple[int, U8]], total: int, rate: F
         ThreadPoolExecutor(1) as thread,
     ):
         stream: Any = container.add_stream("libx264", rate=rate)
-        stream.width, stream.height, stream.pix_fmt = columns, rows, "yuv420p"
+        stream.width = columns
+        stream.height = rows
+        stream.pix_fmt = "yuv420p"
         stream.time_base = stream.codec_context.time_base = frame.time_base = 1 / rate
         stream.thread_type = "FRAME"  # slices of one picture would wait for each other
         stream.options = X264

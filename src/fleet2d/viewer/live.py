@@ -146,7 +146,8 @@ class LiveEngine:
             InputError: There is nothing of that name, or the place isn't free.
             ComponentError: The same, of doors.
         """
-        name, place = order["target"], (order["x"], order["y"])
+        name = order["target"]
+        place = (order["x"], order["y"])
         if order["action"] == "door":
             change = HomeChange(open=name) if order["value"] else HomeChange(shut=name)
             self.simulation.change(change)
@@ -177,7 +178,8 @@ class LiveEngine:
         actors = self.simulation.actors
         if name not in actors:
             raise InputError(f"there is nobody named {name!r}")
-        space, lattice = actors[name].space, self.simulation.home.plan.lattice
+        space = actors[name].space
+        lattice = self.simulation.home.plan.lattice
         at = lattice.point_at(place)
         part = space.part_at(*at)
         if part < 0:
@@ -275,7 +277,8 @@ class LiveRun:
 
     def _advance(self) -> None:
         """Advance the simulation by a frame, send the frame, and wait as the speed requires."""
-        start_s, step = time.perf_counter(), self.engine.simulation.step
+        start_s = time.perf_counter()
+        step = self.engine.simulation.step
         self.engine.simulation.advance(self._steps_per_frame())
         self._send(self._state())
         simulated_s = (self.engine.simulation.step - step) * self._clock.step_us / 1e6

@@ -78,7 +78,8 @@ def verdict_html(run: Run) -> str:
 
 def run_html(run: Run) -> str:
     """Return a run as HTML for notebooks: its verdicts, its facts and its picture."""
-    clock, entities = run.clock, run.manifest["entities"]
+    clock = run.clock
+    entities = run.manifest["entities"]
     facts = [
         run.status,
         f"{clock.start:%Y-%m-%d %H:%M} to {clock.time(clock.steps):%Y-%m-%d %H:%M}",

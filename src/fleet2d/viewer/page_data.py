@@ -133,7 +133,8 @@ class PageData:
         """
         with extra("viz", "a film needs matplotlib"):
             from fleet2d.viewer.film import write_film
-        steps, step_us = self.run.manifest["steps"], self.run.manifest["step_us"]
+        steps = self.run.manifest["steps"]
+        step_us = self.run.manifest["step_us"]
         if not 0 <= step < steps:
             raise InputError(f"there is no step {step} to film: the last is {steps - 1}")
         around = max(1, FILM_AROUND_US // step_us)
@@ -152,7 +153,8 @@ class PageData:
         kinds = self.run.tables["key_frames"]["kind"].cast("string")
         if "walk" not in kinds.unique().to_pylist():
             return 0
-        step_us, steps = self.run.manifest["step_us"], self.run.manifest["steps"]
+        step_us = self.run.manifest["step_us"]
+        steps = self.run.manifest["steps"]
         return int(step_us * -(-steps // MAX_POSES))
 
     @cached_property
@@ -175,7 +177,8 @@ class PageData:
         counts = np.bincount(body, minlength=len(number))[: len(number)]
         order = order[: counts.sum()]
         home = self.facts["home"]
-        origin, units = home["origin_units"], home["units_per_m"]
+        origin = home["origin_units"]
+        units = home["units_per_m"]
         start = np.datetime64(run.manifest["start"], "us")
         time = (table["time"].to_numpy().astype("M8[us]") - start).astype(np.float64)
         x, y = (

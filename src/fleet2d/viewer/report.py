@@ -65,7 +65,8 @@ def report_html(run: Run) -> str:
 
 
 def _what_ran(run: Run) -> str:
-    manifest, clock = run.manifest, run.clock
+    manifest = run.manifest
+    clock = run.clock
     entities = manifest["entities"]
     rows = [
         ("status", run.status),

@@ -98,7 +98,9 @@ def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[S
     for record in records:
         if record["do"] != "slow":
             continue
-        step, end, duration = int(record["step"]), clock.steps, record.get("duration")
+        step = int(record["step"])
+        end = clock.steps
+        duration = record.get("duration")
         if duration is not None:
             end = min(end, step + clock.step_at_or_after(micros(parse_duration(duration))))
         area = SlowArea(**{key: record[key] for key in SlowArea.model_fields if key in record})
@@ -174,7 +176,9 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         user, user_names = categories(batch["user"])
         robots |= dict.fromkeys(robot_names)
         users |= dict.fromkeys(user_names)
-        step, false, names = batch["step"].to_numpy(), _are_false(batch), [*user_names, ""]
+        step = batch["step"].to_numpy()
+        false = _are_false(batch)
+        names = [*user_names, ""]
         lane = robot * len(names) + user % len(names)  # the last one is of an unknown user
         for code in np.unique(lane).tolist():
             key = robot_names[code // len(names)], names[code % len(names)]
@@ -216,14 +220,17 @@ def _are_false(table: Any) -> Bool:
 def _extend(lane: SightingFacts, step: I64, false: Bool, gap: int) -> None:
     """Add stretches of later sightings to a lane; the first one may continue its last one."""
     order = np.argsort(step, kind="stable")
-    step, false = step[order], false[order]
+    step = step[order]
+    false = false[order]
     cuts = (np.diff(step) > gap) | (false[1:] != false[:-1])
     begins = np.append(0, np.flatnonzero(cuts) + 1)
     ends = np.append(begins[1:] - 1, len(step) - 1)
     first, last, is_false = (each.tolist() for each in (step[begins], step[ends], false[begins]))
     if lane["last"] and first[0] - lane["last"][-1] <= gap and is_false[0] == lane["false"][-1]:
         lane["last"][-1] = last[0]
-        first, last, is_false = first[1:], last[1:], is_false[1:]
+        first = first[1:]
+        last = last[1:]
+        is_false = is_false[1:]
     lane["first"] += first
     lane["last"] += last
     lane["false"] += is_false
@@ -367,7 +374,8 @@ def _role(scenario: Mapping[str, Any], name: str) -> Role:
 def live_facts(simulation: Simulation) -> RunFacts:
     """Return what the page receives about a running simulation, which has no tables yet."""
     scenario = plain(simulation.scenario.resolved())
-    clock, plan = simulation.clock, simulation.home.plan
+    clock = simulation.clock
+    plan = simulation.home.plan
     objects = simulation.scenario.objects.items()
     doors = [door_facts(name, door, plan) for name, door in objects if isinstance(door, Door)]
     bodies = bodies_of(scenario, scenario)

@@ -50,7 +50,8 @@ def write_notes(run: Run, body: bytes) -> list[NoteFacts]:
     Raises:
         InputError: The body isn't notes, the run isn't stored, or the file can't be written.
     """
-    notes, path = checked_notes(body), notes_path(run)
+    notes = checked_notes(body)
+    path = notes_path(run)
     write_file(path, json.dumps(notes, indent=1, ensure_ascii=False).encode())
     return notes
 

@@ -166,7 +166,8 @@ class Stage:
             ArtifactError: The run stored no key frames or no floor plan.
         """
         self.stride, self._first = stride, first
-        self._run, self._plan = run, run.plan
+        self._run = run
+        self._plan = run.plan
         self._part = part_of_run(run, first, end)
         self._step_us = run.manifest["step_us"]
         self._walls = WallsHistory(run)
@@ -175,7 +176,8 @@ class Stage:
         if axes is None:
             assert figure is not None
             axes, self._strip = self._lay_out(figure)
-        self._axes, self.figure = axes, axes.figure
+        self._axes = axes
+        self.figure = axes.figure
         floorplan_axes(self._plan, self._axes, title=False)
         _, _, _, top = self._plan.bounds
         self._axes.set_ylim(top=top + ABOVE_M)
@@ -256,9 +258,12 @@ class Stage:
 
     def _write_head(self, axes: Axes) -> tuple[Any, Any]:
         """Return the texts above the plan: the clock, and the names of those who are away."""
-        write, style, high = self.figure.text, dict[str, Any](va="top"), 0.975
+        write = self.figure.text
+        style = dict[str, Any](va="top")
+        high = 0.975
         if self._strip is None:
-            write, high = axes.text, 1.0
+            write = axes.text
+            high = 1.0
             style = {"va": "bottom", "transform": axes.transAxes}
         clock = write(0.02, high, "", fontsize=13, weight="bold", color=TEXT_COLOR, **style)
         away = write(0.98, high, "", fontsize=9, color=QUIET_COLOR, ha="right", **style)
@@ -303,11 +308,14 @@ class Stage:
     def _place(self, body: BodyArtists, index: int, step: int) -> tuple[float, float, float] | None:
         """Move the name of a body; return its pose, None while it is away."""
         path = body.path
-        x, y, heading = float(path.x[index]), float(path.y[index]), float(path.heading[index])
+        x = float(path.x[index])
+        y = float(path.y[index])
+        heading = float(path.heading[index])
         is_home = not bool(path.away[index])
         body.name.set_visible(is_home)
         if not is_home:
-            body.views, body.view_key = [], None
+            body.views = []
+            body.view_key = None
             return None
         body.name.set_position((x, y + 1.5 * body.radius))
         if body.facts["cameras"]:
@@ -337,7 +345,8 @@ class Stage:
         key = (pose, walls, pans)
         if key == body.view_key:
             return
-        body.view_key, body.views = key, []
+        body.view_key = key
+        body.views = []
         sight = SightWalls(self._walls.mesh(walls), self._plan.lattice)
         x, y, heading = pose
         ahead = np.array([np.cos(heading), np.sin(heading)])
@@ -361,7 +370,8 @@ class Stage:
         """Draw the paths of the last minute; return them, each float64 (n, 2) [m]."""
         moments = max(1, TAIL // timedelta(microseconds=self._step_us * self.stride))
         span = slice(max(0, index - moments), index + 1)
-        lines, colors = [], []
+        lines = []
+        colors = []
         for body in self.bodies:
             path = body.path
             xy = np.stack([path.x[span], path.y[span]], axis=1)[~path.away[span]]

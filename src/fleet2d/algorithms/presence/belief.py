@@ -80,7 +80,9 @@ class Presence:
             interval: Lower and upper ends, float64 (users + 1, rooms + 1) each, away last.
             track: The belief at the end of each bin of the period.
         """
-        self.users, self.time, self.track = tuple(users), time, track
+        self.users = tuple(users)
+        self.time = time
+        self.track = track
         self.names = (*self.users, ANYONE)
         self._home, self._away, self._interval = home, away, interval
         rows = len(self.names)
@@ -332,7 +334,8 @@ class BeliefReader:
         Raises:
             ComponentError: The algorithm has another period than the metric.
         """
-        previous, presence = self._previous, presence_of(self.name, state)
+        previous = self._previous
+        presence = presence_of(self.name, state)
         self._previous = presence if presence is not None else previous
         if not len(ends):
             return None

@@ -60,7 +60,8 @@ class Habits(NamedTuple):
         days = self.week.reshape(7, 24, -1)[:, hours]
         same_days = days[:WEEKEND] if weekday < WEEKEND else days[WEEKEND:]
         at_hour = same_days.sum(axis=0) + self.smoothing / self.total[-1] * self.total
-        mean_share, share = self.total[:-1] / self.total[-1], at_hour[:, :-1] / at_hour[:, -1:]
+        mean_share = self.total[:-1] / self.total[-1]
+        share = at_hour[:, :-1] / at_hour[:, -1:]
         ratio = np.maximum(share, MIN_SHARE) / np.maximum(mean_share, MIN_SHARE)
         pull = np.sqrt(np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO))
         count, places = pull.shape
@@ -105,7 +106,8 @@ class PersonForecast(NamedTuple):
             part = min(bins, max(to_next_hour, 1))
             [model] = self.habits.at(self.model, time.weekday(), [time.hour])
             now = advance(now, steps_of(model), part)
-            bins, time = bins - part, time + timedelta(microseconds=part * bin_us)
+            bins = bins - part
+            time = time + timedelta(microseconds=part * bin_us)
         return self._replace(now=now)
 
 
@@ -129,11 +131,13 @@ class ChainPresence(Presence):
             bin_us: Length of a bin [us].
             track: The belief at the end of each bin, whose last bin is the present belief.
         """
-        self._people, self._bin_us = tuple(people), bin_us
+        self._people = tuple(people)
+        self._bin_us = bin_us
         if track is None:
             home, away = split([person.places for person in people], len(users), None)
         else:
-            home, away = track.home, track.away
+            home = track.home
+            away = track.away
         super().__init__(users, home[-1], away[-1], time, track=track)
 
     def corrected(self) -> "ChainPresence":
@@ -179,7 +183,8 @@ class Follower:
 
     def __init__(self, layout: StateLayout) -> None:
         """Begin with the uninformed distribution."""
-        self.layout, anywhere = layout, layout.anywhere
+        self.layout = layout
+        anywhere = layout.anywhere
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
 
@@ -193,9 +198,11 @@ class Follower:
 
 def steps_of(model: StayModel) -> F64:
     """Return the transition matrix from bin to bin without evidence: float64 (nodes, nodes)."""
-    nodes, places = len(model.stay), model.follow.shape[1] - 1
+    nodes = len(model.stay)
+    places = model.follow.shape[1] - 1
     stages = nodes // places
-    steps, leave = np.diag(model.stay), (1 - model.stay)[:, np.newaxis] * model.follow
+    steps = np.diag(model.stay)
+    leave = (1 - model.stay)[:, np.newaxis] * model.follow
     steps[:, ::stages] += leave[:, :places]
     early = np.arange(nodes)[np.arange(nodes) % stages < stages - 1]
     steps[early, early + 1] += leave[early, places]
@@ -310,14 +317,18 @@ class RoutineModel(SemiMarkov):
         hours = day.minute // 60
         begins = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist()]
         models = self.habits(user).at(model, (day.number - 1) % 7, hours[begins].tolist())
-        parts, follow = pairwise([*begins, len(hours)]), super()._follow
+        parts = pairwise([*begins, len(hours)])
+        follow = super()._follow
         each = zip(parts, models, strict=True)
         return np.concatenate([follow(user, day.between(*part), at) for part, at in each])
 
     def habits(self, user: int) -> Habits:
         """Return how a user's transitions depend on the hour, as learned so far."""
-        counts, columns = self.learner.counts, [*range(self.rooms + 1), -1]  # places, and all bins
-        week, total = counts.by_hour_of_week[:, user], counts.total[user]
+        # places, and all bins
+        counts = self.learner.counts
+        columns = [*range(self.rooms + 1), -1]
+        week = counts.by_hour_of_week[:, user]
+        total = counts.total[user]
         return Habits(week[:, columns], total[columns], self.smoothing)
 
 

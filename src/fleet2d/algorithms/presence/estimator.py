@@ -100,7 +100,8 @@ class DayCounts:
     def begin_day(self, day: int) -> None:
         """End the present day, if there is one, and reduce the weights of older days."""
         if self.today:
-            total, monday = self.hours.sum(axis=0), (self.today - 1) % 7 * 24
+            total = self.hours.sum(axis=0)
+            monday = (self.today - 1) % 7 * 24
             weight = self.faded(day - self.today)
             self.days.append(self.today)
             self.by_day = np.concatenate([self.by_day, total[None]])
@@ -117,7 +118,8 @@ class DayCounts:
         if day == self.today:
             self.hours = self.hours + change
             return
-        weight, monday = self.faded(self.today - day), (day - 1) % 7 * 24
+        weight = self.faded(self.today - day)
+        monday = (day - 1) % 7 * 24
         self.by_day[self.days.index(day)] += change.sum(axis=0)
         self.finished = self.finished + weight * change.sum(axis=0)
         self.week[monday : monday + 24] += weight * change
@@ -328,9 +330,11 @@ def natural_log(values: ArrayLike) -> F64:
     """
     mantissa, exponent = np.frexp(np.asarray(values, np.float64))
     low = mantissa < ROOT_HALF
-    m, e = np.where(low, 2 * mantissa, mantissa), np.where(low, exponent - 1, exponent)
+    m = np.where(low, 2 * mantissa, mantissa)
+    e = np.where(low, exponent - 1, exponent)
     s = (m - 1) / (m + 1)
-    square, series = s * s, np.zeros_like(s)
+    square = s * s
+    series = np.zeros_like(s)
     for k in range(TERMS, -1, -1):
         series = series * square + 1 / (2 * k + 1)
     return e * LN_2 + 2 * s * series
@@ -376,7 +380,8 @@ class PresenceAlgorithm(Algorithm):
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""
-        self.home, self.has_begun = home, False
+        self.home = home
+        self.has_begun = False
         self.learned_state: Mapping[str, Any] | None = None
 
     @property

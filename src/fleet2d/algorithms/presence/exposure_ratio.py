@@ -59,7 +59,8 @@ class ExposureRatio(Estimator):
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
         """Prepare for a run."""
         self.room = np.arange(rooms)  # the room of each patch; until the first evidence, one each
-        self.half_life, self.is_recalled = half_life, False
+        self.half_life = half_life
+        self.is_recalled = False
         super().begin(rooms, users, half_life)
 
     def width(self, rooms: int) -> int:
@@ -120,8 +121,10 @@ def ratios(sums: F64, detection: float) -> tuple[F64, F64]:
         detection: Chance that somebody in view is perceived.
     """
     places = (sums.shape[-1] - 1) // 2
-    seen, watched = sums[..., :places], sums[..., places:-1]
-    all_seen, all_watched = seen.sum(axis=-1), watched.sum(axis=-1)
+    seen = sums[..., :places]
+    watched = sums[..., places:-1]
+    all_seen = seen.sum(axis=-1)
+    all_watched = watched.sum(axis=-1)
     is_watched = all_watched > 0
     average = (all_seen / np.where(is_watched, all_watched, 1))[..., None]
     rate = (seen + PRIOR * average) / (watched + PRIOR)
@@ -169,7 +172,8 @@ class AuditOnly(ExposureRatio):
 
     def sums(self, evidence: Evidence) -> F64:
         """Return for how long each patch was watched, and somebody seen in it, during audits."""
-        minute, sums = timedelta(minutes=1), super().sums(evidence)
+        minute = timedelta(minutes=1)
+        sums = super().sums(evidence)
         every, length = (max(1, duration // minute) for duration in (self.every, self.length))
         sums[evidence.minute % every >= length, :, :-1] = 0
         return sums
@@ -271,7 +275,8 @@ class Fremen(Estimator):
     def _end_day(self, next_day: int) -> None:
         """Score each order by the finished day, then update the models with it."""
         minutes, sums = (np.concatenate(parts) for parts in zip(*self.day, strict=True))
-        seen, watched = sums[..., : self.rooms], sums[..., self.rooms : -1]
+        seen = sums[..., : self.rooms]
+        watched = sums[..., self.rooms : -1]
         p = np.clip(self._by_order(minutes), MIN_PROBABILITY, 1 - MIN_PROBABILITY)
         missed = np.maximum(watched - seen, 0)[..., np.newaxis]
         gain = seen[..., np.newaxis] * natural_log(p) + missed * natural_log(1 - p)
@@ -283,13 +288,15 @@ class Fremen(Estimator):
                 weight = weights[k, is_positive, user, room, np.newaxis]
                 sums_by_state[k, user, room] += (weight * wave[is_positive]).sum(axis=0)
         self.waves = self.waves * self.counts.faded(next_day - self.counts.today)
-        self.day, self.week = [], None
+        self.day = []
+        self.week = None
         self.span = self.counts.today - self.first + 1
 
     def _by_order(self, minutes: I64) -> F64:
         """Return p(t) for each order: float64 (minutes, users + 1, rooms, orders)."""
         total = self.counts.finished
-        seen, watched = total[:, : self.rooms], total[:, self.rooms : -1]
+        seen = total[:, : self.rooms]
+        watched = total[:, self.rooms : -1]
         n = np.where(watched > 0, watched, 1)
         mean = np.where(watched > 0, np.minimum(seen / n, 1), 0.0)
         sums = self.waves[:, 1] - (seen / n)[..., np.newaxis] * self.waves[:, 0]

@@ -75,7 +75,8 @@ class PlaceFacts(NamedTuple):
         """
         groups = [GROUP_OF_KIND.get(kind, len(GROUPS)) for kind in kinds]
         area = np.maximum(area_m2, 0.01)
-        count, features = len(groups), np.zeros((len(groups) + 1, PLACE_FEATURES))
+        count = len(groups)
+        features = np.zeros((len(groups) + 1, PLACE_FEATURES))
         features[np.arange(count), groups] = 1
         features[count, len(GROUPS) + 1] = 1
         features[:count, -3] = natural_log(area)
@@ -146,7 +147,8 @@ class Weights(NamedTuple):
                     f"{path} lacks finite weights {name!r} of shape {shape}: it is damaged"
                 )
         values = {name: arrays[name].astype(np.float64) for name in shapes}
-        places, start = values.pop("places"), values.pop("start")
+        places = values.pop("places")
+        start = values.pop("start")
         return cls(places, start, PlaceNetwork(**values))
 
     def save(self, path: Path) -> None:

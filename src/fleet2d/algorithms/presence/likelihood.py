@@ -89,7 +89,8 @@ class Likelihood(Estimator):
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return the expected share of rooms given at home, and of away."""
-        rooms, bins = (sums.shape[-1] - 3) // 2, sums[..., -1]
+        rooms = (sums.shape[-1] - 3) // 2
+        bins = sums[..., -1]
         away = np.where(bins > 0, sums[..., rooms] / np.where(bins > 0, bins, 1), 0.0)
         return normalized(np.maximum(sums[..., :rooms], 0)), np.clip(away, 0, 1)
 
@@ -114,7 +115,8 @@ class Likelihood(Estimator):
         if len(self.counts.days) < MIN_DAYS:
             return np.zeros(shape), np.ones(shape)
         assert self.people is not None, "days are over"
-        total, lengths = self.counts.total, self.people.length_of_stay
+        total = self.counts.total
+        lengths = self.people.length_of_stay
         if self.users:
             lengths = np.append(lengths, [np.max(lengths, axis=0)], axis=0)
         variance = np.maximum(total[:, self.rooms + 1 : -1], 0) * lengths
@@ -168,7 +170,8 @@ class Likelihood(Estimator):
         return part, people
 
     def _create_people(self, evidence: Evidence) -> People:
-        layout, prior = StateLayout.of(evidence, self.stages), Prior(self.detection, self.restless)
+        layout = StateLayout.of(evidence, self.stages)
+        prior = Prior(self.detection, self.restless)
         people = People(layout, prior, max(self.users, 1), self.together)
         if self.learned and not people.recall(self.learned):
             raise ComponentError(
@@ -183,7 +186,8 @@ class Likelihood(Estimator):
         is_watched = self.is_watched | evidence.watched.any(axis=0)
         if np.array_equal(is_watched, self.is_watched):
             return
-        before, self.is_watched = self._possible_rooms, is_watched
+        before = self._possible_rooms
+        self.is_watched = is_watched
         self.island = evidence.by_patch.island
         if not np.array_equal(self._possible_rooms, before):
             people.confine(np.append(self._possible_rooms, True).astype(np.float64))
@@ -217,7 +221,8 @@ class Likelihood(Estimator):
 
     def _end_day(self, next_day: int, people: People) -> None:
         """Smooth the present day as a whole, learn from it, and revisit earlier days."""
-        day, self.parts = DayEvidence.joined(self.parts), []
+        day = DayEvidence.joined(self.parts)
+        self.parts = []
         self.counts.hours = self._whole_day(people.end_day(day), day)
         self.hours.append(self.counts.hours)
         for _ in range(REVISITS):

@@ -226,7 +226,8 @@ class RealTimePresence(PresenceAlgorithm):
 
     def _check(self, home: Any, away: Any, bins: int, state: Present) -> None:
         """Refuse a model's belief if it has wrong shapes or isn't a distribution."""
-        users, rooms = len(state.users) + 1, len(self.home.rooms)
+        users = len(state.users) + 1
+        rooms = len(self.home.rooms)
         shapes = np.shape(home), np.shape(away)
         expected = (bins, users, rooms), (bins, users)
         if shapes != expected:
@@ -260,7 +261,8 @@ class BeliefTable(RealTimePresence):
         """Process the evidence of the period; return its beliefs, None without any."""
         self._begin_once(state)
         evidence = history.evidence
-        step_us, bin_steps = round(history.step_s * SECOND_US), evidence.bin_steps
+        step_us = round(history.step_s * SECOND_US)
+        bin_steps = evidence.bin_steps
         every = whole_steps(self.every, step_us, f"{state.path}.every", ComponentError)
         if every % bin_steps:
             raise ComponentError(f"{state.path}.every must be a whole number of minutes")
@@ -277,7 +279,8 @@ class BeliefTable(RealTimePresence):
         if is_whole:
             track = beliefs[0].track
             assert track is not None, "models that go bin by bin have one"
-            home, away = track.home[bins - 1], track.away[bins - 1]
+            home = track.home[bins - 1]
+            away = track.away[bins - 1]
         else:
             home, away = map(np.array, zip(*(b.arrays for b in beliefs[: len(due)]), strict=True))
         names = (*state.users, ANYONE)
@@ -349,8 +352,10 @@ class ToldPresence(Algorithm):
                 self.told.setdefault(name, []).append(Told(event.step, where))
             elif event.event == "user_seen" and event.detail in state.users:
                 self.told.setdefault(event.detail, []).append(Told(event.step, ""))
-        track, step_s = belief.track, history.step_s
-        home, away = track.home.copy(), track.away.copy()
+        track = belief.track
+        step_s = history.step_s
+        home = track.home.copy()
+        away = track.away.copy()
         for row, name in enumerate(state.users):
             for number in range(len(home)):
                 end = track.begin + (number + 1) * track.bin_steps
@@ -369,7 +374,8 @@ class ToldPresence(Algorithm):
         weight = exp2(-(age / self.half_life))
         joint = share * (1 - away[row])
         if told.where in self.rooms:
-            answer, is_away = np.zeros(len(share)), 0.0
+            answer = np.zeros(len(share))
+            is_away = 0.0
             answer[self.rooms[told.where]] = 1
         else:
             is_away = float(told.where == "away")

@@ -25,7 +25,8 @@ from fleet2d.kernels import (
 # Mean length of a stay before anything was learned, and of the first and last of several stages.
 # All in bins.
 MEAN_STAY = 120.0
-SHORTEST_STAGE, LONGEST_STAGE = 5.0, 240.0
+SHORTEST_STAGE = 5.0
+LONGEST_STAGE = 240.0
 
 
 class DayEvidence(NamedTuple):
@@ -56,7 +57,8 @@ class DayEvidence(NamedTuple):
         shown = evidence.by_patch.shown_255
         watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
         watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
-        number, unknown = int(evidence.day[0]), evidence.sightings.unknown
+        number = int(evidence.day[0])
+        unknown = evidence.sightings.unknown
         return cls(number, evidence.minute, unknown, *distinct(watched), sightings)
 
     @classmethod
@@ -137,7 +139,8 @@ class StateLayout(NamedTuple):
     @classmethod
     def of(cls, evidence: Evidence, stages: int) -> Self:
         """Return the states for the rooms and patches of evidence."""
-        room, cells = evidence.by_patch.room, evidence.by_patch.cells
+        room = evidence.by_patch.room
+        cells = evidence.by_patch.cells
         rooms = evidence.watched.shape[1]
         floor = np.maximum(cells, 1)
         spread = np.append(floor / np.bincount(room, floor, minlength=rooms)[room], 1.0)
@@ -154,7 +157,8 @@ class StateLayout(NamedTuple):
 
     def no_moments(self, *people: int) -> Moments:
         """Return moments of some people that are all zero, with people as the first dimension."""
-        places, nodes = self.rooms + 1, (self.rooms + 1) * self.stages
+        places = self.rooms + 1
+        nodes = (self.rooms + 1) * self.stages
         shapes = (nodes,), (nodes, places + 1), (len(self.room),), (places,), (places,)
         return Moments(*(np.zeros((*people, *shape)) for shape in shapes))
 
@@ -187,7 +191,8 @@ def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
     Returns:
         The transitions, with as many dimensions.
     """
-    places, stages = layout.rooms + 1, layout.stages
+    places = layout.rooms + 1
+    stages = layout.stages
     lengths = (
         np.linspace(SHORTEST_STAGE, LONGEST_STAGE, stages) if stages > 1 else np.array([MEAN_STAY])
     )
@@ -213,7 +218,8 @@ def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
 
 def _sum_by_room(values: F64, room: I64) -> F64:
     """Return the sums over the patches of each room, in order: (..., patches) to (..., rooms)."""
-    rooms, rows = int(room[-1]) + 1, values.reshape(-1, len(room))
+    rooms = int(room[-1]) + 1
+    rows = values.reshape(-1, len(room))
     slot = np.arange(len(rows))[:, None] * rooms + room
     sums = np.bincount(slot.ravel(), rows.ravel()).astype(np.float64)
     return sums.reshape(*values.shape[:-1], rooms)
@@ -312,7 +318,8 @@ class People:
             number: Index of the day in `days`.
             weight: Weight of the day.
         """
-        day, moments = self.days[number], self.layout.no_moments(self.count)
+        day = self.days[number]
+        moments = self.layout.no_moments(self.count)
         evidence = day.evidence.of_people(self.count)
         places, end, begin = smooth_people(
             self.model, evidence, self.longest, day.start, day.backward, moments

@@ -120,7 +120,8 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
         enough: The part of the room after which no more points are added.
         most: The maximum number of points.
     """
-    home, space = actor.home, actor.space
+    home = actor.home
+    space = actor.space
     key = "views", home.walls, space, actor.part, sight_range(actor), room.index, enough, most
     return home.cached(key, lambda: _choose_viewpoints(actor, room, enough, most))
 
@@ -147,7 +148,8 @@ def _cover(actor: Actor, room: Room, goals: I64, enough: float, most: int) -> Vi
 
 
 # The part of a room without furniture to be seen, and the maximum number of stops in a room.
-FLOOR_TO_SEE, MOST_STOPS = 0.95, 4
+FLOOR_TO_SEE = 0.95
+MOST_STOPS = 4
 
 
 def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
@@ -157,7 +159,8 @@ def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
         The names of the furniture, of each point; and the points [lattice], int64 (n, 2). In a
         room without furniture that is used there are no names, and points all over the floor.
     """
-    home, plan = actor.home, actor.home.plan
+    home = actor.home
+    plan = actor.home.plan
     uses = [
         (thing.name, (use.x, use.y))
         for thing in home.objects
@@ -220,7 +223,8 @@ def spread(cells: I64, most: int) -> I64:
     if len(cells) <= most:
         return cells
     rows, columns = cells.T
-    pitch, is_cell = 1, np.zeros((rows[-1] + 1, columns.max() + 1), np.bool_)
+    pitch = 1
+    is_cell = np.zeros((rows[-1] + 1, columns.max() + 1), np.bool_)
     is_cell[rows, columns] = True
     while np.count_nonzero(is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]) > most:
         pitch += 1
@@ -275,7 +279,8 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         A point on the shortest way to the free place nearest to the person; the robot's position,
         if it is near enough already or there is no way.
     """
-    actor, lattice = now.actor, now.home.plan.lattice
+    actor = now.actor
+    lattice = now.home.plan.lattice
     position = (actor.state.x, actor.state.y)
     person = lattice.to_lattice((x, y))
     goal = lattice.point_at(now.nearest_free(x, y))
@@ -309,8 +314,10 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         A free point of the person's room at that distance; the robot's position, if it is at least
         as far away already or there is no such point.
     """
-    actor, home = now.actor, now.home
-    lattice, position = home.plan.lattice, (actor.state.x, actor.state.y)
+    actor = now.actor
+    home = now.home
+    lattice = home.plan.lattice
+    position = (actor.state.x, actor.state.y)
     person = lattice.point_at((x, y))
     reach = math.ceil(distance * lattice.units_per_m)
     if _distance(person, position) >= reach:

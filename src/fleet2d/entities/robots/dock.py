@@ -82,7 +82,8 @@ class Dock(Behavior):
         """Charge, if the charge is low; rest at the charger, if `rest` says so."""
         charge = now.actor.charge
         assert charge is not None
-        plan, charger = now.plan(), charge.charger
+        plan = now.plan()
+        charger = charge.charger
         has_command = now.take_command("dock") is not None
         is_low = charge.level <= self.threshold
         if has_command or is_low or (self.charging and charge.level < self.until):

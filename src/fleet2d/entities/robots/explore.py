@@ -109,7 +109,8 @@ class Explore(Behavior):
         near = np.flatnonzero(self._near_frontier(now, explored))
         gains = [np.count_nonzero(self._visible(now.actor, i) & unseen) for i in near.tolist()]
         shows_enough = np.array(gains, np.int64) > WORTH * len(self.targets)
-        near, gain = near[shows_enough], np.array(gains, np.float64)[shows_enough]
+        near = near[shows_enough]
+        gain = np.array(gains, np.float64)[shows_enough]
         if not len(near):
             return None
         actor = now.actor

@@ -227,7 +227,8 @@ class Find(BeliefBehavior):
         search = self.search
         if search is not None and search.goal is not None:
             search.blocked.add(search.goal)
-            search.route, search.goal = search.route[1:], None
+            search.route = search.route[1:]
+            search.goal = None
 
     def dismiss(self) -> None:
         """End the search."""
@@ -235,7 +236,8 @@ class Find(BeliefBehavior):
 
     def decide(self, now: Situation) -> Plan | None:
         """Begin a search that is due, continue one, or leave the robot to other behaviors."""
-        plan, search = now.plan(), self.search
+        plan = now.plan()
+        search = self.search
         user = self._commanded_user(now)
         if user is None and search is None and self._is_due(now):
             user = self.user
@@ -269,9 +271,11 @@ class Find(BeliefBehavior):
 
     def _is_due(self, now: Situation) -> bool:
         """Return whether a search is due and not too late; afterwards the next one is due."""
-        due, start = self.due, now.actor.clock.start
+        due = self.due
+        start = now.actor.clock.start
         while self.due is not None and self.due <= now.time:
-            due, self.due = self.due, self._next(self.due, start)
+            due = self.due
+            self.due = self._next(self.due, start)
         return due is not None and due <= now.time <= due + self.late
 
     def _note_empty_look(self, now: Situation, search: SearchState) -> None:
@@ -280,7 +284,8 @@ class Find(BeliefBehavior):
         is_complete = plan.root is self.plan and plan.is_over(now.step)
         if search.goal is not None and is_complete and not now.events:
             search.looked_at[search.goal] = now.time
-            search.route, search.goal = search.route[1:], None
+            search.route = search.route[1:]
+            search.goal = None
 
     def _approach(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
         """End the search: approach the person, at (x, y) [m], and stay."""
@@ -300,7 +305,8 @@ class Find(BeliefBehavior):
         if now.time >= ends:
             return self._end(plan, "gave_up")
         prior, away = self._prior(now, search.user)
-        age, memory = np.full(len(self.sites), np.inf), self.memory.total_seconds()
+        age = np.full(len(self.sites), np.inf)
+        memory = self.memory.total_seconds()
         for site, at in search.looked_at.items():
             age[site] = (now.time - at).total_seconds()
         remaining = after_empty_looks(prior, age, memory, self.sites.share)
@@ -314,7 +320,8 @@ class Find(BeliefBehavior):
             route = tuple(order_by(self.policy, problem, now.random("order")))
         while route and (route[0] in search.blocked or not self.sites.can_go(plan, route[0])):
             route = route[1:]
-        search.route, search.goal = route, route[0] if route else None
+        search.route = route
+        search.goal = route[0] if route else None
         if route:
             self.sites.look_round(plan, route[0]).interrupt_on("user_seen")
         else:  # shut doors block all sites
@@ -338,7 +345,8 @@ class Find(BeliefBehavior):
     def _end(self, plan: Plan, event: str) -> Plan:
         """End the search with an event."""
         assert self.search is not None
-        user, self.search = self.search.user, None
+        user = self.search.user
+        self.search = None
         return plan.note(event, user)
 
     def _next(self, after: datetime, start: datetime) -> datetime | None:

@@ -70,7 +70,8 @@ class Follow(Behavior):
 
     def dismiss(self) -> None:
         """Let the person go; it follows again when somebody comes into view."""
-        self.person, self.is_searching = None, False
+        self.person = None
+        self.is_searching = False
 
     def decide(self, now: Situation) -> Plan | None:
         """Follow the person, look where the person was lost, or leave it to later behaviors."""
@@ -87,7 +88,8 @@ class Follow(Behavior):
         if self.person in in_view:
             return self._follow(now, now.plan())
         if self.is_searching:  # it has looked round where the person was last, without success
-            self.person, self.is_searching = None, False
+            self.person = None
+            self.is_searching = False
             return None
         self.is_searching = True
         plan = now.plan().note("lost", self.person).interrupt_on("user_seen")

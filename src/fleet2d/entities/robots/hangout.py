@@ -53,7 +53,8 @@ class HangoutPlaces:
             off_doors: The minimum distance of a place from every doorway [m].
         """
         self._actor = actor
-        home, people = actor.home, actor.home.space(PERSON, opens_doors=True)
+        home = actor.home
+        people = actor.home.space(PERSON, opens_doors=True)
         # The key has all that the places depend on: robots of other runs in this home share them.
         body = actor.space, actor.part, actor.entity.radius
         self._key = (*body, people, home.objects, avoid, off_doors)
@@ -69,7 +70,8 @@ class HangoutPlaces:
         """
         self.points, self.room = self._candidates(avoid, off_doors)
         seats = tuple(read_only(self._seats_of(room)) for room in self._actor.home.rooms)
-        block, prox = read_only(self._blocking()), read_only(self._proximity())
+        block = read_only(self._blocking())
+        prox = read_only(self._proximity())
         return read_only(self.points), read_only(self.room), seats, block, prox
 
     def nearness(self, by: Nearness, tau: float) -> F64:
@@ -94,13 +96,15 @@ class HangoutPlaces:
         return np.stack([column(room) for room in rooms], axis=1)
 
     def _candidates(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64]:
-        actor, plan = self._actor, self._actor.home.plan
+        actor = self._actor
+        plan = self._actor.home.plan
         cells = actor.space.cells(None, actor.part)
         pitch = max(1, round(PITCH / plan.lattice.cell))
         on_grid = (cells[:, 0] % pitch == 0) & (cells[:, 1] % pitch == 0)
         rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
         is_candidate = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
-        cells, rooms = cells[is_candidate], rooms[is_candidate]
+        cells = cells[is_candidate]
+        rooms = rooms[is_candidate]
         points = centres(cells)
         if plan.doorways and off_doors > 0:
             lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
@@ -109,7 +113,8 @@ class HangoutPlaces:
                 np.array([shapely.LineString(line) for line in lines]),
             )
             clear = gaps.min(axis=1, initial=np.inf) >= off_doors * plan.lattice.units_per_m
-            points, rooms = points[clear], rooms[clear]
+            points = points[clear]
+            rooms = rooms[clear]
         return np.ascontiguousarray(points), rooms
 
     def _seats_of(self, room: Room) -> I64:
@@ -127,7 +132,8 @@ class HangoutPlaces:
         return centres(cells[:: max(1, len(cells) // MAX_SEATS)])
 
     def _view(self, room: Room) -> F64:
-        walls, reach = self._actor.home.walls, sight_range(self._actor)
+        walls = self._actor.home.walls
+        reach = sight_range(self._actor)
         seats = self._seats[room.index]
         share = np.zeros(len(self.points))
         for i, (x, y) in enumerate(self.points.tolist()):
@@ -147,13 +153,16 @@ class HangoutPlaces:
 
     def _blocking(self) -> F64:
         """Return the share of people's ways from room to room that a robot at each place blocks."""
-        actor, home = self._actor, self._actor.home
+        actor = self._actor
+        home = self._actor.home
         space = home.space(PERSON, opens_doors=True)
         anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
         stops = [space.nearest(x, y, 0, r) for r, (x, y) in enumerate(anchors)]
         pairs = list(combinations([stop for stop in stops if stop is not None], 2))
         reach = (PERSON + actor.entity.radius) * home.plan.lattice.units_per_m
-        points, blocked, ways = shapely.points(self.points), np.zeros(len(self.points)), 0
+        points = shapely.points(self.points)
+        blocked = np.zeros(len(self.points))
+        ways = 0
         for start, goal in pairs:
             route = space.route(start, goal)
             if route is not None and len(route) > 1:
@@ -269,7 +278,8 @@ class Hangout(BeliefBehavior):
 
     def decide(self, now: Situation) -> Plan:
         """Stay, or go to a better place; go back to its place after another behavior's turn."""
-        plan, quiet_until = now.plan(), holds(self.quiet, now.time)
+        plan = now.plan()
+        quiet_until = holds(self.quiet, now.time)
         # As after a visit, or when the run begins.
         is_in_avoided_room = now.room is not None and now.room.index in self.avoided
         if quiet_until is not None and not is_in_avoided_room:
@@ -309,7 +319,8 @@ class Hangout(BeliefBehavior):
             return
         self.better_since = self.better_since or now.time
         if self.place is None or now.time - self.better_since >= self.confirm:
-            self.place, self.better_since = best, None
+            self.place = best
+            self.better_since = None
             plan.note("relocates", now.home.plan.rooms[int(self.places.room[best])].name)
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
@@ -329,7 +340,8 @@ class Hangout(BeliefBehavior):
             # Summed in a fixed order, unlike in a matrix product: the same on every machine.
             for room, chance in enumerate(joint.tolist()):
                 gain += chance * self.nearness[:, room]
-            self.rated_by, self.worth = joint, gain - self.penalty
+            self.rated_by = joint
+            self.worth = gain - self.penalty
         return self.worth - self._ways(now.actor)
 
     def _ways(self, actor: Actor) -> F64:
@@ -338,7 +350,8 @@ class Hangout(BeliefBehavior):
         The robot decides often, but stands at few places: costs are kept by position, until its
         space changes.
         """
-        space, points = actor.space, self.places.points
+        space = actor.space
+        points = self.places.points
         if self.ways[0] is not space:
             self.ways = space, {}
         cell = actor.state.x // SUB, actor.state.y // SUB

@@ -34,7 +34,8 @@ ENOUGH = 0.9
 MOST_SURE = 0.9
 # The least time between two rounds for a person; and from no answer, or from seeing who gave none
 # in the same place, to the next round.
-SEARCH_PAUSE, UNANSWERED_PAUSE = timedelta(minutes=30), timedelta(hours=4)
+SEARCH_PAUSE = timedelta(minutes=30)
+UNANSWERED_PAUSE = timedelta(hours=4)
 SATURDAY = 5
 # How long its answer to a question takes.
 REPLY_TAKES = timedelta(seconds=10)
@@ -59,8 +60,10 @@ class RoundMemory:
     who is there; that fades evenly over 8 h, or until the person is seen.
     """
 
-    MISSED, DOUBT_LASTS = 0.1, timedelta(hours=8)
-    USUAL_COUNTS, HALF_LIFE = 2.0, timedelta(days=14)
+    MISSED = 0.1
+    DOUBT_LASTS = timedelta(hours=8)
+    USUAL_COUNTS = 2.0
+    HALF_LIFE = timedelta(days=14)
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, bool, int], RoundCount] = {}
@@ -221,7 +224,8 @@ class Interact(BeliefBehavior):
         served = self._take_served(now)
         if served is not None and served.step == "ask":
             return self._react(now, served)
-        plan, ready = self._reply(now), self._ready(now)
+        plan = self._reply(now)
+        ready = self._ready(now)
         if plan is not None or not ready:
             return plan
         return (
@@ -232,7 +236,8 @@ class Interact(BeliefBehavior):
 
     def _take_served(self, now: Situation) -> ServedRequest | None:
         """Return and forget what it is doing; None if another behavior has interrupted that."""
-        served, self.served = self.served, None
+        served = self.served
+        self.served = None
         if served is None or now.actor.plan.root is self.plan:
             return served
         if served.step == "ask":  # maybe it was sent away
@@ -317,7 +322,9 @@ class Interact(BeliefBehavior):
             return False
         assert now.requests is not None
         self.set_aside[request.text] = now.time + self.look
-        output, chance, to = now.outputs.get(self.timing), 1.0, request.to
+        output = now.outputs.get(self.timing)
+        chance = 1.0
+        to = request.to
         if output is not None and not callable(getattr(output, "chance", None)):
             raise ComponentError(
                 f"the output of {self.timing!r} has no chances of asking: name an algorithm of type"
@@ -362,7 +369,8 @@ class Interact(BeliefBehavior):
 
     def _react(self, now: Situation, served: ServedRequest) -> Plan:
         """Carry out what was accepted, or withdraw after another answer."""
-        request, to = served.request, served.text.rpartition(" ")[2]
+        request = served.request
+        to = served.text.rpartition(" ")[2]
         answers = [e.event for e in now.events if e.event in ANSWERS and e.user == served.text]
         if Outcome.ACCEPTED in answers:
             self.served = served._replace(step="carry_out")
@@ -399,7 +407,9 @@ class Interact(BeliefBehavior):
         """Continue an interrupted round; None if it is over and nobody was found."""
         if served is None or served.step != "seek" or served.request not in ready:
             return None
-        last, plan, is_in_view = now.actor.plan, None, served.request.to in now.in_view
+        last = now.actor.plan
+        plan = None
+        is_in_view = served.request.to in now.in_view
         if not is_in_view and not last.is_over(now.step):
             plan = resumed(now.plan(), last, now.step)
         if plan is None:
@@ -453,7 +463,8 @@ class Opportunistic(Behavior):
 
     def decide(self, now: Situation) -> Plan | None:
         """Approach somebody in view, or leave the decision to later behaviors."""
-        asked, self.asked = self.asked, None
+        asked = self.asked
+        self.asked = None
         texts = [event.user for event in now.events if event.event == "accepted"]
         if asked is not None and asked[1] in texts:
             request, text = asked

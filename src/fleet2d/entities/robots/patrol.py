@@ -106,7 +106,8 @@ class Patrol(Behavior):
         stops = self.stops
         if self.order == "random":
             stops = now.random("order").shuffled(stops)
-        plan, has_stop = now.plan(), False
+        plan = now.plan()
+        has_stop = False
         for stop in stops:
             if now.actor.may_block_routes and not plan.reaches(*stop):
                 continue  # in a later round its door may be open, or its costs lower

@@ -63,7 +63,8 @@ COLUMNS = (
 )
 """The columns of an observation, in their order: see docs/gym.md."""
 _AT = {name: number for number, name in enumerate(COLUMNS)}
-HERE, WAY = _AT["here"], _AT["way"]
+HERE = _AT["here"]
+WAY = _AT["way"]
 
 INPUTS = ("observation", "action_mask")
 """The names of the inputs of a policy in a file."""
@@ -83,7 +84,9 @@ _HALF_TURN = range(0, TURN // 2, TURN // DIRECTIONS)
 HALF_DIRECTIONS = np.array([(kernels.cosine(h), kernels.sine(h)) for h in _HALF_TURN]) / UNIT
 
 # A time t ago counts 1 / (1 + t / scale) [s].
-SHORT_S, SEEN_S, LONG_S = 20 * 60, 30 * 60, 6 * HOUR_S
+SHORT_S = 20 * 60
+SEEN_S = 30 * 60
+LONG_S = 6 * HOUR_S
 # A way that takes this long, or longer, counts 1 [s].
 LONGEST_WAY_S = 60.0
 # The ways from so many places are kept.
@@ -126,7 +129,8 @@ class WaitingPoses:
     """
 
     def __init__(self, actor: Actor) -> None:
-        home, self._actor = actor.home, actor
+        home = actor.home
+        self._actor = actor
         angles = [camera.angle_deg for camera in actor.entity.eyes.values()]
         self._half_angle = round(max(angles) / 720 * TURN)
         key = (home.walls, actor.space, actor.part, actor.entity.radius, repr(actor.entity.eyes))
@@ -140,14 +144,18 @@ class WaitingPoses:
         rooms = self._actor.reachable_rooms()
         poses = np.array([self._best(room) for room in rooms], np.int64).reshape(-1, 3)
         index = np.array([room.index for room in rooms], np.int64)
-        points, headings = np.ascontiguousarray(poses[:, :2]), poses[:, 2].copy()
+        points = np.ascontiguousarray(poses[:, :2])
+        headings = poses[:, 2].copy()
         return read_only(index), read_only(points), read_only(headings)
 
     def _best(self, room: Room) -> tuple[int, int, int]:
         """Return the place (x, y) and the heading at which most of a room is in view."""
-        actor, walls = self._actor, self._actor.home.walls
-        stands, goals = approach.stands_in(actor, room), approach.floor_of(actor, room)
-        limit, reach = kernels.cosine(self._half_angle) / UNIT, approach.sight_range(actor)
+        actor = self._actor
+        walls = self._actor.home.walls
+        stands = approach.stands_in(actor, room)
+        goals = approach.floor_of(actor, room)
+        limit = kernels.cosine(self._half_angle) / UNIT
+        reach = approach.sight_range(actor)
         best = kernels.best_view(walls, stands, goals, reach * reach, HALF_DIRECTIONS, limit)
         if best is None:
             return *actor.middle(room), 0
@@ -162,7 +170,8 @@ class WaitingPoses:
         if self._distances is None or self._distances.space is not space:
             key = ("distances of rooms", *self._key, space)
             distances = actor.home.cached(key, lambda: PointDistances(space, self.points))
-            self._distances, self._ways = distances, {}
+            self._distances = distances
+            self._ways = {}
         x, y, _, _ = actor.state
         ways = self._ways.get((x, y, actions))
         if ways is None:
@@ -292,7 +301,10 @@ class Policy(BeliefBehavior):
 
     def observe(self, now: Situation) -> F32:
         """Return the observation, float32 (rooms, columns): see docs/gym.md."""
-        actor, room, time, memory = now.actor, now.room, now.time, now.actor.recall().rooms
+        actor = now.actor
+        room = now.room
+        time = now.time
+        memory = now.actor.recall().rooms
         table: F32 = self._fixed.copy()
         part = table[: len(self.visited)]
         if room is not None:
@@ -312,7 +324,8 @@ class Policy(BeliefBehavior):
         newest = max(memory.last[self._person].tolist())
         age_s = (now.step - newest) * step_s
         minute = (time.hour * 60 + time.minute) * TURN // DAY_MINUTES
-        charge, since = actor.charge, self.since
+        charge = actor.charge
+        since = self.since
         common = [
             kernels.sine(minute) / UNIT,
             kernels.cosine(minute) / UNIT,
@@ -322,7 +335,8 @@ class Policy(BeliefBehavior):
             0.0 if newest < 0 else SEEN_S / (SEEN_S + age_s),
             0.0 if since is None else min((time - since) / self.deadline, 1.0),
         ]
-        visits, shown = self.visited, self._shown
+        visits = self.visited
+        shown = self._shown
         kernels.show_memory(memory, shown, visits, now.step, time.hour, step_s, common, table)
         return table
 
@@ -413,7 +427,9 @@ class Policy(BeliefBehavior):
         return int(np.argmax(np.where(mask, scores, -np.inf)))
 
     def _action(self, now: Situation) -> int:
-        mask, action, self.given = self.mask(), self.given, None
+        mask = self.mask()
+        action = self.given
+        self.given = None
         if action is None:
             action = self.act(self.observe(now), mask)
         self.check(now, action, mask)
@@ -436,7 +452,8 @@ class Policy(BeliefBehavior):
 
     def _rest(self, now: Situation, plan: Plan) -> Plan:
         """Charge, if it has a battery; else stay where it is."""
-        charge, lasts = now.actor.charge, MINUTE if self.task == "find" else self.period
+        charge = now.actor.charge
+        lasts = MINUTE if self.task == "find" else self.period
         if charge is not None and plan.reaches(*charge.charger):
             if (plan.x, plan.y) != charge.charger:
                 plan.go_to_point(*charge.charger).note("docks", charge.percent)
@@ -446,8 +463,10 @@ class Policy(BeliefBehavior):
 
     def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
         """Go to a room, and wait or look round there."""
-        name, number = now.home.rooms[room].name, self.poses.number[room]
-        begun, self.visited[room] = max(int(self.visited[room]), 0), now.step
+        name = now.home.rooms[room].name
+        number = self.poses.number[room]
+        begun = max(int(self.visited[room]), 0)
+        self.visited[room] = now.step
         if self.sites is not None and self.task == "find":
             self.sites.look_round(plan, number)
             self._tally["relocations"] += 1

@@ -76,7 +76,8 @@ class SearchOutcome(NamedTuple):
     def restricted_mean(self, deadline: float) -> float:
         """Return the expected time until the target is found or the deadline is reached [s]."""
         inside = self.time <= deadline
-        chances, times = self.chance[inside].tolist(), self.time[inside].tolist()
+        chances = self.chance[inside].tolist()
+        times = self.time[inside].tolist()
         before_deadline = sum_in_order(t * p for t, p in zip(times, chances, strict=True))
         return float(before_deadline + deadline * (1 - sum_in_order(chances)))
 
@@ -100,7 +101,8 @@ def search_problem(
         ([0.5, 0.3], [2.0, 2.0])
     """
     chances = np.asarray(prior, np.float64)
-    count, ways = len(chances), np.asarray(travel, np.float64)
+    count = len(chances)
+    ways = np.asarray(travel, np.float64)
     problem = SearchProblem(
         chances,
         np.asarray(reach, np.float64),
@@ -133,8 +135,10 @@ def play(problem: SearchProblem, order: Sequence[int]) -> SearchOutcome:
         ([3.0, 10.0], 7.375, 7.2)
     """
     undetected = problem.prior.copy()  # the target is at the site, and no look has found it
-    now, at = 0.0, -1
-    times, chances = [], []
+    now = 0.0
+    at = -1
+    times = []
+    chances = []
     for site in order:
         way = problem.reach[site] if at < 0 else problem.travel[at, site]
         now += float(way + problem.look[site])
@@ -214,7 +218,8 @@ def exact(problem: SearchProblem) -> list[int]:
         return []
     ways = problem.travel + problem.look
     choice, first = _solve(ways, problem.reach + problem.look, problem.gain)
-    order, done = [first], 1 << first
+    order = [first]
+    done = 1 << first
     while len(order) < count:
         order.append(int(choice[done, order[-1]]))
         done |= 1 << order[-1]
@@ -283,7 +288,8 @@ def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]
         worth: A function of the time of travel and look [s] and the probability of detection.
     """
     gain, look = problem.gain.tolist(), problem.look.tolist()
-    remaining, order = list(range(len(gain))), list[int]()
+    remaining = list(range(len(gain)))
+    order = list[int]()
     while remaining:
         ways = problem.travel[order[-1]] if order else problem.reach
         best = max(remaining, key=lambda j: (worth(float(ways[j]) + look[j], gain[j]), -j))
@@ -309,7 +315,8 @@ def _solve(ways: F64, reach: F64, gain: F64) -> tuple[I8, int]:
         size += subsets >> j & 1
     cost = np.zeros((1 << count, count))
     choice = np.zeros((1 << count, count), np.int8)
-    bits, last = np.left_shift(1, np.arange(count)), np.arange(count)
+    bits = np.left_shift(1, np.arange(count))
+    last = np.arange(count)
     for done in range(count - 1, 0, -1):
         layer = subsets[size == done]
         ahead = np.where(layer[:, None] & bits, np.inf, cost[layer[:, None] | bits, last])

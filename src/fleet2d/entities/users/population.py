@@ -53,14 +53,16 @@ class Population(ResidentBehavior):
         used = {*survey.activities(self.people), REST}
         self.rules, self.interruptions = None, actor.stream("needs")
         if self.bodily_needs:
-            needs, errands = interruptions.population_needs(), interruptions.usual_errands()
+            needs = interruptions.population_needs()
+            errands = interruptions.usual_errands()
             self.rules = interruptions.interruption_rules(needs, errands, known)
             used |= interruptions.activities_of(needs, errands)
         self.settle(actor, {name: known[name] for name in sorted(used)}, self.make_spots(actor))
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return the rooms of a typical activity of such people at the beginning of the run."""
-        draws, known = Draws(stream_key(0, "", "likely"), 0), catalogue()
+        draws = Draws(stream_key(0, "", "likely"), 0)
+        known = catalogue()
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()
         state = survey.first_state(people, draws, ordinal)
@@ -77,7 +79,8 @@ class Population(ResidentBehavior):
         return self.cache[ordinal]
 
     def _live(self, ordinal: int) -> Sequence[Episode]:
-        people, state = self.people, self.states[ordinal - self.first]
+        people = self.people
+        state = self.states[ordinal - self.first]
         episodes, after = survey.draw_episodes(people, Draws(self.days, ordinal), ordinal, state)
         if len(self.states) == ordinal - self.first + 1:
             self.states.append(after)

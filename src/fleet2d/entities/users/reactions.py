@@ -51,8 +51,11 @@ class Reactions(Behavior):
         self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
         durations = ("looks", "leaves_for", "comes_for")
         self.durations = {name: getattr(self.used_manners, name).table() for name in durations}
-        self.rank, self.until = 0, -1  # of the present reaction, and the step at which it ends
-        units, used = actor.home.plan.lattice.units_per_m, self.used_manners
+        # of the present reaction, and the step at which it ends
+        self.rank = 0
+        self.until = -1
+        units = actor.home.plan.lattice.units_per_m
+        used = self.used_manners
         return Attention(
             notices=round(used.notices * units),
             in_way=round(used.in_the_way * units),

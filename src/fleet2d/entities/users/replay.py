@@ -69,7 +69,8 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
         turns: Headings in the plan [turns], NaN where there is none.
         reach: A fix farther than this from any such place is left out [m].
     """
-    lattice, space = actor.home.plan.lattice, actor.space
+    lattice = actor.home.plan.lattice
+    space = actor.space
     size = 1 << 20  # beyond any home, within 64 bits when squared
     points: I64 = np.clip(
         lattice.to_lattice(np.clip(xy, -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)), -size, size
@@ -137,7 +138,8 @@ class FixFollower:
             else:
                 leave = plan.time_us
                 if self.gaps == "hold":
-                    speeds, heading = (self.actor.speed, self.actor.turn_rate), self.heading[j - 1]
+                    speeds = (self.actor.speed, self.actor.turn_rate)
+                    heading = self.heading[j - 1]
                     takes = time_route(self._route(j), 0, int(heading), *speeds)[-1, 0]
                     leave = max(leave, int(time[j] - takes))
                 self._leg(plan, j, leave)
@@ -147,7 +149,8 @@ class FixFollower:
 
     def _headings(self) -> I64:
         """Return the heading at each fix: the log's, else the direction to the next fix."""
-        xy, heading = self.fixes.xy, self.fixes.heading.copy()
+        xy = self.fixes.xy
+        heading = self.fixes.heading.copy()
         stir = MIN_HEADING_MOVE_M * self.actor.home.plan.lattice.units_per_m
         last = 0
         moves = np.diff(xy, axis=0, append=xy[-1:])
@@ -165,13 +168,15 @@ class FixFollower:
 
     def _appear(self, plan: Plan, i: int) -> None:
         x, y = self.fixes.xy[i].tolist()
-        at_us, heading = int(self.fixes.time_us[i]), int(self.heading[i])
+        at_us = int(self.fixes.time_us[i])
+        heading = int(self.heading[i])
         plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
 
     def _route(self, j: int) -> I64:
         """Return the route to a fix from the one before, straight if that is free; int64 (n, 2)."""
         (ax, ay), (bx, by) = self.fixes.xy[j - 1 : j + 1].tolist()
-        space, straight = self.actor.space, straight_way((ax, ay), (bx, by))
+        space = self.actor.space
+        straight = straight_way((ax, ay), (bx, by))
         if (ax, ay) == (bx, by) or line_of_sight(space.mesh, ax, ay, bx, by):
             return straight
         route = space.route((ax, ay), (bx, by))
@@ -242,7 +247,8 @@ class RoomFollower:
         else:
             self._appear(plan, self.visits[current], plan.time_us, known=False)
         for i in range(current + 1, len(self.visits)):
-            before, visit = self.visits[i - 1], self.visits[i]
+            before = self.visits[i - 1]
+            visit = self.visits[i]
             arrive_us = visit.first * self.step_us
             self._note_activities(plan, before)
             if arrive_us <= plan.time_us:  # still catching up
@@ -373,7 +379,8 @@ def report_rooms(
             f"{logged.overruled} readings yield to later ones of another room in their step"
         )
     gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
-    steps, step_us = follower.actor.clock.steps, follower.step_us
+    steps = follower.actor.clock.steps
+    step_us = follower.step_us
     hours = sum_in_order((min(v.last + 1, steps) - max(v.first, 0)) * step_us / 3.6e9 for v in gaps)
     if gaps:
         lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
@@ -509,7 +516,8 @@ class Replay(Behavior, LogKeys):
 
     def _start_rooms(self, actor: Actor, log: ActivityLog, begin_us: int) -> None:
         mapped = placement.map_rooms(log.rooms, self.rooms, actor.home.rooms)
-        clock, gap_us = actor.clock, units.micros(self.gap or GAP_OF_ROOMS)
+        clock = actor.clock
+        gap_us = units.micros(self.gap or GAP_OF_ROOMS)
         rule = placement.VisitRule(
             step_us=clock.step_us,
             begin_us=begin_us,
@@ -530,7 +538,8 @@ class Replay(Behavior, LogKeys):
     def _start_fixes(self, actor: Actor, log: PositionLog, begin_us: int) -> None:
         if self.rooms:
             raise LogError("a log of positions names no rooms: leave out 'rooms'")
-        clock, frame = actor.clock, self.frame.in_unit(log.unit_m)
+        clock = actor.clock
+        frame = self.frame.in_unit(log.unit_m)
         time_us = log.time_us - begin_us
         step = time_us // clock.step_us
         # The first fix of each step of the run.

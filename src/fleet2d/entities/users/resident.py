@@ -102,7 +102,8 @@ class Spots:
         """Return the body's habitual spots of a room as it is at present, at least one."""
         self._check_version()
         if room.index not in self._of_room:
-            space, part = self._actor.space, self._actor.part
+            space = self._actor.space
+            part = self._actor.part
             grid = self._actor.home.cached(
                 ("spots", space, part, room.index, self.members), lambda: self._grid(room)
             )
@@ -125,7 +126,8 @@ class Spots:
             share: Rank of the body, and number of bodies that share; None: as in its household.
         """
         self._check_version()
-        indices, kinds = frozenset(room.index for room in rooms), activity.objects
+        indices = frozenset(room.index for room in rooms)
+        kinds = activity.objects
         key = kinds, indices, activity.posture, share, self._actor.part
         if key not in self._at_furniture:
             rank, members = share or (self.rank, self.members)
@@ -153,7 +155,8 @@ class Spots:
 
     def _grid(self, room: Room) -> tuple[Spot, ...]:
         """Return the spots of a room: a grid of cells, a finer one in a small room."""
-        actor, lattice = self._actor, self._actor.home.plan.lattice
+        actor = self._actor
+        lattice = self._actor.home.plan.lattice
         cells = actor.space.cells(room.index, actor.part)
         pitch = math.ceil(SPACING / lattice.cell)
         while pitch:
@@ -275,19 +278,24 @@ class KnownHome:
             until_us: None begins then, or later [us since the start].
             continues: Whether the first one may be a part of the last one of the plan before.
         """
-        live, walk, now = self.update().live, partial(self._walk, plan), _end_of(plan)
+        live = self.update().live
+        walk = partial(self._walk, plan)
+        now = _end_of(plan)
         course = live(self, walk, plan.legs, *now, stints, until_us, continues, self._last)
         self._take(plan, course)
 
     def go(self, plan: Plan, activity: str, venue: Venue, draws: Draws) -> None:
         """Go to where an activity is done, and take its posture."""
-        go, walk, now = self.update().go, partial(self._walk, plan), _end_of(plan)
+        go = self.update().go
+        walk = partial(self._walk, plan)
+        now = _end_of(plan)
         self._take(plan, go(self, walk, plan.legs, *now, self.in_core(activity, venue), draws))
 
     def update(self) -> Resident:
         """Forget an earlier arrangement of doors and furniture; return the body for the core."""
         actor = self._actor
-        space, rates = actor.space, (actor.speed, actor.turn_rate)
+        space = actor.space
+        rates = (actor.speed, actor.turn_rate)
         present = actor.home.version, space, actor.part, rates
         of, resident = self._resident
         if resident is None or of != present:
@@ -346,7 +354,8 @@ class KnownHome:
     # What is prepared for it, and taken from it.
 
     def _make_core_venue(self, name: str, venue: Venue) -> CoreVenue:
-        activity, waits = venue.activity, exponential_waits
+        activity = venue.activity
+        waits = exponential_waits
         return CoreVenue(
             venue,
             self._names.setdefault(name, len(self._names)),
@@ -379,7 +388,8 @@ class KnownHome:
         plan.time_us, plan.x, plan.y, plan.heading, plan.away = end
         plan.posture = POSTURES[posture]
         plan.postures += postures
-        names, things = list(self._names), [seat.thing for seat in self._seats]
+        names = list(self._names)
+        things = [seat.thing for seat in self._seats]
         details = names, names, things, [""], [""]  # by event
         plan.notes += [
             new_note((time_us, EVENTS[what], details[what][number]))
@@ -487,7 +497,8 @@ class ResidentBehavior(Behavior):
         All plans end at midnight: bodies that decide at the same step make fewer spans. People who
         react to robots plan less far ahead, as they are interrupted more often.
         """
-        plan, clock = now.plan(), now.actor.clock
+        plan = now.plan()
+        clock = now.actor.clock
         self.is_hindered = now.home.may_block_routes  # by shut doors, for all of the plan
         midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
@@ -522,11 +533,13 @@ class ResidentBehavior(Behavior):
             The day's ordinal and the number in it, the midnight of that day [us since the start],
             and the episode.
         """
-        ordinal, now_us = time.toordinal(), self.clock.elapsed(time)
+        ordinal = time.toordinal()
+        now_us = self.clock.elapsed(time)
         if time < datetime.fromordinal(ordinal) + timedelta(seconds=self.day(ordinal)[0].begin):
             ordinal -= 1
         while True:
-            day, day_us = self.day(ordinal), self.clock.elapsed(datetime.fromordinal(ordinal))
+            day = self.day(ordinal)
+            day_us = self.clock.elapsed(datetime.fromordinal(ordinal))
             first = bisect_right(day, (now_us - day_us) // SECOND_US, key=END)
             for i in range(first, len(day)):
                 yield (ordinal, i), day_us, day[i]
@@ -576,7 +589,8 @@ class ResidentBehavior(Behavior):
     def _venue(self, actor: Actor, activity: Activity) -> Venue:
         if activity.away:
             return Venue(activity, [], [], [], (), None)
-        names, never_in = activity.rooms, activity.never_in
+        names = activity.rooms
+        never_in = activity.never_in
         if activity.choose == "own":
             rooms = self._own_rooms(actor, names, never_in)
         else:

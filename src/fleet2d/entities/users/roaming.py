@@ -110,7 +110,8 @@ class RoomSampling(Behavior):
 
     def _walk(self, actor: Actor, plan: Plan, goal: Spot) -> None:
         """Walk to a spot, and add the time on the way to the debt of the rooms it leads through."""
-        start, began_us = (plan.x, plan.y), plan.time_us
+        start = (plan.x, plan.y)
+        began_us = plan.time_us
         if start == goal and not plan.away:
             return
         goal.walk(plan)

@@ -36,7 +36,8 @@ def private_rooms(household: Household, home: Home) -> MemberRooms:
     Activities that are done only in such rooms, like laundry in the bathroom, count as exclusive,
     too. If the home has none of the rooms of an activity, the activity has no entry.
     """
-    reachable, private = usual_rooms(home), set[int]()
+    reachable = usual_rooms(home)
+    private = set[int]()
     rooms: dict[str, dict[str, list[int]]] = {}
     for name, persona in household.members.items():
         at_home = {a: fields for a, fields in persona.used_activities.items() if not fields.away}
@@ -72,7 +73,8 @@ def _rooms_of(activity: Activity, reachable: list[Room]) -> list[Room]:
 # Bodies of the usual radius that are nearer to each other touch [m].
 TOUCHING_M = 2 * DEFAULT_RADIUS
 # The number of days whose places are kept, and of episodes of a day that have draws of their own.
-CACHED_DAYS, EPISODES_PER_DAY = 3, 1024
+CACHED_DAYS = 3
+EPISODES_PER_DAY = 1024
 
 Places = Mapping[tuple[int, int], Seat | None]
 """The place of each member's episode, by the numbers of both; None: others have all places."""
@@ -112,13 +114,15 @@ class Seating:
 
     def __init__(self, actor: Actor, lives: Lives) -> None:
         """Prepare for the members of a household who are in the scenario."""
-        self._home, self._lives = actor.home, lives
+        self._home = actor.home
+        self._lives = lives
         names = list(lives.household.members)
         self._members = {i: name for i, name in enumerate(names) if name in actor.people}
         users = actor.path.rpartition(".")[0]
         self._paths = {i: f"{users}.{name}" for i, name in self._members.items()}
         self._keys = {i: stream_key(actor.seed, p, "seat") for i, p in self._paths.items()}
-        self._seed, self._count = actor.seed, len(names)
+        self._seed = actor.seed
+        self._count = len(names)
         self._objects: object = None  # the furniture that the places are of
 
     def _restart(self) -> None:
@@ -179,7 +183,8 @@ class Seating:
 
     def _claims(self, ordinal: int) -> Iterator[SeatClaim]:
         """Yield the claims of all members on a day."""
-        midnight, days = ordinal * DAY_S, self._lives.day(ordinal)
+        midnight = ordinal * DAY_S
+        days = self._lives.day(ordinal)
         for rank, name in self._members.items():
             episodes = days[name]
             for numbers in _stays(episodes, partial(self._lives.is_out, name)):
@@ -200,7 +205,8 @@ class Seating:
         return self._wanted[key]
 
     def _find(self, rank: int, name: str) -> tuple[Sequence[Seat], int]:
-        household, member = self._lives.household, self._members[rank]
+        household = self._lives.household
+        member = self._members[rank]
         activity = household.members[member].activity(name)
         is_shared = activity.objects and activity.choose == "own"
         if activity.away or activity.exclusive or not is_shared:
@@ -251,7 +257,8 @@ def _spots(objects: Sequence[PlacedObject]) -> dict[Seat, Seat]:
 def _stays(episodes: Sequence[Episode], is_out: Callable[[Episode], bool]) -> list[list[int]]:
     """Return the numbers of the episodes of a day that are done in one place, in groups."""
     groups: list[list[int]] = []
-    planned, latest = None, list[int]()
+    planned = None
+    latest = list[int]()
     for i, episode in enumerate(episodes):
         stays = episode.activity == REST and episode.end - episode.begin < NO_GAP_S
         if episode.role == RESUMES and planned is not None and not stays:
@@ -311,7 +318,8 @@ class Routine(ResidentBehavior):
     def start(self, actor: Actor) -> None:
         """Set up the days of the person, and find where the activities are done in the home."""
         self.name = actor.name
-        sleeps_in, side = None, (0, 1)
+        sleeps_in = None
+        side = (0, 1)
         if self.household is None:
             spots = self.make_spots(actor)
             self.life = Life(self.resolved_persona, actor.seed, actor.path)
@@ -382,10 +390,12 @@ class Routine(ResidentBehavior):
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return the rooms of a likely activity at that time."""
-        likely_day, today = Life(self.resolved_persona, 0, "").day, time.toordinal()
+        likely_day = Life(self.resolved_persona, 0, "").day
+        today = time.toordinal()
         time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
         if time_s < likely_day(today)[0].begin:
-            today, time_s = today - 1, time_s + DAY_S
+            today = today - 1
+            time_s = time_s + DAY_S
         day = self._with_absences(likely_day(today), today)
         return resident.rooms_at(day, time_s, self._activities())
 
@@ -403,7 +413,8 @@ class Routine(ResidentBehavior):
         """
         if self.household is None or room not in self.private_rooms:
             return 0
-        rank, members = self.spots.rank, self.spots.members
+        rank = self.spots.rank
+        members = self.spots.members
         turn = begin_us // TURN_US
         begins_us = max(begin_us, (turn + (rank - turn) % members) * TURN_US)
         ends_us = begins_us + takes_us + 2 * WAY_US

@@ -163,7 +163,8 @@ def _stop(grace: float = 0.0) -> int:
         grace: How long it has to die by itself [s].
     """
     global _child
-    process, _child = _child, None
+    process = _child
+    _child = None
     if process is None:
         return 0
     _close(process)

@@ -22,7 +22,8 @@ from fleet2d.storage.bags import headings_of, numbers_of, open_bag
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 # Chances of being occupied, in percent, as map_server divides them.
-FREE_BELOW, OCCUPIED_ABOVE = 20, 65
+FREE_BELOW = 20
+OCCUPIED_ABOVE = 65
 
 
 @register("floorplan", "bag")
@@ -45,7 +46,8 @@ class BagMap(OccupancySource):
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
         """Return the map's resolution."""
-        path, topic = Path(settings["path"]), settings.get("topic")
+        path = Path(settings["path"])
+        topic = settings.get("topic")
         return apart(path, _pixel, path, topic, settings["scale"])
 
     def files(self) -> list[Path]:

@@ -27,7 +27,8 @@ TINY = 1e-9
 DOOR_M = (0.4, 1.4)
 USUAL_DOOR_M = 0.8
 # A part of a map in which this can't stand is not part of a home: its area and width [m², m].
-SCRAP_M2, SCRAP_WIDTH_M = 1.0, 0.3
+SCRAP_M2 = 1.0
+SCRAP_WIDTH_M = 0.3
 # A part that nothing joins is a room of the home from this area on [m²].
 ROOM_M2 = 4.0
 
@@ -268,7 +269,8 @@ def remove_specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[s
 
 def home_pixels(free: Bool, pixel: float, ray_width: float) -> Bool:
     """Return the pixels of the largest part that a disc reaches, and of what belongs to it."""
-    across, reach = math.floor(ray_width / pixel + TINY), _reach(pixel, ray_width)
+    across = math.floor(ray_width / pixel + TINY)
+    reach = _reach(pixel, ray_width)
     core = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= reach**2
     if not core.any():
         raise FloorPlanError(

@@ -34,9 +34,12 @@ MOST = 0.8
 DARK_EDGE = 100
 # Sides of a pixel that are tried to find doors [m], the fewest doors that tell the scale, and how
 # near to a side that was tried it is.
-TRIED_M, FEWEST_DOORS, LIKELY_FACTOR = (0.0075, 0.011, 0.016, 0.024, 0.036, 0.005), 3, 1.25
+TRIED_M = (0.0075, 0.011, 0.016, 0.024, 0.036, 0.005)
+FEWEST_DOORS = 3
+LIKELY_FACTOR = 1.25
 # Share of what is dark that is lines if there are any, and of the enclosed space that is the home.
-LINES_SHARE, WHOLE = 0.02, 0.6
+LINES_SHARE = 0.02
+WHOLE = 0.6
 # Side of a picture below which it is no home's [m].
 SMALLEST_M = 1.0
 # Pixels across the widest line, at least, for lines to be told from walls.
@@ -130,7 +133,8 @@ class Image(PictureSource):
                 try:
                     inside = _inside(light, self.close_gaps, pixel, found)
                 except FloorPlanError as error:
-                    inside, problem = np.zeros_like(light), error
+                    inside = np.zeros_like(light)
+                    problem = error
             told = self._without_lines(picture, light, inside)
             if told is None and problem is not None:
                 raise problem
@@ -153,7 +157,8 @@ class Image(PictureSource):
             light: Pixels that are light, bool (rows, columns).
             enclosed: What all that is dark encloses, of the same shape.
         """
-        pixel, dark = self.pixel, ~light
+        pixel = self.pixel
+        dark = ~light
         if pixel > self.line_width / LINE_PIXELS or min(dark.shape) * pixel < SMALLEST_M:
             return None
         home = largest_part(enclosed)
@@ -248,7 +253,8 @@ def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> B
                 closed = _enclosed(light, width / pixel)
                 if _largest(closed) >= MOST * at_most:
                     row, column = _first_gap(light, inside, closed)
-                    lost, whole = home * pixel**2, at_most * pixel**2
+                    lost = home * pixel**2
+                    whole = at_most * pixel**2
                     notes.append(
                         f"gaps in the outer walls are closed up to a width of {width:g} m, since"
                         f" only {lost:.1f} m2 of {whole:.1f} m2 would be inside; one is at pixel"

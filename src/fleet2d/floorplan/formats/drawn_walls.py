@@ -17,10 +17,13 @@ LINE_M = 0.06
 """What is drawn thinner than this is no wall [m]."""
 
 # Width of the widest wall, and of the widest gap without and with a line through it [m].
-WALL_M, DOOR_M, WINDOW_M = 0.6, 1.4, 5.0
+WALL_M = 0.6
+DOOR_M = 1.4
+WINDOW_M = 5.0
 # Walls drawn by lines are at most so wide inside; a group of lines that is smaller, and joined to
 # no wall, is lettering or furniture [m].
-HOLLOW_M, LONE_M = 0.45, 3.0
+HOLLOW_M = 0.45
+LONE_M = 3.0
 # At least half of the walls is this many times as thick as a line.
 TYPICAL_WALL = 2
 # A frame lies within this share of the sides of what is drawn.
@@ -31,7 +34,9 @@ RAGGED_M = 0.03
 JOINED_SHARE = 0.9
 # Walls are darker than the paper by this much, and a grey that fills something is spread over so
 # many shades on each side, which together have this share of what is light.
-CONTRAST, SPREAD, FILLED_SHARE = 24, 4, 0.01
+CONTRAST = 24
+SPREAD = 4
+FILLED_SHARE = 0.01
 
 
 @dataclass(frozen=True)
@@ -125,14 +130,16 @@ def _row_gaps(
     drawn = np.concatenate([np.zeros((len(dark), 1), np.int64), dark.cumsum(axis=1)], axis=1)
     joined = drawn[rows, ends] - drawn[rows, starts] >= JOINED_SHARE * (ends - starts)
     ragged = max(round(RAGGED_M / pixel), 1)
-    thickest, door = WALL_M / pixel, DOOR_M / pixel
+    thickest = WALL_M / pixel
+    door = DOOR_M / pixel
     groups: list[list[int]] = []  # first row, start, end, last row, is joined
     recent: list[list[int]] = []  # those that the present row may continue
     row_before = -1
     runs = zip(rows.tolist(), starts.tolist(), ends.tolist(), joined.tolist(), strict=True)
     for row, start, end, is_joined in runs:
         if row != row_before:
-            recent, row_before = [group for group in recent if group[3] >= row - 1], row
+            recent = [group for group in recent if group[3] >= row - 1]
+            row_before = row
         for group in recent:
             is_beside = abs(group[1] - start) <= ragged and abs(group[2] - end) <= ragged
             if group[3] == row - 1 and is_beside:
@@ -154,7 +161,8 @@ def _runs(walls: Bool, longest: float) -> tuple[I64, I64, I64]:
     opens = change[rows, columns] < 0
     follows = opens[:-1] & ~opens[1:] & (rows[:-1] == rows[1:])
     index = np.flatnonzero(follows)
-    starts, ends = columns[index] + 1, columns[index + 1] + 1
+    starts = columns[index] + 1
+    ends = columns[index + 1] + 1
     short = ends - starts <= longest
     return rows[index][short], starts[short], ends[short]
 

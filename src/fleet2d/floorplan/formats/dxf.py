@@ -35,7 +35,8 @@ OTHERS = re.compile(
 DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE")
 # Width of a line, and of the narrowest space: what is narrower is the inside of a wall that is
 # drawn by its two sides [m].
-LINE_M, NARROW_M = 0.02, 0.5
+LINE_M = 0.02
+NARROW_M = 0.5
 MIN_PART_M2 = 1.0
 # Largest distance between two lines of one window [m].
 WINDOW_LINES_M = 0.3

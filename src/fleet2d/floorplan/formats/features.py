@@ -29,7 +29,8 @@ from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_typ
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
 
-SURFACES, LINES = ("Polygon", "MultiPolygon"), ("LineString", "MultiLineString")
+SURFACES = ("Polygon", "MultiPolygon")
+LINES = ("LineString", "MultiLineString")
 GEOMETRIES = {
     **dict.fromkeys(("room", "free", "no_go"), SURFACES),
     "object": (*SURFACES, "Point"),
@@ -42,10 +43,12 @@ Move = Callable[[F64], F64]
 
 
 # Distance of the entrance from a door that leads outside, and how far an entrance may be moved.
-INSIDE_M, ENTRANCE_REACH_M = 0.3, 1.0
+INSIDE_M = 0.3
+ENTRANCE_REACH_M = 1.0
 # Widths of gaps in walls that are closed in turn to find what they enclose [m], and the share of
 # the largest space that it must keep.
-GAPS_M, KEPT_SHARE = (0.0, 0.05, 0.2, 0.5, 1.0), 0.7
+GAPS_M = (0.0, 0.05, 0.2, 0.5, 1.0)
+KEPT_SHARE = 0.7
 # Side of an object that is drawn as a point.
 POINT_OBJECT_M = 0.1
 
@@ -159,7 +162,8 @@ class Draft:
 
     def _free(self, wall_m: float) -> MultiPolygon:
         """Return the free space between the walls, before doors open these."""
-        open_space, walls = _areas(self._of("free")), self._walls(wall_m)
+        open_space = _areas(self._of("free"))
+        walls = self._walls(wall_m)
         if open_space.is_empty and not self.rooms and not walls.is_empty:
             doors = [door.shape for door in self._of("door", "opening")]
             open_space = enclosed_space(walls, doors, self.notes)
@@ -185,7 +189,8 @@ class Draft:
 
     def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
         """Return the rooms, with walls where they touch unless the file draws these."""
-        free, borders = _areas(self._of("room")), shared_borders(self.rooms)
+        free = _areas(self._of("room"))
+        borders = shared_borders(self.rooms)
         length = sum_in_order(line.length for line in borders)
         near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
         drawn = sum_in_order(float(line.intersection(near).length) for line in borders)
@@ -282,7 +287,8 @@ class Draft:
 
 def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     """Return a room's labels and type: by its use in the file, else by its name."""
-    use, name = room.text(*_USES) or UNKNOWN, room.text("name")
+    use = room.text(*_USES) or UNKNOWN
+    name = room.text("name")
     kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
     if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:
         return (name,), usual_type(name)
@@ -309,7 +315,8 @@ def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
         x, y = _to_plan(move, (use.x, use.y))
         approach = use.approach and _to_plan(move, use.approach)
         uses.append(replace(use, x=x, y=y, approach=approach))
-    name, parts = feature.text("name") or "", _parts(shape)
+    name = feature.text("name") or ""
+    parts = _parts(shape)
     for number, part in enumerate(parts):
         own = f"{name} {number + 1}" if name and len(parts) > 1 else name
         own_uses = () if number else tuple(uses)

@@ -44,9 +44,11 @@ COLLECTION = "FeatureCollection"
 Units = Literal["auto", "m", "degrees"]
 
 # WGS 84: half the larger axis [m], and the square of the eccentricity.
-SEMI_MAJOR_M, ECCENTRICITY_2 = 6378137.0, 0.00669437999014
+SEMI_MAJOR_M = 6378137.0
+ECCENTRICITY_2 = 0.00669437999014
 # Minimum width of a home [m], and largest [degrees], about 5 km.
-SMALLEST_M, LARGEST_DEGREES = 0.5, 0.05
+SMALLEST_M = 0.5
+LARGEST_DEGREES = 0.05
 # The largest coordinate that is read; UTM's northings reach ten million.
 FARTHEST = 1e8
 

@@ -36,7 +36,8 @@ UNDEFINED = (None, "", "NOTDEFINED", "USERDEFINED")
 ROUNDED_M = 1e-4
 # Objects whose lowest point is higher above the storey hang on a wall; through windows whose sill
 # is higher nobody is seen [m].
-RAISED_M, SILL_M = 0.5, 1.3
+RAISED_M = 0.5
+SILL_M = 1.3
 
 
 @register("floorplan", "ifc")
@@ -114,7 +115,9 @@ def _features(model: Any, storey: Any, notes: list[str]) -> Iterator[Feature]:
         try:
             shape, low, high = _seen_from_above(geom.create_shape(settings, element))
         except RuntimeError:  # it has no geometry, or a damaged one
-            shape, low, high = shapely.Polygon(), 0.0, 0.0
+            shape = shapely.Polygon()
+            low = 0.0
+            high = 0.0
         lost += shape.is_empty
         if shape.is_empty or low - _height(storey) > highest.get(kind, np.inf):
             continue

@@ -115,7 +115,8 @@ def space_of(parts: list[AreaEntry]) -> Polygon | MultiPolygon:
         FloorPlanError: Too many overlap.
     """
     shapes = [part.polygon for part in parts]
-    tree, meeting = shapely.STRtree(shapes), 0
+    tree = shapely.STRtree(shapes)
+    meeting = 0
     for shape in shapes:
         meeting += len(tree.query(shape))
         CROSSINGS.check(meeting, "it", FloorPlanError, prefix="at least ")
@@ -171,7 +172,8 @@ class RoomEntry(FileModel):
 
     def to_region(self) -> LabelledRegion:
         """Return the room as a region of the plan."""
-        kind, labels = room_type(self.type), self.labels
+        kind = room_type(self.type)
+        labels = self.labels
         if labels is None:
             labels = [self.type] if kind != UNKNOWN else []
         parts = [self.polygon] if self.polygon is not None else self.region or []
@@ -241,7 +243,8 @@ class ObjectEntry(ObjectUse):
 
     def to_object(self) -> PlacedObject:
         """Return the object as one of the plan."""
-        shape, uses = self.footprint.polygon, self.use_places()
+        shape = self.footprint.polygon
+        uses = self.use_places()
         name = self.name or ""
         return PlacedObject(name, self.type, shape, self.blocks, uses, self.heading, self.height)
 
@@ -400,7 +403,8 @@ def native_plan(
 
 def plan_of(file: PlanFile, path: Path, cell: float, scale: float | None = None) -> FloorPlan:
     """Return the floor plan of a file."""
-    free, regions = space_of(file.free), [room.to_region() for room in file.rooms or ()]
+    free = space_of(file.free)
+    regions = [room.to_region() for room in file.rooms or ()]
     return FloorPlan.build(
         file.name or path.stem,
         free,

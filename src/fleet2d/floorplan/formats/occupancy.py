@@ -40,7 +40,8 @@ RARE_SHARE = 0.25
 # Area of lighter floor from which on a light grey may be unknown [m²].
 FLOOR_M2 = 2.0
 # A home smaller than this, and than this share of all that is drawn, is the inside of an object.
-OBJECT_M2, OBJECT_SHARE = 8.0, 0.15
+OBJECT_M2 = 8.0
+OBJECT_SHARE = 0.15
 
 
 class OccupancySource(PixelSource, ForeignSource):
@@ -85,7 +86,8 @@ class OccupancySource(PixelSource, ForeignSource):
             source: The source, for readers.
             notes: Sentences on how it was read; one is added if walls are straightened.
         """
-        tolerance, corners = self.simplify, shapely.get_num_coordinates(free)
+        tolerance = self.simplify
+        corners = shapely.get_num_coordinates(free)
         if tolerance == 0 and corners > CORNERS.limit:
             tolerance = pixel
             notes.append(
@@ -265,7 +267,8 @@ def outline(free: Bool) -> Polygon:
 def _open_border(raw: OccupancyMap, home: Bool) -> list[str]:
     """Return notes on the parts of the outline where the map ends without an obstacle."""
     notes = []
-    inside, unknown = np.pad(home, 1), np.pad(~raw.free & ~raw.occupied, 1)
+    inside = np.pad(home, 1)
+    unknown = np.pad(~raw.free & ~raw.occupied, 1)
     neighbors = [np.roll(unknown, shift, axis) for axis in (0, 1) for shift in (1, -1)]
     sides = sum(int(np.count_nonzero(inside & beside)) for beside in neighbors)
     if sides:

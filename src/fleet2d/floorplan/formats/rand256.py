@@ -12,7 +12,9 @@ MAP_CLASS = "ValetudoMap"
 MAX_PIXEL_NUMBER = 2**20
 
 # Its places are in millimetres; the whole map is 1024 x 1024 pixels of 5 cm.
-MM_PER_CM, PIXEL_CM, SIDE_CM = 10, 5, 5120
+MM_PER_CM = 10
+PIXEL_CM = 5
+SIDE_CM = 5120
 # Names that wrap the map in a file, the first with pixels from the top, the second from the bottom.
 WRAPPERS = ("rand256", "rand25")
 
@@ -56,7 +58,8 @@ class _RawMap(_RawModel):
     virtual_walls: Listed[Listed[float]] = []
 
 
-_MAP, _SEGMENT = TypeAdapter(_RawMap), TypeAdapter(Listed[PixelNumber])
+_MAP = TypeAdapter(_RawMap)
+_SEGMENT = TypeAdapter(Listed[PixelNumber])
 
 
 def raw_map(content: dict[str, Any]) -> dict[str, Any] | None:

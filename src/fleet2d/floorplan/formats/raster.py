@@ -22,7 +22,9 @@ MAX_SIDE = 2**15
 """Pixels along a side of a picture: each step in cleaning it needs further rows round it."""
 # A shade of at least this share of the light pixels, this many times as frequent as those two
 # shades beside it, and by this much darker than the floor is that of furniture or of walls.
-FILLED_SHARE, FILLED_PEAK, FILLED_CONTRAST = 0.02, 4, 12
+FILLED_SHARE = 0.02
+FILLED_PEAK = 4
+FILLED_CONTRAST = 12
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8\xff"
@@ -161,7 +163,8 @@ def _packed_values(body: bytes, columns: int, rows: int, depth: int) -> NDArray[
 
 
 def _plain_values(body: bytes, columns: int, rows: int) -> NDArray[np.integer[Any]]:
-    values, count = np.empty(columns * rows, np.int64), 0
+    values = np.empty(columns * rows, np.int64)
+    count = 0
     for words in _in_pieces(_PGM_COMMENT.sub(b"", body)):
         wrong = next((word for word in words if not word.isdigit() or len(word) > 9), None)
         if wrong is not None:
@@ -247,11 +250,14 @@ def _check_rows(content: bytes) -> None:
         zlib.error: The data can't be unpacked.
     """
     width, height = _png_size(content)
-    bits, colours, interlaced = content[24], content[25], content[28]
+    bits = content[24]
+    colours = content[25]
+    interlaced = content[28]
     if interlaced:
         return
     row = 1 + (width * bits * _CHANNELS.get(colours, 1) + 7) // 8
-    packed, at = [], len(_PNG)
+    packed = []
+    at = len(_PNG)
     while at + 8 <= len(content):
         length = int.from_bytes(content[at : at + 4], "big")
         if content[at + 4 : at + 8] == b"IDAT":

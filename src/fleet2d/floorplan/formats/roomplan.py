@@ -61,7 +61,8 @@ class _Surface(BaseModel):
     def line(self) -> F64:
         """Its two ends on the floor (x, y), float64 (2, 2) [m]; seen from above."""
         matrix = np.array(self.transform).reshape(4, 4)
-        along, at = matrix[0, [0, 2]] * self.dimensions[0] / 2, matrix[3, [0, 2]]
+        along = matrix[0, [0, 2]] * self.dimensions[0] / 2
+        at = matrix[3, [0, 2]]
         return np.stack([at - along, at + along]) * (1, -1)
 
     @property

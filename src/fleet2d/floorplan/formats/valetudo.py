@@ -54,7 +54,8 @@ VERSIONS = (1, 2)
 MAX_PIXELS = 2**22
 """A map of 2048 x 2048 pixels: 102 m a side at 5 cm."""
 
-MIN_PIXEL_CM, MAX_PIXEL_CM = 1, 100
+MIN_PIXEL_CM = 1
+MAX_PIXEL_CM = 100
 CM_PER_M = 100
 
 
@@ -272,7 +273,9 @@ def read_charger(content: dict[str, Any]) -> tuple[float, float] | None:
 NoGo = Literal["keep_out", "wall", "ignore"]
 
 # Side of a charger, radius of a person in front of it, and how far off that person may be [m].
-CHARGER_M, STAND_RADIUS_M, STAND_REACH_M = 0.2, 0.2, 1.0
+CHARGER_M = 0.2
+STAND_RADIUS_M = 0.2
+STAND_REACH_M = 1.0
 
 MAX_PARTS = 10_000
 
@@ -600,7 +603,8 @@ def _charger(content: dict[str, Any], free: Bool, box: PixelBox) -> list[PlacedO
     stand_x, stand_y = ((n + 0.5) * pixel_m for n in (columns + box.column, rows + box.row))
     away = (stand_x - x) ** 2 + (stand_y - y) ** 2
     nearest = int(np.argmin(away)) if len(away) else None
-    front, uses = 0.0, tuple[UsePlace, ...]()
+    front = 0.0
+    uses = tuple[UsePlace, ...]()
     if nearest is not None and away[nearest] <= STAND_REACH_M**2:
         to_x, to_y = round(float(stand_x[nearest]), 6), round(float(stand_y[nearest]), 6)
         # Rounded, so that the last bit of a machine's arctangent doesn't matter.

@@ -70,15 +70,19 @@ MIN_REACH_SHARE = 0.3
 MIN_TOUCH_SHARE = 0.15
 """A box only touches a chamber that has less than this share of the box's cells, and of which the
 box covers less than half."""
-NOT_FREE, TOO_SMALL = "covers no free space", "covers too little free space"
+NOT_FREE = "covers no free space"
+TOO_SMALL = "covers too little free space"
 ONLY_TOUCHES = "only touches rooms"
 MIN_KEPT_SHARE = 0.25
 """Where boxes overlap: one that keeps less than this share of its cells is no room of its own."""
-MIN_ROOM_M2, MIN_ROOM_WIDTH_M = 0.5, 0.4
+MIN_ROOM_M2 = 0.5
+MIN_ROOM_WIDTH_M = 0.4
 """Least area and width of a room with a label."""
-MIN_REST_M2, MIN_REST_WIDTH_M = 2.5, 0.8
+MIN_REST_M2 = 2.5
+MIN_REST_WIDTH_M = 0.8
 """Least area and width of a room without a label …"""
-REST_SHARE, REST_SHARE_OF_ONE = 0.06, 0.3
+REST_SHARE = 0.06
+REST_SHARE_OF_ONE = 0.3
 """… and its minimum share of a chamber that has several labels, or only one."""
 
 
@@ -328,7 +332,9 @@ MAX_CORNERS = 6_000
 a point each millimetre, it straightens the walls first …"""
 STRAIGHTENED_M = (0.01, 0.02, 0.04, 0.08, 0.16)
 """… within the first of these tolerances that leaves few enough corners, or within the last."""
-ISLAND_M, WALL_M, THICK_M = 3.0, 1.2, 0.25
+ISLAND_M = 3.0
+WALL_M = 1.2
+THICK_M = 0.25
 """A free-standing obstacle counts as a wall from a length of `ISLAND_M` on, or of `WALL_M` if it is
 at most `THICK_M` thick, or parts of it are over such a length, as of a wall with a cupboard at it;
 shorter ones are columns or furniture."""
@@ -416,7 +422,8 @@ def _is_wall(island: MultiPolygon, units_per_m: float) -> bool:
 
 def _with_few_corners(walls: list[Polygon], units_per_m: float) -> list[Polygon]:
     """Return the walls, straightened where they have very many corners."""
-    simpler, shape = walls, shapely.MultiPolygon(walls)
+    simpler = walls
+    shape = shapely.MultiPolygon(walls)
     for tolerance in STRAIGHTENED_M:
         if shapely.get_num_coordinates(simpler).sum() <= MAX_CORNERS:
             break

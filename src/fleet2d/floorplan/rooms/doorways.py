@@ -106,9 +106,11 @@ def fit_lines(
             continue
         (x0, y0), (x1, y1) = line.start, line.end
         name = f" {line.name}" if line.name else ""
-        why, advice = "touches another one", ""
+        why = "touches another one"
+        advice = ""
         if fitted is None:
-            why, advice = "ends at no wall", _missing_corner(lattice, walls, ends)
+            why = "ends at no wall"
+            advice = _missing_corner(lattice, walls, ends)
         notes.append(
             f"the doorway{name} from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m {why}: left"
             f" out{advice}"
@@ -167,7 +169,8 @@ def name_doorways(
 
 def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], LineString] | None:
     """Return the walls and the line from wall to wall, or None where there is no such line."""
-    middle, along = ends.mean(axis=0), ends[1] - ends[0]
+    middle = ends.mean(axis=0)
+    along = ends[1] - ends[0]
     length = float(np.sqrt(along @ along))
     if length == 0:
         return None
@@ -182,7 +185,8 @@ def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], 
     if jambs[0] is None or jambs[1] is None or jambs[0] == jambs[1]:
         return None
     line = LineString([jambs[0], jambs[1]])
-    polygon, stays_valid = walls[index], len(walls) == 1
+    polygon = walls[index]
+    stays_valid = len(walls) == 1
     for jamb in jambs:
         polygon, is_alone = _with_corner(polygon, np.array(jamb, np.float64))
         stays_valid &= is_alone
@@ -545,7 +549,8 @@ def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
         )
         sides = _sides(rooms[one])
         pieces = shapely.intersection(sides, near)
-        lengths, most = shapely.length(pieces), 2 * TOUCH_M
+        lengths = shapely.length(pieces)
+        most = 2 * TOUCH_M
         # The first centimetres of a side that leads away from the border are near it, too.
         along = (lengths > most) | ((lengths > 0) & (lengths >= shapely.length(sides) / 2))
         parts = shapely.get_parts(pieces[along])

@@ -41,7 +41,8 @@ from fleet2d.runtime.determinism import sum_in_order
 
 Corners = NDArray[np.intp]
 
-MIN_DOOR_M, MAX_DOOR_M = 0.5, 1.4
+MIN_DOOR_M = 0.5
+MAX_DOOR_M = 1.4
 """Widths of doorways, from what a person fits through to a double door."""
 MAX_OPENING_M = 2.8
 """The widest opening that still separates rooms, such as a kitchen and its dining area."""
@@ -51,7 +52,8 @@ OFFSETS_M = (0.15, 0.3, 0.45, 0.6)
 """Distances behind a passage at which the space is checked; the last is the thickest wall."""
 WIDENINGS_M = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 """Amounts of widening, on either side of a passage, that are checked behind it."""
-MIN_WIDENING_M, WIDENING_SHARE = 0.3, 0.2
+MIN_WIDENING_M = 0.3
+WIDENING_SHARE = 0.2
 """Least widening behind a passage: in metres, and as a share of its width."""
 MIN_APART_M = 0.5
 """Passages with middles nearer than this are the two sides of one wall."""
@@ -100,7 +102,8 @@ class WallDirections:
         simple = shapely.simplify(shapely.MultiPolygon(list(polygons)), NOISE_M * units_per_m)
         rings = shapely.get_rings(shapely.get_parts(simple))
         sides = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
-        length, degrees = np.sqrt((sides * sides).sum(axis=1)), _degrees(sides)
+        length = np.sqrt((sides * sides).sum(axis=1))
+        degrees = _degrees(sides)
         square = np.bincount(degrees, weights=length * length, minlength=90)
         weight = np.zeros(90)
         for k in range(1 - SPREAD_DEG, SPREAD_DEG):  # in this order on every machine
@@ -185,7 +188,9 @@ def find_passages(
 
 
 def _walls(polygons: Sequence[Polygon]) -> _Walls:
-    starts, ends, befores = [], [], []
+    starts = []
+    ends = []
+    befores = []
     for polygon in polygons:
         for ring in shapely.get_rings(polygon):
             corners = shapely.get_coordinates(ring)[:-1]
@@ -193,7 +198,8 @@ def _walls(polygons: Sequence[Polygon]) -> _Walls:
             ends.append(np.roll(corners, -1, axis=0))
             befores.append(np.roll(corners, 1, axis=0))
     start, end, before = (np.concatenate(points) for points in (starts, ends, befores))
-    into, out = start - before, end - start
+    into = start - before
+    out = end - start
     reflex = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
     return _Walls(start, end, before, reflex)
 
@@ -205,12 +211,15 @@ def _corner_to_corner(
     tree = shapely.STRtree(np.asarray(shapely.points(walls.start[corners])))
     for batch in batches:
         first, second = tree.query(_around(walls.start[batch], units_per_m))
-        first, second = batch[first], corners[second]
+        first = batch[first]
+        second = corners[second]
         in_order = first < second
-        first, second = first[in_order], second[in_order]
+        first = first[in_order]
+        second = second[in_order]
         length2 = _length2(np.hstack([walls.start[first], walls.start[second]]).astype(np.int64))
         near = length2 <= (MAX_OPENING_M * units_per_m) ** 2
-        first, second = first[near], second[near]
+        first = first[near]
+        second = second[near]
         shortest = _ends_well(walls, first, walls.start[second])
         shortest &= _ends_well(walls, second, walls.start[first])
         lines = np.hstack([walls.start[first[shortest]], walls.start[second[shortest]]])
@@ -224,12 +233,16 @@ def _to_walls(walls: _Walls, batches: Sequence[Corners], units_per_m: float) -> 
     for batch in batches:
         near, wall = tree.query(_around(walls.start[batch], units_per_m))
         corner = batch[near]
-        at, along = walls.start[wall], walls.end[wall] - walls.start[wall]
+        at = walls.start[wall]
+        along = walls.end[wall] - walls.start[wall]
         away = walls.start[corner] - at
         share = (away * along).sum(axis=1) / (along * along).sum(axis=1)
         inside = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] > 0
         inside &= (share > 0) & (share < 1)
-        corner, at, along, share = corner[inside], at[inside], along[inside], share[inside]
+        corner = corner[inside]
+        at = at[inside]
+        along = along[inside]
+        share = share[inside]
         foot = 2 * np.rint((at + share[:, None] * along) / 2)
         shortest = _ends_well(walls, corner, foot)
         lines = np.hstack([walls.start[corner[shortest]], foot[shortest]])
@@ -550,7 +563,8 @@ def segment_rooms(
         candidates = []
         for link in chambers.links:
             one, other = (int(owner[chamber]) for chamber in link.chambers)
-            opening, width = is_opening[link.line], widths_m[link.line]
+            opening = is_opening[link.line]
+            width = widths_m[link.line]
             narrow, wide = sorted((across[one], across[other]))
             is_wide = opening and width > WIDE_SHARE * narrow
             is_wide |= width > ACROSS_SHARE * wide

@@ -17,7 +17,9 @@ import numpy as np
 
 from fleet2d.kernels import I32, I64, box_sums, climb, label_parts, spread_labels, squared_distance
 
-IN_STRAIGHT_WALLS, IN_RAGGED_WALLS, OF_VACUUMS = (0.75, 4.0), (0.65, 4.0), (0.8, 1.2)
+IN_STRAIGHT_WALLS = (0.75, 4.0)
+IN_RAGGED_WALLS = (0.65, 4.0)
+OF_VACUUMS = (0.8, 1.2)
 """How much narrower a place that divides a room is, and the least area of a part [m²]. Among the
 clutter of ragged walls much is narrow. A vacuum gets close to furniture, which narrows rooms as
 walls do, and it knows of a small room only what is free in it."""

@@ -37,7 +37,8 @@ from fleet2d.floorplan.synthetic.slicing import (
 from fleet2d.runtime.determinism import sum_in_order
 
 # The largest cost that taste adds to a passage and to a layout, at a variety of 1.
-LINK_TASTE, LAYOUT_TASTE = 1, 12
+LINK_TASTE = 1
+LAYOUT_TASTE = 12
 JAMB = 2  # minimum distance of a door from the corner of a room [units]
 
 
@@ -141,7 +142,9 @@ def link_rooms(layout: RoomLayout, best: RoomLinks) -> tuple[list[Wall], float]:
     """
     kinds = [brief.kind for brief in layout.briefs]
     start = kinds.index("entryway" if "entryway" in kinds else "living_room")
-    reached, links, cost = {start}, [], 0.0
+    reached = {start}
+    links = []
+    cost = 0.0
     while len(reached) < len(kinds):
         candidates = [
             (price, pair, wall)
@@ -266,7 +269,8 @@ def _opening(
 # Rooms that need a window, and the length of outer wall that it takes [units].
 _LIT = {"bedroom": 24, "living_room": 30, "kitchen": 16, "dining_room": 20, "office": 20}
 # Largest part of a home that is corridor, and the part from which on it costs points, by edition.
-MAX_CORRIDOR_SHARE, COSTLY_CORRIDOR_SHARE = {1: 0.15, 2: 0.35}, {1: 0.06, 2: 0.25}
+MAX_CORRIDOR_SHARE = {1: 0.15, 2: 0.35}
+COSTLY_CORRIDOR_SHARE = {1: 0.06, 2: 0.25}
 # A longer corridor, as in a hotel, costs points; the longest is refused [units].
 LONG_CORRIDOR = 150
 MAX_CORRIDOR = 300
@@ -275,7 +279,8 @@ MIN_COURT = 28
 # Largest ratio of the home's length to its width.
 MAX_ASPECT = {1: 2.8, 2: 2.3}
 # From this ratio on it costs points, and how many.
-LONG_ASPECT, LONG_COST = {1: 1.5, 2: 1.5}, {1: 4, 2: 12}
+LONG_ASPECT = {1: 1.5, 2: 1.5}
+LONG_COST = {1: 4, 2: 12}
 _COMFORTABLE_RATIO = 1.45
 
 
@@ -352,7 +357,8 @@ def outline_corners(boxes: Sequence[Box]) -> list[bool]:
     if closed.area > union.area + 1:
         return []
     ring = shapely.get_coordinates(shapely.orient_polygons(union))[:-1]
-    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    into = ring - np.roll(ring, 1, axis=0)
+    out = np.roll(ring, -1, axis=0) - ring
     turns = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
     return list(turns[turns != 0] > 0)
 
@@ -381,7 +387,10 @@ def outline_kind(turns: Sequence[bool]) -> str | None:
 ENOUGH_LAYOUTS = 4
 # Ducts of edition 2: range of the sides [units], probability in a rectangle of a room [%], least
 # side of that, and the least distance from passages [units].
-SHAFT_SIDE, SHAFT_PERCENT, SHAFT_ROOM_SIDE, SHAFT_CLEARANCE = (6, 16), 48, 34, 12
+SHAFT_SIDE = (6, 16)
+SHAFT_PERCENT = 48
+SHAFT_ROOM_SIDE = 34
+SHAFT_CLEARANCE = 12
 # Ranges of the width of corridors [units] of edition 2, and their weights.
 CORRIDORS = (((20, 28), 25), ((28, 44), 35), ((44, 66), 40))
 # … and at most this many.
@@ -436,7 +445,8 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     Raises:
         FloorPlanError: No home was found that meets the request.
     """
-    decided, used = settle_wishes(wishes, Choices(seed, "wishes"), style), style
+    decided = settle_wishes(wishes, Choices(seed, "wishes"), style)
+    used = style
     is_wide = style.edition == 2 and (decided.area_m2 or 0.0) >= WIDE_FROM_M2
     prices = _tastes(Choices(seed, "taste"), style)
     widths = _style(style, Choices(seed, "style"), is_wide, prices)
@@ -449,7 +459,8 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
             if number >= MAX_LAYOUTS // 4 and wishes.garage is None:
                 decided = replace(decided, garage=False)
             if number >= MAX_LAYOUTS // 4 and style.edition == 2 and wishes.bedrooms is None:
-                beds, baths = decided.bedrooms or 0, decided.bathrooms or 1
+                beds = decided.bedrooms or 0
+                baths = decided.bathrooms or 1
                 decided = replace(decided, bedrooms=min(beds, max(beds - 1, baths, 1)))
             choices = Choices(seed, f"rooms {number // PATIENCE}")
             if number >= MAX_LAYOUTS * 3 // 4:  # rare rooms fit into no layout
@@ -490,8 +501,10 @@ def _tastes(choices: Choices, style: Style) -> Prices:
 
 def _style(style: Style, choices: Choices, is_wide: bool, prices: Prices) -> Widths:
     """Return the widths of a home; all are drawn, so that setting one leaves the others as is."""
-    open_plan, corridor = choices.chance(45), choices.between(20, 26)
-    door, bath = choices.choice((16, 17, 18)), choices.choice((14, 15, 16))
+    open_plan = choices.chance(45)
+    corridor = choices.between(20, 26)
+    door = choices.choice((16, 17, 18))
+    bath = choices.choice((14, 15, 16))
     if style.edition == 2:
         corridor = choices.between(*choices.weighted(CORRIDORS)) if is_wide else corridor
         door = choices.choice((15, 15, 16, 16, 17, 18, 20))
@@ -585,7 +598,8 @@ def draw_shafts(layout: RoomLayout, gaps: Sequence[Gap], choices: Choices) -> li
     """Draw ducts and chimneys in corners of rooms, away from all passages."""
     shafts = []
     for box in layout.boxes:
-        width, depth = choices.between(*SHAFT_SIDE), choices.between(*SHAFT_SIDE)
+        width = choices.between(*SHAFT_SIDE)
+        depth = choices.between(*SHAFT_SIDE)
         x = choices.choice((box.x0, box.x1 - WALL - width))
         y = choices.choice((box.y0, box.y1 - WALL - depth))
         if not choices.chance(SHAFT_PERCENT) or min(box.clear) < SHAFT_ROOM_SIDE:
@@ -600,7 +614,8 @@ def _near(shaft: Rectangle, gap: Gap) -> bool:
     """Return whether a passage is less than a robot's width away from a shaft."""
     wall = gap.wall
     low, high = gap.low - SHAFT_CLEARANCE, gap.high + SHAFT_CLEARANCE
-    near, far = wall.at - SHAFT_CLEARANCE, wall.at + SHAFT_CLEARANCE
+    near = wall.at - SHAFT_CLEARANCE
+    far = wall.at + SHAFT_CLEARANCE
     return overlap(shaft, (near, low, far, high) if wall.upright else (low, near, high, far))
 
 

@@ -165,7 +165,8 @@ class Sketch:
 
     def core_trees(self) -> list[Tree]:
         """Draw trees of living room, dining room and kitchen; wings join at high x or high y."""
-        choices, living = self.choices, Leaf(self.of_kind["living_room"][-1])
+        choices = self.choices
+        living = Leaf(self.of_kind["living_room"][-1])
         trees: list[Tree] = []
         for across in (True, False):
             kitchen = self._kitchen(across)
@@ -185,7 +186,8 @@ class Sketch:
 
     def _kitchen(self, across: bool) -> Tree:
         """Return the kitchen, with small rooms at one end of it."""
-        kitchen, pantry = Leaf(self.of_kind["kitchen"][-1]), tuple(map(Leaf, self.pantry))
+        kitchen = Leaf(self.of_kind["kitchen"][-1])
+        pantry = tuple(map(Leaf, self.pantry))
         if not pantry:
             return kitchen
         pair = (Cut(across, pantry) if len(pantry) > 1 else pantry[0], kitchen)
@@ -347,7 +349,8 @@ class Sketch:
 
     def across(self) -> Placing:
         """A long core with a wing at a right angle to it, and the service block at its end."""
-        outline, choices = self.request.outline, self.choices
+        outline = self.request.outline
+        choices = self.choices
         wing = self.wing(self.private, self.add_hallway(), outline)
         core = self.core_trees()
         service = self.service_block()
@@ -374,7 +377,8 @@ class Sketch:
 
     def two_wings(self) -> Placing:
         """A core between two wings."""
-        choices, outline = self.choices, self.request.outline
+        choices = self.choices
+        outline = self.request.outline
         self.private += [[(room,)] for room in self.service]
         main, *others = choices.shuffled(self.private)
         half = (len(others) + choices.below(2)) // 2
@@ -404,7 +408,8 @@ class Sketch:
 
     def columns(self) -> Placing:
         """A small home without a corridor: rooms in a column beside the core open to it."""
-        choices, outline = self.choices, self.request.outline
+        choices = self.choices
+        outline = self.request.outline
         slots = [*(self.entry or [])]
         for group in choices.shuffled(self.private):
             slots += group if choices.chance(50) else group[::-1]
@@ -440,13 +445,15 @@ class Sketch:
         With two rows there is such a strip on both of its sides.
         """
         halls = [self.add_hallway() for _ in range(count)]
-        strips, choices = self._row_strips(count), self.choices
+        strips = self._row_strips(count)
+        choices = self.choices
         core = self.core_trees()
         service = self.service_block()
         if service is not None:
             pairs = [(tree, service.trees[choices.below(len(service.trees))]) for tree in core]
             core = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
-        width, closets = self.request.corridor + WALL, [self.closet, None]
+        width = self.request.corridor + WALL
+        closets = [self.closet, None]
         suites = [closet is None and choices.chance(65) for closet in closets]
         corridors = [
             Corridor(hall, width, suite and len(strip.slots) > 1, closet)
@@ -478,7 +485,8 @@ class Sketch:
         Raises:
             MisfitError: A strip has no rooms.
         """
-        choices, parts = self.choices, [list[RoomGroup]() for _ in range(count)]
+        choices = self.choices
+        parts = [list[RoomGroup]() for _ in range(count)]
         # Groups of about one area share a strip, so that none is much narrower than it is deep.
         ordered = sorted(choices.shuffled(self.private), key=lambda group: self._area([group]))
         half = self._area(ordered) / count
@@ -514,7 +522,8 @@ def _core_width(core: list[Tree], areas: Areas, depth: int) -> int:
 
 def _fit_wing(wing: Wing, areas: Areas, low: int, high: int) -> list[Box]:
     """Return a wing's rooms, moved and deepened to fill a span along y [units]."""
-    rooms, width = wing.place(areas), wing.corridor.width
+    rooms = wing.place(areas)
+    width = wing.corridor.width
     for _ in range(2):
         depth = wing.back_depth * (high - low - width) / (rooms.high - rooms.low - width)
         wing = replace(wing, back_depth=int(depth + 0.5))
@@ -545,7 +554,8 @@ TOLERANCE = 0.012
 ROUNDS = 7
 # Probabilities [%] of edition 2, by the number of bedrooms up to four: that a home is made of rows,
 # and has rooms on both sides of its core.
-ROWS_PERCENT, TWO_ROWS_PERCENT = {1: 25, 2: 40, 3: 65, 4: 80}, {1: 5, 2: 20, 3: 55, 4: 75}
+ROWS_PERCENT = {1: 25, 2: 40, 3: 65, 4: 80}
+TWO_ROWS_PERCENT = {1: 5, 2: 20, 3: 55, 4: 75}
 
 
 @dataclass(frozen=True)
@@ -602,7 +612,8 @@ def _studio(briefs: Sequence[Brief], choices: Choices) -> list[Box]:
     """Return the boxes of a studio: its second and third room in a strip beside the first."""
     (living, first, second) = (brief.area * UNITS_PER_M**2 for brief in briefs)
     width = choices.between(32, 46)
-    bath, third = round(first / width), round(second / width)
+    bath = round(first / width)
+    third = round(second / width)
     height = bath + WALL + third
     end = width + WALL + round(living / height) + WALL
     return [

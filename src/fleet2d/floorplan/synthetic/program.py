@@ -52,7 +52,8 @@ SMALLEST_M2 = 18.0
 # A home that is smaller is a studio, unless it must have a bedroom.
 STUDIO_M2 = 30.0
 # From this area on a studio may have a kitchen of its own, with this probability [%].
-STUDIO_KITCHEN_M2, STUDIO_KITCHEN_PERCENT = 24.0, 50
+STUDIO_KITCHEN_M2 = 24.0
+STUDIO_KITCHEN_PERCENT = 50
 LARGEST_M2 = 450.0
 
 # Deciles and tails of the area of HouseExpo's plans [%, m2]; between them it is linear.
@@ -114,7 +115,9 @@ WIDE_SPREAD: dict[str, tuple[int, int]] = {
     "living_room": (50, 125),
 }
 WIDE_FROM_M2 = 60.0  # in smaller flats hardly any rooms would fit beside a large one
-SMALL_BEDROOM, LARGE_BEDROOM, SMALL_BEDROOM_PERCENT = (46, 72), (95, 145), 40
+SMALL_BEDROOM = (46, 72)
+LARGE_BEDROOM = (95, 145)
+SMALL_BEDROOM_PERCENT = 40
 # Probability of each bedroom of edition 2 to have a wardrobe [%].
 WARDROBE_PERCENT = 40
 
@@ -226,7 +229,8 @@ def settle_wishes(wishes: Wishes, choices: Choices, style: Style) -> Wishes:
         area = round(min(max(area, 1.25 * minimum_area(beds, baths, garage)), most), 1)
     _check(area, beds, baths, garage, wishes)
     if wishes.bedrooms is None:
-        least, most_off = beds, 36 + 36 * style.variety // 100
+        least = beds
+        most_off = 36 + 36 * style.variety // 100
         usual = (round(area) + choices.between(-most_off, most_off) + 38) // 66
         beds = min(max(usual, least), 6)
         # Two small bedrooms fit 50 m2, if tightly.
@@ -299,7 +303,9 @@ def choose_rooms(wishes: Wishes, choices: Choices, style: Style) -> list[Brief]:
 
     if wishes.bedrooms == 0:
         return _studio_rooms(wishes.area_m2 or 0.0, choices)
-    area, beds, baths = wishes.area_m2 or 0.0, wishes.bedrooms or 1, wishes.bathrooms or 1
+    area = wishes.area_m2 or 0.0
+    beds = wishes.bedrooms or 1
+    baths = wishes.bathrooms or 1
     kinds = _base(beds, baths) + ["garage"] * bool(wishes.garage)
     total = area / TYPICAL_AREA_FACTOR
     # Another room is added only while the typical sizes of all leave space for it.
@@ -328,7 +334,8 @@ def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
     """
     has_kitchen = area >= STUDIO_KITCHEN_M2 and choices.chance(STUDIO_KITCHEN_PERCENT)
     kind, (low, high) = ("kitchen", (45, 62)) if has_kitchen else ("entryway", (26, 36))
-    bath, third = choices.between(33, 46) / 10, choices.between(low, high) / 10
+    bath = choices.between(33, 46) / 10
+    third = choices.between(low, high) / 10
     return [Brief("living_room", area - bath - third), Brief("bathroom", bath), Brief(kind, third)]
 
 

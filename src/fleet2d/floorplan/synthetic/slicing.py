@@ -272,7 +272,8 @@ def slenderness(boxes: Sequence[Box]) -> float:
 def divide_span(sizes: Sequence[float], low: int, high: int) -> list[tuple[int, int]]:
     """Divide [low, high] in proportion to sizes, without gaps."""
     total = fsum(sizes)
-    ends, reached = [low], 0.0
+    ends = [low]
+    reached = 0.0
     for size in sizes:
         reached += size
         ends.append(low + int((high - low) * reached / total + 0.5))
@@ -329,7 +330,8 @@ class Strip:
             if len(slot) == 1:
                 boxes.append(Box(slot[0], x0, 0, x1, back))
                 continue
-            first, second = areas[slot[0]], areas[slot[1]]
+            first = areas[slot[0]]
+            second = areas[slot[1]]
             middle = int(back * first / (first + second) + 0.5)
             boxes += [Box(slot[0], x0, 0, x1, middle), Box(slot[1], x0, middle, x1, back)]
         return boxes
@@ -410,7 +412,8 @@ class Wing:
         Raises:
             MisfitError: They do not fit together.
         """
-        width, is_suite = self.corridor.width, self.corridor.suite
+        width = self.corridor.width
+        is_suite = self.corridor.suite
         back = self.back.deepened_at_end(width) if is_suite else self.back
         length = int(fsum(back.widths(areas, self.back_depth)) + 0.5)
         depth = self.front.depth(areas, length)

@@ -71,7 +71,8 @@ def _regions(house: House) -> list[LabelledRegion]:
     """
     kinds = {brief.kind for brief in house.briefs}
     lacking = [kind for kind in ("bedroom", "kitchen") if kind not in kinds]
-    regions, half = [], WALL // 2
+    regions = []
+    half = WALL // 2
     for index, brief in enumerate(house.briefs):
         boxes = [box for box in house.boxes if box.room == index]
         shapes = [(b.x0 - half, b.y0 - half, b.x1 - half, b.y1 - half) for b in boxes]

@@ -158,7 +158,8 @@ def _by_step(table: "pa.Table") -> "tuple[pa.Table, I64]":
     step = table["step"].to_numpy()
     if np.any(step[1:] < step[:-1]):  # such as violations, which are listed when they end
         order = np.argsort(step, kind="stable")
-        table, step = table.take(order), step[order]
+        table = table.take(order)
+        step = step[order]
     return table, step
 
 

@@ -20,7 +20,9 @@ from fleet2d.storage.files import new_folder
 MAGIC = b"\x89MCAP0\r\n"
 # The codes of records of the format, https://mcap.dev/spec.
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
-STATISTICS, SUMMARY_OFFSET, DATA_END = 0x0B, 0x0E, 0x0F
+STATISTICS = 0x0B
+SUMMARY_OFFSET = 0x0E
+DATA_END = 0x0F
 MESSAGE_HEAD = np.dtype(
     [
         ("record", "u1"),
@@ -93,7 +95,8 @@ class McapWriter:
 
     def __init__(self, file: BinaryIO, topics: Sequence[tuple[Topic, str]]) -> None:
         """Begin a file with topics and the definitions of their messages."""
-        self._file, self._at = file, 0
+        self._file = file
+        self._at = 0
         self._channels: dict[str, int] = {}
         definitions = []
         for number, (topic, definition) in enumerate(topics, 1):
@@ -130,7 +133,8 @@ class McapWriter:
         times = struct.pack("<QQQI", begins, ends, len(records), zlib.crc32(records))
         size = struct.pack("<Q", len(data))
         at = self._put(_record(CHUNK, times, _text(COMPRESSION), size, data))
-        length, indices = self._at - at, {}
+        length = self._at - at
+        indices = {}
         for topic, channel in self._channels.items():
             if own := [i for i, block in enumerate(blocks) if block.topic == topic]:
                 pairs = [np.stack([blocks[i].times, places[i]], axis=-1) for i in own]
@@ -143,7 +147,8 @@ class McapWriter:
 
     def _fill_heads(self, blocks: Sequence[Block]) -> None:
         """Write what stands before the messages of a topic."""
-        topic, times = blocks[0].topic, np.concatenate([block.times for block in blocks])
+        topic = blocks[0].topic
+        times = np.concatenate([block.times for block in blocks])
         heads = np.empty(len(times), MESSAGE_HEAD)
         heads["record"], heads["channel"] = MESSAGE, self._channels[topic]
         sizes = np.concatenate([block.sizes for block in blocks])
@@ -171,7 +176,8 @@ class McapWriter:
         counts = dict(sorted((self._channels[topic], n) for topic, n in self.counts.items()))
         begins = min((chunk.begins for chunk in self._chunks), default=0)
         ends = max((chunk.ends for chunk in self._chunks), default=0)
-        channels, chunks = len(self._channels), len(self._chunks)
+        channels = len(self._channels)
+        chunks = len(self._chunks)
         numbers = (self.counts.total(), channels, channels, 0, 0, chunks, begins, ends)
         self._put(_record(STATISTICS, struct.pack("<QHIIIIQQ", *numbers), _numbers(counts)))
         for chunk in self._chunks:
@@ -204,7 +210,8 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
     piece = np.flatnonzero(np.diff(number[order], prepend=-1))
     last = order[np.append(piece[1:], len(order)) - 1]
     data = [_side_by_side([blocks[i] for i in row]).data for row in rows]
-    begins, ends = own[order[piece]].tolist(), (own[last] + sizes[last]).tolist()
+    begins = own[order[piece]].tolist()
+    ends = (own[last] + sizes[last]).tolist()
     pieces = zip(number[order[piece]].tolist(), begins, ends, strict=True)
     records = b"".join([data[row][begin:end] for row, begin, end in pieces])
     of_block = [np.empty(0, np.int64)] * len(blocks)

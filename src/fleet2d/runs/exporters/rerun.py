@@ -14,7 +14,9 @@ from fleet2d.runs.trajectory import Trajectory
 from fleet2d.storage.files import partial_file
 
 # Lengths of the arrows that show headings, and radii of points [m].
-_ARROW, _BODY, _SIGHTING = 0.4, 0.15, 0.06
+_ARROW = 0.4
+_BODY = 0.15
+_SIGHTING = 0.06
 _GREY = (136, 136, 136)
 
 
@@ -55,7 +57,8 @@ class _Writer:
 
     def __init__(self, rr: Any, stream: Any, records: Records) -> None:
         self._rr, self._stream, self._records = rr, stream, records
-        users, robots = records.users, records.robots
+        users = records.users
+        robots = records.robots
         self._colors = {name: _rgb(body_color(i, robot=False)) for i, name in enumerate(users)}
         self._colors |= {name: _rgb(body_color(i, robot=True)) for i, name in enumerate(robots)}
         self._last: dict[str, tuple[float, float, float, bool]] = {}
@@ -69,7 +72,8 @@ class _Writer:
 
     def _home(self) -> None:
         """Write walls and rooms, which are there at all times."""
-        rr, plan = self._rr, self._records.run.plan
+        rr = self._rr
+        plan = self._records.run.plan
         self._stream.log("home", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         rings = [
             plan.lattice.to_metres(np.asarray(ring.coords))

@@ -168,14 +168,16 @@ class _Ways:
 
     def take(self, path: Trajectory) -> Iterator[dict[str, Any]]:
         """Yield the movements that are over in the next poses."""
-        xy, away = np.stack([path.x, path.y], axis=-1), path.away
+        xy = np.stack([path.x, path.y], axis=-1)
+        away = path.away
         times = np.datetime_as_string(path.time, unit="s")
         if not len(xy):
             return
         if self._last is not None:
             place, was_away, time = self._last
             xy = np.concatenate([place[np.newaxis], xy])
-            away, times = np.append(was_away, away), np.append(time, times)
+            away = np.append(was_away, away)
+            times = np.append(time, times)
         self._last = xy[-1], away[-1], times[-1]
         moves = np.any(xy[1:] != xy[:-1], axis=1) & ~away[1:] & ~away[:-1]
         edges = np.flatnonzero(np.diff(np.concatenate([[0], moves, [0]])))
@@ -186,7 +188,8 @@ class _Ways:
             if self._line:  # which goes on
                 self._line += line[1:]
             else:
-                self._line, self._from = line, str(times[begin])
+                self._line = line
+                self._from = str(times[begin])
             self._to = str(times[end])
             if end < len(moves):
                 yield from self.finish()
