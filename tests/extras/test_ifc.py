@@ -173,3 +173,13 @@ def test_elements_without_geometry_are_noted(tmp_path: Path) -> None:
     notes = load_floorplan(model.write(tmp_path)).notes
 
     assert "elements without a geometry, which are left out: 1" in notes
+
+
+def test_text_in_another_encoding_is_no_obstacle(tmp_path: Path) -> None:
+    path = flat().write(tmp_path)
+    plan = load_floorplan(path)
+    path.write_bytes(
+        path.read_bytes().replace(b"ISO-10303-21;\n", b"ISO-10303-21;\n/* \xe4 */\n", 1)
+    )
+
+    assert plan == load_floorplan(path)

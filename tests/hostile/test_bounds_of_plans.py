@@ -195,7 +195,7 @@ def crossing_walls(folder: Path) -> Path:
 def crossing_parts(folder: Path) -> Path:
     """Write free space of thin parts, each of which crosses a quarter of the others."""
     ends = np.random.default_rng(0).random((2_500, 2, 2)).round(4) * 60
-    parts = [[a, b, [b[0], b[1] + 0.02], [a[0], a[1] + 0.02]] for a, b in ends.tolist()]
+    parts = [[a, b, [b[0] + 0.02, b[1] + 0.02]] for a, b in ends.tolist()]
     path = folder / "home.json"
     plan = {"format": "fleet2d-floorplan", "version": 1, "free": parts}
     path.write_text(json.dumps(plan), encoding="utf-8")

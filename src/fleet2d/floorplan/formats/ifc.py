@@ -85,7 +85,7 @@ def _read(content: bytes, path: Path) -> Any:
     with reading(path, "IFC"):
         if not content[:64].lstrip().startswith(b"ISO-10303-21"):
             raise ValueError("it has no header ISO-10303-21")
-        return ifcopenshell.file.from_string(content.decode())
+        return ifcopenshell.file.from_string(content.decode("latin-1"))
 
 
 def _elements(model: Any, storey: Any) -> Iterator[tuple[str, Any]]:
