@@ -22,7 +22,7 @@ from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
-from fleet2d.errors import ComponentError, InputError, blame
+from fleet2d.errors import InputError, blame
 from fleet2d.floorplan.home import HomeChanges
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.memory import rare_collections
@@ -70,7 +70,7 @@ def intervene(state: State, span: Span) -> None:
             else:
                 item.act.check(world)
                 item.act.begin(world)
-        except (ComponentError, InputError) as error:
+        except InputError as error:
             state.interventions.forget(item.act)
             source = item.by or f"the intervention {item.act.type_name}"
             what = f"the end of {source}" if item.ends else source
