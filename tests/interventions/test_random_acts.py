@@ -68,6 +68,18 @@ def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
     assert "work" in [detail for _, detail in events(run, "activity")]
 
 
+def test_what_was_learned_in_another_home_is_left_out(tmp_path: Path) -> None:
+    """The run failed at the step of the intervention."""
+    content = {"extends": "bundled:base", "simulation": {"duration": "13 h"}}
+    other = {"floorplan": {"type": "synthetic", "seed": 1, "area_m2": 60}}
+    fleet2d.run({**content, **other, "artifacts": {"learned": True}}, out=tmp_path / "run")
+    learned = str(tmp_path / "run" / "learned" / "ltp.npz")
+    run = fleet2d.run({**content, "script": [{"at": "1 h", "reset": "ltp", "learned": learned}]})
+    assert "complete" == run.status
+    (note,) = run.manifest["notes"]
+    assert note.startswith(f"step 3600: script.0 was left out: learned: {learned}: algorithms.ltp")
+
+
 # All of them, at random
 
 ITEMS = [

@@ -139,16 +139,23 @@ class Learners:
         """Restart an algorithm with nothing learned, or with the content of a file.
 
         Raises:
-            InputError: The algorithm can't use the file.
+            InputError: The file is damaged.
+            ComponentError: The algorithm can't use what it holds.
         """
         learner = next(learner for learner in self.all if learner.path == f"algorithms.{name}")
-        component = learner.origin.model_copy(deep=True)
-        assert isinstance(component, Algorithm)
-        with blame(learner.path, None):
+        learner.component = self._start(learner.path, learner.origin, learned)
+
+    def _start(
+        self, path: str, origin: Algorithm | Metric, learned: Path | None
+    ) -> Algorithm | Metric:
+        """Return a started copy of an algorithm or a metric, with what a file holds."""
+        component = origin.model_copy(deep=True)
+        with blame(path, None):
             component.start(self.home)
-            if learned is not None:
+            if isinstance(component, Algorithm) and learned is not None:
                 component.recall(load_learned(learned))
-        learner.component = component
+                component.check_learned(self.users, self.clock.start)
+        return component
 
     def next_due(self) -> int | None:
         """Return the step before which the next update is due; None if none is."""
@@ -225,12 +232,7 @@ class Learners:
         with blame(path, None):
             every = 0 if component.on else whole_steps(component.period, step_us, f"{path}.period")
         origin = component
-        component = component.model_copy(deep=True)
-        with blame(path, None):
-            component.start(self.home)
-            if isinstance(component, Algorithm) and component.learned is not None:
-                component.recall(load_learned(component.learned))
-                component.check_learned(self.users, self.clock.start)
+        component = self._start(path, origin, getattr(origin, "learned", None))
         # Metrics and algorithms may share a name; some file systems don't distinguish A and a.
         tables = {*_RUN_TABLES, *(learner.table.casefold() for learner in self.all)}
         table = name

@@ -8,6 +8,7 @@ from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, problem
 from fleet2d.configuration.units import InputPath
+from fleet2d.errors import ComponentError, InputError, errors_as
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
@@ -32,8 +33,13 @@ class Reset(Intervention):
         check_known(self.algorithm, "algorithm", world.algorithms)
 
     def begin(self, world: World) -> None:
-        """Restart the algorithm."""
-        world.reset(self.algorithm, self.learned)
+        """Restart the algorithm.
+
+        Raises:
+            InputError: It can't use the file, such as one that was learned in another home.
+        """
+        with errors_as(InputError, f"learned: {self.learned}", of=ComponentError):
+            world.reset(self.algorithm, self.learned)
 
 
 @register("intervention", "replace")
