@@ -207,7 +207,7 @@ def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
             path.write_text(row.replace("2011", "0001") + row)
             return path, read_log, "LOG_DAYS"
         case "fixes.csv":
-            path.write_text("time,x,y\n0,1,1\n99999999,2,2\n1e7,1,1\n2e9,1,1\n")
+            path.write_text("time,x,y\n0,1,1\n99999999,2,2\n10000000,1,1\n2000000000,1,1\n")
             return path, lambda p: read_log(p, time_zone="UTC"), "LOG_DAYS"
     raise AssertionError(name)
 

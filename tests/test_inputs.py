@@ -254,7 +254,7 @@ CASES = [
 def test_nothing_outside_of_a_root_is_opened(root: Path, text: str) -> None:
     (root / "home.yaml").write_text(text)
 
-    refusal = "is outside of the folder|there is no image|is bundled|it hasn't run"
+    refusal = "is outside of the folder|there is no image|is bundled|is a link|it hasn't run"
     with (
         recorded() as opened,
         within(root),

@@ -122,7 +122,7 @@ def test_a_component_that_is_gone_is_named(tmp_path: Path) -> None:
     fleet2d.run(content, out=tmp_path / "run")
     module.unlink()
     with pytest.raises(RunDirectoryError, match=r"mine\.py.*missing"):
-        fleet2d.reproduce(tmp_path / "run")
+        fleet2d.reproduce(tmp_path / "run", trust=True)
 
 
 def test_only_a_complete_run_can_be_reproduced(tmp_path: Path) -> None:

@@ -177,7 +177,7 @@ def test_a_family_is_on_vacation_at_one_time() -> None:
 
 def test_a_guest_comes_by_chance_and_stays_for_some_hours() -> None:
     members = {"ana": "works_outside", "vera": "retired"}
-    visits = {"vera": {"every": "4 d", "between": ["14:00", "16:00"], "takes": [1800, 7200]}}
+    visits = {"vera": {"every": "4 d", "between": ["14:00", "16:00"], "takes": ["30 min", "2 h"]}}
     home = Lives(Household.model_validate({"members": members, "visits": visits}), 4, MONDAY - 1)
     stays = [
         sum(e.end - e.begin for e in home.day(MONDAY + i)["vera"] if e.activity != AWAY)

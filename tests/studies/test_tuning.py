@@ -249,9 +249,9 @@ def test_trials_of_unknown_origin_are_refused(tmp_path: Path) -> None:
 
 def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Path) -> None:
     """Variants without the axis were trained on, and were shown as held out."""
-    study = search(held_out={"dwell": [2]})
+    study = search(held_out={"dwell": ["2 s"]})
     study["axes"]["dwell"] = {
-        "key": "robots.astro.dwell", "values": [1, 2], "when": {"radius": 0.1},
+        "key": "robots.astro.dwell", "values": ["1 s", "2 s"], "when": {"radius": 0.1},
     }  # fmt: skip
     with pytest.raises(ScenarioError, match="doesn't apply to all variants"):
         tune(study, tmp_path / "tune", SerialExecutor())

@@ -380,9 +380,16 @@ class LogTable:
         empty = _where(is_empty)
         if len(empty):
             raise LogError(f"{path}, line {line[empty[0]]}: it has no time")
-        if _is_text(column) and not pc.all(pc.match_substring_regex(column, _DIGITS)).as_py():
-            return parse_texts(column, path, line, is_utc=is_utc, day_first=self.day_first)
         if _is_text(column):
+            is_number = pc.match_substring_regex(column, _DIGITS)
+            if not pc.any(is_number).as_py():
+                return parse_texts(column, path, line, is_utc=is_utc, day_first=self.day_first)
+            other = _where(pc.invert(is_number))
+            if len(other):
+                raise LogError(
+                    f"{path}, line {line[other[0]]}: expected a number, as in other lines, got"
+                    f" {one_line(column[other[0]].as_py())!r}"
+                )
             return parse_numbers(self._exact_times(column), path, line, unit_s)
         if pa.types.is_timestamp(kind):
             values = pc.cast(column, pa.timestamp("us", kind.tz), safe=False)
@@ -402,7 +409,7 @@ class LogTable:
         if len(wrong):
             raise LogError(
                 f"{self.path}, line {self.line[wrong[0]]}: expected a time like '2011-06-15"
-                f" 01:03:39' or a number of seconds, got {texts[wrong[0]].as_py()!r}"
+                f" 01:03:39' or a number of seconds in digits, got {texts[wrong[0]].as_py()!r}"
             )
         texts = self._with_points(texts, "time")
         try:
