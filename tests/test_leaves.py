@@ -23,7 +23,6 @@ LEAVES = {
     "fit": "fit",
     "floorplan/synthetic": "",
     "paper": "reproduce-paper",
-    "published": "",
     "paper studies": "study",
     "viewer": "view",
 }

@@ -464,7 +464,6 @@ UNUSED = (
     "fleet2d.logs",
     "fleet2d.paper",
     "fleet2d.pictures",
-    "fleet2d.published",
     "fleet2d.studies",
     "fleet2d.testing",
     "fleet2d.viewer",
