@@ -462,7 +462,6 @@ UNUSED = (
     "fleet2d.interventions.home",
     "fleet2d.interventions.robots",
     "fleet2d.logs",
-    "fleet2d.paper",
     "fleet2d.pictures",
     "fleet2d.studies",
     "fleet2d.testing",
