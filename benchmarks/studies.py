@@ -1,24 +1,20 @@
 """How fast studies are: overhead per variant, speed-up by workers, memory of the driver, reading.
 
-    python benchmarks/studies.py                    # all but the next three
+    python benchmarks/studies.py                    # all but the next two
     python benchmarks/studies.py months --workers 2 # the paper's 10 x 10 x 10 runs of 30 days
-    python benchmarks/studies.py forecasts          # five studies, alone and beside other programs
     python benchmarks/studies.py driver --variants 10000000
 
 Run it on a machine that does nothing else.
 """
 
 import argparse
-import json
 import os
-import re
 import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -135,88 +131,6 @@ def reading(folder: Path) -> None:
     )
 
 
-def forecast_cases() -> dict[str, dict[str, Any]]:
-    """Return studies by name, whose runs are short, long, in many homes, or differ."""
-    speeds = {"robots.astro.speed": [0.3, 0.6]}
-    homes = {"home": {"synthetic": 30, "settings": {"furnish": True}}}
-    mixed = {
-        "simulation.duration": ["2 d", "20 d"],
-        "robot": {
-            "options": {
-                "patrols": {"robots.astro.behaviors": [{"type": "patrol"}]},
-                "waits": {"robots.astro.speed": 0.6},
-            }
-        },
-    }
-
-    def case(duration: str, axes: dict[str, Any], seeds: int, **keys: Any) -> dict[str, Any]:
-        base = {"extends": "bundled:base", "simulation": {"duration": duration}}
-        return {"base": base, "axes": axes, "replicates": seeds, **keys}
-
-    return {
-        "400 runs of an hour": case("1 h", speeds, 200),
-        "12 runs of 90 days": case("90 d", speeds, 6),
-        "150 runs of 2 days in 30 homes": case("2 d", homes, 5),
-        "60 runs of 2 and of 20 days, two robots": case("2 d", mixed, 15),
-        "60 runs of 7 days with all observations": case(
-            "7 d", speeds, 30, keep={"tables": ["observations", "events"]}
-        ),
-    }
-
-
-@contextmanager
-def busy(processes: int) -> Iterator[None]:
-    """Keep cores busy by other programs."""
-    command = [sys.executable, "-c", "while True: pass"]
-    others = [subprocess.Popen(command) for _ in range(processes)]
-    try:
-        yield
-    finally:
-        for process in others:
-            process.kill()
-            process.wait()
-
-
-def forecasts(folder: Path, workers: int, cases: list[str]) -> None:
-    """Print how long studies are said to take, and how long they take, as rows of docs/studies.md.
-
-    Each is a command of its own, with compiled modules, as it is for users.
-    """
-    folder.mkdir()
-    environment = {**os.environ, **_as_installed(folder)}
-    commands = [sys.executable, "-c", "from fleet2d.cli import main; main()", "study", "run"]
-
-    def command(*arguments: str | Path) -> tuple[str, float]:
-        start_s = time.perf_counter()
-        line = [*commands, *map(str, arguments), "--workers", str(workers)]
-        text = subprocess.check_output(line, env=environment, text=True)
-        return text, time.perf_counter() - start_s
-
-    ratios, inside = list[float](), 0
-    print("| study | said | taken | said, two programs more | taken |")
-    print("| --- | ---: | ---: | ---: | ---: |")
-    for number, name in enumerate(cases):
-        file, cells = folder / "study.yaml", list[str]()
-        file.write_text(json.dumps(forecast_cases()[name]))
-        if not number:
-            command(file, "--dry-run")  # compiles the modules
-        for others in (0, workers):
-            with busy(others):
-                said, _ = command(file, "--dry-run")
-                _, taken_s = command(file, "--out", folder / f"{number}-{others}")
-            match = re.search(r"time: ([\d.]+) (\w+) to ([\d.]+) (\w+) by", said)
-            assert match, said
-            units = {"s": 1, "min": 60, "h": 3600}
-            low_s = float(match[1]) * units[match[2]]
-            high_s = float(match[3]) * units[match[4]]
-            cells += [f"{low_s:.0f} to {high_s:.0f} s", f"{taken_s:.0f} s"]
-            ratios.append((low_s + high_s) / 2 / taken_s)
-            inside += low_s <= taken_s <= high_s
-        print(f"| {' | '.join([name, *cells])} |", flush=True)
-    texts = ", ".join(f"{ratio:.2f}" for ratio in ratios)
-    print(f"\nmiddle of what is said over what is taken: {texts}; {inside} of {len(ratios)} inside")
-
-
 def _as_installed(folder: Path) -> dict[str, str]:
     """Return the environment of commands whose modules are compiled, as pip installs them."""
     return {
@@ -246,8 +160,8 @@ def months(folder: Path, workers: int, *, small: bool = False) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parts = ("overhead", "speedup", "driver", "reading", "forecasts", "months")
-    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:-2])
+    parts = ("overhead", "speedup", "driver", "reading", "months")
+    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:-1])
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--variants", type=int, default=100_000, help="of the driver")
     parser.add_argument("--small", action="store_true", help="few variants: does it work?")
@@ -266,9 +180,6 @@ def main() -> None:
                 speedup(folder_of, 1 if arguments.small else 5, 1 if arguments.small else 40)
             elif name == "driver":
                 driver(folder_of, 1_000 if arguments.small else arguments.variants)
-            elif name == "forecasts":
-                cases = [*forecast_cases()]
-                forecasts(folder_of, arguments.workers, cases[:1] if arguments.small else cases)
             else:
                 reading(folder_of)
 

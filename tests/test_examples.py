@@ -15,17 +15,21 @@ from fleet2d.studies.driver import check_study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SCRIPTS = sorted(EXAMPLES.rglob("*.py"))
-RUNNABLE = [  # those in agents/ need torch: tests/extras; those in live/ a run: tests/live
+# Those in agents/ need torch: tests/extras; those in live/ a run: tests/live; paper/ has tests of
+# its own.
+RUNNABLE = [
     path
     for path in SCRIPTS
-    if '__name__ == "__main__"' in path.read_text() and path.parent.name not in ("agents", "live")
+    if '__name__ == "__main__"' in path.read_text()
+    and path.parent.name not in ("agents", "live", "paper")
 ]
 STUDIES = sorted((EXAMPLES / "studies").glob("*.yaml"))
 DATA_SETS = sorted((EXAMPLES / "datasets").glob("*.yaml"))
 # What makes a script short, unless it is thorough.
 SHORTER = {"duration.days=7": "duration.days=1", "range(5, 5 +": "range(1, 1 +"}
 MAY_BE_EMPTY = {"observations", "violations"}
-SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - {*STUDIES, *DATA_SETS})
+PAPER = set((EXAMPLES / "paper").glob("*.yaml"))
+SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - {*STUDIES, *DATA_SETS, *PAPER})
 
 
 @pytest.fixture

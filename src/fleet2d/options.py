@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
@@ -22,10 +22,6 @@ Scale = Annotated[
         max=1000,
         help="What lengths of a floor plan are multiplied by, such as 0.001 for millimetres.",
     ),
-]
-
-ThemeChoice = Annotated[
-    Literal["light", "dark"], typer.Option(help="Theme of pictures: a light or a dark background.")
 ]
 
 

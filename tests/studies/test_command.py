@@ -1,7 +1,6 @@
 """The commands: what they print, write and return."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -35,25 +34,13 @@ def test_json_is_one_object(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_a_dry_run_prints_axes_variants_and_time_and_writes_nothing(fleet2d: Cli) -> None:
+def test_a_dry_run_prints_axes_and_variants_and_writes_nothing(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("study", "run", "speeds.yaml", "--dry-run", "--workers", "2")
     assert 0 == code
     assert f"{SPEED}: 0.3, 0.6" in out
     assert f"variant 3 ({SPEED} = 0.6, seed = 1)" in out
-    said = r"4 variants, 1 home, 8\.0 min of simulated time: .* to .* by 2 workers here"
-    assert re.search(said, out)
+    assert out.endswith("\n4 variants, 1 home, 8.0 min of simulated time\n")
     assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
-
-
-@pytest.mark.slow
-def test_a_dry_run_tells_the_line_of_a_number_that_no_run_has(fleet2d: Cli) -> None:
-    study = small(replicates=1, keep={"metrics": ["sightings.*", "room_share.ana.kitchn"]})
-    text = yaml.safe_dump(study, sort_keys=False)
-    Path("speeds.yaml").write_text(text)
-    code, _, err = fleet2d("study", "run", "speeds.yaml", "--dry-run", "--workers", "1")
-    line = 1 + text[: text.index("kitchn")].count("\n")
-    assert (0, True) == (code, f"note: speeds.yaml:{line}: 2 of 2 complete variants have" in err)
-    assert "no metric room_share.ana.kitchn" in err
 
 
 def test_status_tells_how_far_it_is(fleet2d: Cli) -> None:

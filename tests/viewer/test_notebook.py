@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from matplotlib.colors import to_rgb
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -69,18 +68,3 @@ def test_missing_library_is_named(run_dir: Path, monkeypatch: pytest.MonkeyPatch
 
     with pytest.raises(InputError, match=r"need.* matplotlib: pip install"):
         run.draw()
-
-
-@pytest.mark.slow
-def test_dark_figure_has_a_dark_ground_and_bright_words(run_dir: Path) -> None:
-    run = fleet2d.open_run(run_dir)
-    for figure in (
-        run.draw(theme="dark"),
-        run.draw(at=9, theme="dark"),
-        run.plan.draw(theme="dark"),
-    ):
-        assert max(figure.get_facecolor()[:3]) < 0.15
-        texts = [text for axes in figure.axes for text in axes.texts if text.get_text()]
-        assert all(max(to_rgb(text.get_color())) > 0.4 for text in texts)
-    with pytest.raises(InputError, match="no theme 'blue'"):
-        run.draw(theme="blue")

@@ -1,15 +1,12 @@
 """Commands on scenarios and plans: `fleet2d validate`, `convert`, `components` and `schema`."""
 
 import json
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fleet2d.cli.__main__ import entries
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError
 from fleet2d.options import Resolution, Scale, file_name, split
@@ -101,48 +98,21 @@ def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None
 
 
 def convert(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            help="A floor plan of any format, or a configuration of the published Fleet2D."
-        ),
-    ],
+    source: Annotated[Path, typer.Argument(help="A floor plan of any format.")],
     target: Annotated[
-        Path,
-        typer.Argument(help="The floor plan (.json, .yaml, .geojson) or the scenario to write."),
+        Path, typer.Argument(help="The floor plan to write: .json, .yaml or .geojson.")
     ],
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
-    from fleet2d.floorplan.load import is_floorplan, load_floorplan
+    """Turn a floor plan of any format into Fleet2D's own, or into GeoJSON."""
+    from fleet2d.floorplan.load import load_floorplan, save_floorplan
 
-    if is_floorplan(source):
-        from fleet2d.floorplan.load import save_floorplan
-
-        plan = load_floorplan(source, resolution=resolution, scale=scale)
-        save_floorplan(plan, target)
-        notes = list(plan.notes)
-    else:
-        notes = _converter()(source, target)
-    for note in notes:
+    plan = load_floorplan(source, resolution=resolution, scale=scale)
+    save_floorplan(plan, target)
+    for note in plan.notes:
         typer.echo(f"note: {note}")
     typer.echo(target)
-
-
-def _converter() -> Callable[[Path, Path], list[str]]:
-    """Return the function that converts a configuration of another program into a scenario.
-
-    Raises:
-        InputError: There is none.
-    """
-    for entry in entries("fleet2d.converter"):
-        with suppress(ModuleNotFoundError):
-            return entry.load()
-    raise InputError(
-        "this is neither a floor plan (docs/floorplans.md lists the formats) nor a file that an"
-        " installed converter takes"
-    )
 
 
 def components(

@@ -11,7 +11,6 @@ from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
     Resolution,
     Scale,
-    ThemeChoice,
     Trust,
     file_name,
     show_code,
@@ -101,21 +100,17 @@ def show(  # noqa: PLR0913 - options of the command line
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Of a run: where it ends.")] = None,
     figure: Figure = "life",
-    theme: ThemeChoice = "light",
     trust: Trust = False,
 ) -> None:
     """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
-    from fleet2d.pictures.theme import themed
-
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
-    with themed(theme):
-        if diary:
-            for line in show_diary(None if source is None else str(source), out, days, seed):
-                typer.echo(line)
-        else:
-            typer.echo(
-                _draw(source, out, picture, fov, trust=trust, resolution=resolution, scale=scale)
-            )
+    if diary:
+        for line in show_diary(None if source is None else str(source), out, days, seed):
+            typer.echo(line)
+    else:
+        typer.echo(
+            _draw(source, out, picture, fov, trust=trust, resolution=resolution, scale=scale)
+        )
 
 
 class RunPicture(NamedTuple):

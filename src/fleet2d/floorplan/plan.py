@@ -531,19 +531,18 @@ class FloorPlan:
         near_x, near_y = self.lattice.to_metres(centre).tolist()
         return near_x, near_y
 
-    def draw(self, ax: Any = None, theme: str = "light") -> Any:
+    def draw(self, ax: Any = None) -> Any:
         """Draw the plan; needs the extra `viz`.
 
         Args:
             ax: Matplotlib axes to draw on, in metres; None for a new figure.
-            theme: Of a new figure: light or dark.
 
         Returns:
             A matplotlib figure, or `ax`.
         """
         from fleet2d.configuration.components import hook  # with pydantic: only to draw
 
-        return hook("plan", "draw")(self, ax, theme)
+        return hook("plan", "draw")(self, ax)
 
     def _repr_png_(self) -> bytes | None:
         """Show the plan in a notebook, where matplotlib is installed."""

@@ -39,7 +39,6 @@ from fleet2d.palette import (
     TEXT_COLOR,
     WALL_COLOR,
 )
-from fleet2d.pictures.theme import apply_theme
 from fleet2d.storage.files import write_atomically
 
 EDGE_COLOR = "#6d737c"
@@ -276,14 +275,14 @@ def drawing_style() -> AbstractContextManager[Any]:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure in the current theme, without a date; readers see all of the file, or none.
+    """Write a figure without a date; readers see all of the file, or none.
 
     Raises:
         InputError: The file can't be written.
     """
     unstamped = {DATE_METADATA[path.suffix.lower()]: None}
     content = io.BytesIO()
-    apply_theme(figure).savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
+    figure.savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
     with os_errors_as(InputError, f"can't write the picture {path}"):
         write_atomically(path, content.getvalue())
 

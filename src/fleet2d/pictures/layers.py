@@ -19,7 +19,6 @@ from fleet2d.kernels import TURN, Reach
 from fleet2d.palette import TEXT_COLOR, VIEW_EDGE
 from fleet2d.pictures.floorplan import draw_cells, figure_size, floorplan_axes, picture
 from fleet2d.pictures.life import SightWalls, draw_region, draw_robot, field_of_view
-from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import LAYER_PREFIX, Run, layer_steps, read_layer
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.sight.fov import FieldOfView, Flashlight, VisibleRegion
@@ -85,7 +84,7 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
         colors = ScalarMappable(Normalize(low, high if high > low else low + 1.0), COLORS)
         image[has_value] = colors.to_rgba(numbers)
         image[has_value, 3] = SOLID
-    draw_cells(plan, image, axes, interpolation="nearest", zorder=2.1, label=SCALE)
+    draw_cells(plan, image, axes, interpolation="nearest", zorder=2.1)
     return colors
 
 

@@ -201,22 +201,21 @@ class Run:
         """
         return hook("run", "judge")(self, expectation, name)
 
-    def draw(self, at: str | int | None = None, ax: Any = None, theme: str = "light") -> Any:
+    def draw(self, at: str | int | None = None, ax: Any = None) -> Any:
         """Draw the run, or one moment of it; needs the extra `viz`.
 
         Args:
             at: A moment, such as "day 3 18:30", or a step; None: the whole run.
             ax: Matplotlib axes to draw the moment on (the last one, if `at` is None).
-            theme: Theme of a new figure: light or dark.
 
         Returns:
             A matplotlib figure, or `ax`.
 
         Raises:
-            InputError: `at` names no moment, there is no such theme, or matplotlib is missing.
+            InputError: `at` names no moment, or matplotlib is missing.
             ArtifactError: The run stored no floor plan or no key frames.
         """
-        return hook("run", "draw")(self, at, ax, theme)
+        return hook("run", "draw")(self, at, ax)
 
     def view(self, height: int = 720) -> Any:
         """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.

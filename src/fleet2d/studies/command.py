@@ -5,15 +5,15 @@ import itertools
 import json
 import signal
 import sys
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import counted, suggest
 from fleet2d.errors import InputError, end_by_signal, printable
 from fleet2d.options import Trust, Workers, show_code
 
@@ -38,7 +38,6 @@ SlurmParameters = Annotated[
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
 MANY_VARIANTS = 20_000
-BUSY = 0.9  # share of a core that workers get, below which other programs are mentioned
 PIVOTED = 4  # columns of a table of two kinds of units, such as homes and seeds
 IDENTITY_START = 6
 """The minimum number of characters of an identity that name a variant."""
@@ -59,7 +58,7 @@ def run(  # noqa: PLR0913 - options of the command line
     executor: ExecutorName = "local",
     slurm: SlurmParameters = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check all, and print the variants and their time.")
+        bool, typer.Option("--dry-run", help="Check all, and print the variants.")
     ] = False,
     fail_fast: Annotated[
         bool, typer.Option("--fail-fast", help="End with the first variant that fails.")
@@ -76,10 +75,9 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
 
-    begin_s = time.perf_counter()
     checked = check_study(source, _print_size)
     if dry_run:
-        _print_plan(checked, workers, begin_s)
+        _print_plan(checked, workers)
         return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
@@ -278,16 +276,14 @@ def _print_size(count: int) -> None:
         _print(f"{count:,} variants: all are checked first, a million takes minutes", err=True)
 
 
-def _print_plan(checked: "CheckedStudy", workers: int | None, begin_s: float) -> None:
-    """Print the axes, the first variants, and the time that all will take."""
+def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
+    """Print the axes, the first variants, and how much all of them are."""
     from fleet2d.studies.executors import LocalExecutor, cores
     from fleet2d.studies.plan import check_setups
-    from fleet2d.studies.progress import NoteObserver, forecast, in_words
+    from fleet2d.studies.progress import in_words
 
     plan = checked.plan
-    executor = LocalExecutor(workers or cores())
-    check_setups(plan, executor)
-    checked_s = time.perf_counter() - begin_s
+    check_setups(plan, LocalExecutor(workers or cores()))
     for column, labels in plan.design.labels.items():
         values = ", ".join(map(str, labels[:MAX_LINES]))
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
@@ -297,18 +293,10 @@ def _print_plan(checked: "CheckedStudy", workers: int | None, begin_s: float) ->
         _print(f"  {plan.design.describe(variant.index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
-    expected = forecast(checked, executor, checked_s, NoteObserver())
-    variants = len(plan.variants)
-    homes = len(plan.variants.home_keys)
-    _print(
-        f"\n{variants} variant{'s' * (variants != 1)}, {homes} home{'s' * (homes != 1)},"
-        f" {in_words(expected.simulated)} of simulated time: {in_words(expected.shortest)} to"
-        f" {in_words(expected.longest)} by {executor.workers} workers here"
-    )
-    if expected.core_share < BUSY:
-        alone = in_words((expected.shortest + expected.longest) / 2 * expected.core_share)
-        others = f"{100 * (1 - expected.core_share):.0f} %"
-        _print(f"other programs use {others} of the cores: without them it takes about {alone}")
+    simulated = in_words(timedelta(seconds=plan.variants.total_simulated_s))
+    variants = counted(len(plan.variants), "variant")
+    homes = counted(len(plan.variants.home_keys), "home")
+    _print(f"\n{variants}, {homes}, {simulated} of simulated time")
 
 
 def _print_failures(location: str) -> None:

@@ -3,15 +3,14 @@
 import copy
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 from fleet2d.engine.basis import input_files as input_files
 from fleet2d.engine.simulation import Simulation, run
 from fleet2d.errors import ComponentError
-from fleet2d.runtime.clock import HOUR_S
 from fleet2d.runtime.memory import peak_memory_mb
 from fleet2d.scenario.model import Scenario
 
@@ -121,20 +120,13 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
             error=describe_error(error),
             trace="".join(traceback.format_exception(error)),
         )
-    return _outcome_of(finished, metrics, tables, start_s)
-
-
-def _outcome_of(
-    run: "Run", metrics: Iterable[str], tables: Iterable[str], start_s: float
-) -> VariantOutcome:
-    """Return the results to keep of a run that began at a time of `perf_counter`."""
-    wall_s: dict[str, float] = {**run.manifest["wall_s"], "total": time.perf_counter() - start_s}
+    wall_s = {**finished.manifest["wall_s"], "total": time.perf_counter() - start_s}
     patterns = tuple(metrics)
     return VariantOutcome(
         "complete",
-        run.digest,
-        {name: value for name, value in flat_numbers(run.metrics) if is_kept(name, patterns)},
-        {name: run.tables[name] for name in tables if name in run.tables},
+        finished.digest,
+        {name: value for name, value in flat_numbers(finished.metrics) if is_kept(name, patterns)},
+        {name: finished.tables[name] for name in tables if name in finished.tables},
         wall_s,
         peak_memory_mb() or 0.0,
     )
@@ -162,55 +154,3 @@ def flat_numbers(metrics: Mapping[str, Any], prefix: str = "") -> Iterator[tuple
             yield from flat_numbers(value, f"{prefix}{name}{SEPARATOR}")
         elif isinstance(value, bool | int | float):
             yield f"{prefix}{name}", float(value)
-
-
-class RunSpeed(NamedTuple):
-    """How fast a scenario runs on this machine.
-
-    Attributes:
-        fixed_s: Wall time of building the scenario, setting it up, and closing the run [s].
-        moving_s: Wall time of the simulated time [s].
-        simulated_s: The simulated time that was run [s].
-        setup_s: Wall time of the set-up alone [s].
-        core_share: Processor time over wall time: below 1 as far as other programs run.
-    """
-
-    fixed_s: float
-    moving_s: float
-    simulated_s: float
-    setup_s: float = 0.0
-    core_share: float = 1.0
-
-
-def measure(
-    build: Callable[[], Scenario], metrics: Iterable[str], tables: Iterable[str], max_s: float = 2.0
-) -> tuple[RunSpeed, VariantOutcome]:
-    """Run a scenario for some time to measure its speed; return the results so far, too.
-
-    Args:
-        build: Returns the scenario.
-        metrics: Patterns of the numbers to keep.
-        tables: Names of the tables to keep.
-        max_s: The longest wall time between set-up and end [s].
-
-    Raises:
-        Fleet2DError: The scenario is wrong, or a component failed.
-    """
-    start_s = time.perf_counter()
-    start_core_s = time.process_time()
-    scenario = build()
-    built_s = time.perf_counter()
-    simulation = Simulation(scenario)
-    ready_s = time.perf_counter()
-    hour = max(1, int(HOUR_S * 1e6 / simulation.clock.step_us))
-    while not simulation.done and time.perf_counter() - ready_s < max_s:
-        simulation.advance(min(hour, simulation.clock.steps - simulation.step))
-    moving_s = time.perf_counter() - ready_s
-    outcome = _outcome_of(simulation.finish("interrupted"), metrics, tables, start_s)
-    wall_s = time.perf_counter() - start_s
-    core_s = time.process_time() - start_core_s
-    simulated_s = simulation.step * simulation.clock.step_us / 1e6
-    speed = RunSpeed(
-        wall_s - moving_s, moving_s, simulated_s, ready_s - built_s, min(core_s / wall_s, 1.0)
-    )
-    return speed, outcome

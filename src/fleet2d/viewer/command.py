@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.errors import InputError, RunDirectoryError
-from fleet2d.options import ThemeChoice, Trust, resume_hint, show_code, split
+from fleet2d.options import Trust, resume_hint, show_code, split
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -109,11 +109,9 @@ def film(
     end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
     speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
     height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
-    theme: ThemeChoice = "light",
     trust: Trust = False,
 ) -> None:
     """Make a film of a stretch of a stored run."""
-    from fleet2d.pictures.theme import themed
     from fleet2d.runs.run import open_run
     from fleet2d.viewer.film import write_film
     from fleet2d.viewer.moments import steps_of
@@ -123,8 +121,7 @@ def film(
         show_code(run.manifest)
     first, last = steps_of(run, begin, end)
     target = out or directory / "film.mp4"
-    with themed(theme):
-        frames = write_film(run, target, first, last, speed=speed, height=height)
+    frames = write_film(run, target, first, last, speed=speed, height=height)
     typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
 
 

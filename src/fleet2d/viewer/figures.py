@@ -27,7 +27,6 @@ from fleet2d.pictures.floorplan import (
 from fleet2d.pictures.layers import COLORS
 from fleet2d.pictures.life import blurred, samples_by_cell
 from fleet2d.pictures.run import run_figure
-from fleet2d.pictures.theme import SCALE
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.viewer.moments import part_of_run
@@ -241,7 +240,7 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
     colors = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
     image = colors.to_rgba(hours)
     image[..., 3] = np.clip(np.sqrt(hours / high) * 3, 0, 0.85) * plan.free
-    draw_cells(plan, image, axes, interpolation="bilinear", zorder=2.1, label=SCALE)
+    draw_cells(plan, image, axes, interpolation="bilinear", zorder=2.1)
     return colors
 
 

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from fleet2d.errors import InputError, extra, os_errors_as
 from fleet2d.kernels import I64, U8
 from fleet2d.pictures.floorplan import drawing_style, figure_size
-from fleet2d.pictures.theme import apply_theme
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import partial_file
 from fleet2d.viewer.stage import Stage
@@ -193,7 +192,7 @@ def _check(path: Path, speed: float, height: int) -> None:
 
 
 def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_PX) -> Stage:
-    """Return the stage of a film, in the current theme; see `write_film`.
+    """Return the stage of a film; see `write_film`.
 
     Args:
         run: The run.
@@ -209,9 +208,7 @@ def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_P
     dpi = rows / HEIGHT_IN  # text grows with the film
     figure = Figure(figsize=(columns / dpi, rows / dpi), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
-    stage = Stage(run, first, end, figure=figure, stride=stride)
-    apply_theme(figure)
-    return stage
+    return Stage(run, first, end, figure=figure, stride=stride)
 
 
 def draw_frames(stage: Stage, first: int, moments: I64) -> Iterator[tuple[int, U8]]:

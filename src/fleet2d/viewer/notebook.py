@@ -16,10 +16,9 @@ from fleet2d.viewer.run_facts import run_title
 NOTEBOOK_DPI = 100
 
 
-def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") -> Any:
+def draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
     """Draw a run, or a moment of it; see `Run.draw`."""
     from fleet2d.pictures.run import run_figure
-    from fleet2d.pictures.theme import apply_theme, check_theme, themed
     from fleet2d.viewer.figures import moment_figure, moment_on_axes
 
     last = run.manifest["steps"] - 1
@@ -27,24 +26,22 @@ def draw_run(run: Run, at: str | int | None, axes: Any, theme: str = "light") ->
     if axes is not None:
         moment_on_axes(run, min(step, last), axes)
         return axes
-    with themed(check_theme(theme)):
-        return apply_theme(run_figure(run) if at is None else moment_figure(run, step))
+    return run_figure(run) if at is None else moment_figure(run, step)
 
 
-def draw_plan(plan: FloorPlan, axes: Any, theme: str = "light") -> Any:
+def draw_plan(plan: FloorPlan, axes: Any) -> Any:
     """Draw a floor plan; see `FloorPlan.draw`."""
     from matplotlib.figure import Figure
 
     from fleet2d.pictures.floorplan import drawing_style, figure_size, floorplan_axes
-    from fleet2d.pictures.theme import apply_theme, check_theme, themed
 
     if axes is not None:
         floorplan_axes(plan, axes, title=False)
         return axes
-    with drawing_style(), themed(check_theme(theme)):
+    with drawing_style():
         figure = Figure(figsize=figure_size(plan))
         floorplan_axes(plan, figure.add_axes((0, 0, 1, 1)))
-        return apply_theme(figure)
+        return figure
 
 
 def plan_png(plan: FloorPlan) -> bytes | None:

@@ -124,22 +124,13 @@ def _figures(run: Run) -> list[str]:
     for caption, draw in kinds:
         try:
             with drawing_style():
-                picture = _both_themes(draw(), caption)
+                address = _png(draw())
         except (ArtifactError, InputError) as error:
             figures.append(f"<p>{html.escape(caption)}: {html.escape(str(error))}</p>")
         else:
+            picture = f'<img alt="{caption}" src="{address}">'
             figures.append(f"<figure>{picture}<figcaption>{caption}</figcaption></figure>")
     return figures
-
-
-def _both_themes(figure: Any, caption: str) -> str:
-    """Return a figure as HTML, light or dark as the page is; the figure itself is darkened."""
-    from fleet2d.pictures.theme import darken
-
-    light = _png(figure)
-    darken(figure)
-    dark = f'<source media="(prefers-color-scheme: dark)" srcset="{_png(figure)}">'
-    return f'<picture>{dark}<img alt="{caption}" src="{light}"></picture>'
 
 
 def _png(figure: Any) -> str:

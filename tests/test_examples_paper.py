@@ -1,6 +1,8 @@
-"""The results in their smallest versions: studies of months, tables, files and pictures."""
+"""The paper's results in their smallest versions: studies, tables, files, pictures, the command."""
 
 import json
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,13 +10,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from matplotlib.container import BarContainer
-
-from fleet2d.configuration.documents import read_document
-from fleet2d.errors import ComponentError, FloorPlanError, InputError
-from fleet2d.paper import results, speed
-from fleet2d.paper.pictures import DRAWERS, draw
-from fleet2d.paper.results import (
+from examples.paper import reproduce as paper
+from examples.paper.reproduce import (
+    DRAWERS,
     ESTIMATORS,
     NAIVE_ESTIMATOR,
     NAIVE_GUESS,
@@ -22,6 +20,7 @@ from fleet2d.paper.results import (
     PaperOptions,
     Result,
     differences,
+    draw,
     estimates,
     feedback,
     ltp_gap,
@@ -30,6 +29,10 @@ from fleet2d.paper.results import (
     study_content,
     table_of_means,
 )
+from matplotlib.container import BarContainer
+
+from fleet2d.configuration.documents import read_document
+from fleet2d.errors import ComponentError, FloorPlanError, InputError
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.specification import read_specification
@@ -60,7 +63,7 @@ def test_a_table_leaves_cells_without_a_mean_empty() -> None:
 
 def test_the_study_files_hold_the_sizes_of_the_paper() -> None:
     for name in ("rtp-gap", "feedback"):
-        file = Path(results.__file__).with_name(f"{name}.yaml")
+        file = Path(paper.__file__).with_name(f"{name}.yaml")
         assert read_document(file).data == study_content(name, *SIZES[name])
 
 
@@ -90,7 +93,7 @@ def test_a_month_that_fails_is_an_error(tmp_path: Path, monkeypatch: pytest.Monk
         own = {"type": f"{tmp_path.as_posix()}/mine:Fails"}
         return {**study_content(name, seeds, days), "rules": [{"set": {"metrics.own": own}}]}
 
-    monkeypatch.setattr(results, "study_content", failing)
+    monkeypatch.setattr(paper, "study_content", failing)
     with pytest.raises(ComponentError, match="thirteen"):
         run_months(
             "ltp-gap", PaperOptions(quick=True, seeds=1, days=1, folder=tmp_path / "studies")
@@ -214,7 +217,7 @@ def test_estimators_share_a_month_unless_the_robot_acts_on_them() -> None:
 
 
 def test_every_row_of_the_paper_is_there(shared_data: Path) -> None:
-    cases = {row["case"]: row for row in speed.rows(PaperOptions(), 30)}
+    cases = {row["case"]: row for row in paper.rows(PaperOptions(), 30)}
     for case in (
         "base: routine, presence, hangout", "60 days", "without robot algorithms", "Flashlight",
         "2 users", "5 users", "10 users", "20 users", "50 users",
@@ -223,7 +226,7 @@ def test_every_row_of_the_paper_is_there(shared_data: Path) -> None:
         assert case in cases
     assert "real-world map" not in cases
     real = shared_data / "ros_maps" / "aws_small_house" / "map.yaml"
-    mapped = {row["case"]: row for row in speed.rows(PaperOptions(map=real), 30)}
+    mapped = {row["case"]: row for row in paper.rows(PaperOptions(map=real), 30)}
     for row in mapped.values():
         assert load_scenario(None, *row["overrides"]) is not None
     assert "ros" == load_scenario(None, *mapped["real-world map"]["overrides"]).floorplan.type_name
@@ -231,7 +234,7 @@ def test_every_row_of_the_paper_is_there(shared_data: Path) -> None:
 
 def test_a_map_that_cannot_be_read_says_so() -> None:
     with pytest.raises(FloorPlanError, match="nowhere"):
-        speed.rows(PaperOptions(map=Path("nowhere.yaml")), 30)
+        paper.rows(PaperOptions(map=Path("nowhere.yaml")), 30)
 
 
 @pytest.mark.slow
@@ -244,8 +247,8 @@ def test_rows_are_measured_in_processes_of_their_own(
         {"case": "impossible", "overrides": [day, "robots.astro.radius=40 m"], "paper": ""},
         {"case": "watched", "frames": {"period_s": 1, "count": 5}, "paper": ""},
     ]
-    monkeypatch.setattr(speed, "rows", lambda options, days: cases)
-    result = speed.measure_rows(PaperOptions(quick=True, seeds=1))
+    monkeypatch.setattr(paper, "rows", lambda options, days: cases)
+    result = paper.measure_rows(PaperOptions(quick=True, seeds=1))
     base, impossible, watched = result.numbers["rows"]
     assert base["speedup"] == pytest.approx(86_400 / base["seconds"][0])
     assert base["process_s"] > base["seconds"][0]
@@ -255,9 +258,95 @@ def test_rows_are_measured_in_processes_of_their_own(
     draw(result, tmp_path / "speed.png")
 
 
+def test_watching_counts_the_time_between_frames() -> None:
+    timing = paper.time_frames(60, 10, from_hour=1)
+    assert 600 == timing["simulated_s"]
+
+
 # --- Names and files ------------------------------------------------------------------------------
 
 
 def test_numbers_that_cannot_be_written_are_an_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can't be written"):
         Result("speed", "", ()).save(tmp_path / "absent")
+
+
+# --- The command ----------------------------------------------------------------------------------
+
+Output = tuple[int, str, str]
+SMALLEST = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")
+
+
+@pytest.fixture
+def reproduce(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> Callable[..., Output]:
+    """The command in this process, in an empty folder: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Result:
+        monkeypatch.setattr(sys, "argv", ["reproduce.py", *arguments])
+        with pytest.raises(SystemExit) as caught:
+            paper.main()
+        out, err = capsys.readouterr()
+        return int(caught.value.code or 0), out, err
+
+    return call
+
+
+def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Output]) -> None:
+    code, out, _ = reproduce("ltp-gap", *SMALLEST)
+    assert 0 == code
+    assert "Fig. 7 left" in out
+    assert "the paper's figure" in out
+    assert "living_room_0" in out
+    names = sorted(path.name for path in Path("paper").iterdir())
+    assert ["ltp-gap.json", "ltp-gap.png", "studies"] == names
+    assert 2 == json.loads(Path("paper/ltp-gap.json").read_text(encoding="utf-8"))["days"]
+
+
+@pytest.mark.slow
+def test_units_in_brackets_are_printed(reproduce: Callable[..., Output]) -> None:
+    code, out, _ = reproduce("rtp-gap", *SMALLEST, "--out", "here/there")
+    assert 0 == code
+    assert "log loss [nats]" in out
+    assert Path("here/there/rtp-gap.json").exists()
+
+
+def test_results_come_in_the_order_of_the_paper(
+    reproduce: Callable[..., Output], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured = []
+    for name in ("ltp-gap", "feedback"):
+        monkeypatch.setitem(
+            paper.MEASURES,
+            name,
+            lambda _, name=name: measured.append(name) or Result(name, "", ()),
+        )
+    monkeypatch.setattr(paper, "draw", lambda result, path: None)
+    code, _, _ = reproduce("feedback", "ltp-gap", "feedback", *SMALLEST)
+    assert 0 == code
+    assert ["ltp-gap", "feedback"] == measured
+
+
+def test_what_does_not_exist_is_refused(reproduce: Callable[..., Output]) -> None:
+    code, _, err = reproduce("ltpgap")
+    assert 2 == code
+    assert "did you mean 'ltp-gap'?" in err
+    assert not Path("paper").exists()
+
+
+@pytest.mark.parametrize("option", ["--seeds", "--days", "--workers"])
+def test_sizes_below_one_are_refused(reproduce: Callable[..., Output], option: str) -> None:
+    code, _, err = reproduce("ltp-gap", option, "0")
+    assert 2 == code
+    assert option in err
+
+
+def test_a_directory_that_is_a_file_is_refused_first(reproduce: Callable[..., Output]) -> None:
+    Path("file").write_text("")
+    code, _, err = reproduce("ltp-gap", "--out", "file")
+    assert 2 == code
+    assert "--out" in err

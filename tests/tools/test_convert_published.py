@@ -3,11 +3,13 @@
 import errno
 import math
 import os
+import sys
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tools.convert_published import convert_file, main
 
 import fleet2d
 from fleet2d.cli.__main__ import app
@@ -15,7 +17,6 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError, FloorPlanError, InputError, ScenarioError
-from fleet2d.published import convert_file
 from fleet2d.scenario.model import Scenario, load_scenario
 
 PLAN = "658e5214673c7a4e25b458e56bdb6144.json"
@@ -225,7 +226,9 @@ def test_remarks_are_in_the_new_file_as_comments(folder: Path) -> None:
     remarks, _ = converted(folder, ("ppm: 20", 'ppm: 20\n    "odd\\nkey": 1'))
     lines = (folder / "new.yaml").read_text().splitlines()
     comment = " ".join(" ".join(line[2:] for line in lines if line.startswith("#")).split())
-    assert comment.startswith("Converted by `fleet2d convert` from old.yaml, a configuration of")
+    assert comment.startswith(
+        "Converted by `tools/convert_published.py` from old.yaml, a configuration of"
+    )
     assert any("odd\nkey" in remark for remark in remarks)
     for remark in remarks:
         assert remark.replace("\n", "?") in comment
@@ -711,13 +714,27 @@ def test_file_that_cannot_be_written_leaves_nothing(
 # The command line
 
 
-def test_commands_convert_and_validate(folder: Path) -> None:
+def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["convert_published.py", *arguments])
+    return main()
+
+
+def test_script_converts_and_the_scenario_is_valid(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     from typer.testing import CliRunner
 
     written(folder)
-    result = CliRunner().invoke(app, ["convert", "home/old.yaml", "home/new.yaml"])
-    assert 0 == result.exit_code
-    assert [*(f"note: {remark}" for remark in USUAL), "home/new.yaml"] == result.output.splitlines()
+    assert 0 == call(monkeypatch, "home/old.yaml", "home/new.yaml")
+    output = capsys.readouterr().out.splitlines()
+    assert [*(f"note: {remark}" for remark in USUAL), "home/new.yaml"] == output
     result = CliRunner().invoke(app, ["validate", "home/new.yaml"])
     assert 0 == result.exit_code
     assert result.output.startswith("ok: 2 users and 1 robot in ")
+
+
+def test_script_says_what_is_wrong_in_a_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert 2 == call(monkeypatch, "home/old.yaml", "home/new.yaml")
+    assert "error: there is no file home/old.yaml.\n" == capsys.readouterr().err

@@ -1,1 +1,0 @@
-"""The paper's results, measured again: speed, presence by days and by gap, the feedback loop."""
