@@ -1,4 +1,4 @@
-"""`fleet2d run`, `resume`, `reproduce`, `verify`: simulate, repeat, and check what is stored."""
+"""`fleet2d run`, `resume` and `verify`: simulate, continue, and check what is stored."""
 
 import gc
 import json
@@ -252,7 +252,13 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     strict: Strict = False,
 ) -> None:
-    """Simulate a scenario and store the run."""
+    """Simulate a scenario and store the run.
+
+    Examples:
+      fleet2d run
+      fleet2d run home.yaml simulation.duration.days=60 --seed 4 --out sixty
+      fleet2d run bundled:base --json --quiet
+    """
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
         simulation = _set_up(arguments, seed, out, strict=strict, quiet=quiet)
         result = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
@@ -318,7 +324,13 @@ def resume(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Continue an interrupted or killed run; the result equals that of an undisturbed run."""
+    """Continue an interrupted or killed run.
+
+    The result equals that of an undisturbed run.
+
+    Examples:
+      fleet2d resume runs/home-001
+    """
     from fleet2d.artifacts.manifest import Manifest
     from fleet2d.engine.repeat import reopen
 
@@ -332,10 +344,31 @@ def resume(
     print_results(run, as_json=as_json, quiet=quiet)
 
 
-def reproduce(
+def verify(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    again: Annotated[
+        bool, typer.Option("--again", help="Simulate it again, and compare with that.")
+    ] = False,
     trust: Trust = False,
 ) -> None:
+    """Check that a stored run is unchanged or reproducible.
+
+    Without --again its files are compared with its seal, and nothing is simulated. The exit code is
+    1 if files differ.
+
+    Examples:
+      fleet2d verify runs/home-001
+      fleet2d verify runs/home-001 --again
+    """
+    if again:
+        _reproduce(directory, trust=trust)
+    elif trust:
+        raise InputError("--trust is for --again: without it no code of the run is called")
+    else:
+        _compare_with_seal(directory)
+
+
+def _reproduce(directory: Path, *, trust: bool) -> None:
     """Run a stored run again from its manifest, and compare."""
     from fleet2d.artifacts.manifest import Manifest
     from fleet2d.engine.repeat import reproduce as repeat
@@ -353,9 +386,7 @@ def reproduce(
     raise typer.Exit(1)
 
 
-def verify(
-    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-) -> None:
+def _compare_with_seal(directory: Path) -> None:
     """Check that the files of a stored run are unchanged, without running anything."""
     from fleet2d.artifacts.seal import verify_run
 

@@ -1,11 +1,11 @@
-"""Commands on scenarios and plans: `fleet2d validate`, `convert`, `components` and `schema`."""
+"""Commands on scenarios and plans: `fleet2d validate`, `convert` and `components`."""
 
 import json
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -35,7 +35,15 @@ def validate(
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Check a scenario, with the places of all people and robots; or a floor plan."""
+    """Check a scenario or a floor plan without simulating.
+
+    The exit code is 2 if something is wrong.
+
+    Examples:
+      fleet2d validate home.yaml
+      fleet2d validate bundled:base robots.astro.speed=0.5
+      fleet2d validate synthetic:7 --radius 0.2
+    """
     from fleet2d.floorplan.load import is_floorplan, load_or_mark
 
     scenario, overrides = split(arguments)
@@ -114,7 +122,15 @@ def convert(
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Turn a floor plan into Fleet2D's own format, or a published configuration into a scenario."""
+    """Convert a floor plan, or a published configuration.
+
+    A floor plan of any format becomes one of our own or GeoJSON; a configuration of the published
+    Fleet2D becomes a scenario. What is odd or lost is listed.
+
+    Examples:
+      fleet2d convert flat.dxf flat.json --scale 0.001
+      fleet2d convert old.yaml new.yaml
+    """
     from fleet2d.floorplan.load import is_floorplan, load_floorplan
 
     if is_floorplan(source):
@@ -147,8 +163,23 @@ def _converter() -> Callable[[Path, Path], list[str]]:
 
 def components(
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+    schema: Annotated[
+        Literal["scenario", "floorplan"] | None,
+        typer.Option(
+            help="Print the JSON Schema of a scenario, or of a floor plan in our own format, for an"
+            " editor."
+        ),
+    ] = None,
 ) -> None:
-    """List every registered type, with its fields, units and defaults."""
+    """List all types with their keys, units and defaults.
+
+    Examples:
+      fleet2d components
+      fleet2d components --schema scenario
+    """
+    if schema is not None:
+        _print_schema(schema)
+        return
     from fleet2d.scenario.schema import describe_components
 
     descriptions = describe_components()
@@ -166,13 +197,8 @@ def components(
         typer.echo("")
 
 
-def schema(
-    floorplan: Annotated[
-        bool, typer.Option("--floorplan", help="The schema of Fleet2D's own floor plan format.")
-    ] = False,
-) -> None:
-    """Print the JSON Schema of a scenario, for completion in an editor."""
-    if floorplan:
+def _print_schema(of: Literal["scenario", "floorplan"]) -> None:
+    if of == "floorplan":
         from fleet2d.floorplan.formats.native import native_schema as content
     else:
         from fleet2d.scenario.schema import schema as content

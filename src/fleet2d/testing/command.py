@@ -51,7 +51,14 @@ def falsify(
     workers: Workers = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Look for a home, a household, a timing or a seed that breaks what is expected."""
+    """Search for a case that breaks an expectation.
+
+    A case is a home, a household, a timing or a seed. The exit code is 1 if there is one.
+
+    Examples:
+      fleet2d falsify home.yaml --over 'home={synthetic: 50}' --budget '5 min'
+      fleet2d falsify test_robot.py::test_keeps_off --over axes.yaml
+    """
     from fleet2d.studies.api import make_executor
     from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
