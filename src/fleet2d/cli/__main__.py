@@ -24,6 +24,7 @@ GROUP = "fleet2d.command"
 COMMANDS = {
     "components": "scenarios",
     "convert": "scenarios",
+    "demo": "demo",
     "export": "show",
     "resume": "run",
     "run": "run",

@@ -81,30 +81,26 @@ def _line(frame: FrameType | None) -> str:
     return f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
 
 
-def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
-    """Run to the end, with a progress bar on stderr if `show`.
+def run_with_progress(simulation: "Simulation", *, quiet: bool = False) -> "Run":
+    """Run to the end, and show the progress unless `quiet`.
 
     Raises:
         Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
     """
+    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     try:
         with watched():
-            return _run_with_bar(simulation, show=show)
+            return simulation.run() if quiet else _run_with_bar(simulation)
     except KeyboardInterrupt:
         assert simulation.directory is not None
         typer.echo(resume_hint(simulation.time, simulation.directory), err=True)
         raise typer.Exit(130) from None
 
 
-def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
-    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    if not show:
-        return simulation.run()
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+def _run_with_bar(simulation: "Simulation") -> "Run":
+    from fleet2d.runtime.progress import progress_bar
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with progress_bar(show=True, counts=False) as progress:
         task = progress.add_task("", total=simulation.clock.steps)
         start_s = time.perf_counter()
 
@@ -260,8 +256,8 @@ def run(
       fleet2d run bundled:base --json --quiet
     """
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
-        simulation = _set_up(arguments, seed, out, strict=strict, quiet=quiet)
-        result = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+        simulation = set_up(arguments, seed, out, strict=strict, quiet=quiet)
+        result = run_with_progress(simulation, quiet=quiet)
     print_results(result, as_json=as_json, quiet=quiet)
 
 
@@ -277,9 +273,20 @@ def report_wrong(simulation: "Simulation", *, strict: bool, quiet: bool = False)
         raise InputError(f"{simulation.home.plan.name}: --strict refuses a home like that")
 
 
-def _set_up(
+def set_up(
     arguments: list[str] | None, seed: int | None, out: Path | None, **wrong: bool
 ) -> "Simulation":
+    """Return the simulation of a scenario and its changes, of which no step is done.
+
+    Args:
+        arguments: The scenario, and changes to it.
+        seed: The seed; None: that of the scenario.
+        out: The directory of the run; None: a new one of the scenario's name.
+        wrong: What `report_wrong` takes.
+
+    Raises:
+        InputError: Something of it is wrong.
+    """
     with rare_collections():
         from fleet2d.engine.simulation import Simulation
         from fleet2d.scenario.model import load_scenario
@@ -340,7 +347,7 @@ def resume(
         simulation, note = reopen(directory, trust=trust)
         if not quiet:
             typer.echo(note, err=True)
-        run = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+        run = run_with_progress(simulation, quiet=quiet)
     print_results(run, as_json=as_json, quiet=quiet)
 
 

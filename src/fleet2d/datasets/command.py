@@ -25,7 +25,8 @@ making = typer.Typer(
     no_args_is_help=True,
 )
 training = typer.Typer(
-    help="Train networks on data sets.\n\nExamples:\n  fleet2d train rtp --on presence --out rtp.npz",
+    help="Train networks on data sets.\n\nExamples:\n"
+    "  fleet2d train rtp --on presence --out rtp.npz",
     no_args_is_help=True,
 )
 # A callback, as typer would otherwise drop the name of the only subcommand.

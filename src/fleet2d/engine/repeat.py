@@ -202,8 +202,8 @@ def decisions_of(run: Run) -> Any:
     poses = "trajectories"
     if poses in old and old[poses] != new.manifest["tables"][poses]:
         raise ArtifactError(
-            "the run can't be repeated: its poses would differ; `fleet2d verify --again` says what has"
-            " changed"
+            "the run can't be repeated: its poses would differ; `fleet2d verify --again` says what"
+            " has changed"
         )
     return new.tables["decisions"]
 

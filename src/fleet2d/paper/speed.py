@@ -25,7 +25,7 @@ from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError
 from fleet2d.paper.results import PAPER_COLUMN, SPEED, PaperOptions, Result, table_of
 from fleet2d.runtime.clock import HOUR_S
-from fleet2d.studies.progress import progress_bar
+from fleet2d.runtime.progress import progress_bar
 
 REAL_MAP = "real-world map"  # the row of the user's own map
 PHASES = ("setup", "simulate", "save", "draw")

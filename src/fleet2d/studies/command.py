@@ -4,7 +4,6 @@ import gc
 import itertools
 import json
 import signal
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -418,9 +417,8 @@ def tune(
 
     specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    show = sys.stderr.isatty() and not quiet
     runner = make_executor(executor, workers, slurm_parameters(slurm))
-    with _interruptible(folder), observing_trials(show=show) as bar:
+    with _interruptible(folder), observing_trials(show=not quiet) as bar:
         result = search(specification, folder, runner, bar, changed=changed, storage=storage)
     if quiet:
         return

@@ -6,7 +6,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,6 +16,7 @@ import numpy as np
 from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.kernels import F64
 from fleet2d.runtime.clock import DAY_S, HOUR_S
+from fleet2d.runtime.progress import progress_bar
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, Observer, StudyJob
 from fleet2d.studies.executors import Executor, FinishedTask, TaskSchedule, WorkerTask, cores
@@ -383,26 +384,6 @@ def _rate(per_second: float) -> str:
     return f"{60 * per_second:.1f} variants/min"
 
 
-@contextmanager
-def progress_bar(*, show: bool) -> "Iterator[Progress]":
-    """Yield a progress bar on stderr with counts and time left; it is invisible unless `show`."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    text = TextColumn("{task.description}")
-    columns = (text, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    progress = Progress(*columns, console=console, transient=True, disable=not show)
-    with progress if show else nullcontext():
-        yield progress
-
-
 class NoteObserver(Observer):
     """Prints remarks on stderr."""
 
@@ -413,16 +394,13 @@ class NoteObserver(Observer):
 
 @contextmanager
 def observing(*, quiet: bool = False) -> Iterator[Observer]:
-    """Yield an observer of a study: it prints remarks, and shows a bar on a terminal.
+    """Yield an observer of a study, which prints remarks and shows the progress.
 
     Args:
         quiet: Show nothing.
     """
-    if quiet or not sys.stderr.isatty():
-        yield Observer() if quiet else NoteObserver()
-        return
-    with progress_bar(show=True) as progress:
-        yield BarObserver(progress)
+    with progress_bar(show=not quiet) as progress:
+        yield Observer() if quiet else BarObserver(progress)
 
 
 def in_words(time_span: timedelta) -> str:
@@ -446,12 +424,9 @@ def in_words(time_span: timedelta) -> str:
 
 
 @contextmanager
-def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
-    """Yield an observer of a search; it shows a bar if `show`, else nothing."""
-    if not show:
-        yield None
-        return
-    with progress_bar(show=True) as progress:
+def observing_trials(*, show: bool) -> "Iterator[TuneObserver]":
+    """Yield an observer of a search, whose progress is shown if `show`."""
+    with progress_bar(show=show) as progress:
         task = progress.add_task("trials", total=None)
 
         def update(done: int, trials: int, best: list[float] | None) -> None:

@@ -348,4 +348,5 @@ def _store(
     first = max(0, step - FILM_STEPS)
     last = min(step + FILM_STEPS, variant.scenario.simulation.steps - 1)
     film = shlex.quote(str(out.with_suffix(".mp4")))
-    yield f"  film it: fleet2d export {path} {film} --from 'step {first}' --to 'step {last}' --speed 4"
+    stretch = f"--from 'step {first}' --to 'step {last}'"
+    yield f"  film it: fleet2d export {path} {film} {stretch} --speed 4"
