@@ -3,6 +3,7 @@
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,9 +11,8 @@ import typer
 
 from fleet2d.cli import named_extras
 from fleet2d.cli.run import print_verdict, run_with_progress, set_up
-from fleet2d.configuration.problems import counted
+from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
-from fleet2d.runtime.clock import DAY_S
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -63,10 +63,10 @@ def sentences(run: "Run") -> Iterator[str]:
     """Yield what happened in a run, as far as its metrics and events tell it."""
     robots = run.manifest["entities"]["robots"]
     names = _listed([*run.manifest["entities"]["users"], *robots])
-    days = counted(round(run.manifest["simulated_s"] / DAY_S), "day")
+    simulated = format_duration(timedelta(seconds=run.manifest["simulated_s"]))
     wall_s = sum(run.manifest["wall_s"].values())
     speedup = run.manifest["simulated_s"] / wall_s
-    yield f"{days} with {names} took {wall_s:.1f} s: {speedup:,.0f} times real time."
+    yield f"{simulated} with {names} took {wall_s:.1f} s: {speedup:,.0f} times real time."
     seen = _result(run, "sightings")
     if seen and robots:
         shares = _listed([f"{name} in {100 * share:.0f} %" for name, share in seen.items()])
