@@ -175,7 +175,7 @@ def test_concepts_deny_nothing_that_there_is() -> None:
 
 
 # They need files of the user, a browser, a minute, or a month.
-NOT_RUN = {"view", "fit", "calibrate", "convert"}
+NOT_RUN = {"view", "fit", "convert"}
 
 
 @pytest.mark.slow

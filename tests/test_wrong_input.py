@@ -473,9 +473,9 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
         (["run", "home.yaml", "other.yaml"], ["'other.yaml'", "no '='"]),
         (["run", "home.yaml", "--fast"], ["--fast"]),
         (["rum"], ["rum"]),
-        (["reproduce", "home.yaml"], ["home.yaml", "file"]),
-        (["reproduce", "nothing"], ["nothing", "does not exist"]),
-        (["reproduce"], ["RUN_DIR"]),
+        (["verify", "home.yaml", "--again"], ["home.yaml", "file"]),
+        (["verify", "nothing", "--again"], ["nothing", "does not exist"]),
+        (["verify"], ["RUN_DIR"]),
         (["convert", "nothing.yaml", "new.yaml"], ["nothing.yaml"]),
     ],
 )  # fmt: skip

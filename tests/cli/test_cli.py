@@ -214,7 +214,7 @@ def schema() -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_the_schema_is_valid_and_says_which_it_is(fleet2d: Cli, schema: dict[str, Any]) -> None:
-    code, out, err = fleet2d("schema")
+    code, out, err = fleet2d("components", "--schema", "scenario")
     assert (0, "", schema) == (code, err, json.loads(out))
     jsonschema.validators.validator_for(schema).check_schema(schema)
     assert schema["$schema"].startswith("https://json-schema.org/")
@@ -361,7 +361,7 @@ def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(
 
 def test_reproduce_says_reproduced(fleet2d: Cli) -> None:
     assert 0 == fleet2d("run", written(everything("5 min")), "--out", "run", "--quiet")[0]
-    code, out, err = fleet2d("reproduce", "run")
+    code, out, err = fleet2d("verify", "run", "--again")
     assert (0, "") == (code, err)
     assert f"reproduced: digest {package.open_run('run').digest}" in out
 
@@ -374,7 +374,7 @@ def test_reproduce_fails_on_a_table_that_was_tampered_with(fleet2d: Cli) -> None
     x[0] += 1e-9
     changed = rows.set_column(rows.column_names.index("x"), rows.schema.field("x"), [x])
     pq.write_table(changed, file)
-    code, _, err = fleet2d("reproduce", "run")
+    code, _, err = fleet2d("verify", "run", "--again")
     assert 1 == code
     assert "not reproduced" in err
     assert "trajectories" in err
@@ -386,7 +386,7 @@ def test_reproduce_fails_on_a_manifest_that_was_tampered_with(fleet2d: Cli) -> N
     manifest = json.loads(file.read_text())
     manifest["scenario"]["users"]["ana"]["speed"] = 0.5
     file.write_text(json.dumps(manifest))
-    code, _, err = fleet2d("reproduce", "run")
+    code, _, err = fleet2d("verify", "run", "--again")
     assert 1 == code
     assert "trajectories" in err
 

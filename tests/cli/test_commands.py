@@ -1,12 +1,18 @@
 """Commands are found by their names, and are imported when they are called."""
 
+import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
 
 import pytest
-from tests.scenes import Cli
+import typer
+from tests.scenes import Cli, process
 
-from fleet2d.cli.__main__ import COMMANDS
+from fleet2d import __version__
+from fleet2d.cli import __main__ as commands
+from fleet2d.cli.__main__ import COMMANDS, GROUPS, app
 
 OTHERS = """
 import sys
@@ -28,12 +34,105 @@ def test_module_of_a_command_has_its_function(command: str, fleet2d: Cli) -> Non
     assert len(out.splitlines()) > 5
 
 
-def test_help_lists_all_commands_by_name(fleet2d: Cli) -> None:
+def all_commands() -> Iterator[tuple[str, ...]]:
+    """Yield the words that call each command of Fleet2D, those within a command, too."""
+    group = typer.main.get_command(app)
+    context = typer.Context(group)
+    for name in (name for names in GROUPS.values() for name in names):
+        command = group.get_command(context, name)  # type: ignore[attr-defined]
+        yield (name,)
+        for own in getattr(command, "commands", ()):
+            yield name, own
+
+
+def described(help_text: str) -> dict[str, list[str]]:
+    """Return the lines of each section of a help text."""
+    sections: dict[str, list[str]] = {}
+    for part in help_text.split("\n\n"):
+        heading, *lines = part.strip("\n").splitlines()
+        sections[heading.strip().rstrip(":")] = [line.strip() for line in lines]
+    return sections
+
+
+def test_help_lists_the_commands_in_groups_the_most_used_first(fleet2d: Cli) -> None:
     _, out, _ = fleet2d("--help")
 
-    names = [line.split()[0] for line in out.split("Commands:")[1].splitlines() if line]
-    assert names == sorted(names)
-    assert {*COMMANDS, "study", "view"} <= set(names)
+    sections = described(out)
+    for heading, names in GROUPS.items():
+        assert list(names) == [line.split()[0] for line in sections[heading]]
+    assert 3 == len(sections["Examples"])
+    assert 18 == sum(map(len, GROUPS.values()))
+
+
+@pytest.mark.parametrize("words", [(), ("study",), ("fit",), ("dataset",)])
+def test_no_description_of_a_command_is_cut_or_wrapped(words: tuple[str, ...]) -> None:
+    done = process("-m", "fleet2d", *words, "--help", COLUMNS="80")
+
+    sections = described(done.stdout)
+    for heading in GROUPS if not words else ("Commands",):
+        for line in sections[heading]:
+            name, description = line.split(maxsplit=1)
+            assert description[0].isupper()
+            assert description.endswith("."), name
+            assert len(description) <= 58, name
+
+
+def test_descriptions_are_wrapped_in_a_narrow_terminal() -> None:
+    done = process("-m", "fleet2d", "--help", COLUMNS="50")
+
+    commands = done.stdout.partition("Run:")[2].partition("Examples:")[0]
+    assert max(map(len, commands.splitlines())) <= 50
+    assert "..." not in commands
+    assert "Simulate a scenario and store the run." in " ".join(commands.split())
+
+
+@pytest.mark.parametrize("words", list(all_commands()), ids=" ".join)
+def test_help_of_each_command_ends_in_examples_that_are_valid(
+    words: tuple[str, ...], fleet2d: Cli
+) -> None:
+    code, out, _ = fleet2d(*words, "--help")
+
+    assert 0 == code
+    examples = out.rpartition("Examples:\n")[2].splitlines()
+    assert 1 <= len(examples) <= 3
+    for example in examples:
+        program, *arguments = shlex.split(example)
+        assert "fleet2d" == program
+        assert tuple(arguments[: len(words)]) == words
+        parse(arguments)
+
+
+def parse(arguments: list[str]) -> None:
+    """Parse the arguments of a command, and of one within it, without calling it."""
+    command = typer.main.get_command(app)
+    context = typer.Context(command)
+    while hasattr(command, "get_command"):
+        name = arguments[0]
+        command = command.get_command(context, name)
+        context = command.make_context(name, arguments[1:], parent=context)
+        arguments = arguments[1:]
+
+
+def test_command_of_an_installed_package_is_listed_below_the_own(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = EntryPoint("dust", "tests.own_components:dust", "fleet2d.command")
+    monkeypatch.setattr(commands, "entries", lambda: iter([entry]))
+    monkeypatch.setattr(EntryPoint, "load", lambda self: dust)
+
+    _, out, _ = fleet2d("--help")
+
+    assert ["dust        Sweep."] == described(out)["Installed"]
+
+
+def dust() -> None:
+    """Sweep."""
+
+
+def test_python_runs_the_command_line() -> None:
+    done = process("-m", "fleet2d", "--version")
+
+    assert (0, f"fleet2d {__version__}\n") == (done.returncode, done.stdout)
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("exprt", "export"), ("stdy", "study")])

@@ -48,20 +48,20 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("command", "run"), [("reproduce", "run"), ("resume", "half")])
+@pytest.mark.parametrize("command", [("verify", "run", "--again"), ("resume", "half")])
 def test_code_runs_only_when_it_is_trusted(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path, command: str, run: str
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path, command: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(home)
-    code, _, err = fleet2d(command, run)
+    code, _, err = fleet2d(*command)
     assert 2 == code
     assert f"{home}/mine.py (algorithms.count.type)" in err
     assert "if you trust all of it, give --trust" in err
     assert not (home / "ran").exists()
-    trusted = fleet2d_process(command, run, "--trust", cwd=home)
+    trusted = fleet2d_process(*command, "--trust", cwd=home)
     assert 0 == trusted.returncode, trusted.stderr
     assert f"{home}/mine.py (algorithms.count.type)" in trusted.stderr
-    assert ("continuing from" in trusted.stderr) == (command == "resume")
+    assert ("continuing from" in trusted.stderr) == (command[0] == "resume")
     (home / "ran").unlink()
 
 

@@ -82,7 +82,7 @@ SERIAL = ("--executor", "serial")
         ("study", "run", "study.yaml", *SERIAL),
         ("study", "run", "study.yaml", "--workers", "1"),
         ("study", "run", "study.yaml", "--dry-run"),
-        pytest.param(("tune", "search.yaml", *SERIAL), marks=pytest.mark.slow),
+        pytest.param(("study", "tune", "search.yaml", *SERIAL), marks=pytest.mark.slow),
         ("run", "home.yaml", "--quiet"),
         ("validate", "home.yaml"),
     ],
@@ -154,9 +154,9 @@ def stored(folder: Path) -> Path:
     ("command", "made"),
     [
         (("show", "run"), "run/picture.png"),
-        (("report", "run"), "run/report.html"),
-        (("export", "run", "--html", "page.html"), "page.html"),
-        (("film", "run", "--out", "a.gif", "--height", "120", "--to", "step 60"), "a.gif"),
+        (("export", "run", "report.html", "--format", "report"), "report.html"),
+        (("export", "run", "page.html"), "page.html"),
+        (("export", "run", "a.gif", "--height", "120", "--to", "step 60"), "a.gif"),
     ],
 )
 def test_a_stored_run_is_shown_without_code_unless_a_body_needs_it(
@@ -217,7 +217,7 @@ def half_a_run(name: str) -> package.Simulation:
     return simulation
 
 
-@pytest.mark.parametrize(("command", "status"), [("resume", "interrupted"), ("reproduce", "complete")])  # fmt: skip
+@pytest.mark.parametrize(("command", "status"), [("resume", "interrupted"), ("verify --again", "complete")])  # fmt: skip
 def test_an_interrupt_that_only_a_plan_from_outside_names_is_listed(
     fleet2d: Cli, tmp_path: Path, command: str, status: str
 ) -> None:
@@ -227,7 +227,7 @@ def test_an_interrupt_that_only_a_plan_from_outside_names_is_listed(
     manifest = json.loads(path.read_text())
     manifest["interventions"][1]["plan"]["interrupts"] = [f"{tmp_path}/theirs:Never"]
     path.write_text(json.dumps({**manifest, "status": status}))
-    code, _, err = fleet2d(command, "half")
+    code, _, err = fleet2d(*command.split(), "half")
     assert (2, False) == (code, Path("ran").exists())
     assert f"{tmp_path}/theirs.py (interventions.1.plan.interrupts.0)" in err
 
@@ -293,7 +293,7 @@ def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(
     manifest["scenario"]["extends"] = f"{tmp_path}/home.yaml"
     path.write_text(json.dumps({**manifest, "inputs": []}))
     assert [f"  {tmp_path}/home.yaml (extends)"] == code_lines(manifest["scenario"])
-    assert 2 == fleet2d("reproduce", "run")[0]
+    assert 2 == fleet2d("verify", "run", "--again")[0]
     with running_code(allowed=False), pytest.raises(ScenarioError, match="would run"):
         package.load_scenario(manifest["scenario"])
     assert not Path("ran").exists()

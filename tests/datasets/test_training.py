@@ -107,7 +107,7 @@ def test_a_data_set_trains_weights_that_a_run_uses(
     assert 0 == code, err
     assert Weights.read(tuned).network.bias.shape == shipped_weights().network.bias.shape
 
-    code, out, err = fleet2d("leaderboard", folder, f"--weights={tuned}")
+    code, out, err = fleet2d("dataset", "score", folder, f"--weights={tuned}")
     assert 0 == code, err
     for word in ("rtp (", "tuned.npz ", "next_room (", "time_to_return (", "activity (", "ltp ("):
         assert word in out

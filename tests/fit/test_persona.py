@@ -289,7 +289,7 @@ def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
 ) -> None:
     log = write_life(tmp_path, 12)
     monkeypatch.chdir(tmp_path)
-    arguments = ["fit", "routine", str(log), "--out", "ana.yaml", "--picture", "ana.png"]
+    arguments = ["fit", "persona", str(log), "--out", "ana.yaml", "--picture", "ana.png"]
     monkeypatch.setattr("sys.argv", ["fleet2d", *arguments])
     with pytest.raises(SystemExit) as caught:
         cli.main()

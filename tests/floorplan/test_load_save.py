@@ -249,7 +249,7 @@ def test_convert_of_a_picture_takes_its_resolution(fleet2d: Cli) -> None:
 
 
 def test_schema_of_a_floor_plan_is_printed(fleet2d: Cli) -> None:
-    code, out, err = fleet2d("schema", "--floorplan")
+    code, out, err = fleet2d("components", "--schema", "floorplan")
 
     assert (0, "", native_schema()) == (code, err, json.loads(out))
 

@@ -275,7 +275,16 @@ def test_a_damaged_search_is_refused_in_one_line(
     axes = {"radius": {"key": "robots.astro.radius", "values": [0.1, 0.15]}}
     study = small(axes=axes, replicates=1, tune=settings)
     Path("study.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
-    arguments = ("tune", "study.yaml", "--executor", "serial", "--quiet", "--out", "search")
+    arguments = (
+        "study",
+        "tune",
+        "study.yaml",
+        "--executor",
+        "serial",
+        "--quiet",
+        "--out",
+        "search",
+    )
     assert fleet2d(*arguments)[0] == 0
     BYTES[damage](Path("search") / file)
     code, _, err = fleet2d(*arguments)

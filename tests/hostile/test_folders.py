@@ -76,7 +76,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "open": read_all,
     "verify": verify_run,
     "path": rebuild,
-    "export --html": to_page,
+    "export page": to_page,
     "export": to_sensors,
     "resume": resume,
     "reproduce": reproduce,

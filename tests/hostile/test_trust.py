@@ -276,7 +276,7 @@ def test_without_a_key_no_checkpoint_is_written(
     notes = [note for note in done.notes if note.startswith("no checkpoint from step ")]
     assert 1 == len(notes)
     assert undisturbed(run) == done.digest
-    code, out, _ = fleet2d("reproduce", run)
+    code, out, _ = fleet2d("verify", run, "--again")
     assert (0, True) == (code, "reproduced: digest" in out)
     _, out, _ = fleet2d("run", *SETTINGS, "--seed", "4", "--out", "second")
     assert 1 == out.count(f"note: {notes[0]}")
@@ -386,14 +386,14 @@ def test_a_program_of_a_stored_run_is_listed_with_its_arguments(folder: Path) ->
     (folder / "ran").unlink()
     line = f"  {folder}/belief.py -c 'a b' (algorithms.p.command)"
 
-    done = fleet2d_process("reproduce", "run", cwd=folder)
+    done = fleet2d_process("verify", "run", "--again", cwd=folder)
 
     assert 2 == done.returncode
     assert line in done.stderr.splitlines()
     assert "so could any file in its folders" in done.stderr
     assert not (folder / "ran").exists()
 
-    done = fleet2d_process("reproduce", "run", "--trust", cwd=folder)
+    done = fleet2d_process("verify", "run", "--again", "--trust", cwd=folder)
 
     assert 0 == done.returncode, done.stderr
     assert ["trusted, with all files in these folders:", line] == done.stderr.splitlines()

@@ -111,7 +111,7 @@ def test_a_search_prints_what_it_found_and_how_it_does_elsewhere(fleet2d: Cli) -
         },
     )
     Path("speeds.yaml").write_text(yaml.safe_dump(content))
-    code, out, err = fleet2d("tune", "speeds.yaml", *SERIAL)
+    code, out, err = fleet2d("study", "tune", "speeds.yaml", *SERIAL)
     assert (0, "") == (code, err)
     assert "trials: 3 complete, 0 pruned, 0 fail" in out
     assert f"  {SPEED}=" in out

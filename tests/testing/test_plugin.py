@@ -137,8 +137,10 @@ def test_ana_stays(trial):
     report = (folder / "failure.txt").read_text()
     assert "see it: fleet2d view" in report
     place = folder.relative_to(tmp_path)
-    assert f"film it: fleet2d film {place / 'run'} --from 'step 94' --to 'step 154'" in report
-    assert f"film it: fleet2d film {place / 'smaller'} --from 'step 0' --to 'step 4'" in report
+    film = f"film it: fleet2d export {place / 'run'} {place / 'run.mp4'} --from"
+    assert f"{film} 'step 94' --to 'step 154'" in report
+    film = f"film it: fleet2d export {place / 'smaller'} {place / 'smaller.mp4'} --from"
+    assert f"{film} 'step 0' --to 'step 4'" in report
 
 
 @pytest.mark.slow

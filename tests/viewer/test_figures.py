@@ -111,7 +111,14 @@ def report(run_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.slow
 def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, report: str) -> None:
     run, text = fleet2d.open_run(run_dir), report
-    for words in (str(run.digest), "fleet2d reproduce", "bath_door", "sightings · ana", "<img"):
+    for words in (
+        str(run.digest),
+        "fleet2d verify",
+        "--again",
+        "bath_door",
+        "sightings · ana",
+        "<img",
+    ):
         assert words in text
     assert 3 == text.count("<img")
     assert '<iframe title="Timeline" sandbox="allow-scripts"' in text

@@ -1,11 +1,13 @@
-"""The program `fleet2d`, also as `python -m fleet2d.cli`, and how its commands are found.
+"""The program `fleet2d`, also as `python -m fleet2d`, and how its commands are found.
 
 A command is a function of its name, or a Typer app of several commands, in a module of this package
 that `COMMANDS` names. Installed packages add others by entry points of the group `fleet2d.command`,
 and some of Fleet2D's own commands do so, too. All are imported when they are called, and should
-import what they need then, too.
+import what they need then, too. A docstring is the help: its first line is the description in the
+list of commands, and a section "Examples:" ends it.
 """
 
+import sys
 from collections.abc import Iterator
 from difflib import get_close_matches
 from importlib import import_module
@@ -22,27 +24,58 @@ GROUP = "fleet2d.command"
 COMMANDS = {
     "components": "scenarios",
     "convert": "scenarios",
+    "demo": "demo",
     "export": "show",
-    "reproduce": "run",
     "resume": "run",
     "run": "run",
-    "schema": "scenarios",
     "show": "show",
     "test": "test",
     "validate": "scenarios",
     "verify": "run",
 }
 """The module of each command of this package."""
+GROUPS = {
+    "Run": ("run", "demo", "resume", "live", "mcp"),
+    "Look": ("view", "show", "export"),
+    "Test": ("test", "falsify", "verify"),
+    "Experiment": ("study",),
+    "Learn": ("fit", "dataset", "train"),
+    "Homes and files": ("validate", "convert", "components"),
+}
+"""The commands below each heading of the help, the most used first; others are `INSTALLED`."""
+INSTALLED = "Installed"
+EXAMPLES = "\n\nExamples:\n"
 
 
 class Commands(TyperGroup):
     """The commands of Fleet2D and of installed packages, by name."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all commands that can be loaded, sorted."""
-        own = set(COMMANDS)
-        others = {entry.name for entry in entries()} - own
-        return sorted(own | {name for name in others if self.get_command(ctx, name) is not None})
+        """Return the names of all commands that can be loaded, in the order of the help."""
+        return [name for names in self._groups(ctx).values() for name in names]
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands in groups, with descriptions that are wrapped and never cut."""
+        groups = self._groups(ctx)
+        width = max(len(name) for names in groups.values() for name in names)
+        for heading, commands in groups.items():
+            rows = [
+                (name.ljust(width), command.get_short_help_str(sys.maxsize))
+                for name, command in commands.items()
+            ]
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+    def _groups(self, ctx: Any) -> dict[str, dict[str, Any]]:
+        """Return the commands that can be loaded, by heading and name."""
+        grouped = {name for names in GROUPS.values() for name in names}
+        installed = {*COMMANDS, *(entry.name for entry in entries())} - grouped
+        groups = {}
+        for heading, names in (*GROUPS.items(), (INSTALLED, sorted(installed))):
+            commands = {name: self.get_command(ctx, name) for name in names}
+            if loaded := {name: command for name, command in commands.items() if command}:
+                groups[heading] = loaded
+        return groups
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command, None if there is none of that name."""
@@ -93,7 +126,19 @@ def _command(name: str, value: Any, ctx: Any) -> Any:
         app.add_typer(value, name=name)
     else:
         app.command(name)(value)
-    return get_group(app).get_command(ctx, name)
+    command = get_group(app).get_command(ctx, name)
+    _part_examples(command)
+    return command
+
+
+def _part_examples(command: Any) -> None:
+    """Let the examples in the help of a command, and of its own commands, end it line by line."""
+    command.help, _, examples = (command.help or "").partition(EXAMPLES)
+    if examples:
+        # After a line of a backspace alone, lines aren't wrapped.
+        command.epilog = f"\b\nExamples:\n{examples}"
+    for own in getattr(command, "commands", {}).values():
+        _part_examples(own)
 
 
 app = typer.Typer(
@@ -102,6 +147,11 @@ app = typer.Typer(
     no_args_is_help=True,
     invoke_without_command=True,
     add_completion=False,
+    epilog="\b\nExamples:\n"
+    "  fleet2d demo\n"
+    "  fleet2d run bundled:base simulation.duration.days=60 --out sixty\n"
+    "  fleet2d view sixty\n\n"
+    "fleet2d COMMAND --help describes a command; docs/cli.md describes all.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )

@@ -1,4 +1,4 @@
-"""`fleet2d run`, `resume`, `reproduce`, `verify`: simulate, repeat, and check what is stored."""
+"""`fleet2d run`, `resume` and `verify`: simulate, continue, and check what is stored."""
 
 import gc
 import json
@@ -81,30 +81,26 @@ def _line(frame: FrameType | None) -> str:
     return f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
 
 
-def run_with_progress(simulation: "Simulation", *, show: bool) -> "Run":
-    """Run to the end, with a progress bar on stderr if `show`.
+def run_with_progress(simulation: "Simulation", *, quiet: bool = False) -> "Run":
+    """Run to the end, and show the progress unless `quiet`.
 
     Raises:
         Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
     """
+    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     try:
         with watched():
-            return _run_with_bar(simulation, show=show)
+            return simulation.run() if quiet else _run_with_bar(simulation)
     except KeyboardInterrupt:
         assert simulation.directory is not None
         typer.echo(resume_hint(simulation.time, simulation.directory), err=True)
         raise typer.Exit(130) from None
 
 
-def _run_with_bar(simulation: "Simulation", *, show: bool) -> "Run":
-    gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    if not show:
-        return simulation.run()
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+def _run_with_bar(simulation: "Simulation") -> "Run":
+    from fleet2d.runtime.progress import progress_bar
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with progress_bar(show=True, counts=False) as progress:
         task = progress.add_task("", total=simulation.clock.steps)
         start_s = time.perf_counter()
 
@@ -252,10 +248,16 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     strict: Strict = False,
 ) -> None:
-    """Simulate a scenario and store the run."""
+    """Simulate a scenario and store the run.
+
+    Examples:
+      fleet2d run
+      fleet2d run home.yaml simulation.duration.days=60 --seed 4 --out sixty
+      fleet2d run bundled:base --json --quiet
+    """
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
-        simulation = _set_up(arguments, seed, out, strict=strict, quiet=quiet)
-        result = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+        simulation = set_up(arguments, seed, out, strict=strict, quiet=quiet)
+        result = run_with_progress(simulation, quiet=quiet)
     print_results(result, as_json=as_json, quiet=quiet)
 
 
@@ -271,9 +273,20 @@ def report_wrong(simulation: "Simulation", *, strict: bool, quiet: bool = False)
         raise InputError(f"{simulation.home.plan.name}: --strict refuses a home like that")
 
 
-def _set_up(
+def set_up(
     arguments: list[str] | None, seed: int | None, out: Path | None, **wrong: bool
 ) -> "Simulation":
+    """Return the simulation of a scenario and its changes, of which no step is done.
+
+    Args:
+        arguments: The scenario, and changes to it.
+        seed: The seed; None: that of the scenario.
+        out: The directory of the run; None: a new one of the scenario's name.
+        wrong: What `report_wrong` takes.
+
+    Raises:
+        InputError: Something of it is wrong.
+    """
     with rare_collections():
         from fleet2d.engine.simulation import Simulation
         from fleet2d.scenario.model import load_scenario
@@ -318,7 +331,13 @@ def resume(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Continue an interrupted or killed run; the result equals that of an undisturbed run."""
+    """Continue an interrupted or killed run.
+
+    The result equals that of an undisturbed run.
+
+    Examples:
+      fleet2d resume runs/home-001
+    """
     from fleet2d.artifacts.manifest import Manifest
     from fleet2d.engine.repeat import reopen
 
@@ -328,14 +347,35 @@ def resume(
         simulation, note = reopen(directory, trust=trust)
         if not quiet:
             typer.echo(note, err=True)
-        run = run_with_progress(simulation, show=sys.stderr.isatty() and not quiet)
+        run = run_with_progress(simulation, quiet=quiet)
     print_results(run, as_json=as_json, quiet=quiet)
 
 
-def reproduce(
+def verify(
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
+    again: Annotated[
+        bool, typer.Option("--again", help="Simulate it again, and compare with that.")
+    ] = False,
     trust: Trust = False,
 ) -> None:
+    """Check that a stored run is unchanged or reproducible.
+
+    Without --again its files are compared with its seal, and nothing is simulated. The exit code is
+    1 if files differ.
+
+    Examples:
+      fleet2d verify runs/home-001
+      fleet2d verify runs/home-001 --again
+    """
+    if again:
+        _reproduce(directory, trust=trust)
+    elif trust:
+        raise InputError("--trust is for --again: without it no code of the run is called")
+    else:
+        _compare_with_seal(directory)
+
+
+def _reproduce(directory: Path, *, trust: bool) -> None:
     """Run a stored run again from its manifest, and compare."""
     from fleet2d.artifacts.manifest import Manifest
     from fleet2d.engine.repeat import reproduce as repeat
@@ -353,9 +393,7 @@ def reproduce(
     raise typer.Exit(1)
 
 
-def verify(
-    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-) -> None:
+def _compare_with_seal(directory: Path) -> None:
     """Check that the files of a stored run are unchanged, without running anything."""
     from fleet2d.artifacts.seal import verify_run
 

@@ -1,9 +1,9 @@
-"""Commands on scenarios and plans: `fleet2d validate`, `convert`, `components` and `schema`."""
+"""Commands on scenarios and plans: `fleet2d validate`, `convert` and `components`."""
 
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -32,7 +32,15 @@ def validate(
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Check a scenario, with the places of all people and robots; or a floor plan."""
+    """Check a scenario or a floor plan without simulating.
+
+    The exit code is 2 if something is wrong.
+
+    Examples:
+      fleet2d validate home.yaml
+      fleet2d validate bundled:base robots.astro.speed=0.5
+      fleet2d validate synthetic:7 --radius 0.2
+    """
     from fleet2d.floorplan.load import is_floorplan, load_or_mark
 
     scenario, overrides = split(arguments)
@@ -105,7 +113,13 @@ def convert(
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Turn a floor plan of any format into Fleet2D's own, or into GeoJSON."""
+    """Convert a floor plan of any format to our own, or to GeoJSON.
+
+    What is odd or lost is listed.
+
+    Examples:
+      fleet2d convert flat.dxf flat.json --scale 0.001
+    """
     from fleet2d.floorplan.load import load_floorplan, save_floorplan
 
     plan = load_floorplan(source, resolution=resolution, scale=scale)
@@ -117,8 +131,23 @@ def convert(
 
 def components(
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+    schema: Annotated[
+        Literal["scenario", "floorplan"] | None,
+        typer.Option(
+            help="Print the JSON Schema of a scenario, or of a floor plan in our own format, for an"
+            " editor."
+        ),
+    ] = None,
 ) -> None:
-    """List every registered type, with its fields, units and defaults."""
+    """List all types with their keys, units and defaults.
+
+    Examples:
+      fleet2d components
+      fleet2d components --schema scenario
+    """
+    if schema is not None:
+        _print_schema(schema)
+        return
     from fleet2d.scenario.schema import describe_components
 
     descriptions = describe_components()
@@ -136,13 +165,8 @@ def components(
         typer.echo("")
 
 
-def schema(
-    floorplan: Annotated[
-        bool, typer.Option("--floorplan", help="The schema of Fleet2D's own floor plan format.")
-    ] = False,
-) -> None:
-    """Print the JSON Schema of a scenario, for completion in an editor."""
-    if floorplan:
+def _print_schema(of: Literal["scenario", "floorplan"]) -> None:
+    if of == "floorplan":
         from fleet2d.floorplan.formats.native import native_schema as content
     else:
         from fleet2d.scenario.schema import schema as content

@@ -1,7 +1,7 @@
-"""`fleet2d show` and `export`: pictures of floor plans, runs and diaries; runs for others."""
+"""`fleet2d show` and `export`: pictures of floor plans, runs and diaries; runs as files."""
 
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import typer
 
@@ -102,7 +102,13 @@ def show(  # noqa: PLR0913 - options of the command line
     figure: Figure = "life",
     trust: Trust = False,
 ) -> None:
-    """Draw a floor plan of any format, a stored run in its home, or a persona's diary."""
+    """Draw a floor plan, a stored run or a persona's diary.
+
+    Examples:
+      fleet2d show family_home --out home.svg
+      fleet2d show runs/home-001 --at 'day 3 18:30'
+      fleet2d show retired --diary --days 3
+    """
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
     if diary:
         for line in show_diary(None if source is None else str(source), out, days, seed):
@@ -229,49 +235,92 @@ def _draw_floorplan(
     return target
 
 
+_REPORT = "report"
+_FILMS = (".mp4", ".gif", ".webp")
+
+
 def _format_help() -> str:
     described = (
         f"{name}: {text}" if text else f"{name}." for name, text in exporters.formats().items()
     )
-    return f"Its format; by default that of the suffix of FILE. {' '.join(described)}"
+    return (
+        "Its format; by default that of the suffix of FILE. .html: a page that plays anywhere."
+        f" .mp4, .gif, .webp: a film. {_REPORT}: a page of what ran, metrics and figures."
+        f" {' '.join(described)}"
+    )
 
 
-def export(
+def export(  # noqa: PLR0913 - options of the command line
     directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-    out: Annotated[
-        Path | None, typer.Argument(help="The file to write, for other programs.")
-    ] = None,
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write.")],
     layout: Annotated[str | None, typer.Option("--format", help=_format_help())] = None,
-    html: Annotated[
-        Path | None, typer.Option(help="The page to write: one file that plays anywhere.")
-    ] = None,
     begin: Annotated[
         str | None, typer.Option("--from", help="Where it begins, such as 'day 3 18:30'.")
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
     every: Annotated[
-        str | None, typer.Option(help="Time between two poses, such as '10 s'; default: the step.")
+        str | None,
+        typer.Option(help="Of data: time between two poses, such as '10 s'; default: the step."),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Of a film: times real time; default: 60.")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option(help="Of a film: its height [pixels]; default: 720.")
     ] = None,
     trust: Trust = False,
 ) -> None:
-    """Write a run for others: a file for other programs, or a web page in one file."""
+    """Write a run as a film, a page or data for other programs.
+
+    Examples:
+      fleet2d export runs/home-001 evening.mp4 --from 'day 3 18:00' --to 'day 3 19:00'
+      fleet2d export runs/home-001 week.html
+      fleet2d export runs/home-001 report.html --format report
+    """
     from fleet2d.runs.run import open_run
     from fleet2d.viewer.moments import steps_of
 
-    if (out is None) == (html is None):
-        raise InputError(
-            "name exactly one output: FILE (see --format), or --html FILE (a web page)"
-        )
-    if html is not None and every is not None:
-        raise InputError("--every is for FILE: a page has the exact poses at all times")
+    suffix = out.suffix.lower()
+    is_film = layout is None and suffix in _FILMS
+    is_page = layout is None and suffix == ".html"
+    is_data = not is_film and not is_page and layout != _REPORT
+    if not is_film:
+        _refuse(f"{out} is no film", speed=speed, height=height)
+    if not is_data:
+        _refuse(f"{out} is no data for other programs", every=every)
+    if layout == _REPORT:
+        _refuse("a report is of the whole run", **{"from": begin, "to": end})
     run = open_run(directory, trust=trust)
     if trust:
         show_code(run.manifest)
     first, last = steps_of(run, begin, end)
-    if out is not None:
-        typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
-    elif html is not None:
+    if is_film:
+        from fleet2d.viewer.film import write_film
+
+        size: dict[str, Any] = {"speed": speed, "height": height}
+        given = {name: value for name, value in size.items() if value is not None}
+        frames = write_film(run, out, first, last, **given)
+        typer.echo(f"{out}: {frames} pictures, {out.stat().st_size / 1e6:.1f} MB")
+    elif is_page:
         from fleet2d.viewer.page_data import export_html
 
-        export_html(run, html, first, last)
-        typer.echo(f"{html}: {html.stat().st_size / 1e6:.1f} MB")
+        export_html(run, out, first, last)
+        typer.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB")
+    elif is_data:
+        typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
+    else:
+        from fleet2d.viewer.report import write_report
+
+        write_report(run, out)
+        typer.echo(out)
+
+
+def _refuse(reason: str, **options: object) -> None:
+    """Refuse options that are given.
+
+    Raises:
+        InputError: One is.
+    """
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"{reason}: leave out --{name}")

@@ -220,7 +220,14 @@ def test(  # noqa: PLR0913 - options of the command line
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     strict: Strict = False,
 ) -> None:
-    """Run scenarios and judge their expectations; exit code 1 if one is violated."""
+    """Run scenarios and check their expectations.
+
+    The exit code is 1 if one is violated.
+
+    Examples:
+      fleet2d test home.yaml --seeds 20
+      fleet2d test home.yaml --homes 10 --junit results.xml --pictures failures
+    """
     files = [argument for argument in arguments if "=" not in argument]
     overrides = [argument for argument in arguments if "=" in argument]
     if not files:

@@ -1,4 +1,4 @@
-"""The commands `fleet2d dataset`, `fleet2d train rtp` and `fleet2d leaderboard`."""
+"""The commands `fleet2d dataset make`, `verify` and `score`, and `fleet2d train rtp`."""
 
 import json
 import time
@@ -18,32 +18,52 @@ if TYPE_CHECKING:
     from fleet2d.datasets.windows import Windows
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")]
-training = typer.Typer(help="Train models on data sets.", no_args_is_help=True)
+making = typer.Typer(
+    help="Make, verify and score data sets of labelled evidence.\n\nExamples:\n"
+    "  fleet2d dataset make presence.yaml --out presence\n"
+    "  fleet2d dataset score presence --task rtp",
+    no_args_is_help=True,
+)
+training = typer.Typer(
+    help="Train networks on data sets.\n\nExamples:\n"
+    "  fleet2d train rtp --on presence --out rtp.npz",
+    no_args_is_help=True,
+)
 # A callback, as typer would otherwise drop the name of the only subcommand.
 training.callback()(lambda: None)
 
 
-def dataset(
+@making.command()
+def make(
     source: Annotated[Path, typer.Argument(metavar="FILE.yaml", help="What it is drawn from.")],
     out: Annotated[Path, typer.Option(help="The folder to write.")],
     workers: Workers = None,
-    verify: Annotated[
-        bool, typer.Option("--verify", help="Compare the files of a made one with its manifest.")
-    ] = False,
 ) -> None:
-    """Make a data set of labelled evidence, the rest of an interrupted one, or lacking files."""
+    """Make a data set, or what an interrupted one lacks.
+
+    Examples:
+      fleet2d dataset make presence.yaml --out presence
+    """
+    _make(source, out, workers)
+
+
+@making.command()
+def verify(directory: Folder) -> None:
+    """Compare the files of a data set with its manifest.
+
+    Examples:
+      fleet2d dataset verify presence
+    """
     from fleet2d.datasets.reader import open_dataset
 
-    if not verify:
-        _make(source, out, workers)
-        return
-    made = open_dataset(out)
+    made = open_dataset(directory)
     differing = made.verify()
     for name in differing:
-        typer.echo(f"{out / name} is missing, or differs from what was written", err=True)
+        typer.echo(f"{directory / name} is missing, or differs from what was written", err=True)
     if differing:
         typer.echo(
-            f"delete these files, and make them again: fleet2d dataset {source} --out {out}",
+            "delete these files, and make them again: fleet2d dataset make FILE.yaml --out"
+            f" {directory}",
             err=True,
         )
         raise typer.Exit(1)
@@ -84,6 +104,10 @@ def rtp(
 
     The data set of a YAML file is made beside the weights, once: learned_data for learned.npz. If a
     data set has a split `test`, the weights are scored on it in the end, beside the shipped ones.
+
+    Examples:
+      fleet2d train rtp --on presence --out rtp.npz
+      fleet2d train rtp --on runs/home-001 --from learned
     """
     from fleet2d.algorithms.presence.learned import Weights, shipped_weights
     from fleet2d.datasets.reader import MANIFEST, open_dataset
@@ -133,6 +157,7 @@ def _windows(on: Path) -> "tuple[list[Windows], list[Windows]]":
     return list(windows(data, TRAIN)), list(check)
 
 
+@making.command("score")
 def leaderboard(
     directory: Folder,
     task: Annotated[
@@ -150,7 +175,12 @@ def leaderboard(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Score the baselines of each task on a data set, and networks of your own."""
+    """Score baselines and your own networks on a data set.
+
+    Examples:
+      fleet2d dataset score presence
+      fleet2d dataset score presence --task rtp --weights rtp.npz
+    """
     from fleet2d.algorithms.presence.learned import Weights
     from fleet2d.datasets.reader import open_dataset
     from fleet2d.datasets.tasks import forecasts

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import shutil
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
@@ -37,9 +36,9 @@ from fleet2d.datasets.specification import (
 )
 from fleet2d.datasets.tables import SCHEMAS, tables_of
 from fleet2d.errors import InputError
+from fleet2d.runtime.progress import progress_bar
 from fleet2d.storage.files import FolderLock, partial_file, refuse_links, write_atomically
 from fleet2d.studies.api import map_runs
-from fleet2d.studies.progress import progress_bar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -298,7 +297,7 @@ def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[st
     lacking = [shard for shard, record in records.items() if not record]
     size = max(1, BLOCK_RUNS // plan.file.runs_per_shard)
     total, left = (sum(s.end - s.first for s in shards) for shards in (records, lacking))
-    with progress_bar(show=sys.stderr.isatty()) as bar:
+    with progress_bar(show=True) as bar:
         task = bar.add_task("runs", total=total, completed=total - left)
         for begin in range(0, len(lacking), size):
             runs = {

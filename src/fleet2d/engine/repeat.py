@@ -127,7 +127,7 @@ def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Ver
     if tables:
         raise ArtifactError(
             f"the run can't be reproduced ({', '.join(sorted(tables))} differ), so it can't be"
-            " judged: `fleet2d reproduce` says what has changed"
+            " judged: `fleet2d verify --again` says what has changed"
         )
     verdict = simulation.verdicts()[label]
     return replace(verdict, name=name or verdict.expectation)
@@ -171,7 +171,7 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
             simulation.finish("failed")
             raise ArtifactError(
                 f"the run can't be repeated: at step {step} {name} would be elsewhere than it was;"
-                " `fleet2d reproduce` says what has changed"
+                " `fleet2d verify --again` says what has changed"
             )
     return simulation
 
@@ -202,8 +202,8 @@ def decisions_of(run: Run) -> Any:
     poses = "trajectories"
     if poses in old and old[poses] != new.manifest["tables"][poses]:
         raise ArtifactError(
-            "the run can't be repeated: its poses would differ; `fleet2d reproduce` says what has"
-            " changed"
+            "the run can't be repeated: its poses would differ; `fleet2d verify --again` says what"
+            " has changed"
         )
     return new.tables["decisions"]
 

@@ -1,4 +1,4 @@
-"""The commands `fleet2d fit` and `fleet2d calibrate`, whose functions are called from Python, too.
+"""The commands `fleet2d fit persona` and `perception`, whose functions Python code calls, too.
 
 They return what the commands print, in lines.
 """
@@ -19,15 +19,21 @@ def _print(lines: list[str], **_: Any) -> None:
         typer.echo(line)
 
 
-fitting = typer.Typer(help="Learn from a real log.", no_args_is_help=True, result_callback=_print)
-
-# A callback, as typer would otherwise drop the name of the only subcommand.
-fitting.callback()(lambda: None)
+fitting = typer.Typer(
+    help="Fit a persona or a camera to a real log.\n\nExamples:\n"
+    "  fleet2d fit persona events.txt --out persona.yaml\n"
+    "  fleet2d fit perception detections.csv --out perception.yaml",
+    no_args_is_help=True,
+    result_callback=_print,
+)
 UNITS = {"distance": " m", "bearing": " deg"}
 
 
 @fitting.command(
-    "routine", help="Learn a persona from a log, and report how well its days match days held back."
+    "persona",
+    help="Learn a persona from a log.\n\n"
+    "A report says how well its days match days held back.\n\nExamples:\n"
+    "  fleet2d fit persona events.txt --out persona.yaml --picture fit.png",
 )
 def fit_routine(
     path: Annotated[
@@ -149,18 +155,11 @@ def privacy(fitted: "FittedPersona", private: bool) -> list[str]:
     return [*lines, verdict]
 
 
-calibrating = typer.Typer(
-    help="Fit a model to a log of a real device.", no_args_is_help=True, result_callback=_print
-)
-
-# A callback, as typer would otherwise drop the name of the only subcommand.
-calibrating.callback()(lambda: None)
-
-
-@calibrating.command(
+@fitting.command(
     "perception",
-    help="Fit the probabilities of noticing and recognizing people to a log of a robot's"
-    " detections.",
+    help="Fit a camera's perception to a log of detections.\n\n"
+    "Fitted are the probabilities of noticing and recognizing people.\n\nExamples:\n"
+    "  fleet2d fit perception detections.csv --out perception.yaml --robot astro",
 )
 def calibrate_perception(
     path: Annotated[
@@ -220,7 +219,7 @@ def fragment(calibration: "Calibration", robot: str, extends: str | None) -> str
     text = yaml.safe_dump(top, sort_keys=False, default_flow_style=None, allow_unicode=True)
     return (
         f"# Fitted to {len(calibration.log)} rows of {calibration.log.path.name} by"
-        f" `fleet2d calibrate perception`.\n{text}"
+        f" `fleet2d fit perception`.\n{text}"
     )
 
 

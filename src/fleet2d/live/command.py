@@ -42,7 +42,14 @@ def live(
         bool, typer.Option("--schema", help="Print the JSON Schema of messages, and end.")
     ] = False,
 ) -> None:
-    """Run a scenario in real time among other programs, which may move its bodies."""
+    """Run in real time among other programs.
+
+    They may move its bodies.
+
+    Examples:
+      fleet2d live home.yaml --with ws://127.0.0.1:8765
+      fleet2d live --with mqtt://localhost:1883/fleet2d --speed 10
+    """
     if schema:
         from fleet2d.live.messages import message_schema
 
@@ -89,7 +96,13 @@ def mcp(
         Path, typer.Argument(metavar="FOLDER", help="The only folder that is read and written.")
     ],
 ) -> None:
-    """Serve assistants by the Model Context Protocol, on stdin and stdout, within one folder."""
+    """Serve AI assistants within one folder.
+
+    They speak the Model Context Protocol on stdin and stdout.
+
+    Examples:
+      fleet2d mcp experiments
+    """
     from fleet2d.live.assistant import server
 
     app = server(folder)

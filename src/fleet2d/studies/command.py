@@ -1,10 +1,9 @@
-"""The commands `fleet2d study run`, `status`, `rerun`, `report`, and `fleet2d tune`."""
+"""The commands `fleet2d study run`, `tune`, `status`, `rerun`, `report`, `power` and `track`."""
 
 import gc
 import itertools
 import json
 import signal
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import timedelta
@@ -22,7 +21,10 @@ if TYPE_CHECKING:
     from fleet2d.studies.reader import Study
 
 studying = typer.Typer(
-    help="Run many scenarios as one experiment, resumable, ending in an answer.",
+    help="Run many variants of a scenario as one experiment.\n\nExamples:\n"
+    "  fleet2d study run speeds.yaml --dry-run\n"
+    "  fleet2d study run speeds.yaml\n"
+    "  fleet2d study report studies/speeds",
     no_args_is_help=True,
 )
 ExecutorName = Annotated[
@@ -70,7 +72,12 @@ def run(  # noqa: PLR0913 - options of the command line
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Run the variants of a study that have no results yet."""
+    """Run the variants of a study that have no results yet.
+
+    Examples:
+      fleet2d study run speeds.yaml --dry-run
+      fleet2d study run speeds.yaml --workers 8 --out speeds
+    """
     from fleet2d.studies.api import default_location, make_executor
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
@@ -120,7 +127,11 @@ def status(
     location: Where,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Print the progress of a study, even while it is being run."""
+    """Print the progress of a study, even while it runs.
+
+    Examples:
+      fleet2d study status studies/speeds
+    """
     from fleet2d.studies.directory import StudyDirectory
 
     directory = StudyDirectory(location)
@@ -146,7 +157,11 @@ def rerun(
     out: Annotated[Path | None, typer.Option(help="Store the run in this directory.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Run one variant again, and compare its digest with the stored one."""
+    """Run one variant again and compare the digests.
+
+    Examples:
+      fleet2d study rerun studies/speeds 12 --out variant
+    """
     from fleet2d.studies.reader import open_study
 
     study = open_study(location)
@@ -175,7 +190,11 @@ def report(
         Path | None, typer.Option(help="Folder for the page and the figures; DIR/report.")
     ] = None,
 ) -> None:
-    """Write one self-contained HTML page of answers, and its figures as files."""
+    """Write the answers as an HTML page, figures and tables.
+
+    Examples:
+      fleet2d study report studies/speeds --out report
+    """
     from fleet2d.studies.reader import open_study
     from fleet2d.studies.report import write_report
 
@@ -202,7 +221,13 @@ def power(
         float, typer.Option("--power", min=0.5, max=0.999, help="Share of studies that detect it.")
     ] = 0.8,
 ) -> None:
-    """Print how many homes and seeds an effect needs, from how much they vary in a small study."""
+    """Print how many homes and seeds an effect needs.
+
+    That follows from how much they vary in a small study.
+
+    Examples:
+      fleet2d study power studies/speeds distance.astro --effect 5
+    """
     import polars as pl
 
     from fleet2d.studies.reader import open_study
@@ -237,7 +262,11 @@ def track(
         str | None, typer.Option(help="MLflow's store; left out: as MLFLOW_TRACKING_URI says.")
     ] = None,
 ) -> None:
-    """Store parameters, metrics and report of a study in MLflow or Weights & Biases."""
+    """Store a study in MLflow or Weights & Biases.
+
+    Examples:
+      fleet2d study track studies/speeds --to mlflow --project speeds
+    """
     from fleet2d.studies.reader import open_study
     from fleet2d.studies.trackers import track as store
 
@@ -348,6 +377,7 @@ def _interruptible(location: str | Path) -> Iterator[None]:
         signal.signal(signal.SIGTERM, handler)
 
 
+@studying.command()
 def tune(
     source: Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="A study that tunes.")],
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
@@ -363,7 +393,11 @@ def tune(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Search parameters on training homes, and judge the best on other homes."""
+    """Search parameters, and judge the best on other homes.
+
+    Examples:
+      fleet2d study tune search.yaml --workers 8
+    """
     from fleet2d.studies.api import default_location, make_executor
     from fleet2d.studies.progress import observing_trials
     from fleet2d.studies.specification import read_specification
@@ -371,9 +405,8 @@ def tune(
 
     specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    show = sys.stderr.isatty() and not quiet
     runner = make_executor(executor, workers, slurm_parameters(slurm))
-    with _interruptible(folder), observing_trials(show=show) as bar:
+    with _interruptible(folder), observing_trials(show=not quiet) as bar:
         result = search(specification, folder, runner, bar, changed=changed, storage=storage)
     if quiet:
         return

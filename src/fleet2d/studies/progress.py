@@ -4,12 +4,13 @@ import math
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from fleet2d.runtime.clock import DAY_S, HOUR_S
+from fleet2d.runtime.progress import progress_bar
 from fleet2d.studies.driver import Observer
 
 if TYPE_CHECKING:
@@ -133,26 +134,6 @@ def _rate(per_second: float) -> str:
     return f"{60 * per_second:.1f} variants/min"
 
 
-@contextmanager
-def progress_bar(*, show: bool) -> "Iterator[Progress]":
-    """Yield a progress bar on stderr with counts and time left; it is invisible unless `show`."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    text = TextColumn("{task.description}")
-    columns = (text, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    progress = Progress(*columns, console=console, transient=True, disable=not show)
-    with progress if show else nullcontext():
-        yield progress
-
-
 class NoteObserver(Observer):
     """Prints remarks on stderr."""
 
@@ -163,16 +144,13 @@ class NoteObserver(Observer):
 
 @contextmanager
 def observing(*, quiet: bool = False) -> Iterator[Observer]:
-    """Yield an observer of a study: it prints remarks, and shows a bar on a terminal.
+    """Yield an observer of a study, which prints remarks and shows the progress.
 
     Args:
         quiet: Show nothing.
     """
-    if quiet or not sys.stderr.isatty():
-        yield Observer() if quiet else NoteObserver()
-        return
-    with progress_bar(show=True) as progress:
-        yield BarObserver(progress)
+    with progress_bar(show=not quiet) as progress:
+        yield Observer() if quiet else BarObserver(progress)
 
 
 def in_words(time_span: timedelta) -> str:
@@ -196,12 +174,9 @@ def in_words(time_span: timedelta) -> str:
 
 
 @contextmanager
-def observing_trials(*, show: bool) -> "Iterator[TuneObserver | None]":
-    """Yield an observer of a search; it shows a bar if `show`, else nothing."""
-    if not show:
-        yield None
-        return
-    with progress_bar(show=True) as progress:
+def observing_trials(*, show: bool) -> "Iterator[TuneObserver]":
+    """Yield an observer of a search, whose progress is shown if `show`."""
+    with progress_bar(show=show) as progress:
         task = progress.add_task("trials", total=None)
 
         def update(done: int, trials: int, best: list[float] | None) -> None:

@@ -163,7 +163,7 @@ class StudyFile(Settings):
         keep: The metrics and tables to keep of each run.
         compare: The comparisons that the report shows.
         adapt: When values of an axis get no more seeds.
-        tune: The search of `fleet2d tune`.
+        tune: The search of `fleet2d study tune`.
     """
 
     name: str | None = None

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +11,7 @@ import yaml
 
 from fleet2d.errors import InputError, RunDirectoryError, os_errors_as
 from fleet2d.options import Workers
+from fleet2d.runtime.progress import progress_bar
 from fleet2d.storage.files import new_folder
 
 if TYPE_CHECKING:
@@ -51,7 +51,14 @@ def falsify(
     workers: Workers = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Look for a home, a household, a timing or a seed that breaks what is expected."""
+    """Search for a case that breaks an expectation.
+
+    A case is a home, a household, a timing or a seed. The exit code is 1 if there is one.
+
+    Examples:
+      fleet2d falsify home.yaml --over 'home={synthetic: 50}' --budget '5 min'
+      fleet2d falsify test_robot.py::test_keeps_off --over axes.yaml
+    """
     from fleet2d.studies.api import make_executor
     from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
@@ -62,8 +69,14 @@ def falsify(
     job = job_of(target, read_space(parse_over(over)))
     job.check()
     search = FailureSearch(job, tries, seed=seed, finds=finds)
-    shows_progress = sys.stderr.isatty() and not quiet
-    search.run(make_executor("local", workers), seconds, _progress if shows_progress else None)
+    with progress_bar(show=not quiet) as bar:
+        task = bar.add_task("runs", total=tries if seconds is None else None)
+
+        def update(search: "FailureSearch") -> None:
+            narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
+            bar.update(task, completed=search.tries, description=f"{search.tries} runs{narrowest}")
+
+        search.run(make_executor("local", workers), seconds, update)
     if search.failure is None:
         _print_no_failure(search, job)
         return
@@ -189,8 +202,3 @@ def _print_no_failure(search: "FailureSearch", job: "TryJob") -> None:
         typer.echo(f"narrowest: margin {margin:.3g} at {job.space.text(point)}")
     for error, number in search.errors.items():
         typer.echo(f"{number} could not be run: {error}", err=True)
-
-
-def _progress(search: "FailureSearch") -> None:
-    narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
-    print(f"\r{search.tries} runs{narrowest}   ", end="", file=sys.stderr, flush=True)  # noqa: T201

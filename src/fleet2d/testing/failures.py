@@ -285,7 +285,7 @@ def describe_trial(
         yield from _failures(case.result)
         out = folder / "smaller"
         yield from _store(case.variant, case.without, body, out, case.result)
-        yield f"  again: fleet2d reproduce {shlex.quote(str(out))}"
+        yield f"  again: fleet2d verify {shlex.quote(str(out))} --again"
 
 
 def _by_expectation(result: ClaimResult) -> Iterable[str]:
@@ -347,4 +347,6 @@ def _store(
     yield f"  see it: fleet2d view {path}, or fleet2d show {path} --at 'step {step}'"
     first = max(0, step - FILM_STEPS)
     last = min(step + FILM_STEPS, variant.scenario.simulation.steps - 1)
-    yield f"  film it: fleet2d film {path} --from 'step {first}' --to 'step {last}' --speed 4"
+    film = shlex.quote(str(out.with_suffix(".mp4")))
+    stretch = f"--from 'step {first}' --to 'step {last}'"
+    yield f"  film it: fleet2d export {path} {film} {stretch} --speed 4"

@@ -1,4 +1,4 @@
-"""Commands that show runs: view, film, report."""
+"""The command `fleet2d view`."""
 
 from datetime import timedelta
 from pathlib import Path
@@ -31,7 +31,15 @@ def view(
     out: Annotated[Path | None, typer.Option(help="Of a scenario: directory of the run.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Show runs in the browser, on this machine only; Ctrl-C ends it."""
+    """Watch runs in the browser, or a scenario live.
+
+    The page is shown on this machine only, until Ctrl-C.
+
+    Examples:
+      fleet2d view runs/home-001
+      fleet2d view runs/home-001 runs/home-002
+      fleet2d view home.yaml --out watched
+    """
     names = list(arguments or [])
     directories = [Path(name) for name in names]
     if names and all(path.is_dir() for path in directories):
@@ -98,45 +106,3 @@ def _view_runs(
 
 def _announce(address: str) -> None:
     typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")
-
-
-def film(
-    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-    out: Annotated[Path | None, typer.Option(help="Film to write: .mp4, .gif or .webp.")] = None,
-    begin: Annotated[
-        str | None, typer.Option("--from", help="Where it begins, such as 'day 3'.")
-    ] = None,
-    end: Annotated[str | None, typer.Option("--to", help="Where it ends.")] = None,
-    speed: Annotated[float, typer.Option(help="Times real time.")] = 60.0,
-    height: Annotated[int, typer.Option(help="Of the film [pixels].")] = 720,
-    trust: Trust = False,
-) -> None:
-    """Make a film of a stretch of a stored run."""
-    from fleet2d.runs.run import open_run
-    from fleet2d.viewer.film import write_film
-    from fleet2d.viewer.moments import steps_of
-
-    run = open_run(directory, trust=trust)
-    if trust:
-        show_code(run.manifest)
-    first, last = steps_of(run, begin, end)
-    target = out or directory / "film.mp4"
-    frames = write_film(run, target, first, last, speed=speed, height=height)
-    typer.echo(f"{target}: {frames} pictures, {target.stat().st_size / 1e6:.1f} MB")
-
-
-def report(
-    directory: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A stored run.")],
-    out: Annotated[Path | None, typer.Option(help="HTML file to write.")] = None,
-    trust: Trust = False,
-) -> None:
-    """Write a report of a stored run: what ran, metrics, figures, how to run it again."""
-    from fleet2d.runs.run import open_run
-    from fleet2d.viewer.report import write_report
-
-    target = out or directory / "report.html"
-    run = open_run(directory, trust=trust)
-    if trust:
-        show_code(run.manifest)
-    write_report(run, target)
-    typer.echo(target)

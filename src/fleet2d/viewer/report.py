@@ -158,7 +158,7 @@ def _again(run: Run) -> str:
     )
     files = f"<p>It read:</p><ul>{inputs}</ul>" if inputs else ""
     return (
-        f"<pre>fleet2d reproduce {html.escape(str(directory))}</pre>"
+        f"<pre>fleet2d verify {html.escape(str(directory))} --again</pre>"
         f"<p>compares every table with a new run of this scenario:</p>"
         f"<pre>{html.escape(scenario)}</pre>{files}"
     )

@@ -78,7 +78,7 @@ def test_command_writes_a_part_of_a_run(tmp_path: Path, fleet2d: Cli) -> None:
         (("--every", "often"), "--every: expected a duration"),
         (("--every", "0 s"), "--every"),
         (("--from", "3 d"), "is not within the run"),
-        (("--html", "w.html"), "name exactly one output"),
+        (("--speed", "0"), "w.csv is no film: leave out --speed"),
     ],
 )
 def test_wrong_option_is_one_line(
