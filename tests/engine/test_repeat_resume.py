@@ -24,6 +24,7 @@ from fleet2d.artifacts import arrow
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+from fleet2d.interventions import Put, Replan
 from fleet2d.storage import files
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "100" if THOROUGH else "4"))
@@ -115,9 +116,9 @@ def test_what_was_done_to_a_run_is_done_again(tmp_path: Path) -> None:
     def steered(**more: Any) -> fleet2d.Simulation:
         simulation = fleet2d.Simulation(content(), **more)
         simulation.run_until(700)
-        simulation.put("ana", "kitchen")
+        simulation.do(Put("ana", "kitchen"))
         simulation.run_until(1500)
-        simulation.replan("astro")
+        simulation.do(Replan("astro"))
         return simulation
 
     expected = digests(steered().run())
@@ -136,7 +137,7 @@ def test_what_was_only_scheduled_is_done_after_a_new_beginning(tmp_path: Path) -
     simulation = fleet2d.Simulation(text, seed=4, out=tmp_path / "run")
     for each in (twin, simulation):
         each.advance(60)
-        each.put("astro", "kitchen")
+        each.do(Put("astro", "kitchen"))
     simulation.finish()
     shutil.rmtree(tmp_path / "run" / FOLDER)
     assert twin.run().digest == fleet2d.resume(tmp_path / "run").digest

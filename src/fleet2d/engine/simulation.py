@@ -54,7 +54,6 @@ from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
-from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels import About, in_radians
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import midnight_of
@@ -69,7 +68,7 @@ if TYPE_CHECKING:
 PURPOSE = "saved simulation"  # of the signature of a file
 
 
-class Simulation(InterventionMethods):
+class Simulation:
     """A run in progress: step it, run it until a time or event, read its state, copy it.
 
     Attributes:
@@ -645,12 +644,12 @@ class Simulation(InterventionMethods):
 
     # Interventions: each is recorded in the manifest, and repeated by `reproduce`.
 
-    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
+    def do(self, act: Intervention | Mapping[str, Any]) -> None:
         """Apply an intervention at the present step, or later.
 
         Args:
-            act: The intervention, or a mapping as in a scenario's `script`, which may say when by
-                `at` or `on`.
+            act: The intervention, from `fleet2d.interventions`, or a mapping as in a scenario's
+                `script`, which may say when by `at` or `on`.
 
         Raises:
             ScenarioError: It is not valid, names something unknown, or can never happen.
@@ -660,12 +659,13 @@ class Simulation(InterventionMethods):
         Example:
             >>> import fleet2d
             >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.intervene({"put": "ana", "to": "kitchen"})
+            >>> from fleet2d.interventions import Put
+            >>> simulation.do(Put("ana", "kitchen"))  # or {"put": "ana", "to": "kitchen"}
             >>> simulation.run().manifest["interventions"]
             [{'do': 'put', 'step': 0, 'entity': 'ana', 'to': 'kitchen'}]
 
             >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.intervene({"on": ["activity", "ana", "dinner"], "hold": "astro"})
+            >>> simulation.do({"on": ["activity", "ana", "dinner"], "hold": "astro"})
             >>> [act["do"] for act in simulation.run().manifest["interventions"]]
             ['hold']
         """
@@ -681,7 +681,7 @@ class Simulation(InterventionMethods):
             ScenarioError: There is no such body.
         """
         row = self._body(name).row
-        self._do("drive", entity=name)
+        self.do({"drive": name})
         self._state.driven.add(row)
         self._state.bodies.ask_at[row] = self.step
 
@@ -711,7 +711,7 @@ class Simulation(InterventionMethods):
         row = self._body(name).row
         if row not in self._state.driven:
             raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
-        self._do("decide", entity=name, plan=data_of(plan))
+        self.do({"decide": name, "plan": data_of(plan)})
 
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""

@@ -301,7 +301,7 @@ class Workspace:
         Raises:
             InputError: There is no such simulation, or the intervention is wrong.
         """
-        self._get(simulation).intervene(act)
+        self._get(simulation).do(act)
         return "done"
 
     @confined

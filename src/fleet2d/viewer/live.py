@@ -22,6 +22,7 @@ from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
 from fleet2d.floorplan.home import HomeChange
+from fleet2d.interventions import ChangeHome, Configure, HoldStill, Put, Replan, Send
 from fleet2d.kernels import TURN, Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
@@ -150,21 +151,20 @@ class LiveEngine:
         place = (order["x"], order["y"])
         if order["action"] == "door":
             change = HomeChange(open=name) if order["value"] else HomeChange(shut=name)
-            self.simulation.change(change)
+            self.simulation.do(ChangeHome(change))
         elif order["action"] == "place":
-            self.simulation.put(name, self._near(name, place))
+            self.simulation.do(Put(name, self._near(name, place)))
             if name in self._called:
-                self.simulation.hold(name)
+                self.simulation.do(HoldStill(name))
         elif order["action"] == "call":
-            self.simulation.send(name, self._near(name, place))
+            self.simulation.do(Send(name, self._near(name, place)))
             self._called.add(name)
         elif order["action"] == "replan":
-            self.simulation.replan(name)
+            self.simulation.do(Replan(name))
         elif order["action"] == "configure":
             behavior, _, key = order["key"].partition(".")
-            self.simulation.configure(
-                name, behavior, **{key: parse_yaml(order["text"], Path(), "the value")}
-            )
+            value = parse_yaml(order["text"], Path(), "the value")
+            self.simulation.do(Configure(name, behavior, {key: value}))
         else:
             raise InputError(f"there is no intervention {order['action']!r}")
 

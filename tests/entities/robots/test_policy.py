@@ -12,6 +12,7 @@ import fleet2d
 from fleet2d import Simulation
 from fleet2d.entities.robots.policy import COLUMNS, NEVER, Policy, SightingMemory
 from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
+from fleet2d.interventions import Send
 from fleet2d.kernels import F32, SUB, Bool, SightingColumn
 from fleet2d.runtime.clock import Clock
 
@@ -213,7 +214,7 @@ def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:
 
 def test_order_is_carried_out_without_asking_the_policy() -> None:
     simulation = Simulation(home_with([policy()], "1 h"))
-    simulation.send("astro", to="bedroom", duration="30 min")
+    simulation.do(Send("astro", "bedroom", duration="30 min"))
 
     assert ["astro"] == simulation.run_until_asked("astro")
     assert simulation.step >= 1800
