@@ -20,8 +20,9 @@ from tests.scenes import AGENDA, OWN, scenario
 from tests.thorough import examples, some
 
 import fleet2d
+from fleet2d.entities.plan import data_of
 from fleet2d.errors import InputError
-from fleet2d.interventions import HoldStill, Put, Send, StartActivity
+from fleet2d.interventions import Decide, HoldStill, Put, Send, StartActivity
 
 USERS = ("ana", "ben", "gina")
 ROBOTS = ("astro", "bolt")
@@ -165,7 +166,7 @@ def request(run: fleet2d.Simulation, order: Any) -> None:
         if isinstance(order, tuple):
             _, name, place = order
             run.drive(name)
-            run.decide(name, run.plan(name).go_to(place).stay(timedelta(seconds=20)))
+            run.do(Decide(name, data_of(run.plan(name).go_to(place).stay(timedelta(seconds=20)))))
         else:
             run.do(order)
     except InputError:
@@ -189,7 +190,7 @@ def test_no_intervention_lets_a_run_fail(doors: bool, orders: list[Any]) -> None
 
 def decide(run: fleet2d.Simulation) -> None:
     run.drive("astro")
-    run.decide("astro", run.plan("astro").go_to("kitchen").stay())
+    run.do(Decide("astro", data_of(run.plan("astro").go_to("kitchen").stay())))
 
 
 def put(run: fleet2d.Simulation) -> None:

@@ -26,6 +26,7 @@ from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.trust import UntrustedCodeError, running_code, stored_code
 from fleet2d.engine import checkpoint
 from fleet2d.engine.repeat import reopen
+from fleet2d.engine.simulation import directory_of
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions import Put
 from fleet2d.runtime.program import ExternalProgram
@@ -57,8 +58,9 @@ def cut_off(simulation: Simulation) -> Path:
     unfinished.journal.close()
     assert unfinished._lock is not None
     os.close(unfinished._lock._handle)
-    assert simulation.directory is not None
-    return simulation.directory
+    directory = directory_of(simulation)
+    assert directory is not None
+    return directory
 
 
 def cut_run(out: Path, seed: int = 4, **more: Any) -> Path:

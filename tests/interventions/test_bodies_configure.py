@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import fleet2d
+from fleet2d.engine.simulation import interventions_of
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.interventions import Configure
 
@@ -55,4 +56,4 @@ def test_wrong_keys_are_refused_and_nothing_is_recorded(
     run = simulation()
     with pytest.raises(error, match=words):
         run.do(Configure("astro", behavior, keys))
-    assert [] == run.interventions
+    assert [] == interventions_of(run)

@@ -8,8 +8,9 @@ import pytest
 
 import fleet2d
 from fleet2d import interventions
+from fleet2d.entities.plan import data_of
 from fleet2d.errors import ScenarioError
-from fleet2d.interventions import Put, Send, SwitchOff
+from fleet2d.interventions import Decide, Put, Send, SwitchOff
 from fleet2d.interventions.intervention import dump_intervention, verbs
 
 PACKAGE = Path(fleet2d.__file__).parent
@@ -63,6 +64,18 @@ def test_object_and_mapping_are_recorded_alike() -> None:
         records.append(simulation.run().manifest["interventions"])
 
     assert records[0] == records[1]
+
+
+def test_plan_for_a_body_that_decides_itself_is_left_out_with_a_note() -> None:
+    simulation = fleet2d.Simulation("bundled:base", "simulation.duration=1 h", seed=4)
+    simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen"))))
+    run = simulation.run()
+
+    assert any("astro isn't driven" in note for note in run.manifest["notes"])
+
+
+def test_simulation_has_few_public_names() -> None:
+    assert len([name for name in dir(fleet2d.Simulation) if not name.startswith("_")]) <= 25
 
 
 @pytest.mark.parametrize(

@@ -277,8 +277,15 @@ class Decide(BodyIntervention):
         """Let the body follow the plan from the present step on, and from where it begins.
 
         The body may have been put elsewhere at the same step, after the plan was made.
+
+        Raises:
+            ScenarioError: The body isn't driven: its behaviors would decide at once.
         """
         actor = self.actor(world)
+        if actor.behaviors:
+            raise ScenarioError(
+                f"{self.entity} isn't driven, it decides itself: drive it before its first plan"
+            )
         rows = self.plan["rows"]
         plan = plan_of(actor, world.step, self.plan)
         if rows and rows[0][0] == world.step * world.clock.step_us:

@@ -25,7 +25,7 @@ import shapely
 from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.loop import deferred_interrupt
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, add_note
 from fleet2d.errors import InputError
 from fleet2d.live.library_errors import libraries_told
 from fleet2d.live.messages import (
@@ -278,7 +278,7 @@ class Bridge:
                 self._simulate()
         finally:
             for note in self.notes():
-                simulation.note(note)
+                add_note(simulation, note)
             run = simulation.finish()
             for peer in self._peers:
                 peer.close(run)

@@ -12,7 +12,7 @@ from typing import Any
 
 from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.configuration.problems import counted
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, evidence_of
 from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.temporal import after, at_end, eventually, until
@@ -100,7 +100,7 @@ class Trial(Simulation):
         return tuple(
             replace(
                 result_of(verdict, expectations.entries[name].expectation),
-                evidence=self.evidence(name) if verdict.fails else None,
+                evidence=evidence_of(self, name) if verdict.fails else None,
             )
             for name, verdict in self.verdicts().items()
         )

@@ -17,7 +17,7 @@ from fleet2d.algorithms.algorithm import RoomDistribution
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.configuration.documents import parse_yaml
 from fleet2d.configuration.trust import running_code
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, interventions_of, may_run_code
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
@@ -47,7 +47,7 @@ class LiveEngine:
         self._events_until = simulation.step
         self._walls: dict[Mesh, int] = {}
         self._called: set[str] = set()
-        self._recorded = len(simulation.interventions)
+        self._recorded = len(interventions_of(simulation))
 
     def bodies(self) -> list[LiveBody]:
         """Return the poses of all users and robots, and their paths ahead."""
@@ -122,7 +122,7 @@ class LiveEngine:
 
     def interventions(self) -> list[dict[str, Any]]:
         """Return the records of the interventions since the last call."""
-        records = self.simulation.interventions[self._recorded :]
+        records = interventions_of(self.simulation)[self._recorded :]
         self._recorded += len(records)
         return records
 
@@ -327,7 +327,7 @@ class LiveRun:
             self._paused = True
             self.engine.simulation.advance(max(1, min(DAY_S, round(order["value"]))))
         else:
-            with running_code(allowed=self.engine.simulation.runs_code):
+            with running_code(allowed=may_run_code(self.engine.simulation)):
                 self.engine.apply(order)
 
     def _state(self) -> LiveFrame:
