@@ -167,6 +167,17 @@ class Intervention(Component):
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         """Show the arguments of the constructor to `help` and interactive sessions."""
         super().__pydantic_init_subclass__(**kwargs)
+        cls._sign()
+
+    @classmethod
+    def model_rebuild(cls, **kwargs: Any) -> bool | None:
+        """Build the validators, after which Pydantic shows arguments of its own."""
+        result = super().model_rebuild(**kwargs)
+        cls._sign()
+        return result
+
+    @classmethod
+    def _sign(cls) -> None:
         needed = [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in cls.needed()]
         others = [
             Parameter(name, Parameter.KEYWORD_ONLY, default=field.default)
