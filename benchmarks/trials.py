@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fleet2d.expectations import always, distance, eventually, seen
+from fleet2d.interventions import Call, Put, Send, ShutDoor
 from fleet2d.testing.claim import Claim, Variant
 from fleet2d.testing.trials import run_trial
 
@@ -41,10 +42,10 @@ def bare(trial: Any) -> None:
 def expecting(trial: Any) -> None:
     """The evening of the docs."""
     trial.run_until("19:00")
-    trial.put("ana", "kitchen")
-    trial.send("ana", to="sofa")
-    trial.shut("bath_door")
-    trial.call("astro", find="ana")
+    trial.do(Put("ana", "kitchen"))
+    trial.do(Send("ana", "sofa"))
+    trial.do(ShutDoor("bath_door"))
+    trial.do(Call("astro", find="ana"))
     trial.expect(eventually(seen("ana", by="astro"), within="4 min"))
     trial.expect(always(distance("astro", "ana") > 0.3), name="keeps off")
 

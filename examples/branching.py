@@ -10,6 +10,7 @@ import copy
 from datetime import datetime
 
 from fleet2d import Behavior, Plan, Simulation, Situation
+from fleet2d.interventions import Replan
 
 
 class Errand(Behavior):
@@ -37,7 +38,7 @@ def main() -> None:
     for room in history.actors["astro"].reachable_rooms():
         future = copy.deepcopy(history)
         future.actors["astro"].behaviors[0].goal = room.name
-        future.replan("astro")
+        future.do(Replan("astro"))
         shares[room.name] = future.run().metrics["sightings"]["ana"]
     for name, share in sorted(shares.items(), key=lambda item: -item[1]):
         print(f"  waiting in {name:14} sees Ana {share:6.1%} of her time at home that day")

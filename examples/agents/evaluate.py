@@ -17,7 +17,7 @@ import numpy as np
 
 from fleet2d import Simulation
 from fleet2d.entities.robots.policy import COLUMNS
-from fleet2d.gym import RobotEnv, load_task
+from fleet2d.gym import RobotEnv, load_task, perceived_s
 from fleet2d.gym.task import Variants
 
 LTP = {"ltp": {"type": "ltp", "estimator": "likelihood"}}
@@ -61,7 +61,7 @@ def bundled(task: str, behavior: dict[str, Any], values: dict[str, Any], seed: i
     content["algorithms"] = LTP if "source" in behavior else {}
     simulation = Simulation(content)
     simulation.run_until(simulation.clock.steps)
-    seen_s, events = simulation.perceived_s("astro"), simulation.finish().arrow("events")
+    seen_s, events = perceived_s(simulation, "astro"), simulation.finish().arrow("events")
     return terms(task, seen_s, events.to_pylist())
 
 
@@ -74,7 +74,7 @@ def lived(task: str, choose: Choice, **settings: Any) -> list[float]:
         action = choose(observation, info["action_mask"], env)
         observation, _, terminated, truncated, info = env.step(action)
         is_over = terminated or truncated
-    seen_s = env.present.simulation.perceived_s("astro")
+    seen_s = perceived_s(env.present.simulation, "astro")
     return terms(task, seen_s, env.run().arrow("events").to_pylist())
 
 

@@ -24,6 +24,7 @@ from fleet2d.expectations import (
     seen,
     sensor,
 )
+from fleet2d.interventions import Away, Call, HoldStill, Put, Send, ShutDoor
 from fleet2d.testing import Trial, trial
 
 HOME = "home.yaml"
@@ -32,18 +33,18 @@ HOME = "home.yaml"
 @trial(HOME, seeds=20, holds=0.8)
 def test_finds_ana_within_four_minutes(trial: Trial) -> None:
     """Wherever she is sent, in at least 80 % of evenings."""
-    trial.send("ana", to=["kitchen", "office", "bedroom_1", "living_room"][trial.seed % 4])
+    trial.do(Send("ana", ["kitchen", "office", "bedroom_1", "living_room"][trial.seed % 4]))
     trial.run_until("17:10")
-    trial.call("astro", find="ana")
+    trial.do(Call("astro", find="ana"))
     trial.expect(eventually(seen("ana", by="astro"), within="4 min"))
 
 
 @trial(HOME, seeds=3)
 def test_keeps_off_who_it_has_found(trial: Trial) -> None:
     """It finds Ana on the sofa, and stays more than 60 cm away."""
-    trial.put("ana", "sofa")
-    trial.hold("ana")
-    trial.call("astro", find="ana")
+    trial.do(Put("ana", "sofa"))
+    trial.do(HoldStill("ana"))
+    trial.do(Call("astro", find="ana"))
     trial.expect(always(distance("astro", "ana") > 0.6), name="keeps off")
     trial.expect(eventually(distance("astro", "ana") < 2.0), name="comes near")
 
@@ -67,8 +68,8 @@ def test_docks_before_it_is_empty(trial: Trial) -> None:
 @trial(HOME)
 def test_stays_out_of_the_bathroom_while_it_is_occupied(trial: Trial) -> None:
     """Ana bathes for two hours; the robot makes its rounds."""
-    trial.put("ana", "bathroom_1")
-    trial.hold("ana")
+    trial.do(Put("ana", "bathroom_1"))
+    trial.do(HoldStill("ana"))
     trial.expect(never(room("astro") == "bathroom_1"))
 
 
@@ -88,37 +89,37 @@ def test_learns_the_bedroom_within_ten_days(trial: Trial) -> None:
 @trial(HOME, seeds=3)
 def test_finds_its_way_when_it_is_carried_off(trial: Trial) -> None:
     """It is carried to the office while it drives to the kitchen, and still comes."""
-    trial.call("astro", to="kitchen")
+    trial.do(Call("astro", to="kitchen"))
     trial.advance(10)
-    trial.put("astro", "office")
+    trial.do(Put("astro", "office"))
     trial.expect(eventually(room("astro") == "kitchen", within="3 min"))
 
 
 @trial(HOME)
 def test_comes_although_a_door_is_shut_on_its_way(trial: Trial) -> None:
     """The door of the hallway falls shut: it goes through the entryway instead."""
-    trial.put("astro", "hallway")
-    trial.call("astro", to="kitchen")
+    trial.do(Put("astro", "hallway"))
+    trial.do(Call("astro", to="kitchen"))
     trial.advance(2)
-    trial.shut("hall_door")
+    trial.do(ShutDoor("hall_door"))
     trial.expect(eventually(room("astro") == "kitchen", within="3 min"))
 
 
 @trial(HOME, seeds=5)
 def test_takes_no_guest_for_ana(trial: Trial) -> None:
     """Ana is out, and Ben sits on the sofa: it must not mistake him for her."""
-    trial.away("ana")
-    trial.put("ben", "sofa")
-    trial.hold("ben")
+    trial.do(Away("ana"))
+    trial.do(Put("ben", "sofa"))
+    trial.do(HoldStill("ben"))
     trial.run_until("17:05")
-    trial.call("astro", find="ana")
+    trial.do(Call("astro", find="ana"))
     trial.expect(never(perceived("ana", by="astro"), within="15 min"))
 
 
 @trial(HOME)
 def test_notices_who_comes_into_the_kitchen(trial: Trial) -> None:
     """The motion sensor says so within a minute."""
-    trial.send("ana", to="kitchen")
+    trial.do(Send("ana", "kitchen"))
     trial.expect(eventually(sensor("kitchen_motion"), within="2 min"))
 
 
@@ -131,7 +132,7 @@ def test_finds_ana_after_an_hour_with_a_dark_camera(trial: Trial) -> None:
     """It notices nobody from five to six; called after that, it still finds her."""
     trial.expect(never(perceived("ana", by="astro") & during("17:05-17:55")), name="is dark")
     trial.run_until("18:05")
-    trial.call("astro", find="ana")
+    trial.do(Call("astro", find="ana"))
     trial.expect(eventually(seen("ana", by="astro"), within="5 min"))
 
 

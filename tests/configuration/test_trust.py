@@ -20,7 +20,9 @@ from fleet2d.configuration.trust import (
     running_code,
     stored_code,
 )
+from fleet2d.entities.plan import data_of
 from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.interventions import Decide
 from fleet2d.studies.reader import open_study
 
 Result = tuple[int, str, str]
@@ -210,7 +212,9 @@ def half_a_run(name: str) -> package.Simulation:
     Path("theirs.py").write_text(INTERRUPT)
     simulation = package.Simulation("simulation.duration=20 min", seed=4, out="half")
     simulation.drive("astro")
-    simulation.decide("astro", simulation.plan("astro").stay().interrupt_on("home_empty"))
+    simulation.do(
+        Decide("astro", data_of(simulation.plan("astro").stay().interrupt_on("home_empty")))
+    )
     simulation.advance(200)
     waits = simulation._state.interruptions._held
     waits[next(iter(waits))[0], name] = False

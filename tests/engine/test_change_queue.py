@@ -14,6 +14,7 @@ import fleet2d
 from fleet2d import Algorithm, ComponentError, InputError
 from fleet2d.engine.change_queue import crossings
 from fleet2d.floorplan.home import HomeChange, HomeChanges
+from fleet2d.interventions import ChangeHome
 from fleet2d.kernels import Breakpoints
 
 
@@ -266,7 +267,7 @@ def test_moved_cart_ends_sight_where_it_stands_now(plan: str) -> None:
 
 def test_paths_go_round_a_moved_cart(plan: str) -> None:
     simulation = fleet2d.Simulation(home(plan, robots={"astro": stands(4.6, 1.45)}))
-    simulation.change(move="cart", to=(6.0, 1.45), turn_deg=45)
+    simulation.do(ChangeHome({"move": "cart", "to": (6.0, 1.45), "turn_deg": 45}))
     simulation.advance(1)
     lattice = simulation.home.plan.lattice
     space = simulation.home.space(0.15)
@@ -342,7 +343,7 @@ def test_branches_change_on_their_own(plan: str) -> None:
     )
     simulation.advance(10)
     branch = copy.deepcopy(simulation)
-    branch.change(shut="door")
+    branch.do(ChangeHome({"shut": "door"}))
     branch.advance(10)
     simulation.advance(10)
     assert (frozenset({0}), frozenset()) == (branch.home.shut, simulation.home.shut)

@@ -7,6 +7,7 @@ from tests.scenes import digests, run, scenario, table
 
 import fleet2d
 from fleet2d.errors import InputError
+from fleet2d.interventions import HoldStill, SwitchLights
 
 CAMERA = {"range": [0.2, 6], "angle_deg": 360}
 NIGHT = {"start": "2026-01-05T22:00"}
@@ -112,7 +113,7 @@ def test_people_sleep_in_the_dark_and_lie_in_the_light_after_a_fall() -> None:
         {"simulation": evening, "floorplan": home, "users": {"ana": ana}}
     )
     simulation.run_until("21:10")
-    simulation.hold("ana", duration="30 min", posture="lie")
+    simulation.do(HoldStill("ana", duration="30 min", posture="lie"))
     simulation.run_until("21:30")
     here = simulation.actors["ana"].home.plan.room(simulation.state["ana"]["room"]).index
     lit = {room.index for room in simulation.home.rooms} - simulation.home.unlit
@@ -124,10 +125,10 @@ def test_people_sleep_in_the_dark_and_lie_in_the_light_after_a_fall() -> None:
 def test_lights_are_switched_by_hand_and_a_note_says_where_events_are_not_stored() -> None:
     simulation = fleet2d.Simulation(people())
     simulation.run_until("22:10")
-    simulation.lights("kitchen", "off")
+    simulation.do(SwitchLights("kitchen", "off"))
     assert switched(simulation.run(), "light_off")[0][-1] == 600
     alone = fleet2d.Simulation(scenario(users={"ana": "meander"}))
-    alone.lights("kitchen", "off")
+    alone.do(SwitchLights("kitchen", "off"))
     stored = alone.run()
     assert [] == switched(stored, "light_off")[0]
     assert any("announce them, like changes:" in note for note in stored.manifest["notes"])

@@ -18,6 +18,7 @@ from fleet2d.engine.intervention_queue import (
     read_record,
 )
 from fleet2d.errors import InputError, PlacementError, ScenarioError
+from fleet2d.interventions import ChangeHome, Put, Replan
 from fleet2d.interventions.intervention import Trigger, parse_intervention
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
@@ -39,9 +40,9 @@ def simulation(**more: Any) -> fleet2d.Simulation:
 def steer(run: fleet2d.Simulation) -> None:
     """Do one of each."""
     run.advance(61)
-    run.put("ana", "kitchen", heading_deg=90)
+    run.do(Put("ana", "kitchen", heading_deg=90))
     run.advance(100)
-    run.replan("astro")
+    run.do(Replan("astro"))
     run.advance(3)
     run.drive("astro")
     run.advance({"astro": run.plan("astro").go_to("kitchen").stay(timedelta(seconds=40))})
@@ -73,7 +74,7 @@ def test_a_body_that_is_put_somewhere_is_there_at_once_and_nobody_else_changes()
     run, other = simulation(), simulation()
     for each in (run, other):
         each.advance(120)
-    run.put("astro", "bedroom")
+    run.do(Put("astro", "bedroom"))
     for each in (run, other):
         each.advance(1)
     assert run.state["astro"]["room"].startswith("bedroom")
@@ -84,7 +85,7 @@ def test_a_body_is_put_at_a_point_with_a_heading() -> None:
     run = simulation()
     run.advance(10)
     x, y = run.home.rooms[0].anchor_xy
-    run.put("ana", (x, y), heading_deg=180)
+    run.do(Put("ana", (x, y), heading_deg=180))
     run.advance(1)
     state = run.state["ana"]
     assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)  # a step away
@@ -94,7 +95,7 @@ def test_poses_are_rebuilt_through_a_jump() -> None:
     content = home(artifacts={"trajectories": "every step"})
     run = fleet2d.Simulation(content)
     run.advance(200)
-    run.put("astro", "kitchen")
+    run.do(Put("astro", "kitchen"))
     stored = run.run()
     rows = stored.pandas("trajectories")
     rows = rows[rows["entity"] == "astro"]
@@ -111,13 +112,13 @@ def test_a_place_that_can_not_be_is_refused_and_nothing_is_done(place: Any, erro
     run = simulation()
     run.advance(5)
     with pytest.raises(error):
-        run.put("ana", place)
+        run.do(Put("ana", place))
     assert [] == run.run().manifest["interventions"]
 
 
 def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
     run = simulation()
-    for call in (lambda: run.put("anna", "kitchen"), lambda: run.replan("anna")):
+    for call in (lambda: run.do(Put("anna", "kitchen")), lambda: run.do(Replan("anna"))):
         with pytest.raises(ScenarioError, match="did you mean 'ana'"):
             call()
     with pytest.raises(InputError, match="did you mean 'user_seen'"):
@@ -199,9 +200,9 @@ def test_a_change_by_a_script_is_done_again() -> None:
     content = home("30 min", objects={"kitchen_door": door})
     run = fleet2d.Simulation(content)
     run.advance(300)
-    run.change(shut="kitchen_door")
+    run.do(ChangeHome({"shut": "kitchen_door"}))
     with pytest.raises(ScenarioError, match="no door 'x'"):
-        run.change(shut="x")
+        run.do(ChangeHome({"shut": "x"}))
     stored = run.run()
     interventions = stored.manifest["interventions"]
     assert stored.digest == fleet2d.Simulation(content, interventions=interventions).run().digest
@@ -211,7 +212,7 @@ def test_a_change_by_a_script_is_done_again() -> None:
 def test_a_branch_keeps_what_was_done_and_what_is_to_be_done() -> None:
     run = simulation()
     run.advance(50)
-    run.put("ana", "kitchen")
+    run.do(Put("ana", "kitchen"))
     branch = copy.deepcopy(run)
     first, second = run.run(), branch.run()
     assert first.digest == second.digest

@@ -12,6 +12,7 @@ from fleet2d import Algorithm, Behavior, Metric, Plan, Situation
 from fleet2d.engine import loop
 from fleet2d.engine.loop import PHASES, Span
 from fleet2d.entities.body import NEVER
+from fleet2d.interventions import ChangeHome, Replan
 
 STORY: list[tuple[int, str]] = []
 """What happened, as it happened: the step, and to whom."""
@@ -94,8 +95,8 @@ def test_in_a_step_come_home_users_robots_algorithms_metrics(
 def test_what_a_script_does_at_a_step_comes_before_all_else(story: list[tuple[int, str]]) -> None:
     simulation = fleet2d.Simulation(told())
     simulation.advance(30)
-    simulation.change(shut="door")
-    simulation.replan("bolt")
+    simulation.do(ChangeHome({"shut": "door"}))
+    simulation.do(Replan("bolt"))
     simulation.advance(1)
     assert (30, "bolt, shut") == story[-1]
 

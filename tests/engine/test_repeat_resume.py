@@ -23,7 +23,10 @@ from fleet2d import Algorithm
 from fleet2d.artifacts import arrow
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
+from fleet2d.engine.simulation import directory_of
+from fleet2d.entities.plan import data_of
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
+from fleet2d.interventions import Decide, Put, Replan
 from fleet2d.storage import files
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "100" if THOROUGH else "4"))
@@ -50,8 +53,9 @@ def cut_off(simulation: fleet2d.Simulation) -> Path:
     unfinished.journal.close()
     assert unfinished._lock is not None
     os.close(unfinished._lock._handle)
-    assert simulation.directory is not None
-    return simulation.directory
+    directory = directory_of(simulation)
+    assert directory is not None
+    return directory
 
 
 @pytest.mark.parametrize("minutes", some([0, 1, 9, 10, 11, 37, 59, 60], 3))
@@ -115,9 +119,9 @@ def test_what_was_done_to_a_run_is_done_again(tmp_path: Path) -> None:
     def steered(**more: Any) -> fleet2d.Simulation:
         simulation = fleet2d.Simulation(content(), **more)
         simulation.run_until(700)
-        simulation.put("ana", "kitchen")
+        simulation.do(Put("ana", "kitchen"))
         simulation.run_until(1500)
-        simulation.replan("astro")
+        simulation.do(Replan("astro"))
         return simulation
 
     expected = digests(steered().run())
@@ -136,7 +140,7 @@ def test_what_was_only_scheduled_is_done_after_a_new_beginning(tmp_path: Path) -
     simulation = fleet2d.Simulation(text, seed=4, out=tmp_path / "run")
     for each in (twin, simulation):
         each.advance(60)
-        each.put("astro", "kitchen")
+        each.do(Put("astro", "kitchen"))
     simulation.finish()
     shutil.rmtree(tmp_path / "run" / FOLDER)
     assert twin.run().digest == fleet2d.resume(tmp_path / "run").digest
@@ -197,7 +201,7 @@ def test_an_edited_plan_of_a_driven_robot_is_refused(
     """A manifest holds the plans of controllers as numbers; edited ones ended in tracebacks."""
     simulation = fleet2d.Simulation("simulation.duration=10 min", seed=4, out=tmp_path / "run")
     simulation.drive("astro")
-    simulation.decide("astro", simulation.plan("astro").go_to("kitchen").stay())
+    simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen").stay())))
     simulation.advance(60)
     simulation.finish()
     shutil.rmtree(tmp_path / "run" / FOLDER)

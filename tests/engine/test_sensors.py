@@ -14,6 +14,7 @@ import fleet2d
 from fleet2d import Algorithm, InputError
 from fleet2d.entities.sensor import Sensor, SensorState, SensorView
 from fleet2d.floorplan.home import Home
+from fleet2d.interventions import Replan
 
 
 @pytest.fixture
@@ -208,7 +209,7 @@ def test_bed_is_occupied_while_somebody_lies_in_it(plan: str) -> None:
             return plan.go_to([9, 2.4]).stay()
 
     ana.behaviors[:] = [Nap()]
-    simulation.replan("ana")
+    simulation.do(Replan("ana"))
     simulation.advance(60)
     assert {"on": True} == simulation.state["bed_sensor"]
     stored = simulation.run()

@@ -6,6 +6,7 @@ import pytest
 
 from fleet2d import Behavior, Plan, Simulation, Situation, load_scenario
 from fleet2d.errors import ScenarioError
+from fleet2d.interventions import Replan
 
 
 class Errand(Behavior):
@@ -28,7 +29,7 @@ def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original() -> None:
     history.advance(600)
     future = copy.deepcopy(history)
     future.actors["astro"].behaviors[0].goal = "kitchen"
-    future.replan("astro")
+    future.do(Replan("astro"))
     future.advance(600)
     history.advance(600)
     assert ("kitchen_0", "entryway_0") == tuple(s.state["astro"]["room"] for s in (future, history))
@@ -37,15 +38,15 @@ def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original() -> None:
 def test_replan_is_kept_in_the_manifest() -> None:
     steered = simulation()
     steered.advance(10)
-    steered.replan("astro")
-    steered.replan("astro")
+    steered.do(Replan("astro"))
+    steered.do(Replan("astro"))
     done = steered.run().manifest["interventions"]
     assert 2 * [{"do": "replan", "step": 10, "entity": "astro"}] == done
 
 
 def test_replan_of_somebody_unknown_names_who_there_is() -> None:
     with pytest.raises(ScenarioError, match="did you mean 'astro'"):
-        simulation().replan("asto")
+        simulation().do(Replan("asto"))
 
 
 def test_override_in_the_place_of_the_file_changes_the_bundled_scenario() -> None:

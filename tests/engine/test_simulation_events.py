@@ -86,7 +86,7 @@ def test_a_listener_gets_only_its_kinds_and_may_intervene() -> None:
     def come(events: Any) -> None:
         for event in events:
             assert event.event == "sensor"
-            simulation.intervene({"call": "astro", "to": "kitchen_0"})
+            simulation.do({"call": "astro", "to": "kitchen_0"})
 
     simulation.listen(come, ["sensor"])
     run = simulation.run()

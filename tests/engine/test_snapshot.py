@@ -24,6 +24,7 @@ from fleet2d.engine import checkpoint
 from fleet2d.engine.simulation import PURPOSE
 from fleet2d.engine.snapshot import MAGIC, open_snapshot
 from fleet2d.errors import ArtifactError, ComponentError, InputError
+from fleet2d.interventions import ChangeHome, Put, Replan
 from fleet2d.runtime.events import Event
 from fleet2d.storage.secret_files import signature
 
@@ -156,8 +157,8 @@ def test_copies_can_be_changed_without_the_other_noticing() -> None:
     simulation.advance(350)
     twins = [way(simulation) for way in some([*WAYS.values()], 2)]
     for twin in twins:
-        twin.put("ana", "kitchen")
-        twin.change(open="bath")
+        twin.do(Put("ana", "kitchen"))
+        twin.do(ChangeHome({"open": "bath"}))
         twin.advance(150)
         assert simulation.state != twin.state
     assert undisturbed("doors, sensors, layers") == result(simulation)
@@ -170,7 +171,7 @@ def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way: str) -> No
     later = [{"do": "put", "step": 900, "entity": "ben", "to": "kitchen", "heading_deg": 5}]
     simulation = Simulation(content, interventions=later)
     simulation.advance(100)
-    simulation.replan("astro")
+    simulation.do(Replan("astro"))
     simulation.advance(100)
     twin = WAYS[way](simulation)
     assert ["replan", "put"] == [i["do"] for i in twin.run().manifest["interventions"]]

@@ -11,6 +11,7 @@ from tests.scenes import AGENDA, digests, scenario, table
 
 import fleet2d
 from fleet2d.errors import ScenarioError
+from fleet2d.interventions import HoldStill
 
 DOOR = {"bath_door": {"type": "door", "doorway": "bathroom_0"}}
 SENSOR = {"contact": {"type": "contact_sensor", "of": "bath_door"}}
@@ -83,9 +84,9 @@ def test_spans_are_invisible(lively: fleet2d.Run, max_span: int) -> None:
 def test_a_run_with_a_script_and_somebody_outside_is_reproduced(tmp_path: Path) -> None:
     run = fleet2d.Simulation(home(LIVELY), out=tmp_path / "run")
     run.advance(305)
-    run.hold("astro", duration="1 min")
-    run.intervene({"on": ["user_lost", "astro"], "delay": "2 s", "put": "astro", "to": "bedroom"})
-    run.intervene({"at": "07:30", "shut": "bath_door"})
+    run.do(HoldStill("astro", duration="1 min"))
+    run.do({"on": ["user_lost", "astro"], "delay": "2 s", "put": "astro", "to": "bedroom"})
+    run.do({"at": "07:30", "shut": "bath_door"})
     run.run()
     assert fleet2d.reproduce(tmp_path / "run").same
 

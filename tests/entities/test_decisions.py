@@ -12,6 +12,7 @@ import fleet2d
 from fleet2d import Behavior, Plan, Situation
 from fleet2d.entities.behavior import holds, parse_span
 from fleet2d.errors import InputError
+from fleet2d.interventions import Replan
 
 OWN = __name__
 
@@ -146,7 +147,7 @@ def test_copies_made_while_something_is_broken_off_live_the_same_future() -> Non
 def test_replanning_asks_everybody_anew() -> None:
     simulation = fleet2d.Simulation(home_with([errand(5), IDLE], "10 min", QUIET))
     simulation.advance(60)
-    simulation.replan("astro")
+    simulation.do(Replan("astro"))
     simulation.advance(60)
     assert simulation.actors["astro"].behaviors[0].decisions == [0, 60]  # type: ignore[attr-defined]
 

@@ -255,7 +255,7 @@ def test_its_camera_cannot_be_disturbed(kitchen: Path) -> None:
     simulation = fleet2d.Simulation(scenario(kitchen))
 
     with pytest.raises(InputError, match="its cameras can't be changed"):
-        simulation.intervene({"switch_off": "astro", "camera": True})
+        simulation.do({"switch_off": "astro", "camera": True})
 
 
 def test_the_log_is_an_input_of_the_run(kitchen: Path, tmp_path: Path) -> None:

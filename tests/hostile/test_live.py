@@ -20,7 +20,9 @@ from tests.scenes import AGENDA, OWN, scenario
 from tests.thorough import examples, some
 
 import fleet2d
+from fleet2d.entities.plan import data_of
 from fleet2d.errors import InputError
+from fleet2d.interventions import Decide, HoldStill, Put, Send, StartActivity
 
 USERS = ("ana", "ben", "gina")
 ROBOTS = ("astro", "bolt")
@@ -164,9 +166,9 @@ def request(run: fleet2d.Simulation, order: Any) -> None:
         if isinstance(order, tuple):
             _, name, place = order
             run.drive(name)
-            run.decide(name, run.plan(name).go_to(place).stay(timedelta(seconds=20)))
+            run.do(Decide(name, data_of(run.plan(name).go_to(place).stay(timedelta(seconds=20)))))
         else:
-            run.intervene(order)
+            run.do(order)
     except InputError:
         pass
 
@@ -188,11 +190,11 @@ def test_no_intervention_lets_a_run_fail(doors: bool, orders: list[Any]) -> None
 
 def decide(run: fleet2d.Simulation) -> None:
     run.drive("astro")
-    run.decide("astro", run.plan("astro").go_to("kitchen").stay())
+    run.do(Decide("astro", data_of(run.plan("astro").go_to("kitchen").stay())))
 
 
 def put(run: fleet2d.Simulation) -> None:
-    run.put("astro", "bedroom")
+    run.do(Put("astro", "bedroom"))
 
 
 @pytest.mark.parametrize(
@@ -201,9 +203,9 @@ def put(run: fleet2d.Simulation) -> None:
         ((decide, put), "bedroom_0"),
         ((put, decide), "kitchen_0"),
         ((put, decide, put), "bedroom_0"),
-        ((decide, lambda run: run.hold("astro"), put), "bedroom_0"),
-        ((decide, lambda run: run.send("astro", "bathroom")), "bathroom_0"),
-        ((lambda run: run.send("astro", "bathroom"), decide), "kitchen_0"),
+        ((decide, lambda run: run.do(HoldStill("astro")), put), "bedroom_0"),
+        ((decide, lambda run: run.do(Send("astro", "bathroom"))), "bathroom_0"),
+        ((lambda run: run.do(Send("astro", "bathroom")), decide), "kitchen_0"),
     ],
 )
 def test_the_last_of_several_orders_counts(
@@ -226,7 +228,7 @@ def test_an_intervention_that_has_become_impossible_is_left_out() -> None:
     run = fleet2d.Simulation(home(doors=False))
     run.advance(10)
     run.drive("ana")
-    run.activity("ana", "wash")  # by a behavior, which no longer decides
+    run.do(StartActivity("ana", "wash"))  # by a behavior, which no longer decides
     stored = run.run()
     (note,) = (note for note in stored.manifest["notes"] if "left out" in note)
     assert note.startswith("step 10: the intervention activity was left out: ana has no activity")
@@ -247,7 +249,7 @@ def test_what_waits_for_its_time_survives_a_kill(
     def steered(**more: Any) -> fleet2d.Simulation:
         run = fleet2d.Simulation(home(doors=False), **more)
         run.advance(20)
-        run.intervene(act)
+        run.do(act)
         return run
 
     whole = steered().run()
@@ -268,9 +270,9 @@ def test_what_has_happened_after_a_wait_happens_once(tmp_path: Path, checkpoint:
         content = home(doors=False)
         content["artifacts"]["checkpoint"] = checkpoint
         run = fleet2d.Simulation(content, **more)
-        run.intervene(WAIT)
+        run.do(WAIT)
         run.advance(165)
-        run.put("ana", "kitchen")
+        run.do(Put("ana", "kitchen"))
         run.advance(10)
         return run
 
@@ -289,7 +291,7 @@ def test_only_events_after_a_request_count() -> None:
     content = home(doors=False)
     run = fleet2d.Simulation(content)
     run.advance(400)
-    run.intervene({"on": "user_seen", "replan": "bolt"})
+    run.do({"on": "user_seen", "replan": "bolt"})
     stored = run.run()
     records = stored.manifest["interventions"]
     assert [] == [record for record in records if record["step"] <= 400]

@@ -26,7 +26,9 @@ from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.trust import UntrustedCodeError, running_code, stored_code
 from fleet2d.engine import checkpoint
 from fleet2d.engine.repeat import reopen
+from fleet2d.engine.simulation import directory_of
 from fleet2d.errors import ScenarioError
+from fleet2d.interventions import Put
 from fleet2d.runtime.program import ExternalProgram
 from fleet2d.storage.secret_files import KEY_NAME, SECRET_BYTES, signature, state_folder
 
@@ -56,8 +58,9 @@ def cut_off(simulation: Simulation) -> Path:
     unfinished.journal.close()
     assert unfinished._lock is not None
     os.close(unfinished._lock._handle)
-    assert simulation.directory is not None
-    return simulation.directory
+    directory = directory_of(simulation)
+    assert directory is not None
+    return directory
 
 
 def cut_run(out: Path, seed: int = 4, **more: Any) -> Path:
@@ -185,7 +188,7 @@ def copy_of_another_course(run: Path) -> None:
     """The same scenario and seed, but something was done to that run."""
     simulation = Simulation(None, *SETTINGS, seed=4, out=run.with_name("other"))
     simulation.run_until(1000)
-    simulation.put("ana", "kitchen")
+    simulation.do(Put("ana", "kitchen"))
     simulation.run_until(4000)
     other = cut_off(simulation)
     for name in (CHECKPOINT_NAME, JOURNAL_NAME):

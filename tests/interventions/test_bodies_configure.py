@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 import fleet2d
+from fleet2d.engine.simulation import interventions_of
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.interventions import Configure
 
 
 def simulation() -> fleet2d.Simulation:
@@ -18,7 +20,9 @@ def test_changed_key_changes_what_follows_and_nothing_before() -> None:
     changed = simulation()
     changed.advance(6 * 3600)
     plain = copy.deepcopy(changed)
-    changed.configure("astro", "hangout", avoid=["bathroom", "living_room"], period="10 min")
+    changed.do(
+        Configure("astro", "hangout", {"avoid": ["bathroom", "living_room"], "period": "10 min"})
+    )
     paths = [run.run().path("astro") for run in (changed, plain)]
     same = paths[0].x == paths[1].x
     assert same[: 6 * 60].all()
@@ -28,7 +32,7 @@ def test_changed_key_changes_what_follows_and_nothing_before() -> None:
 def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
     run = simulation()
     run.advance(3600)
-    run.configure("astro", "hangout", tau="10 min")
+    run.do(Configure("astro", "hangout", {"tau": "10 min"}))
     run.advance()
     run.save(tmp_path / "saved")
     loaded = fleet2d.Simulation.load(tmp_path / "saved")
@@ -51,5 +55,5 @@ def test_wrong_keys_are_refused_and_nothing_is_recorded(
 ) -> None:
     run = simulation()
     with pytest.raises(error, match=words):
-        run.configure("astro", behavior, **keys)
-    assert [] == run.interventions
+        run.do(Configure("astro", behavior, keys))
+    assert [] == interventions_of(run)

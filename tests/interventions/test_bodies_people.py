@@ -8,6 +8,22 @@ from tests.scenes import AGENDA, digests, scenario, table
 
 import fleet2d
 from fleet2d.errors import ScenarioError
+from fleet2d.interventions import (
+    Away,
+    Call,
+    CallHome,
+    Fault,
+    HoldStill,
+    LetIn,
+    LockDoor,
+    Put,
+    Release,
+    Send,
+    SetBattery,
+    ShutDoor,
+    SwitchOff,
+    UnlockDoor,
+)
 
 BATTERY = {"driving": "2 h", "standing": "10 h", "charging": "1 h", "charger": "storage_spot"}
 CHARGER = [0.5, 3.5]
@@ -63,12 +79,12 @@ def test_who_is_sent_goes_on_foot_stays_and_is_left_to_itself_in_the_end() -> No
 def test_who_is_held_stands_still_and_is_released() -> None:
     run = simulation()
     run.advance(130)
-    run.hold("astro")
+    run.do(HoldStill("astro"))
     run.advance(1)
     spot = run.state["astro"]
     run.advance(600)
     assert spot == run.state["astro"]
-    run.release("astro")
+    run.do(Release("astro"))
     run.advance(20)
     assert spot != run.state["astro"]
 
@@ -76,10 +92,10 @@ def test_who_is_held_stands_still_and_is_released() -> None:
 def test_who_is_sent_away_comes_home_when_called() -> None:
     run = simulation()
     run.advance(10)
-    run.away("ana")
+    run.do(Away("ana"))
     run.advance(120)
     assert run.state["ana"]["away"]
-    run.call_home("ana", "kitchen")
+    run.do(CallHome("ana", to="kitchen"))
     run.advance(120)
     assert "kitchen_0" == room(run, "ana")
     run.advance(2400)  # her agenda has her out from 07:30 on
@@ -106,7 +122,7 @@ def test_a_guest_comes_stays_and_leaves() -> None:
     run.advance(420)
     assert run.state["gina"]["away"]
     with pytest.raises(ScenarioError, match="ana is not a guest"):
-        run.guest("ana")
+        run.do(LetIn("ana"))
 
 
 def test_a_robot_comes_when_called_and_goes_on_patrol_after() -> None:
@@ -122,15 +138,15 @@ def test_a_robot_comes_when_called_and_goes_on_patrol_after() -> None:
 
 def test_a_robot_docks_when_called_and_finds_whom_it_is_called_to_find() -> None:
     run = simulation()
-    run.put("ana", "bedroom")
-    run.hold("ana")
+    run.do(Put("ana", "bedroom"))
+    run.do(HoldStill("ana"))
     run.advance(120)
-    run.call("astro", find="ana")
+    run.do(Call("astro", find="ana"))
     result = run.run_until(event="found", entity="astro", timeout="10 min")
     assert result is not None
     assert "ana" == result.detail
-    run.battery("astro", "50 %")
-    run.call("astro", dock=True)
+    run.do(SetBattery("astro", "50 %"))
+    run.do(Call("astro", dock=True))
     assert run.run_until(event="docks", timeout="5 min") is not None
     assert run.run_until(event="charged", timeout="40 min") is not None
 
@@ -138,7 +154,7 @@ def test_a_robot_docks_when_called_and_finds_whom_it_is_called_to_find() -> None
 def test_a_battery_that_is_set_low_sends_the_robot_to_the_charger() -> None:
     run = simulation()
     run.advance(300)
-    run.battery("astro", 0.1)
+    run.do(SetBattery("astro", 0.1))
     docks = run.run_until(event="docks", timeout="5 min")
     assert docks is not None
     assert docks.detail.startswith(("9.", "10."))
@@ -147,8 +163,8 @@ def test_a_battery_that_is_set_low_sends_the_robot_to_the_charger() -> None:
 def test_stuck_wheels_hold_a_robot_whatever_it_is_called_to_do() -> None:
     run = simulation()
     run.advance(130)
-    run.fault("astro", wheels=True, duration="10 min")
-    run.call("astro", to="bedroom")
+    run.do(Fault("astro", wheels=True, duration="10 min"))
+    run.do(Call("astro", to="bedroom"))
     run.advance(1)
     spot = run.state["astro"]
     run.advance(598)
@@ -160,7 +176,7 @@ def test_stuck_wheels_hold_a_robot_whatever_it_is_called_to_do() -> None:
 def test_a_behavior_that_is_switched_off_is_not_asked() -> None:
     run = simulation()
     run.advance(200)
-    run.switch_off("astro", behavior="patrol", duration="10 min")
+    run.do(SwitchOff("astro", behavior="patrol", duration="10 min"))
     run.advance(1)
     spot = run.state["astro"]
     run.advance(590)
@@ -171,14 +187,14 @@ def test_a_behavior_that_is_switched_off_is_not_asked() -> None:
 
 def test_who_is_sent_behind_a_locked_door_waits_until_it_is_open() -> None:
     run = simulation()
-    run.put("ana", "kitchen")
-    run.shut("bath_door")
-    run.lock("bath_door")
+    run.do(Put("ana", "kitchen"))
+    run.do(ShutDoor("bath_door"))
+    run.do(LockDoor("bath_door"))
     run.advance(60)
-    run.send("ana", to="bathroom")
+    run.do(Send("ana", "bathroom"))
     run.advance(120)
     assert "bathroom_0" != room(run, "ana")
-    run.unlock("bath_door")
+    run.do(UnlockDoor("bath_door"))
     run.advance(120)
     assert "bathroom_0" == room(run, "ana")
     assert any(event.event == "way_blocked" for event in run.events())

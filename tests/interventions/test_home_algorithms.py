@@ -8,6 +8,7 @@ from tests.scenes import OWN, scenario, table
 
 import fleet2d
 from fleet2d.errors import ScenarioError
+from fleet2d.interventions import ReplaceOutput, ResetAlgorithm, Restore
 
 
 def home(*script: dict[str, Any]) -> dict[str, Any]:
@@ -35,7 +36,7 @@ def shares(run: fleet2d.Run, name: str) -> Any:
 def test_what_is_reset_begins_anew() -> None:
     run = fleet2d.Simulation(home())
     run.advance(1800)
-    run.reset("share")
+    run.do(ResetAlgorithm("share"))
     run.advance(1)
     fresh = fleet2d.Simulation(home()).algorithms["share"]
     now = run.algorithms["share"].remember()
@@ -56,15 +57,15 @@ def test_a_replaced_output_is_read_by_others_and_its_own_table_stays() -> None:
 def test_an_output_may_be_withheld_or_stay_as_it_is() -> None:
     run = fleet2d.Simulation(home())
     run.advance(700)
-    run.replace("share", withheld=True, duration="5 min")
+    run.do(ReplaceOutput("share", withheld=True, duration="5 min"))
     run.advance(1)
     assert "share" not in run.outputs
     run.advance(400)
     before = run.outputs["share"].share.copy()
-    run.replace("share", frozen=True)
+    run.do(ReplaceOutput("share", frozen=True))
     run.advance(1500)
     np.testing.assert_array_equal(before, run.outputs["share"].share)
-    run.restore("share")
+    run.do(Restore("share"))
     run.advance(1)
     assert (before != run.outputs["share"].share).any()
 

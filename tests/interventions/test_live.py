@@ -23,11 +23,11 @@ def place(room: str) -> tuple[float, float]:
 
 def drive(simulation: fleet2d.Simulation) -> None:
     x, y = place("kitchen_0")
-    simulation.intervene({"put": "ana", "to": [x, y]})
+    simulation.do({"put": "ana", "to": [x, y]})
     for k in range(3):
         seen = [{"user": "ana", "x": x, "y": y}, {"user": "unknown", "x": x + 0.1, "y": y}]
-        simulation.intervene({"perceive": "astro", "detections": seen[: 1 + k]})
-        simulation.intervene({"report": "front_door", "says": "off" if k == 1 else "on"})
+        simulation.do({"perceive": "astro", "detections": seen[: 1 + k]})
+        simulation.do({"report": "front_door", "says": "off" if k == 1 else "on"})
         simulation.advance(10)
 
 
@@ -88,7 +88,7 @@ def test_what_is_wrong_is_refused(act: dict[str, Any], message: str) -> None:
     simulation = fleet2d.Simulation(LIVE)
 
     with pytest.raises(InputError) as caught:
-        simulation.intervene(act)
+        simulation.do(act)
     assert message in str(caught.value)
 
 
@@ -100,6 +100,6 @@ def test_simulated_robots_and_sensors_refuse_what_arrives() -> None:
     simulation = fleet2d.Simulation(content)
 
     with pytest.raises(InputError, match=r"robots\.astro\.perceives=live"):
-        simulation.intervene({"perceive": "astro", "detections": [{"x": 1, "y": 1}]})
+        simulation.do({"perceive": "astro", "detections": [{"x": 1, "y": 1}]})
     with pytest.raises(InputError, match="front_door is simulated"):
-        simulation.intervene({"report": "front_door", "says": "on"})
+        simulation.do({"report": "front_door", "says": "on"})

@@ -285,7 +285,7 @@ def test_no_sequence_of_interventions_makes_a_run_fail(seed: int) -> None:
     for _ in range(12):
         for verb in chance.random.sample(names, 12):
             try:
-                simulation.intervene({**chance.fields(verb), **chance.when()})
+                simulation.do({**chance.fields(verb), **chance.when()})
             except InputError:  # refused before anything is done
                 continue
             applied += 1

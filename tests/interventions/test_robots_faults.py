@@ -9,6 +9,7 @@ from tests.scenes import AGENDA, scenario, table
 
 import fleet2d
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.interventions import Dismiss, Fault, HoldStill, Kidnap
 
 BATTERY = {"driving": "1 h", "standing": "2 h", "charging": "1 h", "charger": [0.5, 6.5]}
 
@@ -134,10 +135,10 @@ def test_methods_do_the_same_as_entries_of_a_script() -> None:
     scripted = home(*({"at": "07:05", **act} for act in acts)).run()
     simulation = home()
     simulation.run_until("07:05")
-    simulation.kidnap("astro", "bathroom", duration="2 min")
-    simulation.hold("ana", posture="lie", duration="1 min")
-    simulation.fault("astro", charger=True, duration="5 min")
-    simulation.dismiss("astro")
+    simulation.do(Kidnap("astro", "bathroom", duration="2 min"))
+    simulation.do(HoldStill("ana", posture="lie", duration="1 min"))
+    simulation.do(Fault("astro", charger=True, duration="5 min"))
+    simulation.do(Dismiss("astro"))
     by_hand = simulation.run()
 
     for name in ("trajectories", "observations", "events"):

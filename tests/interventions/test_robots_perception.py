@@ -8,6 +8,7 @@ from tests.scenes import digests, scenario
 
 import fleet2d
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.interventions import Mistake, Restore, Suppress, SwitchOff, SwitchOn
 
 # While it is done: steps 600 to 1199.
 BEGIN, END = 600, 1200
@@ -119,7 +120,7 @@ def test_what_a_dark_camera_would_have_had_in_view_is_not_explored() -> None:
     run.advance(300)
     area = run._state.layers.areas[0]
     assert not area.explored().any()
-    run.restore("astro")
+    run.do(Restore("astro"))
     run.advance(60)
     assert area.explored().any()
 
@@ -134,12 +135,12 @@ def test_overlapping_disturbances_end_one_by_one() -> None:
 def test_what_is_restored_is_over() -> None:
     run = fleet2d.Simulation(home())
     run.advance(600)
-    run.suppress("astro", "ana", duration="1 h")
-    run.switch_off("astro", camera=True)
+    run.do(Suppress("astro", "ana", duration="1 h"))
+    run.do(SwitchOff("astro", camera=True))
     run.advance(100)
-    run.switch_on("astro", camera=True)
+    run.do(SwitchOn("astro", camera=True))
     run.advance(100)
-    run.restore("astro")
+    run.do(Restore("astro"))
     result = rows(run.run())
     dark = [r for r in plain() if 600 <= r[0] < 700]
     missed = [r for r in plain() if 700 <= r[0] < 800 and r[1] == "ana"]
@@ -149,8 +150,8 @@ def test_what_is_restored_is_over() -> None:
 def test_somebody_unknown_is_refused_where_a_run_has_no_column_for_the_truth() -> None:
     run = fleet2d.Simulation(home())
     with pytest.raises(ScenarioError, match="put this into the scenario's script"):
-        run.mistake("astro", "ana", "unknown")
-    run.mistake("astro", "ana", "ben")
+        run.do(Mistake("astro", "ana", "unknown"))
+    run.do(Mistake("astro", "ana", "ben"))
 
 
 @pytest.mark.parametrize(

@@ -241,7 +241,7 @@ def test_a_function_may_intervene() -> None:
 
     def send(frame: LiveStep) -> None:
         if frame.step == 3:
-            simulation.intervene({"send": "astro", "to": "kitchen_0"})
+            simulation.do({"send": "astro", "to": "kitchen_0"})
 
     run = Bridge(simulation, [to_function(send)], speed=0).run()
 

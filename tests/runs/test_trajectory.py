@@ -15,6 +15,7 @@ import fleet2d
 from fleet2d import Behavior, Plan, Run, Simulation, Situation
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ArtifactError
+from fleet2d.interventions import Put
 from fleet2d.runs.trajectory import PathReader, Trajectory
 
 TWO_ROOMS = {"order": "random", "dwell": "20 s", "rooms": ["living_room", "kitchen", "hallway"]}
@@ -252,7 +253,7 @@ def test_a_person_who_walks_at_random_can_be_put_elsewhere(
     )
     for step, room in zip(at, ("kitchen", "bathroom", "office"), strict=False):
         simulation.run_until(timedelta(seconds=step))
-        simulation.put("ana", room)
+        simulation.do(Put("ana", room))
     run = simulation.run()
     rows = run.pandas("trajectories")
     for name in ("ana", "ben"):

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from tests.scenes import AGENDA, OWN, scenario
 
+from fleet2d.interventions import Call, Put, ShutDoor
 from fleet2d.testing.claim import Variant
 from fleet2d.testing.failures import FailingCase, Shrinker
 from fleet2d.testing.trials import MISSED, Body, Trial, run_trial
@@ -57,11 +58,11 @@ def test_it_keeps_the_violated_expectation_though_others_fail_in_less() -> None:
 
 def test_it_keeps_the_interventions_that_a_missed_expectation_is_about() -> None:
     def body(trial: Trial) -> None:
-        trial.put("ben", "kitchen")
-        trial.shut("bath")
-        trial.put("astro", "storage")
+        trial.do(Put("ben", "kitchen"))
+        trial.do(ShutDoor("bath"))
+        trial.do(Put("astro", "storage"))
         trial.run_until("07:05")
-        trial.call("astro", find="ana")
+        trial.do(Call("astro", find="ana"))
         trial.expect("eventually(seen(ana, by=astro), within=4 min)", name="finds")
 
     case = smaller(flat(), body)

@@ -114,9 +114,9 @@ def test_a_failure_leaves_a_run_that_reproduces_a_picture_and_the_command(
     result = suite("""
 @trial("flat.yaml", seeds=3)
 def test_ana_stays(trial):
-    trial.put("astro", "kitchen")
+    trial.do({"put": "astro", "to": "kitchen"})
     trial.run_until("07:02")
-    trial.put("ana", "bathroom")
+    trial.do({"put": "ana", "to": "bathroom"})
     trial.advance(5)
     assert trial.state["ana"]["room"] == "kitchen_0"
 """, "-q")  # fmt: skip
@@ -152,7 +152,7 @@ def place():
 @pytest.mark.parametrize("name", ["ana", "ben"])
 @trial("flat.yaml", seeds=2)
 def test_put(trial, name, place, tmp_path):
-    trial.put(name, place)
+    trial.do({"put": name, "to": place})
     trial.advance()
     assert name == "ana"
 class TestClass:
@@ -200,7 +200,7 @@ def test_trials():
             "@trial('flat.yaml', 'users.ana.start=atttic')\ndef test_x(trial): pass",
             "seed 4: …no room…'atttic'",
         ),
-        ("@trial('flat.yaml')\ndef test_x(trial): trial.put('anna', 'attic')", "did you mean 'ana'…trial.put"),
+        ("@trial('flat.yaml')\ndef test_x(trial): trial.do({'put': 'anna', 'to': 'attic'})", "did you mean 'ana'…trial.do"),
         ("@trial('flat.yaml', seeds=3, holds=.5)\ndef test_x(trial): pass", "take 5 seeds or more"),
     ],
 )  # fmt: skip
@@ -249,7 +249,7 @@ def test_key(trial): pass
 def test_seeds(trial): pass
 @trial("flat.yaml")
 def test_body(trial):
-    trial.call("astr", dock=True)
+    trial.do({"call": "astr", "dock": True})
 """, "-rN")  # fmt: skip
     section = result.text.partition("= FAILURES =")[2].partition("\n=")[0].splitlines()[1:]
     lines = [line for line in section if line and not line.startswith("_")]
@@ -257,7 +257,7 @@ def test_body(trial):
     assert {"failed": 3} == result.outcomes
     assert "did you mean 'seed'" in result.text
     assert "seeds=0: expected 1 or more seeds" in result.text
-    place = "test_suite.py:11: trial.call(\"astr\", dock=True): there is no robot 'astr'"
+    place = 'test_suite.py:11: trial.do({"call": "astr", "dock": True}): there is no robot \'astr\''
     assert place in result.text
     assert 3 == len(lines), lines
 

@@ -42,7 +42,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "from fleet2d.testing import trial\n"
         "@trial('flat.yaml')\n"
         "def test_comes(trial):\n"
-        "    trial.put('astro', 'kitchen')\n"
+        "    trial.do({'put': 'astro', 'to': 'kitchen'})\n"
         "    trial.expect(eventually(room('astro') == 'bathroom', within='2 min'), name='enters')\n"
         "@trial('flat.yaml')\n"
         "def test_more(trial, tmp_path): pass\n"

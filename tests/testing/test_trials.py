@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from tests.scenes import AGENDA, scenario
 
+from fleet2d.interventions import HoldStill, Put
 from fleet2d.testing.claim import Claim
 from fleet2d.testing.trials import Trial, comparable, run_trial
 
@@ -29,8 +30,8 @@ def test_a_trial_ends_when_all_expectations_are_decided() -> None:
 
 def test_all_that_fails_is_named_with_its_step_and_margin() -> None:
     def body(trial: Trial) -> None:
-        trial.put("ana", "kitchen")
-        trial.hold("ana")
+        trial.do(Put("ana", "kitchen"))
+        trial.do(HoldStill("ana"))
         trial.advance(60)
         trial.expect("always(distance(astro, ana) > 30 m)", name="far")
         trial.expect("eventually(room(ana) == bathroom, within=1 min)", name="washes")
@@ -49,8 +50,8 @@ def test_interventions_can_be_left_out(without: Any) -> None:
     rooms = []
 
     def body(trial: Trial) -> None:
-        trial.put("ana", "kitchen")
-        trial.put("astro", "bathroom")
+        trial.do(Put("ana", "kitchen"))
+        trial.do(Put("astro", "bathroom"))
         trial.advance()
         rooms.extend([trial.state["ana"]["room"], trial.state["astro"]["room"]])
 

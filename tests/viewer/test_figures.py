@@ -6,6 +6,7 @@ import pytest
 from tests.scenes import Cli, scenario
 
 import fleet2d
+from fleet2d.engine.simulation import evidence_of
 from fleet2d.errors import InputError
 from fleet2d.viewer.figures import draw_failure, draw_moment, draw_stretch
 from fleet2d.viewer.film import write_film
@@ -173,7 +174,7 @@ def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path: Path) 
     simulation = fleet2d.Simulation(content)
     run = simulation.run()
     verdict = simulation.verdicts()["off"]
-    evidence = simulation.evidence("off")
+    evidence = evidence_of(simulation, "off")
     assert verdict.worst is not None
     draw_failure(run, verdict.worst.worst, tmp_path / "whole.svg", str(verdict), evidence)
     draw_failure(run, verdict.worst.worst, tmp_path / "plain.svg", str(verdict), None)

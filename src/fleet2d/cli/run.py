@@ -92,8 +92,11 @@ def run_with_progress(simulation: "Simulation", *, quiet: bool = False) -> "Run"
         with watched():
             return simulation.run() if quiet else _run_with_bar(simulation)
     except KeyboardInterrupt:
-        assert simulation.directory is not None
-        typer.echo(resume_hint(simulation.time, simulation.directory), err=True)
+        from fleet2d.engine.simulation import directory_of
+
+        directory = directory_of(simulation)
+        assert directory is not None
+        typer.echo(resume_hint(simulation.time, directory), err=True)
         raise typer.Exit(130) from None
 
 
@@ -267,9 +270,12 @@ def report_wrong(simulation: "Simulation", *, strict: bool, quiet: bool = False)
     Raises:
         InputError: Something will not, and `strict` refuses that.
     """
-    for text in simulation.wrong if strict or not quiet else ():
+    from fleet2d.engine.simulation import flaws_of
+
+    flaws = flaws_of(simulation)
+    for text in flaws if strict or not quiet else ():
         typer.echo(f"wrong: {text}", err=True)
-    if strict and simulation.wrong:
+    if strict and flaws:
         raise InputError(f"{simulation.home.plan.name}: --strict refuses a home like that")
 
 

@@ -53,12 +53,12 @@ def validate(
         plan = load_or_mark(scenario, resolution=resolution, scale=scale)
         _check_floorplan(plan, out, radius)
         return
-    from fleet2d.engine.simulation import Simulation
+    from fleet2d.engine.simulation import Simulation, flaws_of
 
     simulation = Simulation(scenario, *overrides)
     plan = simulation.home.plan
     settings = simulation.scenario.simulation
-    verdict = "wrong" if simulation.wrong else "ok"
+    verdict = "wrong" if flaws_of(simulation) else "ok"
     typer.echo(
         f"{verdict}: {counted(len(simulation.scenario.users), 'user')} and"
         f" {counted(len(simulation.scenario.robots), 'robot')} in {plan.name}"
@@ -71,7 +71,7 @@ def validate(
         for behavior in actor.behaviors:
             for note in getattr(behavior, "notes", ()):
                 typer.echo(f"note: {actor.path}: {note}")
-    if simulation.wrong:
+    if flaws_of(simulation):
         raise typer.Exit(2)
 
 

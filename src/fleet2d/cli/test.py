@@ -335,7 +335,7 @@ def _run(case: ScenarioCase) -> None:
 
 def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
     """Run a failed case again, to store it and to draw the worst moments."""
-    from fleet2d.engine.simulation import Simulation
+    from fleet2d.engine.simulation import Simulation, evidence_of
 
     directory = None if out is None else out / case.name
     simulation = Simulation(case.scenario, out=directory)
@@ -351,7 +351,7 @@ def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
         worst = verdict.worst
         if worst is not None:
             path = pictures / f"{case.name}-{file_name(verdict.name)}.png"
-            evidence = simulation.evidence(verdict.name)
+            evidence = evidence_of(simulation, verdict.name)
             draw_failure(run, worst.worst, path, str(verdict), evidence)
             case.files.append(path)
 

@@ -20,7 +20,7 @@ from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.engine.basis import changed_inputs
 from fleet2d.engine.checkpoint import NO_CHECKPOINT, Checkpoint, UnusableCheckpointError
 from fleet2d.engine.expectations import TABLE
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, catch_up, reopened
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
@@ -355,11 +355,11 @@ def _reopen(root: Path, unfinished: UnfinishedRun, *, trust: bool) -> tuple[Simu
         scenario = load_scenario(manifest.scenario)
         try:
             checkpoint = Checkpoint.open(unfinished, manifest)
-            run = Simulation.reopened(scenario, RunStore(root), unfinished, checkpoint)
+            run = reopened(scenario, RunStore(root), unfinished, checkpoint)
         except UnusableCheckpointError as error:
             remark = f"starting again from the first step: {error}"
-            run = Simulation.reopened(scenario, RunStore(root), unfinished, None)
+            run = reopened(scenario, RunStore(root), unfinished, None)
         else:
             remark = f"continuing from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
-    run.catch_up(manifest.interventions)
+    catch_up(run, manifest.interventions)
     return run, remark

@@ -54,7 +54,6 @@ from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
-from fleet2d.interventions.methods import InterventionMethods
 from fleet2d.kernels import About, in_radians
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import midnight_of
@@ -69,7 +68,7 @@ if TYPE_CHECKING:
 PURPOSE = "saved simulation"  # of the signature of a file
 
 
-class Simulation(InterventionMethods):
+class Simulation:
     """A run in progress: step it, run it until a time or event, read its state, copy it.
 
     Attributes:
@@ -164,49 +163,6 @@ class Simulation(InterventionMethods):
         document = self.home.cached("document", lambda: json.dumps(native_document(plan)))
         self._store.keep(FLOORPLAN_NAME, document)
 
-    @classmethod
-    def reopened(
-        cls,
-        scenario: Scenario,
-        store: RunStore,
-        unfinished: UnfinishedRun,
-        checkpoint: Checkpoint | None,
-    ) -> Self:
-        """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
-
-        Args:
-            scenario: The scenario of the run.
-            store: The store of its directory, not opened.
-            unfinished: The journal and checkpoint of the run, locked.
-            checkpoint: Where to continue; None: start from the first step.
-
-        Raises:
-            UnusableCheckpointError: The checkpoint can't be read; nothing is written then.
-            ArtifactError: The journal is damaged, or the directory can't be written.
-        """
-        began = time.perf_counter()
-        run = cls.__new__(cls)
-        run._prepare(scenario, store)
-        if checkpoint is None:
-            store.reopen(unfinished, None)
-            run._store_plan()
-            run._setup_s = time.perf_counter() - began
-            return run
-        state = checkpoint.read(run._constants)
-        store.manifest = checkpoint.manifest
-        store.manifest.resumed.append(checkpoint.commit.step)
-        store.reopen(unfinished, checkpoint.commit)
-        run._take(state)
-        run._setup_s, run._loop.simulate_s, run._loop.save_s = checkpoint.wall_s
-        assert run._keeper is not None
-        run._keeper.resume(run.step)
-        return run
-
-    def catch_up(self, interventions: Sequence[Mapping[str, Any]]) -> None:
-        """Repeat the interventions that were requested after the checkpoint of the run."""
-        outside = [record for record in interventions if is_from_outside(record)]
-        repeat(self._state, outside[len(self._state.interventions.requests) :])
-
     # State
 
     @property
@@ -224,7 +180,7 @@ class Simulation(InterventionMethods):
         """What is odd in the floor plan or won't work in it, and about bodies and their sources."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
-        wrong = (f"wrong: {text}" for text in self.wrong)
+        wrong = (f"wrong: {text}" for text in flaws_of(self))
         sensors = self._state.sensors.notes
         plan = self.home.plan.notes
         return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
@@ -240,15 +196,6 @@ class Simulation(InterventionMethods):
                     yield f"{actor.path}.{path}.height has no effect without sight.heights: true"
 
     @property
-    def wrong(self) -> Sequence[str]:
-        """What will not work in a home from a file; other homes have been checked."""
-        if not self.scenario.floorplan.files():
-            return ()
-        home = self.home
-        radii = tuple(robot.radius for robot in self.scenario.robots.values())
-        return home.cached(("errors", radii), lambda: errors_in(home, radii))
-
-    @property
     def time(self) -> datetime:
         """The local time of the next step."""
         return self.clock.time(self.step)
@@ -257,16 +204,6 @@ class Simulation(InterventionMethods):
     def done(self) -> bool:
         """Whether all steps are simulated."""
         return self.step >= self.clock.steps
-
-    @property
-    def runs_code(self) -> bool:
-        """Whether code and programs that its scenario names may run."""
-        return self._loop.runs_code
-
-    @property
-    def directory(self) -> Path | None:
-        """The run directory; None: the run is in memory."""
-        return self._store.directory
 
     @property
     def state(self) -> dict[str, dict[str, Any]]:
@@ -361,19 +298,10 @@ class Simulation(InterventionMethods):
         self._store.row_listeners.append(function)
         self._state.recorder.keeps_none = True
 
-    def note(self, text: str) -> None:
-        """Add a line to the notes of the manifest."""
-        self._store.manifest.notes.append(text)
-
     def _event_kinds(self) -> frozenset[str]:
         """Return the kinds of events that may happen in this run."""
         behaviors = (b for actor in self._state.actors for b in actor.behaviors)
         return frozenset({*EventKind}.union(*(behavior.records for behavior in behaviors)))
-
-    @property
-    def interventions(self) -> list[dict[str, Any]]:
-        """The interventions so far, of the script and from outside, as in a manifest."""
-        return list(self._state.interventions.done)
 
     def _state_of(self, actor: DecidingActor) -> dict[str, Any]:
         state = actor.state
@@ -416,7 +344,8 @@ class Simulation(InterventionMethods):
                 continues up to the next step at which a driven body has to decide.
 
         Raises:
-            InputError: The number is negative, the run is finished, or a driven body has no plan.
+            InputError: The number is negative, the run is finished, a driven body has no plan, or
+                another one has.
             KeyboardInterrupt: Ctrl-C, after the present span; the simulation can be continued.
 
         Example:
@@ -439,21 +368,6 @@ class Simulation(InterventionMethods):
                 " of an earlier step"
             )
         self._run_to(min(self.clock.steps, self.step + steps))
-
-    def stop(self) -> None:
-        """End what another thread simulates after the present span, as Ctrl-C does.
-
-        Example:
-            >>> import contextlib, threading
-            >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.speedup=1", seed=4)
-            >>> threading.Timer(0.1, simulation.stop).start()
-            >>> with contextlib.suppress(KeyboardInterrupt):
-            ...     simulation.advance(1000)
-            >>> simulation.step < 1000
-            True
-        """
-        self._loop.stop()
 
     def run_until(
         self,
@@ -591,44 +505,6 @@ class Simulation(InterventionMethods):
             state.wait_for(frozenset())
         return None
 
-    def run_until_asked(self, *names: str) -> list[str]:
-        """Simulate until the first behavior of one of some robots has to choose; see `Policy`.
-
-        The robots' first behaviors are policies without file. To continue, set `given` of each that
-        is returned.
-
-        Returns:
-            The names of the robots that have to choose at the present step; none at the end.
-        """
-        rows = {name: self._body(name).row for name in names}
-        asked: list[str] = []
-
-        def asks(state: State, step: int) -> bool:
-            asked[:] = [name for name, row in rows.items() if has_to_choose(state, row, step)]
-            return bool(asked)
-
-        self._check_not_over()
-        self._loop.run_until_asked(self._state, self.clock.steps, asks)
-        return asked
-
-    def situation(self, name: str) -> Situation:
-        """Return what the behaviors of a body know when they are asked at the present step.
-
-        Raises:
-            ScenarioError: There is no such body.
-        """
-        return self._state.situation(self._body(name).row, self.step)
-
-    def perceived_s(self, robot: str) -> float:
-        """Return for how long a robot has perceived people so far, summed over people [s]."""
-        steps = 0
-        for cameras in self._state.cameras:
-            if cameras.owner.name == robot:
-                self._state.take(cameras, self.step)
-                noticed = cameras.memory.about[..., About.NOTICED.value].T.tolist()
-                steps += sum(map(max, noticed)) * int(cameras.lenses.period[0])
-        return steps * self.clock.step_us / 1e6
-
     def _run_to(
         self, end: int, on_progress: Callable[[Self], None] | None = None, spans: int | None = None
     ) -> None:
@@ -645,12 +521,12 @@ class Simulation(InterventionMethods):
 
     # Interventions: each is recorded in the manifest, and repeated by `reproduce`.
 
-    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
+    def do(self, act: Intervention | Mapping[str, Any]) -> None:
         """Apply an intervention at the present step, or later.
 
         Args:
-            act: The intervention, or a mapping as in a scenario's `script`, which may say when by
-                `at` or `on`.
+            act: The intervention, from `fleet2d.interventions`, or a mapping as in a scenario's
+                `script`, which may say when by `at` or `on`.
 
         Raises:
             ScenarioError: It is not valid, names something unknown, or can never happen.
@@ -660,12 +536,13 @@ class Simulation(InterventionMethods):
         Example:
             >>> import fleet2d
             >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.intervene({"put": "ana", "to": "kitchen"})
+            >>> from fleet2d.interventions import Put
+            >>> simulation.do(Put("ana", "kitchen"))  # or {"put": "ana", "to": "kitchen"}
             >>> simulation.run().manifest["interventions"]
             [{'do': 'put', 'step': 0, 'entity': 'ana', 'to': 'kitchen'}]
 
             >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
-            >>> simulation.intervene({"on": ["activity", "ana", "dinner"], "hold": "astro"})
+            >>> simulation.do({"on": ["activity", "ana", "dinner"], "hold": "astro"})
             >>> [act["do"] for act in simulation.run().manifest["interventions"]]
             ['hold']
         """
@@ -681,7 +558,7 @@ class Simulation(InterventionMethods):
             ScenarioError: There is no such body.
         """
         row = self._body(name).row
-        self._do("drive", entity=name)
+        self.do({"drive": name})
         self._state.driven.add(row)
         self._state.bodies.ask_at[row] = self.step
 
@@ -701,25 +578,17 @@ class Simulation(InterventionMethods):
         """
         return Plan(self._body(name), self.step)
 
-    def decide(self, name: str, plan: Plan) -> None:
-        """Let a driven body follow a plan from the present step on, without simulating a step.
-
-        Raises:
-            ScenarioError: There is no such body.
-            InputError: The body isn't driven.
-        """
-        row = self._body(name).row
-        if row not in self._state.driven:
-            raise InputError(f"{name} isn't driven, it decides itself: call drive({name!r}) first")
-        self._do("decide", entity=name, plan=data_of(plan))
-
     def _take_decisions(self, plans: Mapping[str, Plan]) -> None:
         """Follow plans from outside up to the next step at which a driven body has to decide."""
         for name in self.pending():
             if name not in plans:
                 raise InputError(f"advance(): {name} has to decide now, and has no plan")
         for name, plan in plans.items():
-            self.decide(name, plan)
+            if self._body(name).row not in self._state.driven:
+                raise InputError(
+                    f"{name} isn't driven, it decides itself: call drive({name!r}) first"
+                )
+            self.do({"decide": name, "plan": data_of(plan)})
         while not self.done:
             self._run_to(self.clock.steps, spans=1)
             if self.pending():
@@ -777,11 +646,6 @@ class Simulation(InterventionMethods):
             self._state.settle(self.step)
         return self._state.expectations.verdicts(ended=self.done)
 
-    def evidence(self, name: str) -> "VerdictEvidence":
-        """Return the signals of an expectation so far, and what it is about, for pictures."""
-        assert self._state.expectations is not None
-        return self._state.expectations.evidence(name)
-
     def judge(self, expectation: "Expectation | str", name: str = "") -> "Verdict":
         """Return the verdict on an expectation from the step on at which it was first requested.
 
@@ -816,10 +680,10 @@ class Simulation(InterventionMethods):
         Raises:
             ArtifactError: The run is stored in a directory, which can't be in two states.
         """
-        if self.directory is not None:
+        if self._store.directory is not None:
             raise ArtifactError(
-                f"a simulation that stores in {self.directory} can't be copied, because both would"
-                " write there: copy a simulation that stores in memory"
+                f"a simulation that stores in {self._store.directory} can't be copied, because both"
+                " would write there: copy a simulation that stores in memory"
             )
         twin = self.__class__.__new__(self.__class__)
         twin.__dict__.update(self.__dict__)
@@ -864,10 +728,10 @@ class Simulation(InterventionMethods):
         save_snapshot(path, self._state, self._constants, self._header(), PURPOSE)
 
     def _check_savable(self) -> None:
-        if self.directory is not None:
+        if self._store.directory is not None:
             raise ArtifactError(
-                f"a simulation that stores in {self.directory} can't be saved as a file, too: it"
-                " keeps checkpoints there if artifacts.checkpoint is set; continue it by"
+                f"a simulation that stores in {self._store.directory} can't be saved as a file:"
+                " it keeps checkpoints there if artifacts.checkpoint is set; continue it by"
                 " `fleet2d resume`"
             )
         self._check_not_over()
@@ -918,7 +782,7 @@ class Simulation(InterventionMethods):
         constants: dict[str, object] = {f"entity {name}": e for name, e in entities.items()}
         constants |= {"clock": self.clock, "scenario": self.scenario, **self.home.constants}
         constants |= {f"sight of {c.owner.name}": c.method for c in self._state.cameras if c.method}
-        if self.directory is not None:
+        if self._store.directory is not None:
             constants["store"] = self._store
         return constants
 
@@ -1013,8 +877,8 @@ class Simulation(InterventionMethods):
         self._store.manifest.notes.append(f"failed at step {self.step}: {reason}")
         with suppress(Exception):
             self.finish("failed")
-        if self.directory is not None and self._run is not None:
-            error.add_note(f"the run until then, {self.time}, is in {self.directory}")
+        if self._store.directory is not None and self._run is not None:
+            error.add_note(f"the run until then, {self.time}, is in {self._store.directory}")
 
 
 def run(
@@ -1046,6 +910,141 @@ def run(
     finished = simulation.run()
     free_bodies(simulation._state.actors)
     return finished
+
+
+def reopened(
+    scenario: Scenario,
+    store: RunStore,
+    unfinished: UnfinishedRun,
+    checkpoint: Checkpoint | None,
+) -> Simulation:
+    """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
+
+    Args:
+        scenario: The scenario of the run.
+        store: The store of its directory, not opened.
+        unfinished: The journal and checkpoint of the run, locked.
+        checkpoint: Where to continue; None: start from the first step.
+
+    Raises:
+        UnusableCheckpointError: The checkpoint can't be read; nothing is written then.
+        ArtifactError: The journal is damaged, or the directory can't be written.
+    """
+    began = time.perf_counter()
+    run = Simulation.__new__(Simulation)
+    run._prepare(scenario, store)
+    if checkpoint is None:
+        store.reopen(unfinished, None)
+        run._store_plan()
+        run._setup_s = time.perf_counter() - began
+        return run
+    state = checkpoint.read(run._constants)
+    store.manifest = checkpoint.manifest
+    store.manifest.resumed.append(checkpoint.commit.step)
+    store.reopen(unfinished, checkpoint.commit)
+    run._take(state)
+    run._setup_s, run._loop.simulate_s, run._loop.save_s = checkpoint.wall_s
+    assert run._keeper is not None
+    run._keeper.resume(run.step)
+    return run
+
+
+def catch_up(simulation: Simulation, interventions: Sequence[Mapping[str, Any]]) -> None:
+    """Repeat the interventions that were requested after the checkpoint of the run."""
+    outside = [record for record in interventions if is_from_outside(record)]
+    repeat(simulation._state, outside[len(simulation._state.interventions.requests) :])
+
+
+def flaws_of(simulation: Simulation) -> Sequence[str]:
+    """Return what will not work in a home from a file; other homes have been checked."""
+    if not simulation.scenario.floorplan.files():
+        return ()
+    home = simulation.home
+    radii = tuple(robot.radius for robot in simulation.scenario.robots.values())
+    return home.cached(("errors", radii), lambda: errors_in(home, radii))
+
+
+def may_run_code(simulation: Simulation) -> bool:
+    """Return whether code and programs that its scenario names may run."""
+    return simulation._loop.runs_code
+
+
+def directory_of(simulation: Simulation) -> Path | None:
+    """Return the run directory; None: the run is in memory."""
+    return simulation._store.directory
+
+
+def add_note(simulation: Simulation, text: str) -> None:
+    """Add a line to the notes of the manifest."""
+    simulation._store.manifest.notes.append(text)
+
+
+def interventions_of(simulation: Simulation) -> list[dict[str, Any]]:
+    """Return the interventions so far, of the script and from outside, as in a manifest."""
+    return list(simulation._state.interventions.done)
+
+
+def stop(simulation: Simulation) -> None:
+    """End what another thread simulates after the present span, as Ctrl-C does.
+
+    Example:
+        >>> import contextlib, threading
+        >>> import fleet2d
+        >>> simulation = fleet2d.Simulation(None, "simulation.speedup=1", seed=4)
+        >>> threading.Timer(0.1, stop, [simulation]).start()
+        >>> with contextlib.suppress(KeyboardInterrupt):
+        ...     simulation.advance(1000)
+        >>> simulation.step < 1000
+        True
+    """
+    simulation._loop.stop()
+
+
+def run_until_asked(simulation: Simulation, *names: str) -> list[str]:
+    """Simulate until the first behavior of one of some robots has to choose; see `Policy`.
+
+    The robots' first behaviors are policies without file. To continue, set `given` of each that
+    is returned.
+
+    Returns:
+        The names of the robots that have to choose at the present step; none at the end.
+    """
+    rows = {name: simulation._body(name).row for name in names}
+    asked: list[str] = []
+
+    def asks(state: State, step: int) -> bool:
+        asked[:] = [name for name, row in rows.items() if has_to_choose(state, row, step)]
+        return bool(asked)
+
+    simulation._check_not_over()
+    simulation._loop.run_until_asked(simulation._state, simulation.clock.steps, asks)
+    return asked
+
+
+def situation_of(simulation: Simulation, name: str) -> Situation:
+    """Return what the behaviors of a body know when they are asked at the present step.
+
+    Raises:
+        ScenarioError: There is no such body.
+    """
+    return simulation._state.situation(simulation._body(name).row, simulation.step)
+
+
+def perceived_s(simulation: Simulation, robot: str) -> float:
+    """Return for how long a robot has perceived people so far, summed over people [s]."""
+    steps = 0
+    for cameras in simulation._state.cameras:
+        if cameras.owner.name == robot:
+            simulation._state.take(cameras, simulation.step)
+            noticed = cameras.memory.about[..., About.NOTICED.value].T.tolist()
+            steps += sum(map(max, noticed)) * int(cameras.lenses.period[0])
+    return steps * simulation.clock.step_us / 1e6
+
+
+def evidence_of(simulation: Simulation, name: str) -> "VerdictEvidence":
+    """Return the signals of an expectation so far, and what it is about, for pictures."""
+    assert simulation._state.expectations is not None
+    return simulation._state.expectations.evidence(name)
 
 
 def has_to_choose(state: State, row: int, step: int) -> bool:

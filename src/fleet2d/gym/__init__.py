@@ -12,6 +12,7 @@ with library_imports():
         import gymnasium
         import pettingzoo  # noqa: F401
 
+    from fleet2d.engine.simulation import perceived_s as perceived_s
     from fleet2d.gym.env import DiscountByTime as DiscountByTime
     from fleet2d.gym.env import RobotEnv as RobotEnv
     from fleet2d.gym.env import RobotLife as RobotLife

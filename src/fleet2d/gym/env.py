@@ -16,7 +16,7 @@ from pettingzoo import ParallelEnv
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import parse_duration
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, perceived_s, run_until_asked, situation_of
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.robots.policy import COLUMNS, Policy
@@ -41,7 +41,7 @@ class RobotLife:
 
     def __init__(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
         self._follow(simulation, robots)
-        self.due = simulation.run_until_asked(*robots)
+        self.due = run_until_asked(simulation, *robots)
 
     def _follow(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
         self.simulation, self.robots = simulation, robots
@@ -76,13 +76,13 @@ class RobotLife:
             self.policy(robot).check(self.now(robot), actions[robot], self.mask(robot))
         for robot in self.due:
             self.policy(robot).given = int(actions[robot])
-        self.due = self.simulation.run_until_asked(*self.robots)
+        self.due = run_until_asked(self.simulation, *self.robots)
 
     def now(self, robot: str) -> Situation:
         """Return what a robot knows of the present step."""
         now = self._now.get(robot)
         if now is None or now.step != self.simulation.step:
-            now = self._now[robot] = self.simulation.situation(robot)
+            now = self._now[robot] = situation_of(self.simulation, robot)
         return now
 
     def mask(self, robot: str) -> Bool:
@@ -98,7 +98,7 @@ class RobotLife:
         """Return terms of the reward, from the beginning to the present step: at least these."""
         terms = self.policy(robot).tally(self.now(robot))
         if "in_view_min" in names:
-            terms["in_view_min"] = self.simulation.perceived_s(robot) / 60
+            terms["in_view_min"] = perceived_s(self.simulation, robot) / 60
         return terms
 
     def copy(self) -> "RobotLife":

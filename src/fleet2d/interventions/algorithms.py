@@ -13,7 +13,7 @@ from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
 @register("intervention", "reset")
-class Reset(Intervention):
+class ResetAlgorithm(Intervention):
     """Let an algorithm forget what it has learned, or load what another run has learned.
 
     Its present output remains until its next update.
@@ -22,6 +22,10 @@ class Reset(Intervention):
         algorithm: The algorithm.
         learned: Learned state to load, a file of the folder learned/ of another run; left out: the
             algorithm starts without any.
+
+    Example:
+        >>> ResetAlgorithm("ltp").algorithm
+        'ltp'
     """
 
     subject: ClassVar[str] = "algorithm"
@@ -43,7 +47,7 @@ class Reset(Intervention):
 
 
 @register("intervention", "replace")
-class Replace(Lasting):
+class ReplaceOutput(Lasting):
     """Let behaviors and other algorithms read another output of an algorithm for a while.
 
     The algorithm itself continues, and its tables and metrics show its real output.
@@ -54,6 +58,10 @@ class Replace(Lasting):
         values: Numbers and texts by name, for an output that is a mapping.
         frozen: Whether its output at that step remains.
         withheld: Whether there is no output, as before the first one.
+
+    Example:
+        >>> ReplaceOutput("ltp", rooms={"kitchen_0": 1}).rooms
+        {'kitchen_0': 1.0}
     """
 
     subject: ClassVar[str] = "algorithm"

@@ -73,6 +73,10 @@ class Put(BodyIntervention):
     Attributes:
         to: The place: a room, furniture, or a point.
         heading_deg: Its heading, counter-clockwise from +x; left out: as before.
+
+    Example:
+        >>> Put("ana", "kitchen", heading_deg=90).to
+        ('kitchen',)
     """
 
     to: Place
@@ -116,6 +120,10 @@ class Send(BodyIntervention):
         to: The destination: a room, furniture, or a point.
         heading_deg: Its heading there, counter-clockwise from +x; left out: ahead.
         duration: How long it stays there; left out: until it is released.
+
+    Example:
+        >>> Send("astro", "sofa", duration="20 min").duration
+        datetime.timedelta(seconds=1200)
     """
 
     to: Place
@@ -139,6 +147,10 @@ class HoldStill(BodyIntervention):
     Attributes:
         duration: How long it stays still; left out: until it is released.
         posture: How a person is there, such as lie after a fall; left out: as before.
+
+    Example:
+        >>> HoldStill("ana", posture="lie").posture
+        'lie'
     """
 
     duration: PositiveDuration | None = None
@@ -157,7 +169,12 @@ class HoldStill(BodyIntervention):
 
 @register("intervention", "release")
 class Release(BodyIntervention):
-    """Return a body to the control of its own behaviors."""
+    """Return a body to the control of its own behaviors.
+
+    Example:
+        >>> Release("ana").entity
+        'ana'
+    """
 
     def begin(self, world: World) -> None:
         """Cancel its order."""
@@ -166,7 +183,12 @@ class Release(BodyIntervention):
 
 @register("intervention", "replan")
 class Replan(BodyIntervention):
-    """Make a body replan, whatever it is doing."""
+    """Make a body replan, whatever it is doing.
+
+    Example:
+        >>> Replan("astro").entity
+        'astro'
+    """
 
     def begin(self, world: World) -> None:
         """Let its behaviors decide at the present step."""
@@ -182,6 +204,10 @@ class Configure(BodyIntervention):
     Attributes:
         behavior: The behavior, by its type.
         keys: The keys that change, with their values, as in the scenario.
+
+    Example:
+        >>> Configure("astro", "hangout", {"tau": "10 min"}).keys
+        {'tau': '10 min'}
     """
 
     behavior: str
@@ -213,7 +239,12 @@ class Configure(BodyIntervention):
 
 @register("intervention", "drive")
 class TakeControl(BodyIntervention):
-    """Control a body externally for the rest of the run, by plans instead of its behaviors."""
+    """Control a body externally for the rest of the run, by plans instead of its behaviors.
+
+    Example:
+        >>> TakeControl("astro").entity
+        'astro'
+    """
 
     def begin(self, world: World) -> None:
         """Let it follow given plans; without a plan it stays where it is."""
@@ -226,6 +257,14 @@ class Decide(BodyIntervention):
 
     Attributes:
         plan: The plan, as `data_of` returns it.
+
+    Example:
+        >>> import fleet2d
+        >>> from fleet2d.entities.plan import data_of
+        >>> simulation = fleet2d.Simulation("bundled:base", "simulation.duration=1 h", seed=4)
+        >>> plan = simulation.plan("astro").go_to("kitchen")
+        >>> Decide("astro", data_of(plan)).entity
+        'astro'
     """
 
     plan: Annotated[dict[str, Any], AfterValidator(check_data)]
@@ -238,8 +277,15 @@ class Decide(BodyIntervention):
         """Let the body follow the plan from the present step on, and from where it begins.
 
         The body may have been put elsewhere at the same step, after the plan was made.
+
+        Raises:
+            ScenarioError: The body isn't driven: its behaviors would decide at once.
         """
         actor = self.actor(world)
+        if actor.behaviors:
+            raise ScenarioError(
+                f"{self.entity} isn't driven, it decides itself: drive it before its first plan"
+            )
         rows = self.plan["rows"]
         plan = plan_of(actor, world.step, self.plan)
         if rows and rows[0][0] == world.step * world.clock.step_us:
@@ -289,6 +335,10 @@ class Away(PersonIntervention):
 
     Attributes:
         duration: How long the person is away; left out: until called home or released.
+
+    Example:
+        >>> Away("ana", duration="2 h").duration
+        datetime.timedelta(seconds=7200)
     """
 
     duration: PositiveDuration | None = None
@@ -305,6 +355,10 @@ class CallHome(PersonIntervention):
     Attributes:
         to: The destination: a room, furniture, or a point.
         duration: How long the person stays there; left out: until released.
+
+    Example:
+        >>> CallHome("ana", to="kitchen").to
+        ('kitchen',)
     """
 
     to: Place = ("living_room", "any")
@@ -326,6 +380,10 @@ class LetIn(CallHome):
     Attributes:
         to: The destination: a room, furniture, or a point.
         duration: How long the guest stays there.
+
+    Example:
+        >>> LetIn("gina").duration
+        datetime.timedelta(seconds=7200)
     """
 
     duration: PositiveDuration = timedelta(hours=2)
@@ -349,6 +407,10 @@ class StartActivity(PersonIntervention):
         what: The name of the activity in the persona or agenda.
         to: The place; left out: where the person's own behavior does it.
         duration: How long the person does it; left out: until released.
+
+    Example:
+        >>> StartActivity("ana", "dinner").what
+        'dinner'
     """
 
     what: str = Field(min_length=1)

@@ -33,11 +33,15 @@ class HomeIntervention(Intervention):
 
 
 @register("intervention", "change")
-class Change(HomeIntervention):
+class ChangeHome(HomeIntervention):
     """Change the home like an entry of `changes`.
 
     Attributes:
         change: The change, as in `changes` of a scenario.
+
+    Example:
+        >>> ChangeHome({"shut": "bath_door"}).change.shut
+        'bath_door'
     """
 
     subject: ClassVar[str] = "change"
@@ -61,33 +65,57 @@ class DoorIntervention(HomeIntervention):
 
 
 @register("intervention", "open")
-class Open(DoorIntervention):
-    """Open a door, even a locked one."""
+class OpenDoor(DoorIntervention):
+    """Open a door, even a locked one.
+
+    Example:
+        >>> OpenDoor("front").door
+        'front'
+    """
 
 
 @register("intervention", "shut")
-class Shut(DoorIntervention):
-    """Shut a door, as soon as nobody stands in the doorway."""
+class ShutDoor(DoorIntervention):
+    """Shut a door, as soon as nobody stands in the doorway.
+
+    Example:
+        >>> ShutDoor("front").door
+        'front'
+    """
 
 
 @register("intervention", "lock")
-class Lock(DoorIntervention):
-    """Lock a door: nobody opens it by hand once it is shut."""
+class LockDoor(DoorIntervention):
+    """Lock a door: nobody opens it by hand once it is shut.
+
+    Example:
+        >>> LockDoor("front").door
+        'front'
+    """
 
 
 @register("intervention", "unlock")
-class Unlock(DoorIntervention):
-    """Unlock a door."""
+class UnlockDoor(DoorIntervention):
+    """Unlock a door.
+
+    Example:
+        >>> UnlockDoor("front").door
+        'front'
+    """
 
 
 @register("intervention", "move")
-class Move(HomeIntervention):
+class MoveFurniture(HomeIntervention):
     """Move a piece of furniture.
 
     Attributes:
         object: The piece of furniture.
         to: Where its centre is then, [x, y] in metres.
         turn_deg: How far it is turned, counter-clockwise.
+
+    Example:
+        >>> MoveFurniture("sofa_0", (2, 1), turn_deg=90).to
+        (2.0, 1.0)
     """
 
     subject: ClassVar[str] = "object"
@@ -103,6 +131,10 @@ class SetRoomType(HomeIntervention):
     Attributes:
         name: The room.
         type: Its new type.
+
+    Example:
+        >>> SetRoomType("office_0", "bedroom").type
+        'bedroom'
     """
 
     subject: ClassVar[str] = "name"
@@ -111,12 +143,16 @@ class SetRoomType(HomeIntervention):
 
 
 @register("intervention", "lights")
-class Lights(HomeIntervention):
+class SwitchLights(HomeIntervention):
     """Switch the light of a room on or off.
 
     Attributes:
         room: The room, a kind of rooms, or `all`.
         turn: How it is switched.
+
+    Example:
+        >>> SwitchLights("kitchen", "off").turn
+        'off'
     """
 
     subject: ClassVar[str] = "room"
@@ -125,20 +161,24 @@ class Lights(HomeIntervention):
 
 
 @register("intervention", "slow")
-class Slow(SlowArea, Lasting):
+class SlowFloor(SlowArea, Lasting):
     """Let a wet floor or a carpet slow robots down, or its edge stop them; they don't know of it.
 
     Attributes:
         area: Its corners [m].
         speed: Their speed in it, as a share of the usual one; turning on the spot is as ever.
         stop: How long they stop when they enter it.
+
+    Example:
+        >>> SlowFloor([(2, 2), (4, 2), (4, 3)], speed="20 %").speed
+        0.2
     """
 
     subject: ClassVar[str] = "area"
 
     def begin(self, world: World) -> None:
         """Apply all that are active."""
-        world.slow([act for act in world.lasting if isinstance(act, Slow)])
+        world.slow([act for act in world.lasting if isinstance(act, SlowFloor)])
 
 
 class SensorIntervention(Intervention):
@@ -157,12 +197,16 @@ class SensorIntervention(Intervention):
 
 
 @register("intervention", "report")
-class Report(SensorIntervention):
+class ReportState(SensorIntervention):
     """Let a real sensor report its state: one of the type `live_sensor`.
 
     Attributes:
         sensor: The sensor.
         says: Whether it is on or off from now on.
+
+    Example:
+        >>> ReportState("front_door", "on").says
+        'on'
     """
 
     says: Literal["on", "off"]
@@ -182,12 +226,16 @@ class Report(SensorIntervention):
 
 
 @register("intervention", "stick")
-class Stick(SensorIntervention, Lasting):
+class StickSensor(SensorIntervention, Lasting):
     """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long.
 
     Attributes:
         sensor: The sensor.
         says: The state: on, always triggered; off, never triggered; silent, it reports nothing.
+
+    Example:
+        >>> StickSensor("bath_contact", says="off").says
+        'off'
     """
 
     says: SensorFault = "silent"
@@ -204,6 +252,10 @@ class Restore(Intervention):
 
     Attributes:
         name: The robot, sensor or algorithm.
+
+    Example:
+        >>> Restore("astro").name
+        'astro'
     """
 
     subject: ClassVar[str] = "name"

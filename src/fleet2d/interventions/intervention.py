@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import partial
+from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, Self
 
@@ -130,7 +131,7 @@ class World(Protocol):
 class Intervention(Component):
     """A change of a run from outside: by a script, a test or a person.
 
-    It is data: the same in a scenario's `script`, as a method of a simulation and in a manifest.
+    It is data: the same in a scenario's `script`, in `Simulation.do` and in a manifest.
     Interventions are the first phase of a step, so their effects hold for all of it. The random
     draws of all other bodies stay the same.
     """
@@ -138,6 +139,58 @@ class Intervention(Component):
     kind: ClassVar[str] = "intervention"
     # The field whose value follows the verb in the short form: `put: ana`.
     subject: ClassVar[str] = "entity"
+
+    def __init__(self, *values: Any, **keys: Any) -> None:
+        """Describe it: ``Put("ana", "kitchen")``.
+
+        Args:
+            values: Its subject, and its other required fields in their order.
+            keys: All others.
+
+        Raises:
+            ScenarioError: A key is unknown, missing or given twice, or a value is wrong.
+        """
+        cls = type(self)
+        needed = cls.needed()
+        given = dict(zip(needed, values, strict=False))
+        if len(values) > len(needed) or given.keys() & keys.keys():
+            raise ScenarioError(
+                f"{cls.__name__}(): give {' and '.join(needed)} once, and all others by keyword"
+            )
+        with validating(f"{cls.__name__}()"):
+            super().__init__(**given, **keys)
+
+    # Pydantic passes no context through a constructor of its own that is not marked like this.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Show the arguments of the constructor to `help` and interactive sessions."""
+        super().__pydantic_init_subclass__(**kwargs)
+        cls._sign()
+
+    @classmethod
+    def model_rebuild(cls, **kwargs: Any) -> bool | None:
+        """Build the validators, after which Pydantic shows arguments of its own."""
+        result = super().model_rebuild(**kwargs)
+        cls._sign()
+        return result
+
+    @classmethod
+    def _sign(cls) -> None:
+        needed = [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in cls.needed()]
+        others = [
+            Parameter(name, Parameter.KEYWORD_ONLY, default=field.default)
+            for name, field in cls.model_fields.items()
+            if not field.is_required()
+        ]
+        cls.__signature__ = Signature([*needed, *others])
+
+    @classmethod
+    def needed(cls) -> list[str]:
+        """Return the fields without default, the subject first."""
+        names = [name for name, field in cls.model_fields.items() if field.is_required()]
+        return sorted(names, key=lambda name: name != cls.subject)
 
     def check(self, world: World) -> None:
         """Refuse an impossible intervention; called before the run, or when it is requested.

@@ -52,6 +52,10 @@ class Call(RobotIntervention):
         find: A person to find, by the behavior `find`.
         dock: Whether to go to the charger, by the behavior `dock`.
         command: A word that a behavior of your own responds to.
+
+    Example:
+        >>> Call("astro", find="ana").find
+        'ana'
     """
 
     to: Place | None = None
@@ -96,7 +100,12 @@ class Call(RobotIntervention):
 
 @register("intervention", "dismiss")
 class Dismiss(RobotIntervention):
-    """Send a robot away: it drops what it was called to do, whom it follows, and its search."""
+    """Send a robot away: it drops what it was called to do, whom it follows, and its search.
+
+    Example:
+        >>> Dismiss("astro").entity
+        'astro'
+    """
 
     def begin(self, world: World) -> None:
         """Make it replan without that."""
@@ -112,6 +121,10 @@ class KeepOut(RobotIntervention, Lasting):
     Attributes:
         entity: The robot.
         of: The rooms, or kinds of rooms if the home has them.
+
+    Example:
+        >>> KeepOut("astro", "bedroom", duration="1 h").of
+        'bedroom'
     """
 
     of: tuple[str, ...] | str
@@ -160,6 +173,10 @@ class SetBattery(RobotIntervention):
 
     Attributes:
         charge: The charge at that moment, 0 to 1.
+
+    Example:
+        >>> SetBattery("astro", "20 %").charge
+        0.2
     """
 
     charge: Share
@@ -216,7 +233,12 @@ class Switch(Lasting):
 
 @register("intervention", "switch_off")
 class SwitchOff(Switch):
-    """Switch a camera or a behavior off: the camera sees nothing, the behavior never decides."""
+    """Switch a camera or a behavior off: the camera sees nothing, the behavior never decides.
+
+    Example:
+        >>> SwitchOff("astro", camera=True, duration="10 min").camera
+        True
+    """
 
     @property
     def disturbance(self) -> Disturbance | None:
@@ -241,6 +263,10 @@ class SwitchOn(Switch):
 
     Attributes:
         duration: Not used: it stays on.
+
+    Example:
+        >>> SwitchOn("astro", behavior="patrol").behavior
+        'patrol'
     """
 
     duration: None = None
@@ -336,6 +362,10 @@ class Fault(Trouble):
         dark: A camera that is dark, by name where it has several; true: all.
         detection: Factor of the probability that a user in view is noticed.
         errs: The errors of its cameras instead of the usual ones.
+
+    Example:
+        >>> Fault("astro", wheels=True, duration="10 min").wheels
+        True
     """
 
     wheels: bool = False
@@ -413,6 +443,10 @@ class Perceive(RobotIntervention):
 
     Attributes:
         detections: The people, as {user: ana, x: 1.5, y: 2}.
+
+    Example:
+        >>> Perceive("astro", [{"user": "ana", "x": 1.5, "y": 2}]).detections[0].x
+        1.5
     """
 
     detections: tuple[RealDetection, ...] = Field(min_length=1)
@@ -448,6 +482,10 @@ class Relocalize(RobotIntervention):
     Attributes:
         by_sight: Only if one of its cameras sees; else it tries again, as often as its
             `localization.relocalizes` says.
+
+    Example:
+        >>> Relocalize("astro").entity
+        'astro'
     """
 
     by_sight: bool = False
@@ -484,6 +522,10 @@ class Kidnap(Trouble):
         to: The place: a room, furniture, or a point.
         duration: How long it takes at most until it knows where it is; left out: until it is
             restored, or knows it by sight (`localization.relocalizes`).
+
+    Example:
+        >>> Kidnap("astro", "office").duration
+        datetime.timedelta(seconds=60)
     """
 
     to: Place
@@ -608,6 +650,10 @@ class Suppress(PerceptionIntervention):
 
     Attributes:
         user: The person.
+
+    Example:
+        >>> Suppress("astro", "ana").user
+        'ana'
     """
 
     user: str
@@ -630,6 +676,10 @@ class Mistake(PerceptionIntervention):
     Attributes:
         user: The person.
         taken_for: The other person, or 'unknown'.
+
+    Example:
+        >>> Mistake("astro", "ana", "ben").taken_for
+        'ben'
     """
 
     user: str
@@ -658,6 +708,10 @@ class Inject(PerceptionIntervention):
         user: The person that it perceives, or 'unknown'.
         spot: The apparent place, [x, y] in metres.
         heading_deg: The apparent heading, counter-clockwise from +x.
+
+    Example:
+        >>> Inject("astro", "ana", (2, 1)).spot
+        (2.0, 1.0)
     """
 
     user: str

@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import running_code
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, stop
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra, os_errors_as
 from fleet2d.inputs import open_input, within
 from fleet2d.live import questions
@@ -301,7 +301,7 @@ class Workspace:
         Raises:
             InputError: There is no such simulation, or the intervention is wrong.
         """
-        self._get(simulation).intervene(act)
+        self._get(simulation).do(act)
         return "done"
 
     @confined
@@ -328,7 +328,7 @@ def limited(simulation: Simulation, advice: str) -> Iterator[None]:
     Raises:
         InputError: It was stopped.
     """
-    timer = threading.Timer(MAX_S, simulation.stop)
+    timer = threading.Timer(MAX_S, stop, [simulation])
     timer.start()
     try:
         yield

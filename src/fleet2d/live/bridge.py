@@ -25,7 +25,7 @@ import shapely
 from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import suggest
 from fleet2d.engine.loop import deferred_interrupt
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, add_note
 from fleet2d.errors import InputError
 from fleet2d.live.library_errors import libraries_told
 from fleet2d.live.messages import (
@@ -278,7 +278,7 @@ class Bridge:
                 self._simulate()
         finally:
             for note in self.notes():
-                simulation.note(note)
+                add_note(simulation, note)
             run = simulation.finish()
             for peer in self._peers:
                 peer.close(run)
@@ -415,7 +415,7 @@ class Bridge:
             try:
                 self._check(message, sender)
                 for act in _acts_of(self._mended(message)):
-                    self.simulation.intervene(act)
+                    self.simulation.do(act)
             except InputError as error:
                 self._count("wrong", str(error))
                 continue
@@ -510,7 +510,7 @@ class Bridge:
                 self._standing.add(name)
                 self.counts["silences"] += 1
                 self._say("silent", f"{name}: no pose arrived for {self.silence_s:g} s: it stands")
-                self.simulation.intervene({"hold": name})
+                self.simulation.do({"hold": name})
 
     def _withdraw(self, sender: Sender) -> None:
         """Let bodies decide again that go where a client sent them which is gone."""
@@ -519,7 +519,7 @@ class Bridge:
                 del self._goals[name]
                 self.counts["withdrawn"] += 1
                 self._say("gone", f"{name}: who sent it to {to} is gone: the goal is withdrawn")
-                self.simulation.intervene({"release": name})
+                self.simulation.do({"release": name})
 
     def _count(self, kind: str, text: str, count: int = 1) -> None:
         """Count what is odd, and tell it once for each reason: numbers in it make no other one."""

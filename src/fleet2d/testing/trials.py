@@ -12,14 +12,13 @@ from typing import Any
 
 from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.configuration.problems import counted
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, evidence_of
 from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.temporal import after, at_end, eventually, until
 from fleet2d.expectations.verdict import Verdict, VerdictEvidence
 from fleet2d.floorplan.home import HOME_CACHE
 from fleet2d.floorplan.source import PLAN_CACHE
-from fleet2d.interventions.bodies import Decide, TakeControl
 from fleet2d.interventions.intervention import Intervention, dump_intervention
 from fleet2d.scenario.model import Scenario
 from fleet2d.testing.claim import Claim, SetUpError, Variant, nested_rate_interval, percent
@@ -51,8 +50,8 @@ NOTHING = ArtifactSettings(
 class Trial(Simulation):
     """The simulation that a test function gets.
 
-    It has all methods of a simulation: `run_until`, `advance`, `put`, `send`, `call`, `shut`,
-    `expect`, `state`, …. After the function it runs on until all expectations are decided.
+    It has all methods of a simulation: `run_until`, `advance`, `do`, `expect`, `state`, …. After
+    the function it runs on until all expectations are decided.
     """
 
     def __init__(
@@ -69,13 +68,13 @@ class Trial(Simulation):
         self._without = frozenset(without)
         self.acts: list[frozenset[str]] = []
 
-    def intervene(self, act: Intervention | Mapping[str, Any]) -> None:
-        """Intervene at the present step; see `Simulation.intervene`."""
+    def do(self, act: Intervention | Mapping[str, Any]) -> None:
+        """Apply an intervention at the present step; see `Simulation.do`."""
         number = len(self.acts)
         self.acts.append(names_in(act))
         # The commands of a driven body can't be left out: it would have no plan.
-        if number not in self._without or isinstance(act, TakeControl | Decide):
-            super().intervene(act)
+        if number not in self._without or _is_command(act):
+            super().do(act)
 
     @property
     def expected(self) -> list[str]:
@@ -101,7 +100,7 @@ class Trial(Simulation):
         return tuple(
             replace(
                 result_of(verdict, expectations.entries[name].expectation),
-                evidence=self.evidence(name) if verdict.fails else None,
+                evidence=evidence_of(self, name) if verdict.fails else None,
             )
             for name, verdict in self.verdicts().items()
         )
@@ -109,8 +108,16 @@ class Trial(Simulation):
 
 def names_in(act: Intervention | Mapping[str, Any]) -> frozenset[str]:
     """Return the names and other texts of an intervention."""
-    content = act if isinstance(act, Mapping) else dump_intervention(act)
-    return frozenset(value for value in content.values() if isinstance(value, str))
+    return frozenset(value for value in _content(act).values() if isinstance(value, str))
+
+
+def _is_command(act: Intervention | Mapping[str, Any]) -> bool:
+    content = _content(act)
+    return not {"drive", "decide"}.isdisjoint({*content, content.get("do")})
+
+
+def _content(act: Intervention | Mapping[str, Any]) -> Mapping[str, Any]:
+    return act if isinstance(act, Mapping) else dump_intervention(act)
 
 
 @dataclass(frozen=True)

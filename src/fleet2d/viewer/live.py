@@ -17,11 +17,12 @@ from fleet2d.algorithms.algorithm import RoomDistribution
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.configuration.documents import parse_yaml
 from fleet2d.configuration.trust import running_code
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, interventions_of, may_run_code
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
 from fleet2d.floorplan.home import HomeChange
+from fleet2d.interventions import ChangeHome, Configure, HoldStill, Put, Replan, Send
 from fleet2d.kernels import TURN, Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
@@ -46,7 +47,7 @@ class LiveEngine:
         self._events_until = simulation.step
         self._walls: dict[Mesh, int] = {}
         self._called: set[str] = set()
-        self._recorded = len(simulation.interventions)
+        self._recorded = len(interventions_of(simulation))
 
     def bodies(self) -> list[LiveBody]:
         """Return the poses of all users and robots, and their paths ahead."""
@@ -121,7 +122,7 @@ class LiveEngine:
 
     def interventions(self) -> list[dict[str, Any]]:
         """Return the records of the interventions since the last call."""
-        records = self.simulation.interventions[self._recorded :]
+        records = interventions_of(self.simulation)[self._recorded :]
         self._recorded += len(records)
         return records
 
@@ -150,21 +151,20 @@ class LiveEngine:
         place = (order["x"], order["y"])
         if order["action"] == "door":
             change = HomeChange(open=name) if order["value"] else HomeChange(shut=name)
-            self.simulation.change(change)
+            self.simulation.do(ChangeHome(change))
         elif order["action"] == "place":
-            self.simulation.put(name, self._near(name, place))
+            self.simulation.do(Put(name, self._near(name, place)))
             if name in self._called:
-                self.simulation.hold(name)
+                self.simulation.do(HoldStill(name))
         elif order["action"] == "call":
-            self.simulation.send(name, self._near(name, place))
+            self.simulation.do(Send(name, self._near(name, place)))
             self._called.add(name)
         elif order["action"] == "replan":
-            self.simulation.replan(name)
+            self.simulation.do(Replan(name))
         elif order["action"] == "configure":
             behavior, _, key = order["key"].partition(".")
-            self.simulation.configure(
-                name, behavior, **{key: parse_yaml(order["text"], Path(), "the value")}
-            )
+            value = parse_yaml(order["text"], Path(), "the value")
+            self.simulation.do(Configure(name, behavior, {key: value}))
         else:
             raise InputError(f"there is no intervention {order['action']!r}")
 
@@ -327,7 +327,7 @@ class LiveRun:
             self._paused = True
             self.engine.simulation.advance(max(1, min(DAY_S, round(order["value"]))))
         else:
-            with running_code(allowed=self.engine.simulation.runs_code):
+            with running_code(allowed=may_run_code(self.engine.simulation)):
                 self.engine.apply(order)
 
     def _state(self) -> LiveFrame:

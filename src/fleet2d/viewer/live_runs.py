@@ -12,7 +12,12 @@ from starlette.routing import Route
 from fleet2d.artifacts.manifest import plain
 from fleet2d.configuration.trust import running_code
 from fleet2d.engine.repeat import branch, repeat_until
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import (
+    Simulation,
+    directory_of,
+    interventions_of,
+    may_run_code,
+)
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.viewer.contract import BRANCH_ORDER, LIVE_ORDER, BranchOrder, LiveSession, read_body
@@ -71,7 +76,7 @@ class LiveRuns:
                 raise InputError(f"{MAX_BRANCHES} branches are under way: run one to its end first")
             simulation = self._branch(order["of"], order["step"])
             live = LiveRun(simulation, paused=True)
-            directory = simulation.directory
+            directory = directory_of(simulation)
             title = directory.name if directory else f"branch of {order['of']}"
             session = self._add(live, title, order["of"], order["step"])
         live.start()
@@ -88,9 +93,9 @@ class LiveRuns:
             raise InputError(f"step {step} is not simulated yet: the run is at {simulation.step}")
         scenario: dict[str, Any] = plain(simulation.scenario.resolved())
         scenario["simulation"]["seed"] = simulation.seed
-        content = {"scenario": scenario, "interventions": simulation.interventions}
-        directory = free_directory(simulation.directory)
-        with running_code(allowed=simulation.runs_code):
+        content = {"scenario": scenario, "interventions": interventions_of(simulation)}
+        directory = free_directory(directory_of(simulation))
+        with running_code(allowed=may_run_code(simulation)):
             return repeat_until({**content, "expectations": {}}, step, directory)
 
     def _live(self, number: int) -> LiveRun:

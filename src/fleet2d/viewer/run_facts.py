@@ -11,7 +11,7 @@ from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
 from fleet2d.artifacts.table import categories
 from fleet2d.configuration.units import micros, parse_duration
-from fleet2d.engine.simulation import Simulation
+from fleet2d.engine.simulation import Simulation, interventions_of
 from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError, errors_as
 from fleet2d.floorplan.slow_area import SlowArea
@@ -402,7 +402,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         marks=[],
         verdict="",
         verdicts=[],
-        slows=slow_floors(scenario, simulation.interventions, clock),
+        slows=slow_floors(scenario, interventions_of(simulation), clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(KINDS),
         metrics={},

@@ -9,6 +9,7 @@ from tests.scenes import DOORS, scenario, table, write_flat
 import fleet2d
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.interventions import Call
 
 CAMERA = {"range": [0.2, 6], "angle_deg": 340}
 BEHAVIORS: dict[str, dict[str, Any]] = {
@@ -53,7 +54,7 @@ def test_a_robot_called_into_a_room_that_it_avoids_waits_near_the_door() -> None
     simulation = fleet2d.Simulation(
         scenario(robots={"astro": {"start": [1.0, 1.0], "behaviors": [{"type": "come", "avoid": ["kitchen"]}]}})
     )  # fmt: skip
-    simulation.call("astro", to="kitchen")
+    simulation.do(Call("astro", to="kitchen"))
     simulation.run_until("07:01")
     x, y = simulation.state["astro"]["x"], simulation.state["astro"]["y"]
     assert simulation.state["astro"]["room"] == "living_room_0"

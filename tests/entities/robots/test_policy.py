@@ -10,8 +10,10 @@ from tests.scenes import run
 
 import fleet2d
 from fleet2d import Simulation
+from fleet2d.engine.simulation import perceived_s, run_until_asked, situation_of
 from fleet2d.entities.robots.policy import COLUMNS, NEVER, Policy, SightingMemory
 from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
+from fleet2d.interventions import Send
 from fleet2d.kernels import F32, SUB, Bool, SightingColumn
 from fleet2d.runtime.clock import Clock
 
@@ -53,9 +55,9 @@ def fixed(action: int, **fields: Any) -> dict[str, Any]:
 def lives(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[F32]]:
     """Let a function of the simulation choose all actions; return the observations, too."""
     simulation, observations = Simulation(content), []
-    while simulation.run_until_asked("astro"):
+    while run_until_asked(simulation, "astro"):
         behavior: Any = simulation.actors["astro"].behaviors[0]
-        now = simulation.situation("astro")
+        now = situation_of(simulation, "astro")
         observations.append(behavior.observe(now))
         behavior.given = choose(behavior, observations[-1], behavior.mask())
     return simulation, observations
@@ -144,10 +146,10 @@ def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str)
         run(home_with([fixed(action)]))
 
     simulation = Simulation(home_with([policy()]))
-    simulation.run_until_asked("astro")
+    run_until_asked(simulation, "astro")
     behavior: Any = simulation.actors["astro"].behaviors[0]
     with pytest.raises(InputError, match=reason):
-        behavior.check(simulation.situation("astro"), action, behavior.mask())
+        behavior.check(situation_of(simulation, "astro"), action, behavior.mask())
 
 
 def test_policy_without_a_file_says_what_to_give() -> None:
@@ -184,7 +186,7 @@ def test_terms_of_rewards_count_searches_to_their_ends() -> None:
     content = home_with([policy("find", every="20 min", deadline="3 min")], "30 min", ana=OUT)
     simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
     behavior: Any = simulation.actors["astro"].behaviors[0]
-    tally = behavior.tally(simulation.situation("astro"))
+    tally = behavior.tally(situation_of(simulation, "astro"))
 
     assert (0, 2) == (tally["found"], tally["gave_up"])
     assert 6 <= tally["searching_min"] < 8
@@ -193,10 +195,10 @@ def test_terms_of_rewards_count_searches_to_their_ends() -> None:
 def test_perceived_time_is_that_of_the_sightings() -> None:
     content = home_with([policy()], "2 h")
     simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
-    perceived_s = simulation.perceived_s("astro")
+    seconds = perceived_s(simulation, "astro")
     stored = simulation.finish()
 
-    assert stored.tables["observations"].num_rows == perceived_s > 0
+    assert stored.tables["observations"].num_rows == seconds > 0
 
 
 def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:
@@ -213,9 +215,9 @@ def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:
 
 def test_order_is_carried_out_without_asking_the_policy() -> None:
     simulation = Simulation(home_with([policy()], "1 h"))
-    simulation.send("astro", to="bedroom", duration="30 min")
+    simulation.do(Send("astro", "bedroom", duration="30 min"))
 
-    assert ["astro"] == simulation.run_until_asked("astro")
+    assert ["astro"] == run_until_asked(simulation, "astro")
     assert simulation.step >= 1800
 
 

@@ -13,6 +13,7 @@ from tests.scenes import ROOMS, each_step, path, run, scenario, table
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
+from fleet2d.interventions import Replan
 from fleet2d.runs.run import Run
 
 # 2020-03-02, and the run of scenario() begins at 07:00 of a day.
@@ -296,7 +297,7 @@ def test_asked_anew_in_the_middle_it_goes_on_as_the_log_says(tmp_path: Path) -> 
     simulation = Simulation(replay(events(tmp_path, MORNING)))
     for minute in (2, 5.25, 6, 12):
         simulation.run_until(timedelta(minutes=minute))
-        simulation.replan("ben")
+        simulation.do(Replan("ben"))
     simulation.run_until(timedelta(minutes=20))
     assert "bathroom_0" == simulation.state["ben"]["room"]
 
