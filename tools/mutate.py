@@ -14,7 +14,7 @@ import random
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Iterator
 from itertools import accumulate
 from pathlib import Path
 
@@ -31,24 +31,22 @@ COMPUTED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.
 def compare(node: ast.AST) -> ast.AST | None:
     """Move or turn a comparison."""
     if isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARED:
-        node.ops[0] = COMPARED[type(node.ops[0])]()
-        return node
+        other = COMPARED[type(node.ops[0])]()
+        return ast.Compare(node.left, [other, *node.ops[1:]], node.comparators)
     return None
 
 
 def compute(node: ast.AST) -> ast.AST | None:
     """Turn an operator of arithmetic."""
     if isinstance(node, ast.BinOp) and type(node.op) in COMPUTED:
-        node.op = COMPUTED[type(node.op)]()
-        return node
+        return ast.BinOp(node.left, COMPUTED[type(node.op)](), node.right)
     return None
 
 
 def connect(node: ast.AST) -> ast.AST | None:
     """Turn `and` into `or`, and `or` into `and`."""
     if isinstance(node, ast.BoolOp):
-        node.op = ast.Or() if isinstance(node.op, ast.And) else ast.And()
-        return node
+        return ast.BoolOp(ast.Or() if isinstance(node.op, ast.And) else ast.And(), node.values)
     return None
 
 
@@ -62,17 +60,14 @@ def count_one_more(node: ast.AST) -> ast.AST | None:
     """Add one to a number, or turn a truth value."""
     if isinstance(node, ast.Constant) and isinstance(node.value, int):
         is_truth = isinstance(node.value, bool)
-        node.value = not node.value if is_truth else node.value + 1
-        return node
+        return ast.Constant(not node.value if is_truth else node.value + 1)
     return None
 
 
 def return_none(node: ast.AST) -> ast.AST | None:
     """Return nothing."""
-    if isinstance(node, ast.Return) and node.value is not None:
-        node.value = ast.Constant(None)
-        return node
-    return None
+    is_value = isinstance(node, ast.Return) and node.value is not None
+    return ast.Return(ast.Constant(None)) if is_value else None
 
 
 def remove(node: ast.AST) -> ast.AST | None:
@@ -84,74 +79,39 @@ def remove(node: ast.AST) -> ast.AST | None:
 def swap(node: ast.AST) -> ast.AST | None:
     """Swap the first two arguments of a call."""
     if isinstance(node, ast.Call) and len(node.args) > 1:
-        node.args[0], node.args[1] = node.args[1], node.args[0]
-        return node
+        return ast.Call(node.func, [node.args[1], node.args[0], *node.args[2:]], node.keywords)
     return None
 
 
 CHANGES = (compare, compute, connect, affirm, count_one_more, return_none, remove, swap)
-Change = Callable[[ast.AST], ast.AST | None]
+UNTRIED = ("annotation", "returns")  # types are for readers
 
 
-class _Changed(ast.NodeTransformer):
-    """A tree in which the n-th place of a change is changed."""
-
-    def __init__(self, change: Change, place: int) -> None:
-        self.change = change
-        self.place = place
-        self.line = 0
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
-        """Leave the type as it is."""
-        if node.value is not None:
-            node.value = self.visit(node.value)
-        return node
-
-    def visit_arg(self, node: ast.arg) -> ast.AST:
-        """Leave the type of an argument as it is."""
-        return node
-
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
-        """Leave messages as they are."""
-        return node
-
-    def visit(self, node: ast.AST) -> ast.AST:
-        """Change the node if it is the one."""
-        line = getattr(node, "lineno", 0)
-        node = super().visit(node)
-        if self.place < 0:
-            return node
-        changed = self.change(node) if self.place == 0 else self.change(_copy(node))
-        if changed is None:
-            return node
-        self.place -= 1
-        if self.place >= 0:
-            return node
-        self.line = line
-        return ast.copy_location(changed, node)
-
-
-def _copy(node: ast.AST) -> ast.AST:
-    """Return a copy of a node whose lists may be changed."""
-    fields = {name: value for name, value in ast.iter_fields(node)}
-    lists = {name: value.copy() for name, value in fields.items() if isinstance(value, list)}
-    return type(node)(**{**fields, **lists})
-
-
-def places(source: str, change: Change) -> int:
-    """Return how many places of a module a change fits."""
-    count = _Changed(change, sys.maxsize)
-    count.visit(ast.parse(source))
-    return sys.maxsize - count.place
+def parts_of(parent: ast.AST) -> Iterator[tuple[ast.AST, str, int | None]]:
+    """Yield the parts of a node, each with the field and the index in it, if that is a list."""
+    for name, value in ast.iter_fields(parent):
+        if name in UNTRIED or isinstance(parent, ast.JoinedStr):
+            continue
+        if isinstance(value, list):
+            parts = (part for part in enumerate(value) if isinstance(part[1], ast.AST))
+            yield from ((part, name, index) for index, part in parts)
+        elif isinstance(value, ast.AST):
+            yield value, name, None
 
 
 def mutant(source: str, generator: random.Random) -> tuple[str, str, int]:
     """Return the text of a mutant, the name of the change, and its line."""
-    fitting = {change: places(source, change) for change in CHANGES}
-    change = generator.choice([change for change, number in fitting.items() if number])
-    changed = _Changed(change, generator.randrange(fitting[change]))
-    tree = changed.visit(ast.parse(source))
-    return ast.unparse(ast.fix_missing_locations(tree)), change.__name__, changed.line
+    tree = ast.parse(source)
+    places = [(parent, *part) for parent in ast.walk(tree) for part in parts_of(parent)]
+    changes = [change for change in CHANGES if any(change(place[1]) for place in places)]
+    change = generator.choice(changes)
+    parent, node, name, index = generator.choice([p for p in places if change(p[1])])
+    if index is None:
+        setattr(parent, name, change(node))
+    else:
+        getattr(parent, name)[index] = change(node)
+    line = getattr(node, "lineno", 0)
+    return ast.unparse(ast.fix_missing_locations(tree)), change.__name__, line
 
 
 def tests_of(module: Path) -> list[str]:

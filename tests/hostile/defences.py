@@ -194,7 +194,7 @@ INPUTS = [
         "inputs",
         "if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):",
         "if False:",
-        "test_bounds_of_input.py::test_devices_and_pipes_are_no_input",
+        "test_inputs.py::test_pipes_sockets_devices_and_folders_are_refused",
     ),
     Defence(
         "it is none when it is opened",
