@@ -1,6 +1,7 @@
 """Each defence, taken out: a test fails, so that it can't get lost without a word."""
 
 import os
+import resource
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -10,6 +11,12 @@ import pytest
 from tests.hostile.defences import DEFENCES, Defence
 
 TESTS = Path(__file__).parent.parent
+MEMORY = 8 << 30
+
+
+def limit_memory() -> None:
+    """Let nothing that was defended against fill the memory of the machine."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 @pytest.mark.slow
@@ -36,7 +43,8 @@ def test_a_test_fails_without_the_defence(tmp_path: Path, defence: Defence) -> N
         env={**os.environ, **overlay},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
+        preexec_fn=limit_memory,
         check=False,
     )
     assert "1 failed" in done.stdout.splitlines()[-1], done.stdout + done.stderr

@@ -270,6 +270,15 @@ def answering(content: bytes, length: int | None = None) -> str:
     )
 
 
+def test_coordinate_beyond_all_floats_is_refused() -> None:
+    """JSON may spell infinity as a number, too, which no check of words refuses."""
+    corners = [[0, 0], [9, 0], [9, 9], [0, 9]]
+    answer = json.dumps({"value": PARTS | {"free": {"rings": [corners]}}})
+    apart._decode(answer.encode(), PlanParts)
+    with pytest.raises(ValueError, match="a coordinate is infinite"):
+        apart._decode(answer.replace("[9, 0]", "[1e999, 0]").encode(), PlanParts)
+
+
 def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "_CODE", answering(json.dumps({"value": PARTS}).encode()))
 
