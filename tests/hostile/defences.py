@@ -475,7 +475,7 @@ ASSISTANT = [
         "live.questions",
         'if len(tree["statements"]) != 1:',
         "if False:",
-        "live/test_questions.py::test_a_query_reads_and_changes_nothing_else",
+        "live/test_questions.py::test_what_is_not_there_is_an_error",
     ),
     Defence(
         "it reads the tables of the run only",
@@ -485,16 +485,9 @@ ASSISTANT = [
         "live/test_questions.py::test_a_query_reads_and_changes_nothing_else",
     ),
     Defence(
-        "DuckDB opens no files",
+        "DuckDB opens no files, and finds no variables of Python",
         "live.questions",
         '"enable_external_access": "false",',
-        "",
-        "live/test_questions.py::test_the_database_itself_is_closed",
-    ),
-    Defence(
-        "DuckDB finds no variables of Python",
-        "live.questions",
-        '"python_enable_replacements": "false",',
         "",
         "live/test_questions.py::test_the_database_itself_is_closed",
     ),
