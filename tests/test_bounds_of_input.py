@@ -361,3 +361,21 @@ def test_a_large_manifest_is_not_read(tmp_path: Path) -> None:
 def test_one_line_is_one_line() -> None:
     assert "a b" == one_line("a\n\n\tb")
     assert 60 == len(one_line("x " * 10**6))
+
+
+def test_a_large_file_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "large"
+    path.write_bytes(bytes(SMALL["FILE_BYTES"] + 1))
+    monkeypatch.setattr("fleet2d.bounds.open_input", lambda *_: pytest.fail("it was opened"))
+    with pytest.raises(InputError, match="1000001 bytes, and at most 1000000 are read"):
+        read_bytes(path, FILE_BYTES)
+
+
+def test_a_file_that_has_grown_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "large"
+    path.write_bytes(bytes(SMALL["FILE_BYTES"] + 7))
+    monkeypatch.setattr("fleet2d.bounds.check_file", lambda *_: None)
+    with pytest.raises(InputError, match="1000001 bytes, and at most 1000000 are read"):
+        read_bytes(path, FILE_BYTES)

@@ -9,6 +9,7 @@ import pytest
 import typer
 import yaml
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from tests.hostile.defences import DEFENCES
 
 from fleet2d.cli.__main__ import app
 from fleet2d.configuration.components import lookup
@@ -145,9 +146,12 @@ def test_each_line_of_the_threat_model_names_its_tests() -> None:
     lines = [line.split("|")[3] for line in table.split("\n\n", 1)[0].splitlines()]
 
     assert len(lines) >= 9
+    paths: set[Path] = set()
     for line in lines:
         named = re.findall(r"`([^`]+)`", line)
         assert named, line
         for name in named:
             path = tests.parent / name if "/" in name else tests / "hostile" / name
             assert path.is_file() or any(path.glob("test_*.py")), name
+            paths.add(path)
+    assert {tests / defence.test.partition("::")[0] for defence in DEFENCES} <= paths

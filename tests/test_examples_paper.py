@@ -16,6 +16,7 @@ from examples.paper.reproduce import (
     ESTIMATORS,
     NAIVE_ESTIMATOR,
     NAIVE_GUESS,
+    PAPER_COLUMN,
     SIZES,
     PaperOptions,
     Result,
@@ -27,6 +28,7 @@ from examples.paper.reproduce import (
     rtp_gap,
     run_months,
     study_content,
+    table_of,
     table_of_means,
 )
 from matplotlib.container import BarContainer
@@ -59,6 +61,13 @@ def test_a_table_leaves_cells_without_a_mean_empty() -> None:
     table = table_of_means("title", means, ("0-1 min", "all"))
     assert ["model", "0-1 min", "all"] == [column.header for column in table.columns]
     assert [["semi markov"], [""], ["0.500"]] == [list(column.cells) for column in table.columns]
+
+
+def test_words_of_a_table_are_at_the_left_and_numbers_at_the_right() -> None:
+    columns = table_of(
+        "feedback", ("policy", "gap", PAPER_COLUMN), [("hangout", "3", "4 ± 1")]
+    ).columns
+    assert ["left", "right", "left"] == [column.justify for column in columns]
 
 
 def test_the_study_files_hold_the_sizes_of_the_paper() -> None:

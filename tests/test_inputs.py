@@ -69,6 +69,17 @@ def test_a_pipe_in_place_of_a_checked_file_is_refused(
         open_input(pipe)
 
 
+def test_a_link_in_place_of_a_checked_file_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "secret").write_text("1234")
+    (tmp_path / "link").symlink_to("secret")
+    monkeypatch.setattr("fleet2d.inputs.input_path", lambda path, _: path)
+
+    with pytest.raises(OSError, match="symbolic links"):
+        open_input(tmp_path / "link")
+
+
 @pytest.mark.parametrize(
     "read",
     [

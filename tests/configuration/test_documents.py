@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from fleet2d.configuration.documents import Document, parse_yaml, read_document
+from fleet2d.configuration import documents
+from fleet2d.configuration.documents import Document, parse, parse_yaml, read_document
 from fleet2d.configuration.units import Text
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import InputError, ScenarioError
 
 
 @pytest.mark.parametrize(
@@ -120,3 +121,22 @@ def test_missing_file_names_the_nearest(tmp_path: Path) -> None:
 def test_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="is a folder"):
         read_document(tmp_path)
+
+
+def test_values_of_an_anchor_count_for_each_alias(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_VALUES", "50")
+    assert {"a": [1] * 20, "b": 2} == parse(f"a: &a {[1] * 20}\nb: 2")
+    with pytest.raises(InputError, match="more than 51 values, and at most 50"):
+        parse(f"a: &a {[1] * 20}\nb: [*a, *a]")
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"), [("[" * 3000, "DEPTH"), (f"[{'[],' * 3000}]", "VALUES")]
+)
+def test_a_long_text_is_counted_before_its_nodes_are_built(
+    monkeypatch: pytest.MonkeyPatch, text: str, bound: str
+) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_VALUES", "100")
+    monkeypatch.setattr(documents, "_composed", lambda _: pytest.fail("nodes were built"))
+    with pytest.raises(InputError, match=f"set FLEET2D_MAX_{bound}="):
+        parse(text)

@@ -275,6 +275,15 @@ def test_all_of_a_program_is_listed(tmp_path: Path) -> None:
     assert f"{line} (algorithms.p.command)" in str(caught.value).splitlines()
 
 
+def test_the_name_of_a_stored_run_is_escaped() -> None:
+    content = {"algorithms": {"a": {"type": "mine:Own"}}}
+    with (
+        pytest.raises(UntrustedCodeError, match=r"^month\\x1b\[2J has code of its own"),
+        stored_code("month\x1b[2J", content, trust=False),
+    ):
+        pass
+
+
 def test_all_files_are_listed_however_many_they_are(tmp_path: Path) -> None:
     content = {f"a{i}": {"type": f"{tmp_path}/mine{i}:Own"} for i in range(500)}
     with pytest.raises(UntrustedCodeError) as caught, stored_code("it", content, trust=False):

@@ -38,7 +38,7 @@ def main() -> None:
     print("| class | tried | broken |\n| --- | ---: | ---: |")
     total = 0
     with tempfile.TemporaryDirectory() as folder:
-        for file in sorted(HERE.glob("test_*.py")):
+        for file in sorted({*HERE.glob("test_*.py")} - {HERE / "test_defences.py"}):
             tried, broken = count(file, Path(folder) / "report.xml")
             total += broken
             name = file.stem.removeprefix("test_").replace("_", " ")

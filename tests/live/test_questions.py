@@ -264,3 +264,30 @@ def test_an_answer_takes_limited_time_and_memory(
 
     with pytest.raises(InputError, match=message):
         answer(tables, query)
+
+
+@pytest.mark.parametrize(
+    ("query", "message"),
+    [
+        ("SELECT * FROM read_text('FILE')", "disabled by configuration"),
+        ("COPY frame TO 'OUT'", "disabled by configuration|does not exist"),
+        ("SELECT * FROM frame", "frame does not exist"),
+        ("SET threads = 9", "configuration has been locked"),
+    ],
+)
+def test_the_database_itself_is_closed(
+    tables: dict[str, pa.Table], tmp_path: Path, query: str, message: str
+) -> None:
+    """Also if a query were not refused before."""
+    import duckdb
+
+    frame = tables["events"]  # which DuckDB would find by its name
+    (tmp_path / "secret.csv").write_text("password\n1234\n")
+    query = query.replace("FILE", str(tmp_path / "secret.csv")).replace("OUT", str(tmp_path / "o"))
+    with duckdb.connect(config=questions._CLOSED) as database:
+        limit = "SELECT current_setting('memory_limit'), current_setting('threads')"
+        assert [("953.6 MiB", 2)] == database.execute(limit).fetchall()
+        with pytest.raises(duckdb.Error, match=message):
+            database.execute(query)
+    assert frame.num_rows == 5
+    assert ["secret.csv"] == [path.name for path in tmp_path.iterdir()]

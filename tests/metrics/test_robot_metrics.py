@@ -175,6 +175,14 @@ def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
     assert result["metres"] == pytest.approx(metres * 14.4)
 
 
+@pytest.mark.parametrize(("apart", "moves"), [(0.0, 2), (0.4, 1), (0.6, 0)])
+def test_rests_count_if_they_are_farther_apart(apart: float, moves: int) -> None:
+    walk = [[1.0, 3.0], [1.5, 3.0], [1.4, 3.0]]
+    tour = {"type": "patrol", "waypoints": walk, "dwell": "2 min", "start": [1.0, 3.0]}
+    content = scenario("6 min", robots={"astro": tour}, metrics={"travel": {"apart": apart}})
+    assert run(content).metrics["travel"]["astro"]["relocations"] == pytest.approx(moves * 240)
+
+
 def test_reach_time_is_the_distance_at_call_times_divided_by_speed(stored: Run) -> None:
     home_steps = np.flatnonzero(~poses(stored, "ana")["away"])
     calls = [k for k in range(0, 6000, 600) if k in set(home_steps.tolist())]

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fleet2d.errors import RunDirectoryError
+from fleet2d.storage import files
 from fleet2d.storage.files import (
     FolderLock,
     new_folder,
@@ -94,6 +95,20 @@ def test_a_file_that_was_not_finished_leaves_the_old_one(
         fail()
     assert "old" == file.read_text()
     assert [file] == list(tmp_path.iterdir())
+
+
+def test_a_file_is_on_the_disk_before_it_replaces_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a power cut, a name may else lead to a file without content."""
+    done: list[str] = []
+    for name in ("write_all", "sync", "replace"):
+        operation = getattr(files, name)
+        monkeypatch.setattr(
+            files, name, lambda *given, f=operation, n=name: (done.append(n), f(*given))
+        )
+    write_atomically(tmp_path / "plan.json", b"{}")
+    assert ["write_all", "sync", "replace"] == done
 
 
 @pytest.mark.parametrize("path", [".", "/"])

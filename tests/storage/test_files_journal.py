@@ -95,3 +95,22 @@ def test_other_files_have_no_frames(tmp_path: Path) -> None:
     assert [] == texts_of(tmp_path / "text")
     with pytest.raises(ArtifactError, match="can't be read"):
         texts_of(tmp_path)
+
+
+def test_a_changed_byte_ends_the_journal_before_its_frame(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    written(path, ["one", "two"]).close()
+    whole = path.read_bytes()
+    ends = [frame.end for frame in read_frames(path, NOTES)]
+    for at in range(len(NOTES.magic), len(whole)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        assert ["one", "two"][: sum(end <= at for end in ends)] == texts_of(path)
+
+
+def test_a_size_beyond_the_file_is_not_read(tmp_path: Path) -> None:
+    """A few bytes requested all memory."""
+    path = tmp_path / "journal"
+    written(path, ["one"]).close()
+    with path.open("ab") as file:
+        file.write(files._HEADER.pack(0, 1, 1 << 62, 0) + b"7")
+    assert ["one"] == texts_of(path)

@@ -196,6 +196,8 @@ def test_a_grid_within_an_axis_combines_all() -> None:
         ({"key": SPEED, "range": [1, 0], "count": 3}, "below the last"),
         ({"key": SPEED, "range": [0, 1], "count": 3, "log": True}, "above 0"),
         ({"sample": {"a": {"key": SPEED, "low": 2, "high": 1}}, "count": 3}, "low below high"),
+        ({"sample": {"a": {"key": SPEED, "low": 2, "choices": [3]}}, "count": 3}, "not both"),
+        ({"sample": {"a": {"key": SPEED, "high": 2, "choices": [3]}}, "count": 3}, "not both"),
         (
             {"sample": {"a": {"key": SPEED, "low": 0, "high": 1, "log": True}}, "count": 3},
             "above 0",

@@ -37,7 +37,6 @@ _CLOSED = {
     "autoload_known_extensions": "false",
     "autoinstall_known_extensions": "false",
     "allow_community_extensions": "false",
-    "python_enable_replacements": "false",
     "temp_directory": "",
     "memory_limit": "1GB",
     "threads": "2",

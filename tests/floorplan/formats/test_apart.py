@@ -191,15 +191,35 @@ def test_time_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         load_floorplan(endless(tmp_path))
 
 
+def test_processor_time_ends_before_the_clock_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends: list[int] = []
+    death = apart._death
+    monkeypatch.setattr(
+        apart,
+        "_death",
+        lambda path, late, status: (ends.append(status), death(path, late, status))[1],
+    )
+    monkeypatch.setattr(apart, "PATIENCE", 20)
+    monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
+
+    with pytest.raises(FloorPlanError, match="takes longer to read than 1 seconds"):
+        load_floorplan(endless(tmp_path))
+    assert [-signal.SIGXCPU] == ends
+
+
 def test_clock_limits_what_takes_no_processor_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(apart, "PATIENCE", 0.5)
-    monkeypatch.setattr(apart, "_CODE", "import time; time.sleep(60)")
+    monkeypatch.setattr(apart, "_CODE", "import time; time.sleep(20)")
     monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
+    begin = time.monotonic()
 
     with pytest.raises(FloorPlanError, match="takes longer to read than 1 seconds"):
         load_floorplan(good(tmp_path))
+    assert time.monotonic() < begin + 15
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
@@ -250,6 +270,15 @@ def answering(content: bytes, length: int | None = None) -> str:
     )
 
 
+def test_coordinate_beyond_all_floats_is_refused() -> None:
+    """JSON may spell infinity as a number, too, which no check of words refuses."""
+    corners = [[0, 0], [9, 0], [9, 9], [0, 9]]
+    answer = json.dumps({"value": PARTS | {"free": {"rings": [corners]}}})
+    apart._decode(answer.encode(), PlanParts)
+    with pytest.raises(ValueError, match="a coordinate is infinite"):
+        apart._decode(answer.replace("[9, 0]", "[1e999, 0]").encode(), PlanParts)
+
+
 def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "_CODE", answering(json.dumps({"value": PARTS}).encode()))
 
@@ -288,6 +317,14 @@ def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 )
 def test_wrong_answer_is_refused(answer: bytes) -> None:
     with pytest.raises(apart.WRONG):
+        apart._decode(answer, PlanParts)
+
+
+def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = json.dumps({"value": PARTS}).encode()
+    apart._decode(answer, PlanParts)
+    monkeypatch.setenv("FLEET2D_MAX_JSON_VALUES", "9")
+    with pytest.raises(ValueError, match="too many values"):
         apart._decode(answer, PlanParts)
 
 

@@ -484,6 +484,14 @@ def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> N
         GeoJson.model_validate({"path": str(path), "units": "feet"})
 
 
+def test_room_of_one_part_may_be_written_as_of_several(tmp_path: Path) -> None:
+    one = read_geojson(write(tmp_path, KITCHEN, BEDROOM))
+    shape = KITCHEN["geometry"]
+    several = {"type": "MultiPolygon", "coordinates": [shape["coordinates"]]}
+
+    assert one == read_geojson(write(tmp_path, KITCHEN | {"geometry": several}, BEDROOM))
+
+
 def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
     assert 0.1 == load_floorplan(write(tmp_path, KITCHEN), 0.1).lattice.cell
 

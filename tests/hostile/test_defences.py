@@ -1,0 +1,50 @@
+"""Each defence, taken out: a test fails, so that it can't get lost without a word."""
+
+import os
+import resource
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from tests.hostile.defences import DEFENCES, Defence
+
+TESTS = Path(__file__).parent.parent
+MEMORY = 8 << 30
+
+
+def limit_memory() -> None:
+    """Let nothing that was defended against fill the memory of the machine."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("defence", DEFENCES, ids=lambda defence: defence.name)
+def test_a_test_fails_without_the_defence(tmp_path: Path, defence: Defence) -> None:
+    module = f"fleet2d.{defence.module}"
+    spec = find_spec(module)
+    assert spec is not None
+    text = Path(str(spec.origin)).read_text(encoding="utf-8")
+    assert 1 == text.count(defence.line)
+    without = text.replace(defence.line, defence.instead)
+    compile(without, module, "exec")
+    (tmp_path / "module.py").write_text(without, encoding="utf-8")
+    overlay = {
+        "PYTHONPATH": str(TESTS / "overlay"),
+        "OVERLAY_MODULE": module,
+        "OVERLAY_FILE": str(tmp_path / "module.py"),
+    }
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "", "--tb=line"]
+    command += ["-p", "no:cacheprovider", str(TESTS / defence.test)]
+    done = subprocess.run(
+        command,
+        cwd=TESTS.parent,
+        env={**os.environ, **overlay},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        preexec_fn=limit_memory,
+        check=False,
+    )
+    assert "1 failed" in done.stdout.splitlines()[-1], done.stdout + done.stderr
