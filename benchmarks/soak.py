@@ -62,7 +62,7 @@ def people(count: int, days: int, folder: Path) -> None:
     """A crowd in one home."""
     users = {f"user{n}": {"type": "room_sampling"} for n in range(count)}
     scenario = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": f"{days} d", "seed": 4},
         "users": {"ana": None, **users},
         "algorithms": {"ltp": None},

@@ -39,7 +39,7 @@ from fleet2d.studies.records import VariantRecord, record_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
-HOUR = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+HOUR = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
 
 
 class InstantExecutor:
@@ -150,7 +150,7 @@ def forecast_cases() -> dict[str, dict[str, Any]]:
     }
 
     def case(duration: str, axes: dict[str, Any], seeds: int, **keys: Any) -> dict[str, Any]:
-        base = {"extends": "bundled:base", "simulation": {"duration": duration}}
+        base = {"extends": "bundled:paper", "simulation": {"duration": duration}}
         return {"base": base, "axes": axes, "replicates": seeds, **keys}
 
     return {

@@ -52,7 +52,7 @@ def test_a_furnished_synthetic_home_is_lived_in_for_a_day(seed: int, area: int) 
     users = {name: {"type": "routine", "persona": kind} for name, kind in personas.items()}
     simulation = {"duration": "1 d", "start": "2026-01-05", "seed": seed}
     content = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": simulation,
         "floorplan": floorplan,
         "users": users,

@@ -83,7 +83,7 @@ def test_only_the_duration_and_the_floor_plan_are_required() -> None:
 
 
 def test_durations_in_mappings_merge_and_as_text_replace() -> None:
-    base = {"extends": "bundled:base"}
+    base = {"extends": "bundled:paper"}
     merged = fleet2d.load_scenario({**base, "simulation": {"duration": {"hours": 2}}})
     assert timedelta(days=30, hours=2) == merged.simulation.duration
     replaced = fleet2d.load_scenario({**base, "simulation": {"duration": "2 h"}})
@@ -124,7 +124,7 @@ def test_columns_of_the_stored_tables_are_those_of_the_page(day: fleet2d.Run) ->
 def test_columns_with_the_truth_are_there_if_a_camera_can_err() -> None:
     cells = next(c for c in rows(page("artifacts"), "| column | unit | |") if "entity" in c[0])
     assert cells
-    erring = run({"extends": "bundled:base"}, "simulation.duration=3 h",
+    erring = run({"extends": "bundled:paper"}, "simulation.duration=3 h",
                  "robots.astro.perception={attributes: {range_noise: 5 cm, activity: {}}}", seed=4)  # fmt: skip
     columns = set(erring.tables["observations"].column_names)
     part = page("artifacts")
@@ -216,7 +216,7 @@ def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(
 @pytest.mark.slow
 def test_the_bundled_month_is_as_the_pages_say() -> None:
     """Its error of presence after the month, and the rounds that the robot makes."""
-    month = run({"extends": "bundled:base"})
+    month = run({"extends": "bundled:paper"})
     said = re.search(r"printed by `fleet2d run`: (0\.\d+) after the month", page("presence"))
     assert said is not None
     assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)

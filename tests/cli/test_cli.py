@@ -222,7 +222,7 @@ def test_the_schema_is_valid_and_says_which_it_is(fleet2d: Cli, schema: dict[str
 
 def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> None:
     validator = jsonschema.validators.validator_for(schema)(schema)
-    base = read_document(bundled_path("base")).data
+    base = read_document(bundled_path("paper")).data
     for content in (base, small(), everything()):
         plain = json.loads(json.dumps(content, default=str))
         assert [] == [error.message for error in validator.iter_errors(plain)]

@@ -287,7 +287,7 @@ def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(
     fleet2d: Cli, tmp_path: Path
 ) -> None:
     """A forged manifest may extend a file that names the code."""
-    package.run("bundled:base", "simulation.duration=1 min", seed=4, out="run")
+    package.run("bundled:paper", "simulation.duration=1 min", seed=4, out="run")
     path = Path("run/manifest.json")
     manifest = json.loads(path.read_text())
     manifest["scenario"]["extends"] = f"{tmp_path}/home.yaml"

@@ -91,7 +91,7 @@ def test_windows_equal_those_of_the_model_in_the_loop() -> None:
     from fleet2d.datasets.training import predict
 
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=8 h",
         "simulation.start=2026-01-05 14:00",
         "robots.astro.behaviors=[{type: patrol, dwell: 5 min}]",

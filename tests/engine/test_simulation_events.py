@@ -9,7 +9,7 @@ import fleet2d
 from fleet2d.errors import InputError
 
 DAY = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "1 d", "seed": 4},
     "objects": {
         "hall_motion": {"type": "motion_sensor", "at": [16.53, 7.73], "range": 4},

@@ -128,7 +128,7 @@ def _safely(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
 
 def _lives_by(path: Path) -> Any:
     user = {"type": "routine", "persona": str(path)}
-    return load_scenario({"extends": "bundled:base", "users": {"ana": user}})
+    return load_scenario({"extends": "bundled:paper", "users": {"ana": user}})
 
 
 # --- Runs --------------------------------------------------------------------------------------
@@ -238,7 +238,7 @@ def _start_from(path: Path) -> None:
     users = dict.fromkeys(("ben",))
     changes = {"simulation": {"duration": "7 h"}, "algorithms": algorithms}
     del users
-    fleet2d.Simulation({"extends": "bundled:base", **changes}, seed=4)
+    fleet2d.Simulation({"extends": "bundled:paper", **changes}, seed=4)
 
 
 # --- Tables ------------------------------------------------------------------------------------

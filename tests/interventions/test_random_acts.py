@@ -15,7 +15,7 @@ from fleet2d.errors import InputError
 from fleet2d.interventions.intervention import verbs
 
 KEPT_OUT = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "30 min"},
     "script": [
         {"at": "1 min", "keep_out": "astro", "of": "kitchen", "duration": "10 min"},
@@ -56,7 +56,7 @@ def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
     days = [{"on": "daily", "items": [{"at": "00:00", "place": "kitchen", "activity": "cook"}]}]
     other = [{"on": "daily", "items": [{"at": "00:00", "place": "office", "activity": "work"}]}]
     content = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "20 min"},
         "users": {"ana": {"type": "schedule", "days": days}},
         "script": [

@@ -88,7 +88,7 @@ def test_picture_says_what_was_run(tmp_path: Path) -> None:
     assert run.digest is not None
     words = words_drawn(run, tmp_path)
     for fact in (
-        "base",
+        "paper",
         "2 days in family_home",
         "seed 4",
         run.digest[:12],

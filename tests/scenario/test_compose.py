@@ -202,7 +202,7 @@ def test_extending_what_is_not_there_is_refused(
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("source", [None, "bundled:base", {"extends": "bundled:base"}])
+@pytest.mark.parametrize("source", [None, "bundled:paper", {"extends": "bundled:paper"}])
 def test_bundled_scenario_is_found_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: Any
 ) -> None:

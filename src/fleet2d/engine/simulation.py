@@ -80,7 +80,7 @@ class Simulation(InterventionMethods):
     Example:
         >>> import copy
         >>> from datetime import timedelta
-        >>> simulation = Simulation("bundled:base", "simulation.duration=1 d", seed=4)
+        >>> simulation = Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
         >>> simulation.run_until(timedelta(hours=12))
         >>> futures = [copy.deepcopy(simulation).run() for _ in range(2)]
         >>> futures[0].digest == futures[1].digest

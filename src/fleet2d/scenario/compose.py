@@ -51,7 +51,7 @@ def compose(
     Raises:
         ScenarioError: a file or an override can't be read.
     """
-    document = _load("bundled:base" if source is None else source, Path(), (), [])
+    document = _load("bundled:paper" if source is None else source, Path(), (), [])
     changes = [_read_override(text) for text in overrides]
     for keys, value in (settings or {}).items():
         changes.append(assignment(keys, value, f"argument {keys[-1]}={value!r}"))

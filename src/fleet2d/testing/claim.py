@@ -464,7 +464,7 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
 
     Example:
         >>> from fleet2d.testing import trial
-        >>> @trial("bundled:base", "simulation.duration=1 h", seeds=20, holds=0.8)
+        >>> @trial("bundled:paper", "simulation.duration=1 h", seeds=20, holds=0.8)
         ... def test_robot_moves(trial):
         ...     before = trial.state["astro"]
         ...     trial.run_until("00:50")

@@ -67,7 +67,7 @@ def test_forecasts_begin_with_the_present_belief() -> None:
 def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
     routine = {"type": "rtp", "model": "routine"}
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=5 d",
         "floorplan={type: synthetic, seed: 77, furnish: true}",
         "robots.astro.behaviors=[{type: patrol, order: random, dwell: 10 min}]",
@@ -90,7 +90,7 @@ def test_it_is_calibrated_in_unseen_homes_with_unseen_people() -> None:
         "households": [["works_from_home"], ["night_shift"]],
     }
     base = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": {"days": 3}},
         "robots": {
             "astro": {"behaviors": [{"type": "patrol", "order": "random", "dwell": "10 min"}]}
