@@ -90,7 +90,7 @@ class Put(BodyIntervention):
         """
         actor = self.actor(world)
         x, y = self._place(actor, world)
-        if actor.space.part_at(x, y) < 0:
+        if actor.whole_space.part_at(x, y) < 0:
             x_m, y_m = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
             raise PlacementError(
                 f"{actor.path}: there is no room for its body at ({x_m:g}, {y_m:g}) m"
