@@ -1,4 +1,4 @@
-"""What a month is spent on: seconds of the bundled scenario by part, in a warm process.
+"""What a month is spent on: seconds of a scenario by part, in a warm process.
 
     python benchmarks/profile_month.py [SCENARIO] [--runs 5]
 

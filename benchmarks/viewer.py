@@ -3,8 +3,8 @@
     python benchmarks/viewer.py [RUN_DIR ...]
     python benchmarks/viewer.py --crowd --year
 
-Without a run, one of a robot and five users over thirty days is simulated first; `--crowd` adds one
-of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the base scenario over a year. At the
+Without a run, one of a robot and five users over thirty days is simulated first; `--crowd` adds
+one of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the paper's over a year. At the
 end, what has a limit is printed as a table. Needs Chromium at /usr/bin/chromium and the extra
 `test`.
 """

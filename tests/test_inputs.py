@@ -74,7 +74,9 @@ def test_a_pipe_in_place_of_a_checked_file_is_refused(
     [
         load_scenario,
         lambda path: load_scenario("bundled:paper", f"floorplan={{type: native, path: {path}}}"),
-        lambda path: load_scenario("bundled:paper", f"users.ana={{type: routine, persona: {path}}}"),
+        lambda path: load_scenario(
+            "bundled:paper", f"users.ana={{type: routine, persona: {path}}}"
+        ),
         lambda path: load_scenario("bundled:paper", f"users.ana={{type: replay, path: {path}}}"),
         load_floorplan,
         read_detections,

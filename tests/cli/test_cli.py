@@ -138,10 +138,12 @@ def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d: Cl
     assert ["home-001", "home-002", "home-003", "home-005", "quiet_week-001"] == names
 
 
-def test_without_a_scenario_the_base_scenario_runs_changed_as_told(fleet2d: Cli) -> None:
+def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d: Cli) -> None:
     arguments = [
         "simulation.duration.days=1",
-        "users.ana=null",
+        "users={}",
+        "script=[]",
+        "interactions={}",
         "--seed",
         "7",
         "--json",
@@ -190,7 +192,7 @@ def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
     for word in ("wrong", "1 user", "1 robot", "flat", "150 steps of 2 s", "2026-01-05 07:00"):
         assert word in out
     assert ["home.yaml"] == [path.name for path in Path().iterdir()]
-    assert 0 == fleet2d("validate")[0]
+    assert 0 == fleet2d("validate", "bundled:paper")[0]
 
 
 def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d: Cli) -> None:

@@ -208,7 +208,9 @@ class Never(fleet2d.Interrupt):
 def half_a_run(name: str) -> package.Simulation:
     """A driven robot whose plan waits for an interrupt; the file in which it is isn't loaded."""
     Path("theirs.py").write_text(INTERRUPT)
-    simulation = package.Simulation("simulation.duration=20 min", seed=4, out="half")
+    simulation = package.Simulation(
+        "bundled:paper", "simulation.duration=20 min", seed=4, out="half"
+    )
     simulation.drive("astro")
     simulation.decide("astro", simulation.plan("astro").stay().interrupt_on("home_empty"))
     simulation.advance(200)

@@ -1,6 +1,6 @@
 """Robots that act on what they learn: the same run however it is computed, and nobody else changed.
 
-The bundled base (long-term presence, and a robot that hangs out by it), with real-time presence and
+The paper's scenario (long-term presence, and a robot that hangs out by it), with real-time presence and
 a search by it on top: what is learned decides where the robot goes, and that what is learned.
 """
 

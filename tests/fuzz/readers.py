@@ -164,7 +164,9 @@ def _unfinished() -> dict[str, bytes]:
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
-        run = fleet2d.Simulation("simulation.duration=2 h", seed=4, out=f"{folder}/run")
+        run = fleet2d.Simulation(
+            "bundled:paper", "simulation.duration=2 h", seed=4, out=f"{folder}/run"
+        )
         run.advance(4000)
         run.finish()
         root = Path(folder) / "run"

@@ -197,7 +197,7 @@ def test_no_run_begins_that_could_not_be_opened(
     monkeypatch.setattr(store, "FILE_BYTES", Bound("FILE_BYTES", 1000, "bytes"))
 
     with pytest.raises(RunDirectoryError, match=r"month/manifest\.json has \d+ bytes, and at most"):
-        fleet2d.run("simulation.duration=1h", seed=1, out=tmp_path / "month")
+        fleet2d.run("bundled:paper", "simulation.duration=1h", seed=1, out=tmp_path / "month")
     assert not (tmp_path / "month").exists()
 
 

@@ -112,7 +112,10 @@ def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) 
         ("a: !!python/object/apply:os.system [x]\n", "bad.yaml:1: the tag .* can't be used here"),
         ("a: &a [*a]\n", "bad.yaml:1: a value can't contain itself"),
         ("a: [\n", "bad.yaml:2: not valid YAML: a value is missing"),
-        ("extends: bundled:paper\nsimulation: {duration: 100000 d}\n", "would take minutes or more"),
+        (
+            "extends: bundled:paper\nsimulation: {duration: 100000 d}\n",
+            "would take minutes or more",
+        ),
     ],
 )
 def test_a_wrong_file_is_told(place: Workspace, text: str, message: str) -> None:

@@ -268,7 +268,7 @@ def test_unfinished_run_is_shown_as_far_as_it_goes(copy: Path) -> None:
 def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: Path) -> None:
     out = tmp_path / "cut"
     simulation = fleet2d.Simulation(
-        "simulation.duration=6 h", "artifacts.checkpoint=1 h", seed=4, out=out
+        "bundled:paper", "simulation.duration=6 h", "artifacts.checkpoint=1 h", seed=4, out=out
     )
     simulation.advance(4 * 3600)
     copied = shutil.copytree(out, tmp_path / "copied")  # as a crash would leave it

@@ -239,7 +239,7 @@ Arguments = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
-        help="A scenario (left out: the bundled base scenario), and changes to it.",
+        help="A scenario (left out: the bundled family), and changes to it.",
     ),
 ]
 

@@ -98,7 +98,7 @@ class Simulation(InterventionMethods):
         """Set up the run; with `out` it is stored in that directory, else in memory.
 
         Args:
-            scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
+            scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled family
                 scenario.
             overrides: Texts like 'simulation.duration.days=60'.
             out: Directory to store the run in; None keeps it in memory.
@@ -351,7 +351,7 @@ class Simulation(InterventionMethods):
 
         Example:
             >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=2 h", seed=4)
+            >>> simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4)
             >>> tables = []
             >>> simulation.listen_rows(lambda table, row: tables.append(table))
             >>> _ = simulation.run()
@@ -1026,7 +1026,7 @@ def run(
     """Run a scenario to its end.
 
     Args:
-        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
+        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled family
             scenario.
         overrides: Texts like 'simulation.duration.days=60'.
         out: Directory to store the run in; None keeps it in memory.
@@ -1038,7 +1038,7 @@ def run(
 
     Example:
         >>> import fleet2d
-        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> run = fleet2d.run("bundled:paper", "simulation.duration=2 h", seed=4)
         >>> run.manifest["steps"], run.tables["trajectories"].num_rows
         (7200, 4)
     """

@@ -129,7 +129,7 @@ class InterventionMethods(ABC):
 
         Example:
             >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
             >>> simulation.configure("astro", "hangout", tau="10 min")
             >>> simulation.advance()
             >>> simulation.actors["astro"].behaviors[-1].tau
