@@ -141,9 +141,7 @@ def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d: Cl
 def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d: Cli) -> None:
     arguments = [
         "simulation.duration.days=1",
-        "users={}",
-        "script=[]",
-        "interactions={}",
+        "metrics.ltp_error=null",
         "--seed",
         "7",
         "--json",
@@ -154,7 +152,10 @@ def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d: Cli) -> Non
     assert 0 == code
     summary = json.loads(out)
     assert (86400, 7) == (summary["steps"], summary["seed"])
-    assert {"users": [], "robots": ["astro"]} == package.open_run("run").manifest["entities"]
+    run = package.open_run("run")
+    assert {"users": ["ana", "ben", "cleo"], "robots": ["astro"]} == run.manifest["entities"]
+    assert "ltp_error" not in run.metrics
+    assert "sightings" in run.metrics
 
 
 def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:

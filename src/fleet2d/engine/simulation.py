@@ -486,7 +486,7 @@ class Simulation(InterventionMethods):
 
         Example:
             >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
             >>> simulation.run_until("19:00")
             >>> simulation.time.hour
             19
