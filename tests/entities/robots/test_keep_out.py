@@ -2,10 +2,9 @@
 
 from typing import Any
 
-import numpy as np
 import pytest
-from tests.entities.robots.robots import assert_same_for_every_max_span, names
-from tests.scenes import path, run, scenario
+from tests.entities.robots.robots import assert_same_for_every_max_span, names, rooms_of
+from tests.scenes import run, scenario
 
 import fleet2d
 from fleet2d.errors import PlacementError
@@ -26,17 +25,6 @@ def flat(*behaviors: Any, keep_out: Any = (), duration: str = "1 h", **sections:
         **sections.pop("astro", {}),
     }
     return scenario(duration, robots={"astro": astro}, **sections)
-
-
-def rooms_of(stored: Run, entity: str = "astro") -> list[str]:
-    """The room that a body is in at each step."""
-    poses = path(stored, entity)
-    points = np.stack([poses.x, poses.y], axis=1)
-    known = {}
-    for xy in map(tuple, np.unique(points, axis=0).tolist()):
-        room = stored.plan.room_at(*xy)
-        known[xy] = "" if room is None else room.name
-    return [known[xy] for xy in map(tuple, points.tolist())]
 
 
 BEHAVIORS: dict[str, list[dict[str, Any]]] = {
