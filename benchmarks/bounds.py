@@ -111,7 +111,7 @@ def least(do: Callable[[], object], times: int, *, imported: bool = False) -> fl
     if imported:
         from fleet2d.scenario.model import load_scenario
 
-        load_scenario(None)
+        load_scenario("bundled:paper")
     found = []
     for _ in range(times):
         began = time.process_time()
@@ -129,10 +129,10 @@ def least_of_both(
 
 
 def run(*overrides: str, **settings: Any) -> object:
-    """Run the base scenario."""
+    """Run the paper's scenario."""
     import fleet2d
 
-    return fleet2d.run(None, *overrides, **settings)
+    return fleet2d.run("bundled:paper", *overrides, **settings)
 
 
 def robots(count: int) -> list[str]:
@@ -144,7 +144,9 @@ def users(count: int) -> list[str]:
     """Return overrides that add users like the first, up to a number."""
     import fleet2d
 
-    first = next(iter(fleet2d.Simulation(None, "simulation.duration=1 h").scenario.users))
+    first = next(
+        iter(fleet2d.Simulation("bundled:paper", "simulation.duration=1 h").scenario.users)
+    )
     return _copies("users", first, count)
 
 
@@ -163,7 +165,7 @@ def requests(behavior: str) -> list[str]:
 def _copies(bucket: str, name: str, count: int) -> list[str]:
     import fleet2d
 
-    content = fleet2d.Simulation(None, "simulation.duration=1 h").scenario.resolved()
+    content = fleet2d.Simulation("bundled:paper", "simulation.duration=1 h").scenario.resolved()
     one = json.dumps(content[bucket][name])
     return [f"{bucket}.{name}_{i}={one}" for i in range(1, count)]
 

@@ -50,7 +50,7 @@ def source(
         "households": [["works_outside"], ["retired"], ["student", "child"]],
     }
     base = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": {"days": days}},
         "robots": {"astro": ROBOTS[robot]},
         **algorithms,

@@ -18,7 +18,7 @@ from fleet2d.runs.run import Run
 
 NEAR_M = (0.75, 0.35)
 SCENARIO = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "floorplan": {"furnish": True},
     "users": {
         "ana": {"type": "routine", "persona": "works_from_home"},

@@ -73,7 +73,7 @@ def live(days: int, answers: str, policy: tuple[float, float], seed: int) -> Log
     offer = {"do": "greet", "to": "ana", "every": "1 h", "within": "59 min", "tries": 1}
     run = fleet2d.run(
         {
-            "extends": "bundled:base",
+            "extends": "bundled:paper",
             "simulation": {"duration": {"days": days}, "seed": seed},
             "users": {"ana": {"persona": "retired", "answers": ANSWERS[answers]}},
             "robots": {"astro": {"behaviors": behaviors}},

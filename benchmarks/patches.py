@@ -34,7 +34,7 @@ def shares(seed: int, days: int) -> Shares:
         for name in ESTIMATORS
     }
     content = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": {"days": days}, "seed": seed},
         "robots": {"astro": {"behaviors": [ROUNDS]}},
         "algorithms": {"ltp": None, **algorithms},

@@ -75,15 +75,15 @@ def month(perception: dict[str, Any] | None, **look: Any) -> dict[str, Any]:
     robot: dict[str, Any] = {"camera": {**CAMERA, **look}}
     if perception is not None:
         robot["perception"] = copy.deepcopy(perception)
-    return {"extends": "bundled:base", "robots": {"astro": robot}}
+    return {"extends": "bundled:paper", "robots": {"astro": robot}}
 
 
 def cases() -> dict[str, dict[str, Any]]:
     """Return what is compared; the first is the bare month, `fleet2d run` as it is."""
     parts = {f"only {key}": month({key: part}) for key, part in FULL.items()}
     return {
-        "the bundled month as it is": {"extends": "bundled:base"},
-        "only heights": {"extends": "bundled:base", "sight": {"heights": True}},
+        "the bundled month as it is": {"extends": "bundled:paper"},
+        "only heights": {"extends": "bundled:paper", "sight": {"heights": True}},
         "only period, latency and 8 body points": month(None, **LOOK),
         "the same, with heights": {**month(None, **LOOK), "sight": {"heights": True}},
         **parts,

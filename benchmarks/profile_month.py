@@ -1,4 +1,4 @@
-"""What a month is spent on: seconds of the bundled scenario by part, in a warm process.
+"""What a month is spent on: seconds of a scenario by part, in a warm process.
 
     python benchmarks/profile_month.py [SCENARIO] [--runs 5]
 
@@ -96,7 +96,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("scenario", nargs="?", default="bundled:base")
+    parser.add_argument("scenario", nargs="?", default="bundled:paper")
     parser.add_argument("--runs", type=int, default=5)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:

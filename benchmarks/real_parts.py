@@ -33,9 +33,9 @@ BODIES = ("ana", "ben", "cora", "dan")
 
 
 def base(days: int, **content: Any) -> dict[str, Any]:
-    """Return the bundled scenario with changes."""
+    """Return the paper's scenario with changes."""
     settings = {"duration": {"days": days}, "seed": 4}
-    return {"extends": "bundled:base", "simulation": settings, **content}
+    return {"extends": "bundled:paper", "simulation": settings, **content}
 
 
 def detections(path: Path, count: int, days: int) -> Path:

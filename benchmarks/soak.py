@@ -30,9 +30,11 @@ def held_mb() -> float:
 
 def years(count: int, folder: Path) -> None:
     """A month, and then years in one run: its memory should be a month's."""
-    fleet2d.run("simulation.duration=30 d", seed=4, out=folder / "month")
+    fleet2d.run("bundled:paper", "simulation.duration=30 d", seed=4, out=folder / "month")
     month, began = peak_mb(), time.process_time()
-    run = fleet2d.run(f"simulation.duration={365 * count} d", seed=4, out=folder / "years")
+    run = fleet2d.run(
+        "bundled:paper", f"simulation.duration={365 * count} d", seed=4, out=folder / "years"
+    )
     took = time.process_time() - began
     size = sum(path.stat().st_size for path in (folder / "years").rglob("*") if path.is_file())
     print(
@@ -46,7 +48,9 @@ def runs(count: int, folder: Path) -> None:
     begins: list[tuple[int, float]] = []
     began = time.process_time()
     for number in range(count):
-        fleet2d.run("simulation.duration=10 min", seed=number, out=folder / str(number))
+        fleet2d.run(
+            "bundled:paper", "simulation.duration=10 min", seed=number, out=folder / str(number)
+        )
         if number in (count // 10, count - 1):
             gc.collect()
             begins.append((number, held_mb()))
@@ -62,7 +66,7 @@ def people(count: int, days: int, folder: Path) -> None:
     """A crowd in one home."""
     users = {f"user{n}": {"type": "room_sampling"} for n in range(count)}
     scenario = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": f"{days} d", "seed": 4},
         "users": {"ana": None, **users},
         "algorithms": {"ltp": None},

@@ -35,7 +35,7 @@ from fleet2d.studies.records import VariantRecord, record_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
-HOUR = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+HOUR = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
 
 
 class InstantExecutor:

@@ -3,8 +3,8 @@
     python benchmarks/viewer.py [RUN_DIR ...]
     python benchmarks/viewer.py --crowd --year
 
-Without a run, one of a robot and five users over thirty days is simulated first; `--crowd` adds one
-of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the base scenario over a year. At the
+Without a run, one of a robot and five users over thirty days is simulated first; `--crowd` adds
+one of 50 users and 10 robots in 1,049 m² over 14 days, `--year` the paper's over a year. At the
 end, what has a limit is printed as a table. Needs Chromium at /usr/bin/chromium and the extra
 `test`.
 """
@@ -133,13 +133,13 @@ def main() -> None:
         if not runs:
             people = {name: {"type": "routine"} for name in ("ana", "ben", "cleo", "dan", "eva")}
             runs = [Path(folder) / "month"]
-            fleet2d.run("bundled:base", seed=4, users=people, out=runs[0])
+            fleet2d.run("bundled:paper", seed=4, users=people, out=runs[0])
         if options.crowd:
             runs.append(Path(folder) / "crowd")
             fleet2d.run(crowd_scenario(Path(folder)), out=runs[-1])
         if options.year:
             runs.append(Path(folder) / "year")
-            fleet2d.run("bundled:base", "simulation.duration=365 d", seed=4, out=runs[-1])
+            fleet2d.run("bundled:paper", "simulation.duration=365 d", seed=4, out=runs[-1])
         for run in runs:
             measure_page(browser, run)
         measure_live(browser)
@@ -189,7 +189,7 @@ def measure_page(browser: Any, run: Path) -> None:
 
 def measure_live(browser: Any) -> None:
     live = LiveRun(
-        fleet2d.Simulation("bundled:base", "simulation.duration=10 d", seed=4), paused=True
+        fleet2d.Simulation("bundled:paper", "simulation.duration=10 d", seed=4), paused=True
     )
     live.start()
     server = PageServer([], live=live)

@@ -30,7 +30,7 @@ class Errand(Behavior):
 def main() -> None:
     """Run a day, branch it in the afternoon, and tell which room was best."""
     robot = {"behaviors": [Errand()], "camera": {"angle_deg": 360}}
-    history = Simulation("simulation.duration.days=1", robots={"astro": robot})
+    history = Simulation("bundled:paper", "simulation.duration.days=1", robots={"astro": robot})
     history.run_until(datetime(2026, 1, 5, 17, 0))
     print(f"{history.time:%A %H:%M}, the robot is in {history.state['astro']['room']}")
 

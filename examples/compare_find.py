@@ -26,6 +26,7 @@ def main() -> None:
     """Look for Ana by every policy at every call; print a row for each policy."""
     behaviors = [{**FIND, "deadline": DEADLINE}, {"type": "hangout", "source": "ltp"}]
     history = Simulation(
+        "bundled:paper",
         f"simulation.duration={DAYS.stop} d",
         seed=4,
         users={"ana": {"persona": "works_from_home"}},

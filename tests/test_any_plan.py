@@ -18,7 +18,7 @@ def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
             f"floorplan.path={plan}",
             "simulation.duration=1 d",
         )
-        run = fleet2d.run(None, *overrides)
+        run = fleet2d.run("bundled:paper", *overrides)
         shares = run.metrics["room_share"]["ana"]
         assert sum(shares.values()) == pytest.approx(1)
         assert 0.3 < shares["away"] < 0.5, plan.name  # it is a working day
@@ -36,7 +36,7 @@ def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
         overrides = (
             f"floorplan.type={kind}", f"floorplan.path={path}", "simulation.duration=1 d",
         )  # fmt: skip
-        run = fleet2d.run(None, *overrides)
+        run = fleet2d.run("bundled:paper", *overrides)
         shares = run.metrics["room_share"]["ana"]
         assert sum(shares.values()) == pytest.approx(1)
         assert len(shares) >= 2, path
@@ -52,7 +52,7 @@ def test_a_furnished_synthetic_home_is_lived_in_for_a_day(seed: int, area: int) 
     users = {name: {"type": "routine", "persona": kind} for name, kind in personas.items()}
     simulation = {"duration": "1 d", "start": "2026-01-05", "seed": seed}
     content = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": simulation,
         "floorplan": floorplan,
         "users": users,

@@ -348,7 +348,7 @@ def test_no_message_echoes_more_than_a_line(override: str) -> None:
 )
 def test_wrong_values_from_python_are_no_tracebacks(settings: dict[str, Any]) -> None:
     with pytest.raises(InputError):
-        load_scenario(None, **settings)
+        load_scenario("bundled:paper", **settings)
 
 
 def test_a_large_manifest_is_not_read(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels import SUB, TURN
-from fleet2d.routines.persona import Manners, bundled_names
+from fleet2d.routines.persona import Manners
 from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.claim import rate_test
 
@@ -49,7 +49,7 @@ def names(cell: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def day() -> fleet2d.Run:
-    return fleet2d.run("simulation.duration=1 d", seed=4)
+    return fleet2d.run("bundled:paper", "simulation.duration=1 d", seed=4)
 
 
 # The scenario file
@@ -83,7 +83,7 @@ def test_only_the_duration_and_the_floor_plan_are_required() -> None:
 
 
 def test_durations_in_mappings_merge_and_as_text_replace() -> None:
-    base = {"extends": "bundled:base"}
+    base = {"extends": "bundled:paper"}
     merged = fleet2d.load_scenario({**base, "simulation": {"duration": {"hours": 2}}})
     assert timedelta(days=30, hours=2) == merged.simulation.duration
     replaced = fleet2d.load_scenario({**base, "simulation": {"duration": "2 h"}})
@@ -102,7 +102,10 @@ def test_the_lattice_and_headings_have_the_sizes_of_the_page() -> None:
 
 def test_a_run_has_as_many_full_steps_as_fit() -> None:
     assert (
-        3 == fleet2d.load_scenario(None, "simulation={duration: 25 s, step: 7 s}").simulation.steps
+        3
+        == fleet2d.load_scenario(
+            "bundled:paper", "simulation={duration: 25 s, step: 7 s}"
+        ).simulation.steps
     )
 
 
@@ -124,7 +127,7 @@ def test_columns_of_the_stored_tables_are_those_of_the_page(day: fleet2d.Run) ->
 def test_columns_with_the_truth_are_there_if_a_camera_can_err() -> None:
     cells = next(c for c in rows(page("artifacts"), "| column | unit | |") if "entity" in c[0])
     assert cells
-    erring = run({"extends": "bundled:base"}, "simulation.duration=3 h",
+    erring = run({"extends": "bundled:paper"}, "simulation.duration=3 h",
                  "robots.astro.perception={attributes: {range_noise: 5 cm, activity: {}}}", seed=4)  # fmt: skip
     columns = set(erring.tables["observations"].column_names)
     part = page("artifacts")
@@ -140,14 +143,6 @@ def test_keys_of_the_manifest_are_those_of_the_page(day: fleet2d.Run) -> None:
     said = {name for cells in rows(part, "| key | |") for name in names(cells[0])}
     assert said - {"resumed", "seal"} <= set(day.manifest) | {"seal"}
     assert set(day.manifest) <= said
-
-
-def test_the_readme_names_the_tables_of_the_bundled_scenario(day: fleet2d.Run) -> None:
-    text = page("README")
-    listed = re.search(r"Parquet file per table \(([^)]*)\)", text)
-    assert listed is not None
-    assert set(day.tables) == set(names(listed[1]))
-    assert {7: "seven"}[len(bundled_names())] in text
 
 
 # Behaviors, algorithms, layers, reactions
@@ -194,7 +189,9 @@ def test_manners_have_their_defaults() -> None:
 
 
 def test_json_has_the_keys_of_the_page(fleet2d: Cli) -> None:
-    code, out, _ = fleet2d("run", "simulation.duration=10 min", "--json", "--out", "ten")
+    code, out, _ = fleet2d(
+        "run", "bundled:paper", "simulation.duration=10 min", "--json", "--out", "ten"
+    )
     shown = re.search(r"```json\n(\{.*?\})\n```", page("cli"), re.DOTALL)
     assert shown is not None
     printed, said = yaml.safe_load(out), yaml.safe_load(shown[1])
@@ -216,7 +213,7 @@ def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(
 @pytest.mark.slow
 def test_the_bundled_month_is_as_the_pages_say() -> None:
     """Its error of presence after the month, and the rounds that the robot makes."""
-    month = run({"extends": "bundled:base"})
+    month = run({"extends": "bundled:paper"})
     said = re.search(r"printed by `fleet2d run`: (0\.\d+) after the month", page("presence"))
     assert said is not None
     assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -136,22 +135,6 @@ def test_patrols_that_stop_where_they_see_err_as_the_page_says(
         assert all(map(agrees, said, values)), (stops, values)
         errors.append(of_it.filter(of_it["home"].str.contains("6951eec7"))[error.name].item())
     assert ["0.450", "0.013"] == [f"{error:.3f}" for error in errors]
-
-
-def test_the_robot_of_the_readme_sees_her_as_often_as_it_says_and_enters_no_bedroom(
-    tmp_path: Path,
-) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    scenario = text.split("```yaml title=home.yaml\n")[1].split("```")[0]
-    (tmp_path / "home.yaml").write_text(scenario, encoding="utf-8")
-    run = fleet2d.run(tmp_path / "home.yaml")
-    said = re.search(r"sees Ana during (\d+) % of her time", text)
-    assert said is not None
-    assert said[1] == f"{100 * run.metrics['sightings']['ana']:.0f}"
-
-    private = [r.index for r in fleet2d.load_floorplan().rooms if r.type in {"bedroom", "bathroom"}]
-    path = run.path("astro", every=timedelta(seconds=1))
-    assert not np.isin(path.room, private).any()
 
 
 def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path: Path) -> None:

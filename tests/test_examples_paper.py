@@ -237,8 +237,13 @@ def test_every_row_of_the_paper_is_there(shared_data: Path) -> None:
     real = shared_data / "ros_maps" / "aws_small_house" / "map.yaml"
     mapped = {row["case"]: row for row in paper.rows(PaperOptions(map=real), 30)}
     for row in mapped.values():
-        assert load_scenario(None, *row["overrides"]) is not None
-    assert "ros" == load_scenario(None, *mapped["real-world map"]["overrides"]).floorplan.type_name
+        assert load_scenario("bundled:paper", *row["overrides"]) is not None
+    assert (
+        "ros"
+        == load_scenario(
+            "bundled:paper", *mapped["real-world map"]["overrides"]
+        ).floorplan.type_name
+    )
 
 
 def test_a_map_that_cannot_be_read_says_so() -> None:

@@ -19,7 +19,7 @@ from fleet2d.floorplan.load import load_floorplan
 from fleet2d.inputs import input_path, open_input, resolved, sha256_of_file, within
 from fleet2d.scenario.model import load_scenario
 
-BASE = "extends: bundled:base\nsimulation: {duration: 1 min}\n"
+BASE = "extends: bundled:paper\nsimulation: {duration: 1 min}\n"
 
 
 # --- What is no file -----------------------------------------------------------------------------
@@ -84,9 +84,11 @@ def test_a_link_in_place_of_a_checked_file_is_not_followed(
     "read",
     [
         load_scenario,
-        lambda path: load_scenario("bundled:base", f"floorplan={{type: native, path: {path}}}"),
-        lambda path: load_scenario("bundled:base", f"users.ana={{type: routine, persona: {path}}}"),
-        lambda path: load_scenario("bundled:base", f"users.ana={{type: replay, path: {path}}}"),
+        lambda path: load_scenario("bundled:paper", f"floorplan={{type: native, path: {path}}}"),
+        lambda path: load_scenario(
+            "bundled:paper", f"users.ana={{type: routine, persona: {path}}}"
+        ),
+        lambda path: load_scenario("bundled:paper", f"users.ana={{type: replay, path: {path}}}"),
         load_floorplan,
         read_detections,
         fleet2d.Simulation.load,
@@ -133,7 +135,7 @@ def test_links_inside_of_a_root_and_the_package_are_read(tmp_path: Path) -> None
 
     with within(tmp_path):
         open_input(tmp_path / "link").close()
-        assert list(load_scenario("bundled:base").users) == ["ana"]
+        assert list(load_scenario("bundled:paper").users) == ["ana"]
 
 
 @pytest.mark.parametrize("name", ["a\0b", "\ud800"])
@@ -221,7 +223,7 @@ def root(tmp_path: Path) -> Path:
 
 EXTENDED = [
     "extends: ../secrets/s.yaml", "extends: link.yaml", "extends: link/s.yaml", "extends: key.json",
-    "extends: [bundled:base, extends.json]", "extends: passwd.json", "extends: /etc/passwd",
+    "extends: [bundled:paper, extends.json]", "extends: passwd.json", "extends: /etc/passwd",
     "extends: ../secrets/../secrets/s.yaml", "extends: 'bundled:../../../../../../../etc/passwd'",
     "extends: ../secrets",
 ]  # fmt: skip
@@ -280,7 +282,7 @@ def test_nothing_outside_of_a_root_is_opened(root: Path, text: str) -> None:
 
 
 def test_the_same_is_opened_without_a_root(root: Path) -> None:
-    (root / "home.yaml").write_text("extends: [bundled:base, extends.json]")
+    (root / "home.yaml").write_text("extends: [bundled:paper, extends.json]")
 
     with recorded() as opened:
         assert "zara_secret" in load_scenario(root / "home.yaml").users

@@ -150,7 +150,9 @@ def test_known_failure_02_no_direction_falls_into_a_gap(place: tuple[float, floa
 @pytest.mark.slow
 def test_known_failure_02_ten_days_run_to_their_end() -> None:
     """The shipped 30-day example dies on day 8.75."""
-    stored = fleet2d.run(None, "simulation.duration.days=10", users={"ben": {"type": "meander"}})
+    stored = fleet2d.run(
+        "bundled:paper", "simulation.duration.days=10", users={"ben": {"type": "meander"}}
+    )
     assert ("complete", 10 * 86400) == (stored.status, stored.manifest["steps"])
 
 

@@ -133,7 +133,7 @@ def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(
 
     log = shared_data / "activity" / "uci_adl_a"
     content = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"start": "2011-11-28", "duration": {"days": 13}},
     }
     persona, errors = tmp_path / "persona.yaml", {}

@@ -19,7 +19,7 @@ from fleet2d.viewer.page_data import PageData, embedded_run
 
 TARGET = Path(__file__).parents[1] / "page" / "test" / "run.json"
 SCENARIO: dict[str, Any] = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": {"days": 1}, "seed": 11},
     "floorplan": {"layers": {"explored": {}}},
     "objects": {

@@ -55,6 +55,7 @@ def main() -> None:
     }
     for name, behavior in behaviors.items():
         run = fleet2d.run(
+            "bundled:paper",
             "simulation.duration=7 d",
             seed=4,
             users={"ana": {"persona": "retired"}},

@@ -340,7 +340,7 @@ def time_frames(period_s: int, count: int, from_hour: int = 0) -> dict[str, Any]
     """
     first = from_hour * HOUR_S
     end = first + count * period_s
-    watched = fleet2d.run("bundled:base", f"simulation.duration={end} s", seed=4)
+    watched = fleet2d.run("bundled:paper", f"simulation.duration={end} s", seed=4)
     start_s = time.perf_counter()
     with drawing_style():
         stage = stage_of(watched, first, end, period_s)

@@ -15,7 +15,7 @@ def table(run: Run) -> dict[str, Any]:
 
 def simulated(*overrides: str, **settings: Any) -> Run:
     return fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=6 h",
         "simulation.start=2026-01-05 06:00",
         "robots.astro.behaviors=[{type: patrol, dwell: 10 min}]",

@@ -31,7 +31,7 @@ class SightingsOfRooms(Algorithm):
 
 def scenario(command: Path, **settings: Any) -> dict[str, Any]:
     return {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "12 h", "seed": 4},
         "algorithms": {
             "share": {"type": "process", "command": str(command), "period": "1 h"} | settings
@@ -223,7 +223,7 @@ def test_a_program_that_is_not_trusted_does_not_run() -> None:
 
 def robots(command: Path) -> dict[str, Any]:
     return {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "2 h", "seed": 4},
         "robots": {"astro": {"behaviors": [{"type": "process", "command": str(command)}]}},
     }

@@ -11,7 +11,7 @@ from fleet2d.errors import InputError
 
 def scenario(path: Path, **settings: Any) -> dict[str, Any]:
     return {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "4 h", "seed": 4},
         "algorithms": {
             "ltp": {"type": "replay", "path": str(path), "period": "1 h"} | settings,
@@ -50,7 +50,7 @@ def test_the_newest_shares_are_put_out(tmp_path: Path) -> None:
 
 
 def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
-    content = {"extends": "bundled:base", "simulation": {"duration": "4 h", "seed": 4}}
+    content = {"extends": "bundled:paper", "simulation": {"duration": "4 h", "seed": 4}}
     content["algorithms"] = {"ltp": {"type": "ltp", "period": "1 h"}}
     first = fleet2d.run(content, out=tmp_path / "first")
 

@@ -138,10 +138,10 @@ def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d: Cl
     assert ["home-001", "home-002", "home-003", "home-005", "quiet_week-001"] == names
 
 
-def test_without_a_scenario_the_base_scenario_runs_changed_as_told(fleet2d: Cli) -> None:
+def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d: Cli) -> None:
     arguments = [
         "simulation.duration.days=1",
-        "users.ana=null",
+        "metrics.ltp_error=null",
         "--seed",
         "7",
         "--json",
@@ -152,7 +152,10 @@ def test_without_a_scenario_the_base_scenario_runs_changed_as_told(fleet2d: Cli)
     assert 0 == code
     summary = json.loads(out)
     assert (86400, 7) == (summary["steps"], summary["seed"])
-    assert {"users": [], "robots": ["astro"]} == package.open_run("run").manifest["entities"]
+    run = package.open_run("run")
+    assert {"users": ["ana", "ben", "cleo"], "robots": ["astro"]} == run.manifest["entities"]
+    assert "ltp_error" not in run.metrics
+    assert "sightings" in run.metrics
 
 
 def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:
@@ -190,7 +193,7 @@ def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
     for word in ("wrong", "1 user", "1 robot", "flat", "150 steps of 2 s", "2026-01-05 07:00"):
         assert word in out
     assert ["home.yaml"] == [path.name for path in Path().iterdir()]
-    assert 0 == fleet2d("validate")[0]
+    assert 0 == fleet2d("validate", "bundled:paper")[0]
 
 
 def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d: Cli) -> None:
@@ -222,7 +225,7 @@ def test_the_schema_is_valid_and_says_which_it_is(fleet2d: Cli, schema: dict[str
 
 def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> None:
     validator = jsonschema.validators.validator_for(schema)(schema)
-    base = read_document(bundled_path("base")).data
+    base = read_document(bundled_path("paper")).data
     for content in (base, small(), everything()):
         plain = json.loads(json.dumps(content, default=str))
         assert [] == [error.message for error in validator.iter_errors(plain)]

@@ -48,7 +48,7 @@ def modules() -> str:
     return ",".join(sorted(OTHERS.get(name, name) for name in names))
 
 
-SCENARIO = {"extends": "bundled:base", "simulation": {"duration": "5 min"}}
+SCENARIO = {"extends": "bundled:paper", "simulation": {"duration": "5 min"}}
 FILES: dict[str, Any] = {
     "home.yaml": SCENARIO,
     "network.yaml": {
@@ -95,7 +95,7 @@ LACKING = [
     ("export run run.mp4", "av", "film"),
     ("export run report.html --format report", "", "viz"),
     ("show run --out run.png", "", "viz"),
-    ("show bundled:base --out plan.png", "", "viz"),
+    ("show bundled:paper --out plan.png", "", "viz"),
     ("export run run.mcap", "", "ros"),
     ("export run bag", "", "ros"),
     ("export run run.rrd", "", "rerun"),

@@ -210,7 +210,9 @@ class Never(fleet2d.Interrupt):
 def half_a_run(name: str) -> package.Simulation:
     """A driven robot whose plan waits for an interrupt; the file in which it is isn't loaded."""
     Path("theirs.py").write_text(INTERRUPT)
-    simulation = package.Simulation("simulation.duration=20 min", seed=4, out="half")
+    simulation = package.Simulation(
+        "bundled:paper", "simulation.duration=20 min", seed=4, out="half"
+    )
     simulation.drive("astro")
     simulation.do(
         Decide("astro", data_of(simulation.plan("astro").stay().interrupt_on("home_empty")))
@@ -300,7 +302,7 @@ def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(
     fleet2d: Cli, tmp_path: Path
 ) -> None:
     """A forged manifest may extend a file that names the code."""
-    package.run("bundled:base", "simulation.duration=1 min", seed=4, out="run")
+    package.run("bundled:paper", "simulation.duration=1 min", seed=4, out="run")
     path = Path("run/manifest.json")
     manifest = json.loads(path.read_text())
     manifest["scenario"]["extends"] = f"{tmp_path}/home.yaml"

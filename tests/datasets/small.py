@@ -6,7 +6,7 @@ from typing import Any
 SOURCE: dict[str, Any] = {
     "name": "small",
     "base": {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"start": "2026-01-05 15:00", "duration": "6 h"},
         "robots": {"astro": {"behaviors": [{"type": "patrol", "dwell": "5 min"}]}},
     },

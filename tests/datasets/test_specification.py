@@ -8,7 +8,7 @@ import pytest
 from fleet2d.datasets.specification import plan_dataset
 from fleet2d.errors import InputError, ScenarioError
 
-BASE = {"extends": "bundled:base", "simulation": {"duration": "2 h"}}
+BASE = {"extends": "bundled:paper", "simulation": {"duration": "2 h"}}
 
 
 def split(runs: int, first: int, *households: Any) -> dict[str, Any]:
@@ -94,7 +94,7 @@ def test_axes_vary_each_run() -> None:
     [
         ({"splitz": {}}, "splits"),
         ({"splits": {}}, "splits"),
-        ({"base": "bundled:bass"}, "base"),
+        ({"base": "bundled:papr"}, "base"),
         ({"splits": {"train": split(1, 0, ["retird"])}}, "retired"),
         ({"splits": {"train": split(1, 0, ["retired"] * 9)}}, "household of 9"),
         ({"beliefs": ["routin"]}, "routine"),

@@ -35,7 +35,7 @@ def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path:
         name: {"runs": 1, "homes": [{"synthetic": 1, "first": k}], "households": [household]}
         for k, (name, household) in enumerate(people.items())
     }
-    base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+    base = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
     source = {"base": base, "splits": splits, "beliefs": ["routine", "learned"]}
 
     data = fleet2d.dataset(source, tmp_path / "made", workers=1)
@@ -50,7 +50,7 @@ def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path:
 @pytest.mark.slow
 def test_beliefs_without_a_label_of_their_time_are_not_scored(tmp_path: Path) -> None:
     people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
-    base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+    base = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
     source = {"base": base, "labels": "1 h", "splits": {"test": people}, "beliefs": ["routine"]}
 
     data = fleet2d.dataset(source, tmp_path / "made", workers=1)

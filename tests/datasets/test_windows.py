@@ -91,7 +91,7 @@ def test_windows_equal_those_of_the_model_in_the_loop() -> None:
     from fleet2d.datasets.training import predict
 
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=8 h",
         "simulation.start=2026-01-05 14:00",
         "robots.astro.behaviors=[{type: patrol, dwell: 5 min}]",
@@ -113,7 +113,7 @@ def test_windows_equal_those_of_the_model_in_the_loop() -> None:
 
 
 def test_a_run_without_the_tables_says_what_to_add() -> None:
-    run = fleet2d.run("simulation.duration=1 h", seed=1)
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=1)
     with pytest.raises(InputError, match="type: evidence_table"):
         windows_of_run(run)
 

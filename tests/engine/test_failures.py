@@ -256,7 +256,9 @@ def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(
 ) -> None:
     (tmp_path / "mine.py").write_text(USERS_OWN)
     override = "algorithms.broken.type=mine:Broken"
-    code, _, err = fleet2d("run", "simulation.duration=2 h", override, "--out", "out", "--quiet")
+    code, _, err = fleet2d(
+        "run", "bundled:paper", "simulation.duration=2 h", override, "--out", "out", "--quiet"
+    )
     assert 1 == code
     error, where = err.strip().splitlines()
     assert (

@@ -1,6 +1,6 @@
 """Robots that act on what they learn: the same run however it is computed, and nobody else changed.
 
-The bundled base (long-term presence, and a robot that hangs out by it), with real-time presence and
+The paper's scenario (long-term presence, and a robot that hangs out by it), with real-time presence and
 a search by it on top: what is learned decides where the robot goes, and that what is learned.
 """
 
@@ -31,7 +31,7 @@ LEARNS = (
 
 
 def lived(*overrides: str, **settings: Any) -> Run:
-    return fleet2d.run("bundled:base", *LEARNS, *overrides, **settings)
+    return fleet2d.run("bundled:paper", *LEARNS, *overrides, **settings)
 
 
 @cache
@@ -75,7 +75,7 @@ def test_every_table_is_the_same_step_by_step() -> None:
 
 
 def test_metrics_change_nothing_that_is_learned_or_lived() -> None:
-    loaded = fleet2d.load_scenario("bundled:base", *LEARNS)
+    loaded = fleet2d.load_scenario("bundled:paper", *LEARNS)
     without = fleet2d.run(loaded.model_copy(update={"metrics": {}}))
     assert {} == without.metrics
     before, after = digests(without), digests(base())
@@ -102,7 +102,7 @@ def test_users_live_the_same_whatever_the_robot_does(behaviors: str) -> None:
 
 @pytest.mark.parametrize("at", some([20_000, 1], 2))
 def test_branches_of_a_learning_run_live_the_same_future(at: int) -> None:
-    simulation = fleet2d.Simulation("bundled:base", *LEARNS)
+    simulation = fleet2d.Simulation("bundled:paper", *LEARNS)
     simulation.advance(at)
     twin = copy.deepcopy(simulation)
     twin.advance(5000)
@@ -126,7 +126,7 @@ def test_runs_in_any_number_of_processes_are_those_of_one(workers: int) -> None:
 
 SCRIPT = """
 import json, sys, fleet2d
-print(fleet2d.run("bundled:base", *json.loads(sys.argv[1])).digest)
+print(fleet2d.run("bundled:paper", *json.loads(sys.argv[1])).digest)
 """
 
 

@@ -273,7 +273,7 @@ def test_a_signal_during_the_code_of_a_component_is_not_its_error(
     monkeypatch.setenv("STOP", number)
     (tmp_path / "mine.py").write_text(STOPS)
     algorithms = {"own": {"type": "mine:Stops"}}
-    base = {"extends": "bundled:base", "algorithms": algorithms}
+    base = {"extends": "bundled:paper", "algorithms": algorithms}
     study = {"base": base, "axes": {"robots.astro.speed": [0.3]}, "replicates": 1}
     (tmp_path / "study.yaml").write_text(json.dumps(study))
     code = (

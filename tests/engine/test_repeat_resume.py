@@ -199,7 +199,9 @@ def test_an_edited_plan_of_a_driven_robot_is_refused(
     tmp_path: Path, key: str, value: Any, words: str
 ) -> None:
     """A manifest holds the plans of controllers as numbers; edited ones ended in tracebacks."""
-    simulation = fleet2d.Simulation("simulation.duration=10 min", seed=4, out=tmp_path / "run")
+    simulation = fleet2d.Simulation(
+        "bundled:paper", "simulation.duration=10 min", seed=4, out=tmp_path / "run"
+    )
     simulation.drive("astro")
     simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen").stay())))
     simulation.advance(60)
@@ -504,13 +506,13 @@ def test_a_fault_while_resuming_loses_nothing(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_resume_on_the_command_line(tmp_path: Path) -> None:
     changes = ("simulation.duration=2 d", "artifacts.checkpoint=6 h")
-    simulation = fleet2d.Simulation(None, *changes, seed=4, out=tmp_path / "run")
+    simulation = fleet2d.Simulation("bundled:paper", *changes, seed=4, out=tmp_path / "run")
     simulation.run_until(100_000)
     cut_off(simulation)
     done = fleet2d_process("resume", "run", cwd=tmp_path)
     assert 0 == done.returncode, done.stderr
     assert "continuing from 2026-01-06 00:00:00, step 86400" in done.stderr
-    expected = fleet2d.run(None, *changes, seed=4).digest
+    expected = fleet2d.run("bundled:paper", *changes, seed=4).digest
     assert expected == fleet2d.open_run(tmp_path / "run").digest
     again = fleet2d_process("resume", "run", cwd=tmp_path)
     assert 2 == again.returncode

@@ -21,7 +21,7 @@ class Errand(Behavior):
 
 def simulation() -> Simulation:
     robots = {"astro": {"behaviors": [Errand()]}}
-    return Simulation("simulation.duration=2 h", robots=robots)
+    return Simulation("bundled:paper", "simulation.duration=2 h", robots=robots)
 
 
 def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original() -> None:
@@ -50,7 +50,7 @@ def test_replan_of_somebody_unknown_names_who_there_is() -> None:
 
 
 def test_override_in_the_place_of_the_file_changes_the_bundled_scenario() -> None:
-    assert 7200 == load_scenario("simulation.duration=2 h").simulation.steps
+    assert 7200 == load_scenario("bundled:paper", "simulation.duration=2 h").simulation.steps
 
 
 @pytest.mark.parametrize("xy", [(-3.0, -3.0), (0.0, 0.0), (100.0, 2.0)])

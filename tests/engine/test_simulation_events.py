@@ -9,7 +9,7 @@ import fleet2d
 from fleet2d.errors import InputError
 
 DAY = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "1 d", "seed": 4},
     "objects": {
         "hall_motion": {"type": "motion_sensor", "at": [16.53, 7.73], "range": 4},
@@ -137,7 +137,7 @@ def test_running_until_a_sensor_reports_names_its_state() -> None:
 
 
 def test_a_copy_of_a_run_does_not_call_those_who_listen_to_rows() -> None:
-    simulation = fleet2d.Simulation("simulation.duration=2 h", seed=4)
+    simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4)
     tables: list[str] = []
     simulation.listen_rows(lambda table, row: tables.append(table))
 

@@ -204,7 +204,7 @@ def test_copies_in_memory_share_what_never_changes() -> None:
 
 
 def test_copies_in_memory_share_rows_that_are_not_stored_yet_and_add_their_own() -> None:
-    simulation = Simulation(None, "simulation.duration=1 d", seed=4)
+    simulation = Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
     simulation.run_until("08:00")
     copied = copy.deepcopy(simulation)
     simulation.run_until("10:00")

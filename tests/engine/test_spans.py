@@ -271,7 +271,8 @@ def test_another_seed_is_another_life(reference: Run) -> None:
 
 def test_digests_are_those_pinned(whole: Run) -> None:
     result = {
-        "base, 1 day": fleet2d.run(None, "simulation.duration=1 d").digest,
+        "paper, 1 day": fleet2d.run("bundled:paper", "simulation.duration=1 d").digest,
+        "family, 1 day": fleet2d.run("bundled:family", "simulation.duration=1 d").digest,
         "rounds, 1 day": fleet2d.run("bundled:rounds", "simulation.duration=1 d").digest,
         "every behavior, 2 h": whole.digest,
     }

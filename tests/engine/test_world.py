@@ -178,7 +178,7 @@ def test_what_can_not_be_is_refused_before_the_run(entry: dict[str, Any], words:
 def test_a_wrong_entry_is_named_by_its_line(tmp_path: Path) -> None:
     file = tmp_path / "home.yaml"
     file.write_text(
-        "extends: bundled:base\n"
+        "extends: bundled:paper\n"
         "simulation: {duration: 1 h}\n"
         "script:\n"
         "  - {at: 5 min, hold: ana}\n"

@@ -238,13 +238,13 @@ def test_another_type_in_an_override_replaces_the_keys_of_the_old_one() -> None:
 
 def test_an_unknown_drive_is_refused_with_the_names_of_all() -> None:
     with pytest.raises(ScenarioError) as caught:
-        fleet2d.load_scenario(None, "robots.astro.drive=holonomc")
+        fleet2d.load_scenario("bundled:paper", "robots.astro.drive=holonomc")
     assert "did you mean 'holonomic'" in str(caught.value)
 
 
 def test_people_have_no_drive() -> None:
     with pytest.raises(ScenarioError) as caught:
-        fleet2d.load_scenario(None, "users.ana.drive=holonomic")
+        fleet2d.load_scenario("bundled:paper", "users.ana.drive=holonomic")
     assert "drive" in str(caught.value)
 
 

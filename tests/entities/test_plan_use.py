@@ -128,7 +128,7 @@ def test_unknown_object_is_refused_with_those_there_are(tmp_path: Any) -> None:
 
 def test_ways_of_one_step_equal_those_of_several(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a body may pay costs, the core doesn't find the way: the plan is the same."""
-    quick = fleet2d.run(None, "simulation.duration=1 d", seed=4)
+    quick = fleet2d.run("bundled:paper", "simulation.duration=1 d", seed=4)
     monkeypatch.setattr(Space, "shortest", None)
 
-    assert quick.digest == fleet2d.run(None, "simulation.duration=1 d", seed=4).digest
+    assert quick.digest == fleet2d.run("bundled:paper", "simulation.duration=1 d", seed=4).digest

@@ -21,7 +21,7 @@ def place(room: str) -> tuple[float, float]:
 
 def scenario(path: Path, **robot: Any) -> dict[str, Any]:
     return {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "1 h", "seed": 4},
         "users": {"ana": {"type": "unknown"}},
         "robots": {"astro": {"perceives": {"type": "replay", "path": str(path)} | robot}},
@@ -269,7 +269,7 @@ def both_ways(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     x, y = place("kitchen_0")
     steps = [600, 601, 602, 1500, 1501, 2400]
     table = detections(folder / "ghosts.csv", [(float(s), "ana", x, y) for s in steps])
-    base = {"extends": "bundled:base", "simulation": {"duration": "1 h", "seed": 4}}
+    base = {"extends": "bundled:paper", "simulation": {"duration": "1 h", "seed": 4}}
     source = {"type": "replay", "path": str(table), "besides_cameras": True}
     ghost = {"do": "inject", "entity": "astro", "user": "ana", "spot": [x, y], "duration": "1 s"}
     return (

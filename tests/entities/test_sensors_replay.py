@@ -19,7 +19,7 @@ ROWS = """time,sensor,state
 def scenario(path: Path, **settings: Any) -> dict[str, Any]:
     sensor = {"type": "replay_sensor", "path": str(path), "room": "hallway"} | settings
     return {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "1 h", "seed": 4},
         "objects": {"front": sensor},
     }

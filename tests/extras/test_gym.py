@@ -386,7 +386,7 @@ def test_task_draws_homes_apart_for_training_and_testing() -> None:
 
 def test_task_without_a_policy_says_what_to_give() -> None:
     with pytest.raises(InputError, match="first behavior is a policy"):
-        RobotEnv({"scenario": "bundled:base"})
+        RobotEnv({"scenario": "bundled:paper"})
 
 
 def test_unknown_task_has_the_nearest_name() -> None:

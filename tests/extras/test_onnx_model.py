@@ -66,7 +66,7 @@ def shipped() -> bytes:
 
 def beliefs(model: Any) -> Any:
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=8 h",
         seed=3,
         algorithms={"rtp": {"type": "rtp", "model": model}},

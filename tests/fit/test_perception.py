@@ -141,12 +141,12 @@ def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path: Path) 
         detected=log.detected.astype(int),
     )  # fmt: skip
     alone, part = tmp_path / "alone.yaml", tmp_path / "part.yaml"
-    lines = calibrate_perception(path, alone, tmp_path / "fit.png", extends="bundled:base")
+    lines = calibrate_perception(path, alone, tmp_path / "fit.png", extends="bundled:paper")
     assert f"wrote {alone}" in lines
     assert (tmp_path / "fit.png").read_bytes()[:4] == b"\x89PNG"
     calibrate_perception(path, part)
     both = tmp_path / "both.yaml"
-    both.write_text("extends: [bundled:base, part.yaml]\n")
+    both.write_text("extends: [bundled:paper, part.yaml]\n")
     for file in (alone, both):
         loaded = load_scenario(file)
         robot = loaded.robots["astro"]

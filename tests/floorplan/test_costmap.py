@@ -153,7 +153,7 @@ def test_wrong_settings_are_an_error_that_names_the_key(
     settings: dict[str, object], why: str
 ) -> None:
     with pytest.raises(InputError, match=f"floorplan.costmap.{why}"):
-        fleet2d.load_scenario(None, floorplan={"type": "bundled", "costmap": settings})
+        fleet2d.load_scenario("bundled:paper", floorplan={"type": "bundled", "costmap": settings})
 
 
 def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:

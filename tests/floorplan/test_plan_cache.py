@@ -51,7 +51,7 @@ def test_cache_grows_and_never_shrinks() -> None:
 
 
 def test_second_run_shares_plan_spaces_and_ratings() -> None:
-    first, second = (fleet2d.Simulation(None, SHORT, seed=seed) for seed in (4, 5))
+    first, second = (fleet2d.Simulation("bundled:paper", SHORT, seed=seed) for seed in (4, 5))
     hangouts = [
         next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
         for simulation in (first, second)
@@ -69,17 +69,23 @@ def test_changed_file_is_read_anew(tmp_path: Path) -> None:
     content: dict[str, Any] = json.loads((HOMES / "family_home.json").read_text())
     path.write_text(json.dumps(content))
     at = f"floorplan.path={path}"
-    first = fleet2d.Simulation(None, "floorplan.type=native", at, SHORT, seed=4).home.plan
-    again = fleet2d.Simulation(None, "floorplan.type=native", at, SHORT, seed=4).home.plan
+    first = fleet2d.Simulation(
+        "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
+    ).home.plan
+    again = fleet2d.Simulation(
+        "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
+    ).home.plan
     path.write_text(json.dumps({**content, "name": "another"}))
-    changed = fleet2d.Simulation(None, "floorplan.type=native", at, SHORT, seed=4).home.plan
+    changed = fleet2d.Simulation(
+        "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
+    ).home.plan
 
     assert first is again
     assert (first.name, changed.name) == ("family_home", "another")
 
 
 def test_shared_arrays_are_read_only() -> None:
-    simulation = fleet2d.Simulation(None, SHORT, seed=4)
+    simulation = fleet2d.Simulation("bundled:paper", SHORT, seed=4)
     plan, space = simulation.home.plan, simulation.home.space(0.15)
     hangout: Any = next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
     shared: list[np.ndarray[Any, Any]] = [
@@ -94,15 +100,15 @@ def test_shared_arrays_are_read_only() -> None:
 
 
 def test_run_is_the_same_whatever_ran_before_in_its_home() -> None:
-    alone = fleet2d.run(None, SHORT, seed=4).digest
-    simulation = fleet2d.Simulation(None, SHORT, seed=7)
+    alone = fleet2d.run("bundled:paper", SHORT, seed=4).digest
+    simulation = fleet2d.Simulation("bundled:paper", SHORT, seed=7)
     simulation.home.use_room_as(simulation.home.rooms[0], "office")
     simulation.home.layers.add("dust").values[:] = 5
     simulation.home.objects = simulation.home.objects[:-1]
     simulation.home.version += 1
     simulation.run()
 
-    assert alone == fleet2d.run(None, SHORT, seed=4).digest
+    assert alone == fleet2d.run("bundled:paper", SHORT, seed=4).digest
 
 
 def test_equal_floor_plans_have_spaces_of_their_own() -> None:

@@ -56,7 +56,7 @@ def test_two_pieces_of_one_name_are_refused() -> None:
 
 def test_unknown_type_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(ScenarioError, match=r"furniture.0.type.*did you mean 'bed'"):
-        load_scenario(None, "floorplan.furniture=[{type: bedd, at: [1, 1]}]")
+        load_scenario("bundled:paper", "floorplan.furniture=[{type: bedd, at: [1, 1]}]")
 
 
 @pytest.mark.parametrize("piece", [{"size": [0, 1]}, {"size": [1]}, {"blocks": "light"}, {"x": 1}])
@@ -66,9 +66,9 @@ def test_wrong_settings_of_a_piece_are_refused(piece: dict[str, Any]) -> None:
 
 
 def test_furnish_takes_true_or_settings() -> None:
-    scenario = load_scenario(None, "floorplan.furnish={seed: 3, density: 0.5}")
+    scenario = load_scenario("bundled:paper", "floorplan.furnish={seed: 3, density: 0.5}")
 
     assert Furnishing(seed=3, density=0.5) == scenario.floorplan.furnish
-    assert load_scenario(None, "floorplan.furnish=true").floorplan.furnish is True
+    assert load_scenario("bundled:paper", "floorplan.furnish=true").floorplan.furnish is True
     with pytest.raises(ScenarioError, match="furnish"):
-        load_scenario(None, "floorplan.furnish=maybe")
+        load_scenario("bundled:paper", "floorplan.furnish=maybe")

@@ -128,7 +128,7 @@ def _safely(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
 
 def _lives_by(path: Path) -> Any:
     user = {"type": "routine", "persona": str(path)}
-    return load_scenario({"extends": "bundled:base", "users": {"ana": user}})
+    return load_scenario({"extends": "bundled:paper", "users": {"ana": user}})
 
 
 # --- Runs --------------------------------------------------------------------------------------
@@ -164,7 +164,9 @@ def _unfinished() -> dict[str, bytes]:
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
-        run = fleet2d.Simulation("simulation.duration=2 h", seed=4, out=f"{folder}/run")
+        run = fleet2d.Simulation(
+            "bundled:paper", "simulation.duration=2 h", seed=4, out=f"{folder}/run"
+        )
         run.advance(4000)
         run.finish()
         root = Path(folder) / "run"
@@ -238,7 +240,7 @@ def _start_from(path: Path) -> None:
     users = dict.fromkeys(("ben",))
     changes = {"simulation": {"duration": "7 h"}, "algorithms": algorithms}
     del users
-    fleet2d.Simulation({"extends": "bundled:base", **changes}, seed=4)
+    fleet2d.Simulation({"extends": "bundled:paper", **changes}, seed=4)
 
 
 # --- Tables ------------------------------------------------------------------------------------

@@ -23,13 +23,13 @@ usage = resource.getrusage(resource.RUSAGE_SELF)
 status = open('/proc/self/status').read()
 print(usage.ru_utime + usage.ru_stime, int(status.split('VmHWM:')[1].split()[0]) / 1024)
 """
-BASE = "extends: bundled:base\n"
+BASE = "extends: bundled:paper\n"
 
 
 def bombs(n: int) -> dict[str, tuple[str, str]]:
     """Scenarios of `n` values or entries and more, and a part of the message each."""
     return {
-        "extends": (f"extends: [{', '.join(['bundled:base'] * n)}]", "at most 100 are read"),
+        "extends": (f"extends: [{', '.join(['bundled:paper'] * n)}]", "at most 100 are read"),
         "extends itself in pairs": ("extends: [pairs0.yaml, pairs0.yaml]", "at most 100 are read"),
         "users": (
             f"{BASE}users:\n" + "".join(f"  u{i}: {{type: meander}}\n" for i in range(n)),
@@ -197,7 +197,7 @@ def test_no_run_begins_that_could_not_be_opened(
     monkeypatch.setattr(store, "FILE_BYTES", Bound("FILE_BYTES", 1000, "bytes"))
 
     with pytest.raises(RunDirectoryError, match=r"month/manifest\.json has \d+ bytes, and at most"):
-        fleet2d.run("simulation.duration=1h", seed=1, out=tmp_path / "month")
+        fleet2d.run("bundled:paper", "simulation.duration=1h", seed=1, out=tmp_path / "month")
     assert not (tmp_path / "month").exists()
 
 

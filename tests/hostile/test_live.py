@@ -302,7 +302,7 @@ class Page:
     """A page of a running simulation, in a process of its own."""
 
     def __init__(self, out: Path) -> None:
-        command = [sys.executable, "-m", "fleet2d.cli", "view", "bundled:base", "--no-browser"]
+        command = [sys.executable, "-m", "fleet2d.cli", "view", "bundled:paper", "--no-browser"]
         options = ["--seed", "4", "--out", str(out), "simulation.duration=20 d"]
         pipe = subprocess.PIPE
         self.process = subprocess.Popen([*command, *options], stdout=pipe, stderr=pipe, text=True)

@@ -88,7 +88,7 @@ def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
             ("components",),
             ("components", "--schema", "scenario"),
             ("show", "run", "--out", "picture.png"),
-            ("validate", "bundled:base"),
+            ("validate", "bundled:paper"),
             ("verify", "run", "--again"),
         ],
         6,

@@ -65,7 +65,7 @@ def cut_off(simulation: Simulation) -> Path:
 
 def cut_run(out: Path, seed: int = 4, **more: Any) -> Path:
     """Return an unfinished run with a checkpoint of its first hour."""
-    simulation = Simulation(None, *SETTINGS, seed=seed, out=out, **more)
+    simulation = Simulation("bundled:paper", *SETTINGS, seed=seed, out=out, **more)
     simulation.run_until(4000)
     return cut_off(simulation)
 
@@ -83,7 +83,7 @@ def as_another_user(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
 def forged(out: Path, command: str) -> Path:
     """Return a run of built-in components only, whose checkpoint starts a shell."""
     period = "algorithms.ltp.period=30 min"
-    simulation = Simulation(None, *SETTINGS, period, seed=4, out=out)
+    simulation = Simulation("bundled:paper", *SETTINGS, period, seed=4, out=out)
     simulation.run_until(4000)
     learners = simulation._state.learners.all
     learner = next(each for each in learners if each.path.startswith("algorithms."))
@@ -186,7 +186,7 @@ def copy_of_another_seed(run: Path) -> None:
 
 def copy_of_another_course(run: Path) -> None:
     """The same scenario and seed, but something was done to that run."""
-    simulation = Simulation(None, *SETTINGS, seed=4, out=run.with_name("other"))
+    simulation = Simulation("bundled:paper", *SETTINGS, seed=4, out=run.with_name("other"))
     simulation.run_until(1000)
     simulation.do(Put("ana", "kitchen"))
     simulation.run_until(4000)
@@ -196,7 +196,7 @@ def copy_of_another_course(run: Path) -> None:
 
 
 def copy_of_a_saved_simulation(run: Path) -> None:
-    simulation = Simulation(None, *SETTINGS, seed=4)
+    simulation = Simulation("bundled:paper", *SETTINGS, seed=4)
     simulation.advance(100)
     simulation.save(run / FOLDER / CHECKPOINT_NAME)
 

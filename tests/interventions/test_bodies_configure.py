@@ -13,7 +13,7 @@ from fleet2d.interventions import Configure
 
 
 def simulation() -> fleet2d.Simulation:
-    return fleet2d.Simulation("bundled:base", "simulation.duration=10 h", seed=4)
+    return fleet2d.Simulation("bundled:paper", "simulation.duration=10 h", seed=4)
 
 
 def test_changed_key_changes_what_follows_and_nothing_before() -> None:

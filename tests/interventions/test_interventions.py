@@ -60,7 +60,7 @@ def test_required_fields_are_positional_and_values_as_in_a_script() -> None:
 def test_object_and_mapping_are_recorded_alike() -> None:
     records = []
     for act in (Put("ana", "kitchen"), {"put": "ana", "to": "kitchen"}):
-        simulation = fleet2d.Simulation("bundled:base", "simulation.duration=1 h", seed=4)
+        simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
         simulation.do(act)
         records.append(simulation.run().manifest["interventions"])
 
@@ -68,7 +68,7 @@ def test_object_and_mapping_are_recorded_alike() -> None:
 
 
 def test_plan_for_a_body_that_decides_itself_is_left_out_with_a_note() -> None:
-    simulation = fleet2d.Simulation("bundled:base", "simulation.duration=1 h", seed=4)
+    simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
     simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen"))))
     run = simulation.run()
 

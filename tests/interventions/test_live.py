@@ -9,7 +9,7 @@ import fleet2d
 from fleet2d.errors import InputError
 
 LIVE: dict[str, Any] = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "10 min", "seed": 4},
     "users": {"ana": {"type": "live"}},
     "robots": {"astro": {"perceives": "live"}},

@@ -15,7 +15,7 @@ from fleet2d.errors import InputError
 from fleet2d.interventions.intervention import verbs
 
 KEPT_OUT = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "30 min"},
     "script": [
         {"at": "1 min", "keep_out": "astro", "of": "kitchen", "duration": "10 min"},
@@ -56,7 +56,7 @@ def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
     days = [{"on": "daily", "items": [{"at": "00:00", "place": "kitchen", "activity": "cook"}]}]
     other = [{"on": "daily", "items": [{"at": "00:00", "place": "office", "activity": "work"}]}]
     content = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "20 min"},
         "users": {"ana": {"type": "schedule", "days": days}},
         "script": [
@@ -70,7 +70,7 @@ def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
 
 def test_what_was_learned_in_another_home_is_left_out(tmp_path: Path) -> None:
     """The run failed at the step of the intervention."""
-    content = {"extends": "bundled:base", "simulation": {"duration": "13 h"}}
+    content = {"extends": "bundled:paper", "simulation": {"duration": "13 h"}}
     other = {"floorplan": {"type": "synthetic", "seed": 1, "area_m2": 60}}
     fleet2d.run({**content, **other, "artifacts": {"learned": True}}, out=tmp_path / "run")
     learned = str(tmp_path / "run" / "learned" / "ltp.npz")

@@ -6,7 +6,7 @@ from typing import Any
 import fleet2d
 
 LIVE: dict[str, Any] = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "30 s", "seed": 4, "start": "2026-01-05T12:00"},
     "users": {"ana": {"type": "live"}},
     "robots": {"astro": {"perceives": "live", "behaviors": [{"type": "live"}]}},

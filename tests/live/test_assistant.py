@@ -14,7 +14,7 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.live import assistant
 from fleet2d.live.assistant import Workspace, server
 
-HOME = "extends: bundled:base\nsimulation: {duration: 3 h, start: 2026-01-05T07:00}\n"
+HOME = "extends: bundled:paper\nsimulation: {duration: 3 h, start: 2026-01-05T07:00}\n"
 
 
 @pytest.fixture
@@ -112,7 +112,10 @@ def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) 
         ("a: !!python/object/apply:os.system [x]\n", "bad.yaml:1: the tag .* can't be used here"),
         ("a: &a [*a]\n", "bad.yaml:1: a value can't contain itself"),
         ("a: [\n", "bad.yaml:2: not valid YAML: a value is missing"),
-        ("extends: bundled:base\nsimulation: {duration: 100000 d}\n", "would take minutes or more"),
+        (
+            "extends: bundled:paper\nsimulation: {duration: 100000 d}\n",
+            "would take minutes or more",
+        ),
     ],
 )
 def test_a_wrong_file_is_told(place: Workspace, text: str, message: str) -> None:
@@ -188,7 +191,7 @@ def test_the_query_of_the_description_sums_durations(place: Workspace) -> None:
 def test_a_json_file_leads_nowhere_else(place: Workspace, text: str) -> None:
     """Only the files of YAML were looked through for paths."""
     place.write("inner.json", text.replace("SECRET", str(place.folder.parent / "secret.yaml")))
-    place.write("bad.yaml", "extends: [bundled:base, inner.json]\n")
+    place.write("bad.yaml", "extends: [bundled:paper, inner.json]\n")
 
     with pytest.raises(InputError, match="is outside of the folder"):
         place.check("bad.yaml")

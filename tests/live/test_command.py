@@ -20,7 +20,7 @@ from fleet2d.live.command import live
 
 APP = typer.Typer()
 APP.command()(live)
-SCENARIO = "extends: bundled:base\nsimulation: {duration: 3 s}\nusers: {ana: {type: live}}\n"
+SCENARIO = "extends: bundled:paper\nsimulation: {duration: 3 s}\nusers: {ana: {type: live}}\n"
 
 
 def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_a_run_that_was_ended_is_continued_by_resume(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     """Nothing said so: the same command only asked for another folder."""
-    (tmp_path / "lab.yaml").write_text("extends: bundled:base\nsimulation: {duration: 2 h}\n")
+    (tmp_path / "lab.yaml").write_text("extends: bundled:paper\nsimulation: {duration: 2 h}\n")
     arguments = ["live", str(tmp_path / "lab.yaml"), "--with", "udp://127.0.0.1:0"]
     arguments += ["--speed", "60", "--out", str(tmp_path / "run")]
     command = [sys.executable, "-m", "fleet2d.cli", *arguments]

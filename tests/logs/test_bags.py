@@ -130,7 +130,7 @@ def test_a_robot_is_where_its_bag_has_it_in_the_map(
     bag = str(ros.bag(tmp_path / "bag", rows))
     replay = {"type": "replay", "path": bag, "id": "/pose", "time_zone": "UTC", "day": "date"}
     simulation = fleet2d.Simulation(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=20 s",
         "simulation.start=2026-01-05T08:00",
         robots={"astro": {"behaviors": [replay]}},
@@ -362,11 +362,11 @@ def test_columns_are_not_for_bags(ros: Ros, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["bag", "run.mcap"])
 def test_exported_run_is_driven_again(name: str, tmp_path: Path) -> None:
     """There and back: a robot that follows the bag of a run is where it was in that run."""
-    first = fleet2d.run("bundled:base", "simulation.duration=40 min", seed=4)
+    first = fleet2d.run("bundled:paper", "simulation.duration=40 min", seed=4)
     fleet2d.export(first, tmp_path / name)
     bag = {"path": str(tmp_path / name), "id": "astro/base_link", "time_zone": "UTC"}
     again = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=40 min",
         seed=4,
         robots={"astro": {"behaviors": [{"type": "replay", **bag}]}},

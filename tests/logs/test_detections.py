@@ -185,7 +185,9 @@ def simulated() -> object:
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
     import fleet2d
 
-    return fleet2d.run("simulation.duration=3 h", "simulation.start=2026-01-05T07:00", seed=4)
+    return fleet2d.run(
+        "bundled:paper", "simulation.duration=3 h", "simulation.start=2026-01-05T07:00", seed=4
+    )
 
 
 def test_detections_of_a_bag_are_those_of_the_run(tmp_path: Path, simulated: object) -> None:

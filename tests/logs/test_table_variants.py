@@ -148,7 +148,7 @@ def verdict(variant: Variant) -> str:
     """Return whether a variant is read as it is meant, wrong, or refused and why."""
     scenario = variant.path.with_name("home.yaml")
     scenario.write_text(
-        f"extends: bundled:base\nsimulation: {{start: {variant.times[0]:%Y-%m-%dT%H:%M}, duration:"
+        f"extends: bundled:paper\nsimulation: {{start: {variant.times[0]:%Y-%m-%dT%H:%M}, duration:"
         f" 30 s}}\nusers:\n  ana: {variant.keys}\n"
     )
     try:

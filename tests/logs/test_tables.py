@@ -94,7 +94,7 @@ def test_an_id_in_yaml_without_quotes_is_refused(tmp_path: Path, text: str) -> N
     csv(tmp_path, TAGS)
     scenario = csv(
         tmp_path,
-        f"extends: bundled:base\nusers: {{ana: {{type: replay, path: log.csv, id: {text}}}}}\n",
+        f"extends: bundled:paper\nusers: {{ana: {{type: replay, path: log.csv, id: {text}}}}}\n",
         name="s.yaml",
     )
 

@@ -7,7 +7,7 @@ import fleet2d
 
 def test_stays_cover_the_run_and_agree_with_the_trajectory() -> None:
     run = fleet2d.run(
-        "bundled:base", "simulation.duration=30 h", metrics={"stays": {"period": "7 h"}}, seed=3
+        "bundled:paper", "simulation.duration=30 h", metrics={"stays": {"period": "7 h"}}, seed=3
     )
     rows = {name: np.array(v, object) for name, v in run.arrow("stays").to_pydict().items()}
 
@@ -25,7 +25,7 @@ def test_stays_cover_the_run_and_agree_with_the_trajectory() -> None:
 
 def test_without_users_there_is_no_table() -> None:
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=1 h",
         users={"ana": None},
         metrics={"stays": {}},

@@ -47,13 +47,13 @@ START = datetime(2026, 1, 5)
 
 @cache
 def two_days() -> Run:
-    """The bundled base scenario for two days."""
+    """The paper's scenario for two days."""
     return base()
 
 
 def base(*overrides: str, **settings: Any) -> Run:
-    """Run the bundled base scenario for two days."""
-    return fleet2d.run(None, "simulation.duration=2 d", *overrides, **settings)
+    """Run the paper's scenario for two days."""
+    return fleet2d.run("bundled:paper", "simulation.duration=2 d", *overrides, **settings)
 
 
 def words_in(svg: Path) -> str:
@@ -88,7 +88,7 @@ def test_picture_says_what_was_run(tmp_path: Path) -> None:
     assert run.digest is not None
     words = words_drawn(run, tmp_path)
     for fact in (
-        "base",
+        "paper",
         "2 days in family_home",
         "seed 4",
         run.digest[:12],
@@ -107,7 +107,7 @@ def test_picture_says_what_was_run(tmp_path: Path) -> None:
 def test_run_without_users_or_robots_is_drawn(
     tmp_path: Path, users: dict[str, Any] | None, robots: dict[str, Any] | None
 ) -> None:
-    scenario = fleet2d.load_scenario(None, "simulation.duration=3 h").resolved()
+    scenario = fleet2d.load_scenario("bundled:paper", "simulation.duration=3 h").resolved()
     scenario["users"] = scenario["users"] if users is None else users
     scenario["robots"] = scenario["robots"] if robots is None else robots
     words = words_drawn(fleet2d.run(scenario), tmp_path)
@@ -162,13 +162,13 @@ def test_of_many_users_four_are_shown_and_the_rest_counted() -> None:
 
 @pytest.mark.slow
 def test_interrupted_run_is_drawn_and_marked(tmp_path: Path) -> None:
-    simulation = Simulation(None, "simulation.duration=2 d")
+    simulation = Simulation("bundled:paper", "simulation.duration=2 d")
     simulation.advance(100_000)
     assert "interrupted" in words_drawn(simulation.finish(), tmp_path)
 
 
 def test_run_that_simulated_nothing_is_drawn(tmp_path: Path) -> None:
-    words = words_drawn(Simulation(None).finish(), tmp_path)
+    words = words_drawn(Simulation("bundled:paper").finish(), tmp_path)
     assert "0 s in family_home" in words
 
 
@@ -287,7 +287,7 @@ def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot() -> None:
 
 @pytest.mark.slow
 def test_each_user_has_a_line_in_the_legend() -> None:
-    scenario = fleet2d.load_scenario(None, "simulation.duration=3 h").resolved()
+    scenario = fleet2d.load_scenario("bundled:paper", "simulation.duration=3 h").resolved()
     scenario["users"] = dict.fromkeys(("ana", "bo", "cleo"), MEANDER)
     words = words_of(fleet2d.run(scenario))
     assert all(f"ways of {name}" in words for name in ("ana", "bo", "cleo"))
@@ -299,7 +299,7 @@ def test_too_many_rings_are_left_out_with_a_note() -> None:
     few = words_of(two_days())
     assert "seen here by a robot" in few
     assert "are not drawn" not in few
-    scenario = fleet2d.load_scenario(None, "simulation.duration=4 d").resolved()
+    scenario = fleet2d.load_scenario("bundled:paper", "simulation.duration=4 d").resolved()
     scenario["users"] = {"ana": MEANDER}
     many = words_of(fleet2d.run(scenario))
     assert "seen here by a robot" not in many

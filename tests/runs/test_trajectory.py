@@ -266,7 +266,7 @@ def test_a_person_who_walks_at_random_can_be_put_elsewhere(
 
 def test_key_frames_out_of_order_are_damaged(tmp_path: Path) -> None:
     """The kernel's refusal was shown as a traceback."""
-    fleet2d.run("simulation.duration=2 h", seed=4, out=tmp_path / "run")
+    fleet2d.run("bundled:paper", "simulation.duration=2 h", seed=4, out=tmp_path / "run")
     path = tmp_path / "run" / "key_frames.parquet"
     table = pq.read_table(path)
     pq.write_table(table.take(np.random.default_rng(1).permutation(table.num_rows)), path)

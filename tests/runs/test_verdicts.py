@@ -16,7 +16,7 @@ VIOLATED = {"holds": False, "decided": True, "says": "it is violated"}
 
 
 def run_with(expectations: dict[str, Any], violations: list[tuple[str, int, int]]) -> Any:
-    run = fleet2d.run("bundled:base", "simulation.duration=10 s", seed=4)
+    run = fleet2d.run("bundled:paper", "simulation.duration=10 s", seed=4)
     names, first, last = ([row[i] for row in violations] for i in range(3))
     table = pa.table({"expectation": names, "step": first, "last_step": last})
     run.tables = Tables(["violations"], {"violations": table}.__getitem__)

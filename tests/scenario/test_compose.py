@@ -202,11 +202,11 @@ def test_extending_what_is_not_there_is_refused(
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("source", [None, "bundled:base", {"extends": "bundled:base"}])
+@pytest.mark.parametrize("source", [None, "bundled:family", {"extends": "bundled:family"}])
 def test_bundled_scenario_is_found_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: Any
 ) -> None:
-    monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path, base="artifacts: {a: 1}"))
+    monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path, family="artifacts: {a: 1}"))
 
     assert {"artifacts": {"a": 1}} == compose(source).data
 

@@ -167,7 +167,7 @@ def test_damaged_file_is_an_error_that_tells_what_to_do(
 )
 def test_wrong_method_is_an_error_that_names_the_key(settings: dict[str, Any], why: str) -> None:
     with pytest.raises(InputError, match=why) as caught:
-        fleet2d.load_scenario(None, sight={"method": settings})
+        fleet2d.load_scenario("bundled:paper", sight={"method": settings})
     assert "sight.method" in str(caught.value)
 
 

@@ -140,7 +140,7 @@ def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path:
     study = fleet2d.study(
         {
             "base": {
-                "extends": "bundled:base",
+                "extends": "bundled:paper",
                 "simulation": {"start": "2026-01-05T17:00", "duration": "5 h"},
             },
             "axes": {

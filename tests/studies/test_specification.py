@@ -27,7 +27,7 @@ def test_the_bundled_scenario_is_the_base_of_those_without(tmp_path: Path) -> No
 
 
 def test_a_base_is_found_beside_the_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "home.yaml").write_text("extends: bundled:base\nsimulation: {duration: 3 h}\n")
+    (tmp_path / "home.yaml").write_text("extends: bundled:paper\nsimulation: {duration: 3 h}\n")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert "3 h" == read_text("base: home.yaml\n", tmp_path).base.data["simulation"]["duration"]

@@ -117,7 +117,7 @@ def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder: Path)
         (["flat.yaml", "--over", f"home={BOMB}"], "values"),
         (["flat.yaml", "--over", "home={synthetic: 5"], "not valid YAML"),
         (["flat.yaml", "--over", "robots.astro.speed={low: 2, high: 1}"], "low below high"),
-        (["bundled:base", "--over", OVER], "has no expectations"),
+        (["bundled:paper", "--over", OVER], "has no expectations"),
         (["flat.yaml", "--over", OVER, "--budget", "soon"], "--budget: expected"),
         (["test_flat.py::test_come", "--over", OVER], "did you mean 'test_comes'"),
         (["test_flat.py::test_more", "--over", OVER], "other arguments (tmp_path)"),

@@ -8,7 +8,7 @@ import pytest
 import fleet2d
 
 SCENARIO = {
-    "extends": "bundled:base",
+    "extends": "bundled:paper",
     "simulation": {"duration": "9 h", "seed": 11},
     "floorplan": {"layers": {"dust": {"fill": 0.5}}},
     "objects": {

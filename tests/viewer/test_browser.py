@@ -149,7 +149,7 @@ def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(
     ben = {"type": "routine", "persona": "works_outside"}
     root = tmp_path / "run"
     run = fleet2d.run(
-        "bundled:base", "simulation.duration=1 d", users={"ben": ben}, algorithms=BELIEFS, out=root
+        "bundled:paper", "simulation.duration=1 d", users={"ben": ben}, algorithms=BELIEFS, out=root
     )
     draw = np.random.default_rng(1)
     with served(root) as address, page_at(browser, f"{address}#panel=beliefs") as page:
@@ -354,7 +354,7 @@ class Tasks:
 @pytest.mark.slow
 def test_each_task_takes_one_or_two_actions(browser: Any) -> None:
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=2 d",
         "expect.unseen=never(seen(ana, by=astro))",
         users={"ana": {"type": "schedule", "days": DAYS}},
@@ -527,7 +527,7 @@ def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(
     browser: Any, tmp_path: Path
 ) -> None:
     root = tmp_path / "minutes"
-    run = fleet2d.run("bundled:base", "simulation={duration: 8 h, step: 1 min}", seed=4, out=root)
+    run = fleet2d.run("bundled:paper", "simulation={duration: 8 h, step: 1 min}", seed=4, out=root)
     paths = {name: run.path(name, timedelta(minutes=1)) for name in ("ana", "astro")}
     with served(root) as address, page_at(browser, f"{address}#select=astro") as page:
         for seconds in (4 * 3600 + 37, 6 * 3600 + 59, 7 * 3600 + 12):
@@ -572,7 +572,7 @@ def test_decision_behind_what_a_robot_does_is_shown(page: Any, run_dir: Path) ->
 def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
     area = [[11.0, 1.0], [14.0, 1.0], [14.0, 4.0], [11.0, 4.0]]
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=1 h",
         seed=4,
         floorplan={"slows": [{"area": area, "speed": 0.5}]},
@@ -596,7 +596,7 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
 @pytest.mark.slow
 def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser: Any) -> None:
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=2 h",
         "expect.unseen=never(seen(ana, by=astro))",
         "expect.apart=always(distance(ana, astro) > 0 m)",
@@ -625,7 +625,7 @@ def test_page_of_a_run_without_expectations_has_no_alarm(page: Any) -> None:
 def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="PyAV is not installed")
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=10 min",
         "expect.unseen=never(seen(ana, by=astro))",
         seed=4,
@@ -675,7 +675,7 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
 @pytest.mark.slow
 def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
     people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
-    run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=4, users=people)
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=4, users=people)
     with served(PageData(run)) as address, page_at(browser, address) as page:
         page.keyboard.press("End")
         until(page, lambda: page.locator("table.now tr[data-body]").count() == 52)
@@ -716,7 +716,7 @@ def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> N
 @pytest.mark.slow
 def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     simulation = fleet2d.Simulation(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=6 h",
         "objects.bath_door={type: door, doorway: bathroom_0}",
         seed=4,

@@ -128,7 +128,7 @@ def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, report: str
 @pytest.mark.slow
 def test_report_begins_with_what_is_violated(tmp_path: Path) -> None:
     changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
-    run = fleet2d.run("bundled:base", *changes, seed=4)
+    run = fleet2d.run("bundled:paper", *changes, seed=4)
     write_report(run, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     verdict = text.index("<b>\u2717 1 of 1 expectation violated: still at Mon 05 Jan 00:00:0")

@@ -23,7 +23,7 @@ DOOR = "objects.bath_door={type: door, doorway: bathroom_0}"
 
 
 def simulation(duration: str = "8 h") -> fleet2d.Simulation:
-    return fleet2d.Simulation("bundled:base", f"simulation.duration={duration}", DOOR, seed=4)
+    return fleet2d.Simulation("bundled:paper", f"simulation.duration={duration}", DOOR, seed=4)
 
 
 def order(action: str, target: str = "", value: float = 0, x: float = 0, y: float = 0) -> LiveOrder:
@@ -87,7 +87,7 @@ def test_frames_have_every_intervention_once(live: LiveRun) -> None:
 
 def test_beliefs_in_frames_sum_to_one_and_are_of_everybody() -> None:
     own = "algorithms.share={type: 'tests.own_components:Share'}"
-    watched = LiveRun(fleet2d.Simulation("bundled:base", "simulation.duration=13 h", own, seed=4))
+    watched = LiveRun(fleet2d.Simulation("bundled:paper", "simulation.duration=13 h", own, seed=4))
     frames = watched.frames()
     watched.start()
     beliefs = []
@@ -142,7 +142,7 @@ def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
 def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
     run_dir = tmp_path / "steered"
     watched = LiveRun(
-        fleet2d.Simulation("bundled:base", "simulation.duration=3 h", DOOR, seed=4, out=run_dir),
+        fleet2d.Simulation("bundled:paper", "simulation.duration=3 h", DOOR, seed=4, out=run_dir),
         paused=True,
     )
     watched.start()

@@ -68,7 +68,7 @@ def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(
 
 def test_branch_of_a_running_simulation_keeps_its_interventions(served: ServedRuns) -> None:
     first = LiveRun(
-        fleet2d.Simulation("bundled:base", "simulation.duration=2 h", seed=4), paused=True
+        fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4), paused=True
     )
     lives = LiveRuns(served, first)
     first.start()

@@ -32,7 +32,7 @@ def test_run_and_home_show_themselves_in_a_notebook(run_dir: Path) -> None:
 
 def test_violated_expectation_comes_before_the_facts_of_a_run_and_notes_are_calm() -> None:
     changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
-    run = fleet2d.run("bundled:base", *changes, "expect.any=always(distance(ana, astro) > 0 m)")
+    run = fleet2d.run("bundled:paper", *changes, "expect.any=always(distance(ana, astro) > 0 m)")
     run.notes.append("a remark")
     shown = run._repr_html_()
     verdict = shown.index("\u2717 1 of 2 expectations violated: still at Mon 05 Jan 00:00:0")

@@ -194,7 +194,7 @@ def test_sightings_cover_the_observations(run_dir: Path) -> None:
 
 def test_false_sightings_are_marked() -> None:
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=6 h",
         "robots.astro.camera.perception={false_positives: {per_hour: 30}}",
         seed=3,
@@ -204,9 +204,9 @@ def test_false_sightings_are_marked() -> None:
 
 
 def test_run_in_memory_is_served_like_a_stored_one() -> None:
-    run = fleet2d.run("bundled:base", "simulation.duration=1 h", seed=3)
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=3)
     client = client_of(PageData(run))
-    assert "base" == client.get("run/0/facts.json").json()["title"]
+    assert "paper" == client.get("run/0/facts.json").json()["title"]
     assert b"PAR1" == client.get("run/0/tables/key_frames.parquet").content[:4]
 
 
@@ -268,7 +268,7 @@ def test_unfinished_run_is_shown_as_far_as_it_goes(copy: Path) -> None:
 def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: Path) -> None:
     out = tmp_path / "cut"
     simulation = fleet2d.Simulation(
-        "simulation.duration=6 h", "artifacts.checkpoint=1 h", seed=4, out=out
+        "bundled:paper", "simulation.duration=6 h", "artifacts.checkpoint=1 h", seed=4, out=out
     )
     simulation.advance(4 * 3600)
     copied = shutil.copytree(out, tmp_path / "copied")  # as a crash would leave it

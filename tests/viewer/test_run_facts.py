@@ -58,7 +58,7 @@ def test_expectation_without_violations_is_what_its_verdict_says(
 def test_marks_come_from_manifest_and_table() -> None:
     import pyarrow as pa
 
-    run = fleet2d.run("simulation.duration=1 min", seed=4)
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
     table = pa.table({"step": [5], "expectation": ["quiet"], "last_step": [9]})
     run.tables = Tables(["violations"], {"violations": table}.__getitem__)
     run.manifest["expectations"] = {"quiet": {"holds": False, "says": "quiet is violated"}}

@@ -56,7 +56,7 @@ def test_what_are_no_notes_is_refused(body: bytes) -> None:
 
 
 def test_run_in_memory_has_no_notes_and_says_why() -> None:
-    run = fleet2d.run("bundled:base", "simulation.duration=10 min", seed=4)
+    run = fleet2d.run("bundled:paper", "simulation.duration=10 min", seed=4)
     assert [] == read_notes(PageData(run).run)
     with pytest.raises(InputError, match="in memory"):
         write_notes(run, b"[]")

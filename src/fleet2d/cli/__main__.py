@@ -149,7 +149,7 @@ app = typer.Typer(
     add_completion=False,
     epilog="\b\nExamples:\n"
     "  fleet2d demo\n"
-    "  fleet2d run bundled:base simulation.duration.days=60 --out sixty\n"
+    "  fleet2d run bundled:paper simulation.duration.days=60 --out sixty\n"
     "  fleet2d view sixty\n\n"
     "fleet2d COMMAND --help describes a command; docs/cli.md describes all.",
     pretty_exceptions_enable=False,

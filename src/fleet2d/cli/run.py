@@ -238,7 +238,7 @@ Arguments = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
-        help="A scenario (left out: the bundled base scenario), and changes to it.",
+        help="A scenario (left out: the bundled family), and changes to it.",
     ),
 ]
 
@@ -256,7 +256,7 @@ def run(
     Examples:
       fleet2d run
       fleet2d run home.yaml simulation.duration.days=60 --seed 4 --out sixty
-      fleet2d run bundled:base --json --quiet
+      fleet2d run bundled:paper --json --quiet
     """
     with redirect_stdout(sys.stderr) if as_json else nullcontext():  # output of components
         simulation = set_up(arguments, seed, out, strict=strict, quiet=quiet)

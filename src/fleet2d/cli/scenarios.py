@@ -38,7 +38,7 @@ def validate(
 
     Examples:
       fleet2d validate home.yaml
-      fleet2d validate bundled:base robots.astro.speed=0.5
+      fleet2d validate bundled:paper robots.astro.speed=0.5
       fleet2d validate synthetic:7 --radius 0.2
     """
     from fleet2d.floorplan.load import is_floorplan, load_or_mark

@@ -322,7 +322,7 @@ def read_document(path: Path, title: str | None = None) -> Document:
     document.data = parse_yaml(_read_text(path, title), path.parent, title, document.places)
     if document.data is None:
         raise ScenarioError(
-            f"{title} is empty; a scenario that changes nothing reads: extends: bundled:base"
+            f"{title} is empty; a scenario that changes nothing reads: extends: bundled:paper"
         )
     if not isinstance(document.data, dict):
         value = f"the value {one_line(repr(document.data))}"

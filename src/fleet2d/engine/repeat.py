@@ -150,7 +150,7 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
 
     Example:
         >>> import fleet2d
-        >>> run = fleet2d.run("bundled:base", "simulation.duration=8 h", seed=4)
+        >>> run = fleet2d.run("bundled:paper", "simulation.duration=8 h", seed=4)
         >>> future = branch(run, step=3600)
         >>> future.put("ana", "kitchen")
         >>> future.run().digest == run.digest

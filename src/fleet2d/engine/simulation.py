@@ -79,7 +79,7 @@ class Simulation:
     Example:
         >>> import copy
         >>> from datetime import timedelta
-        >>> simulation = Simulation("bundled:base", "simulation.duration=1 d", seed=4)
+        >>> simulation = Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
         >>> simulation.run_until(timedelta(hours=12))
         >>> futures = [copy.deepcopy(simulation).run() for _ in range(2)]
         >>> futures[0].digest == futures[1].digest
@@ -97,7 +97,7 @@ class Simulation:
         """Set up the run; with `out` it is stored in that directory, else in memory.
 
         Args:
-            scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
+            scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled family
                 scenario.
             overrides: Texts like 'simulation.duration.days=60'.
             out: Directory to store the run in; None keeps it in memory.
@@ -288,7 +288,7 @@ class Simulation:
 
         Example:
             >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=2 h", seed=4)
+            >>> simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4)
             >>> tables = []
             >>> simulation.listen_rows(lambda table, row: tables.append(table))
             >>> _ = simulation.run()
@@ -400,7 +400,7 @@ class Simulation:
 
         Example:
             >>> import fleet2d
-            >>> simulation = fleet2d.Simulation(None, "simulation.duration=1 d", seed=4)
+            >>> simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
             >>> simulation.run_until("19:00")
             >>> simulation.time.hour
             19
@@ -890,7 +890,7 @@ def run(
     """Run a scenario to its end.
 
     Args:
-        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled base
+        scenario: A YAML file, 'bundled:NAME', a mapping or a Scenario; None: the bundled family
             scenario.
         overrides: Texts like 'simulation.duration.days=60'.
         out: Directory to store the run in; None keeps it in memory.
@@ -902,7 +902,7 @@ def run(
 
     Example:
         >>> import fleet2d
-        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> run = fleet2d.run("bundled:paper", "simulation.duration=2 h", seed=4)
         >>> run.manifest["steps"], run.tables["trajectories"].num_rows
         (7200, 4)
     """

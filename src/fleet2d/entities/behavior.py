@@ -492,11 +492,7 @@ class Actor(Body):
         """Note the rooms that it can't get to, as every way there leads through forbidden ones."""
         if not self.forbidden or self._state.away:
             return
-        whole = self.home.space(
-            self.entity.radius,
-            opens_doors=self.entity.opens_doors,
-            uses_portals=self.entity.uses_portals,
-        )
+        whole = self.whole_space
         within_reach = whole.rooms_of(whole.part_at(self._state.x, self._state.y))
         lost = within_reach - self.space.rooms_of(self.part) - self.forbidden
         if lost:

@@ -22,10 +22,11 @@ from fleet2d.entities.place import (
     forbidden_rooms,
     furniture_of,
     is_point,
+    lies_in,
     matching_rooms,
     parse_place,
 )
-from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame
+from fleet2d.errors import ComponentError, FloorPlanError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
@@ -308,7 +309,13 @@ class Body:
         lattice = self.home.plan.lattice
         self.forbidden = forbidden_rooms(self, getattr(self.entity, "keep_out", ()))
         self.kept_out = self.forbidden
-        self._space: tuple[Arrangement, Space] = self.arrangement, self.space_without()
+        try:
+            space = self.space_without()
+        except FloorPlanError as error:
+            if not self.forbidden:
+                raise
+            raise PlacementError(f"{self.path}.keep_out leaves its body no place") from error
+        self._space: tuple[Arrangement, Space] = self.arrangement, space
         self.speed = self.entity.speed * lattice.units_per_m  # units per second
         self.turn_rate = self.entity.turn_rate_deg / 360 * TURN  # headings per second
         drive: Drive | None = getattr(self.entity, "drive", None)
@@ -366,14 +373,22 @@ class Body:
         """Whether routes may be closed to it that were open before, or will be."""
         return self.home.may_block_routes or self.kept_out != self.forbidden
 
+    @property
+    def whole_space(self) -> Space:
+        """Where its body fits at present, also in rooms that it keeps out of: carried there."""
+        return self._space_outside(frozenset())
+
     def space_without(self, rooms: frozenset[int] = frozenset()) -> Space:
         """Return where its body can be at present outside of some rooms, by their indices."""
+        return self._space_outside(self.kept_out | rooms)
+
+    def _space_outside(self, rooms: frozenset[int]) -> Space:
         entity = self.entity
         space = self.home.space(
             entity.radius,
             opens_doors=entity.opens_doors,
             uses_portals=entity.uses_portals,
-            without=self.kept_out | rooms,
+            without=rooms,
         )
         return self.home.costed(space) if entity.minds_costs else space
 
@@ -538,16 +553,17 @@ class Body:
             PlacementError: There is no such room, or the body fits nowhere in it.
         """
         target = parse_place(place)
+        space = self.whole_space
         if not is_point(target):
             rooms = matching_rooms(target, self.home.rooms, self.home.rooms)[1]  # type: ignore[arg-type]
-            for part in range(self.space.parts):
-                cells = self.space.cells(rooms[0].index, part)
+            for part in range(space.parts):
+                cells = space.cells(rooms[0].index, part)
                 if len(cells):
                     return self._spot_of(cells, Draws(self.stream(purpose), time_us))
             raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
         x, y = self.home.plan.lattice.point_at(target)  # type: ignore[arg-type]
-        if self.space.part_at(x, y) < 0:
-            raise self._is_not_free(target, self.space.nearest(x, y))  # type: ignore[arg-type]
+        if space.part_at(x, y) < 0:
+            raise self._is_not_free(target, space.nearest(x, y))  # type: ignore[arg-type]
         return x, y
 
     def middle(self, room: Room) -> tuple[int, int]:
@@ -577,7 +593,9 @@ class Body:
         if part == self.part:
             return x, y
         why = ""
-        if part >= 0:
+        if lies_in(self, (x, y), self.kept_out):
+            why = "is in a room that it keeps out of (keep_out)"
+        elif part >= 0:
             why = "can't be reached from where it starts"
         elif self.home.space(self.entity.radius).part_at(x, y) >= 0:
             why = "is where the costmap lets no route pass"

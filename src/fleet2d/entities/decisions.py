@@ -383,7 +383,7 @@ class DecidingActor(Actor):
         room = self._room_index()
         banned = self.banned(step)
         if not self.state.away and room in banned:
-            self.kept_out = banned - {room}  # its way out leads through this room
+            self.kept_out = frozenset()  # its way out may lead through others of them, too
             self.order = LeaveRoom("keep_out")
         self.part = self._present_part()
         self.decide_again(step)

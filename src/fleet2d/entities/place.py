@@ -306,7 +306,7 @@ def forbidden_rooms(body: "Body", names: tuple[str, ...]) -> frozenset[int]:
             _, matches = matching_rooms((name,), rooms, rooms)
         except PlacementError as error:
             if not is_kind(body, (name,)):
-                raise PlacementError(f"keep_out: {error}") from None
+                raise PlacementError(f"{body.path}.keep_out: {error}") from None
             body.notes.append(f"keep_out: this home has no {name}")
             continue
         forbidden |= {room.index for room in matches}

@@ -331,7 +331,8 @@ class Plan:
         home = self.body.home
         body = self.body
         # A random walk doesn't open doors: a shut one is a wall.
-        self._motion = RandomWalk(home.barriers, home.space(body.entity.radius).mesh, rule)
+        space = home.space(body.entity.radius, without=body.forbidden)
+        self._motion = RandomWalk(home.barriers, space.mesh, rule)
         self.endless = True
         return self
 

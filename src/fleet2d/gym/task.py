@@ -74,7 +74,7 @@ class LearningTask(Settings):
         reward: Weights of the reward's terms; see `REWARDS`.
     """
 
-    scenario: dict[str, Any] | str = "bundled:base"
+    scenario: dict[str, Any] | str = "bundled:paper"
     vary: dict[str, Values] = Field(default={})
     reward: dict[str, float] = Field(default={"in_view_min": 1.0}, min_length=1)
 

@@ -94,7 +94,7 @@ class Put(BodyIntervention):
         """
         actor = self.actor(world)
         x, y = self._place(actor, world)
-        if actor.space.part_at(x, y) < 0:
+        if actor.whole_space.part_at(x, y) < 0:
             x_m, y_m = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
             raise PlacementError(
                 f"{actor.path}: there is no room for its body at ({x_m:g}, {y_m:g}) m"
@@ -261,7 +261,7 @@ class Decide(BodyIntervention):
     Example:
         >>> import fleet2d
         >>> from fleet2d.entities.plan import data_of
-        >>> simulation = fleet2d.Simulation("bundled:base", "simulation.duration=1 h", seed=4)
+        >>> simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
         >>> plan = simulation.plan("astro").go_to("kitchen")
         >>> Decide("astro", data_of(plan)).entity
         'astro'

@@ -59,7 +59,8 @@ class Workspace:
         >>> import tempfile
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     place = Workspace(Path(folder))
-        ...     _ = place.write("home.yaml", "{extends: bundled:base, simulation: {duration: 2 h}}")
+        ...     home = "{extends: bundled:paper, simulation: {duration: 2 h}}"
+        ...     _ = place.write("home.yaml", home)
         ...     place.run("home.yaml", "first")["steps"]
         7200
     """

@@ -79,7 +79,7 @@ def verdict_line(run: "Run", verdicts: list[ExpectationVerdict]) -> str:
     Example:
         >>> import fleet2d
         >>> changes = ("simulation.duration=10 s", "expect.quiet=never(moving(ana))")
-        >>> run = fleet2d.run("bundled:base", *changes, seed=4)
+        >>> run = fleet2d.run("bundled:paper", *changes, seed=4)
         >>> verdict_line(run, verdicts_of(run))
         '1 of 1 expectation violated: quiet at Mon 05 Jan 00:00:01'
     """

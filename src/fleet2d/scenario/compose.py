@@ -38,7 +38,7 @@ def compose(
     overrides: Iterable[str] = (),
     settings: Mapping[Keys, Any] | None = None,
 ) -> Document:
-    """Compose a scenario from a file (None: the bundled base) or a mapping, and overrides of it.
+    """Compose a scenario from a file (None: the bundled family) or a mapping, and overrides of it.
 
     Mappings are merged, all other values replaced. Where a ``type`` changes, the fields of the old
     type are dropped. All overrides and settings are one change, applied after the files.
@@ -51,7 +51,7 @@ def compose(
     Raises:
         ScenarioError: a file or an override can't be read.
     """
-    document = _load("bundled:base" if source is None else source, Path(), (), [])
+    document = _load("bundled:family" if source is None else source, Path(), (), [])
     changes = [_read_override(text) for text in overrides]
     for keys, value in (settings or {}).items():
         changes.append(assignment(keys, value, f"argument {keys[-1]}={value!r}"))

@@ -316,7 +316,7 @@ def load_scenario(
 
     Args:
         source: a YAML file, 'bundled:NAME', a mapping or a scenario; None, or an override in
-            its place: the bundled base.
+            its place: the bundled family.
         overrides: texts like 'simulation.duration.days=60', the value in YAML.
         settings: keys of ``simulation`` (``seed=4``) or whole sections (``name="night"``).
 

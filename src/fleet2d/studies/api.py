@@ -61,7 +61,7 @@ def study(
     Example:
         >>> import fleet2d
         >>> speeds = {"robots.astro.speed": [0.3, 0.6]}
-        >>> base = {"extends": "bundled:base", "simulation": {"duration": "1 h"}}
+        >>> base = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
         >>> fleet2d.study({"base": base, "axes": speeds}, out="speeds")  # doctest: +SKIP
         <Study speeds: 2 of 2 variants complete>
     """

@@ -155,7 +155,7 @@ class StudyFile(Settings):
         description: The question it answers, for the report.
         tags: Words to find the study by.
         notes: Remarks for the report.
-        base: The scenario: a file, bundled:NAME, or a mapping; left out: bundled:base.
+        base: The scenario: a file, bundled:NAME, or a mapping; left out: bundled:family.
         axes: The axes along which scenarios vary, by name.
         replicates: The number of seeds, from 0 on, or a list; left out: the seed of the base.
         rules: Changes for some of the variants.

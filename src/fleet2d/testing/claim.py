@@ -446,7 +446,7 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
 
     Args:
         scenario: A YAML file beside the test or in the working folder, 'bundled:NAME', a mapping
-            or a Scenario; None: the bundled base scenario.
+            or a Scenario; None: the bundled family.
         overrides: Texts like 'simulation.duration=4 h'.
         seeds: Number of seeds, from 0 on, or the seeds; None: that of the scenario, or 0. With
             homes, households or axes each trial takes the next of these and the next seed.
@@ -464,7 +464,7 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
 
     Example:
         >>> from fleet2d.testing import trial
-        >>> @trial("bundled:base", "simulation.duration=1 h", seeds=20, holds=0.8)
+        >>> @trial("bundled:paper", "simulation.duration=1 h", seeds=20, holds=0.8)
         ... def test_robot_moves(trial):
         ...     before = trial.state["astro"]
         ...     trial.run_until("00:50")

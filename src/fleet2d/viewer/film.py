@@ -143,7 +143,14 @@ MAX_WAITING = 16
 
 
 def write_film(
-    run: Run, path: Path, first: int, end: int, *, speed: float = 60.0, height: int = HEIGHT_PX
+    run: Run,
+    path: Path,
+    first: int,
+    end: int,
+    *,
+    speed: float = 60.0,
+    height: int = HEIGHT_PX,
+    frames_per_s: int = MAX_FRAMES_PER_S,
 ) -> int:
     """Write a stretch of a run as a film; return the number of distinct frames.
 
@@ -154,6 +161,7 @@ def write_film(
         end: The step before which to end.
         speed: Simulated time over the time of the film.
         height: The height of the film [pixels].
+        frames_per_s: At most so many frames to a second of film.
 
     Raises:
         InputError: The file name has another suffix, a number is out of range, or the file can't be
@@ -161,8 +169,8 @@ def write_film(
         ArtifactError: The run stored no key frames or no floor plan.
     """
     _check(path, speed, height)
-    # Steps between two frames: a second of film has at most MAX_FRAMES_PER_S frames.
-    stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / MAX_FRAMES_PER_S))
+    # Steps between two frames.
+    stride = max(1, round(speed * 1e6 / run.manifest["step_us"] / frames_per_s))
     rate = Fraction(speed).limit_denominator(1000) * 1_000_000
     rate /= run.manifest["step_us"] * stride
     kind = path.suffix.lower()[1:]

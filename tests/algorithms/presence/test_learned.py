@@ -67,7 +67,7 @@ def test_forecasts_begin_with_the_present_belief() -> None:
 def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
     routine = {"type": "rtp", "model": "routine"}
     run = fleet2d.run(
-        "bundled:base",
+        "bundled:paper",
         "simulation.duration=5 d",
         "floorplan={type: synthetic, seed: 77, furnish: true}",
         "robots.astro.behaviors=[{type: patrol, order: random, dwell: 10 min}]",
@@ -90,7 +90,7 @@ def test_it_is_calibrated_in_unseen_homes_with_unseen_people() -> None:
         "households": [["works_from_home"], ["night_shift"]],
     }
     base = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": {"days": 3}},
         "robots": {
             "astro": {"behaviors": [{"type": "patrol", "order": "random", "dwell": "10 min"}]}
@@ -121,7 +121,9 @@ def test_it_is_calibrated_in_unseen_homes_with_unseen_people() -> None:
 
 
 def test_a_branch_and_a_learned_state_go_on_alike(tmp_path: Path) -> None:
-    simulation = fleet2d.Simulation("simulation.duration=8 h", seed=3, algorithms=LEARNED)
+    simulation = fleet2d.Simulation(
+        "bundled:paper", "simulation.duration=8 h", seed=3, algorithms=LEARNED
+    )
     simulation.run_until(timedelta(hours=5))
     branch = copy.deepcopy(simulation)
 
@@ -168,7 +170,10 @@ def test_a_damaged_file_is_refused_before_the_run(tmp_path: Path) -> None:
     model = {"type": "learned", "weights": str(tmp_path / "own.npz")}
     with pytest.raises(Fleet2DError, match="can't be read as weights"):
         fleet2d.Simulation(
-            "simulation.duration=1 h", seed=1, algorithms={"rtp": {"type": "rtp", "model": model}}
+            "bundled:paper",
+            "simulation.duration=1 h",
+            seed=1,
+            algorithms={"rtp": {"type": "rtp", "model": model}},
         )
 
 
@@ -185,7 +190,7 @@ def test_weights_are_read_as_they_were_saved(tmp_path: Path) -> None:
 def test_a_run_names_a_missing_file(tmp_path: Path) -> None:
     missing = {"type": "rtp", "model": {"type": "learned", "weights": str(tmp_path / "no.npz")}}
     with pytest.raises(InputError, match=r"no\.npz"):
-        fleet2d.run("simulation.duration=1 h", seed=1, algorithms={"rtp": missing})
+        fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=1, algorithms={"rtp": missing})
 
 
 def test_the_time_of_the_run_is_no_leak() -> None:

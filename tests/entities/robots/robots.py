@@ -3,6 +3,7 @@
 from itertools import groupby
 from typing import Any
 
+import numpy as np
 from tests.scenes import digests, path, run, scenario, table
 
 from fleet2d.runs.run import Run
@@ -50,6 +51,17 @@ def rooms(stored: Run, still_s: int = 20) -> list[str]:
             room = stored.plan.room_at(*xy)
             names_of_rooms.append("" if room is None else room.name)
     return [room for room, _ in groupby(names_of_rooms)]
+
+
+def rooms_of(stored: Run, entity: str = "astro") -> list[str]:
+    """The room that a body is in at each step."""
+    poses = path(stored, entity)
+    points = np.stack([poses.x, poses.y], axis=1)
+    known = {}
+    for xy in map(tuple, np.unique(points, axis=0).tolist()):
+        room = stored.plan.room_at(*xy)
+        known[xy] = "" if room is None else room.name
+    return [known[xy] for xy in map(tuple, points.tolist())]
 
 
 def assert_same_for_every_max_span(content: dict[str, Any], *spans: int) -> Run:

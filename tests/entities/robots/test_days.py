@@ -71,7 +71,7 @@ def home_file(folder: Path, which: str) -> Path:
 )
 def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which: str) -> None:
     behaviors, expected = DAYS[name]
-    ana = fleet2d.load_scenario("bundled:base").users["ana"].model_dump(mode="json")
+    ana = fleet2d.load_scenario("bundled:paper").users["ana"].model_dump(mode="json")
     body = {"battery": BATTERY} if "dock" in behaviors else {}
     content = {
         "simulation": {"start": "2026-01-10", "duration": "1 d", "seed": 4},

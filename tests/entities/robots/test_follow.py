@@ -89,4 +89,6 @@ def test_a_robot_without_a_camera_is_refused() -> None:
 )
 def test_a_user_that_there_is_not_is_refused_before_the_run(behavior: dict[str, object]) -> None:
     with pytest.raises(InputError, match=r"behaviors\.1: there is no user 'anna'.*'ana'"):
-        fleet2d.load_scenario(robots={"astro": {"behaviors": ["patrol", behavior]}})
+        fleet2d.load_scenario(
+            "bundled:paper", robots={"astro": {"behaviors": ["patrol", behavior]}}
+        )

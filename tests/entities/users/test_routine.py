@@ -266,7 +266,7 @@ def test_a_persona_comes_from_a_file_beside_the_scenario_and_is_stored_whole(
 ) -> None:
     (tmp_path / "ana.yaml").write_text("extends: retired\npace: 0.5\ndays: {sunday: null}\n")
     (tmp_path / "home.yaml").write_text(
-        "extends: bundled:base\nusers: {ana: {type: routine, persona: ana.yaml}}\n"
+        "extends: bundled:paper\nusers: {ana: {type: routine, persona: ana.yaml}}\n"
     )
     loaded = fleet2d.load_scenario(tmp_path / "home.yaml", "simulation.duration=1 h")
     persona = loaded.users["ana"].behaviors[0].persona

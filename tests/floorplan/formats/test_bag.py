@@ -75,7 +75,7 @@ def test_a_turned_map_is_turned(tmp_path: Path) -> None:
 
 
 def test_a_run_exported_as_a_bag_is_lived_in_again(tmp_path: Path) -> None:
-    run = fleet2d.run("simulation.duration=1 min", seed=4)
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
     fleet2d.export(run, tmp_path / "home.mcap")
 
     again = fleet2d.load_floorplan(tmp_path / "home.mcap")
@@ -101,7 +101,7 @@ def test_a_bag_without_one_home_is_refused(
 
 
 def test_a_bag_without_a_map_is_refused(tmp_path: Path) -> None:
-    run = fleet2d.run("simulation.duration=1 min", seed=4)
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
     fleet2d.export(run, tmp_path / "home.mcap")
     text = (tmp_path / "home.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(text[: len(text) // 2])

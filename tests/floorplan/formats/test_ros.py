@@ -570,5 +570,5 @@ def test_load_floorplan_of_the_image_names_the_yaml_file(tmp_path: Path) -> None
 def test_a_run_notes_the_image_as_well_as_the_yaml(shared_data: Path) -> None:
     path = shared_data / "ros_maps" / "turtlebot3_house" / "map.yaml"
     overrides = ("floorplan.type=ros", f"floorplan.path={path}", "simulation.duration=1 min")
-    inputs = fleet2d.run(None, *overrides).manifest["inputs"]
+    inputs = fleet2d.run("bundled:paper", *overrides).manifest["inputs"]
     assert ["map.pgm", "map.yaml"] == [Path(record["path"]).name for record in inputs]

@@ -22,7 +22,9 @@ def ways(path: Path) -> list[tuple[str, str, str, int]]:
 def test_ways_do_not_end_where_chunks_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
-    run = fleet2d.run("simulation.duration=10 min", "simulation.start=2026-01-05T07:00", seed=4)
+    run = fleet2d.run(
+        "bundled:paper", "simulation.duration=10 min", "simulation.start=2026-01-05T07:00", seed=4
+    )
     fleet2d.export(run, tmp_path / "whole.geojson")
     monkeypatch.setattr(exporters, "MAX_POSES", size)
 

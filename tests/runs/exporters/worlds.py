@@ -18,7 +18,7 @@ NAMES = ("ana", "ben", "astro")
 def day() -> Run:
     """A day with two people, one of whom goes out, and a robot that is sometimes mistaken."""
     scenario = {
-        "extends": "bundled:base",
+        "extends": "bundled:paper",
         "simulation": {"duration": "10 h", "seed": 4},
         "users": {"ben": {"type": "routine", "persona": "works_outside"}},
         "robots": {"astro": {"perception": {"identity": {"right": 0.8, "mistaken": 0.1}}}},
@@ -45,5 +45,5 @@ def rows(table: str) -> list[dict[str, object]]:
 
 def stored(folder: Path) -> Path:
     """A run of ten minutes in a run directory."""
-    fleet2d.run("bundled:base", "simulation.duration=10 min", seed=4, out=folder / "run")
+    fleet2d.run("bundled:paper", "simulation.duration=10 min", seed=4, out=folder / "run")
     return folder / "run"

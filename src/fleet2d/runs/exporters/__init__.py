@@ -106,7 +106,7 @@ class Records:
 
     Example:
         >>> import fleet2d
-        >>> run = fleet2d.run("simulation.duration=2 h", seed=4)
+        >>> run = fleet2d.run("bundled:paper", "simulation.duration=2 h", seed=4)
         >>> chunks = list(Records(run, Selection.of(run)).chunks())
         >>> len(chunks), len(chunks[0].poses["ana"].x), chunks[0].rows["events"][0]["event"]
         (1, 7200, 'uses')

@@ -1,0 +1,172 @@
+"""Rooms that a robot never enters: its key `keep_out`."""
+
+from typing import Any
+
+import pytest
+from tests.entities.robots.robots import assert_same_for_every_max_span, names, rooms_of
+from tests.scenes import run, scenario
+
+import fleet2d
+from fleet2d.errors import PlacementError
+from fleet2d.runs.run import Run
+
+ROUNDS = {"type": "patrol", "dwell": "5 s"}
+DOORWAYS = "unknown_0"
+CAMERA = {"range": [0.2, 6], "angle_deg": 340}
+
+
+def flat(*behaviors: Any, keep_out: Any = (), duration: str = "1 h", **sections: Any) -> Any:
+    """The flat with a robot: the way to its bathroom leads through the kitchen."""
+    astro = {
+        "start": [1.0, 3.0],
+        "camera": CAMERA,
+        "behaviors": list(behaviors) or [ROUNDS],
+        "keep_out": list(keep_out),
+        **sections.pop("astro", {}),
+    }
+    return scenario(duration, robots={"astro": astro}, **sections)
+
+
+BEHAVIORS: dict[str, list[dict[str, Any]]] = {
+    "patrol": [ROUNDS],
+    "hangout": [{"type": "hangout", "source": "ltp", "near": "room", "period": "10 min"}],
+    "find": [{"type": "find", "user": "ana", "every": "5 min", "distance": 0.5}, ROUNDS],
+    "follow": [{"type": "follow", "user": "ana", "distance": 0.5}, ROUNDS],
+    "opportunistic": [{"type": "opportunistic", "again": "1 min", "distance": 0.5}, ROUNDS],
+    "interact": [{"type": "interact", "source": "ltp"}, ROUNDS],
+    "explore": [{"type": "explore"}],
+    "meander": [{"type": "meander"}],
+    "scheduled": [{"type": "scheduled", "visits": [{"at": "07:20", "place": "bedroom"}]}, ROUNDS],
+    "dock": [{"type": "dock", "threshold": "30 %"}, ROUNDS],
+}  # fmt: skip
+
+
+def lived_in(behavior: str, keep_out: list[str]) -> Run:
+    """Two hours with a person who is about everywhere, and a robot with all reasons to follow."""
+    return run(
+        flat(
+            *BEHAVIORS[behavior],
+            keep_out=keep_out,
+            duration="2 h",
+            users={"ana": {"type": "meander"}},
+            astro={"battery": {"driving": "1 h", "standing": "3 h", "charging": "20 min", "charger": [2.0, 3.5]}},
+            algorithms={"ltp": {"type": "ltp", "period": "10 min"}},
+            interactions={"tea": {"do": "offer", "to": "ana", "at": ["07:10", "08:00"], "within": "1 h"}},
+        )
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("behavior", BEHAVIORS)
+def test_no_behavior_enters(behavior: str) -> None:
+    assert not {"kitchen_0", "bathroom_0"} & set(rooms_of(lived_in(behavior, ["kitchen"])))
+
+
+@pytest.mark.parametrize("behavior", ["patrol", "find", "follow", "explore"])
+def test_behaviors_enter_a_room_that_is_not_forbidden(behavior: str) -> None:
+    assert "kitchen_0" in rooms_of(lived_in(behavior, []))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_the_family_s_robot_enters_neither_bedrooms_nor_bathrooms_in_a_week(seed: int) -> None:
+    week = fleet2d.run("bundled:family", "simulation.duration=7 d", seed=seed)
+    kinds = {room.name: room.type for room in week.plan.rooms}
+    visited = {kinds.get(name, "") for name in rooms_of(week)}
+    assert not {"bedroom", "bathroom"} & visited
+    assert {"kitchen", "living_room", "entryway"} <= visited
+    assert week.metrics["interactions"]
+
+
+@pytest.mark.parametrize("keep_out", [["bedroom"], ["bedroom_0"]])
+def test_rooms_are_given_by_kind_or_name(keep_out: list[str]) -> None:
+    visited = set(rooms_of(run(flat(keep_out=keep_out))))
+    assert {"living_room_0", "kitchen_0", "bathroom_0"} == visited - {DOORWAYS}
+
+
+@pytest.mark.parametrize(("name", "nearest"), [("kitchn", "kitchen"), ("bedroom_1", "bedroom_0")])
+def test_an_unknown_room_is_refused_with_the_nearest_name(name: str, nearest: str) -> None:
+    with pytest.raises(PlacementError, match=rf"robots\.astro\.keep_out: .*{name}.*{nearest}"):
+        run(flat(keep_out=[name]))
+
+
+def notes(content: Any) -> list[str]:
+    """What is said of the key before the run starts."""
+    said = fleet2d.Simulation(content).notes
+    return [note for note in said if "keep_out" in note]
+
+
+def test_a_kind_of_room_that_the_home_lacks_is_noted() -> None:
+    assert ["robots.astro.keep_out: this home has no office"] == notes(flat(keep_out=["office"]))
+
+
+def test_rooms_that_are_cut_off_are_noted_by_name() -> None:
+    said = notes(flat(keep_out=["kitchen"]))
+    assert ["robots.astro.keep_out: no way is left to bathroom_0"] == said
+    assert [] == notes(flat(keep_out=["bedroom"]))
+
+
+@pytest.mark.parametrize("place", [[6.5, 3.1], [7.0, 6.0]])
+def test_a_robot_put_where_it_must_not_be_leaves(place: list[float]) -> None:
+    """Also from the bathroom, whose only door leads to the kitchen, which is forbidden, too."""
+    script = [{"at": "07:10", "put": "astro", "to": place}]
+    content = flat(keep_out=["kitchen", "bathroom"], script=script)
+    rooms = rooms_of(run(content))
+    allowed = {"living_room_0", "bedroom_0", DOORWAYS}
+    assert allowed >= set(rooms[:600])
+    assert rooms[600] in ("kitchen_0", "bathroom_0")
+    assert allowed >= set(rooms[660:])
+
+
+def test_a_robot_cannot_start_where_it_must_not_be() -> None:
+    with pytest.raises(PlacementError, match=r"\[1.0, 3.0\] is in a room .*keep_out") as caught:
+        run(flat(keep_out=["living_room"]))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "act", [{"call": "astro", "to": "kitchen"}, {"send": "astro", "to": "kitchen"}]
+)
+def test_it_cannot_be_sent_or_called_there(act: dict[str, str]) -> None:
+    with pytest.raises(PlacementError, match=r"script\.0: .*'kitchen' can't be reached"):
+        run(flat({"type": "come"}, keep_out=["kitchen"], script=[{"at": "07:10", **act}]))
+
+
+def test_a_robot_starts_elsewhere_if_no_place_is_given() -> None:
+    for seed in range(8):
+        content = flat(keep_out=["living_room", "kitchen", "bathroom"], astro={"start": None})
+        content["simulation"]["seed"] = seed
+        assert {"bedroom_0", DOORWAYS} >= set(rooms_of(run(content, duration="5 min")))
+
+
+def test_a_robot_that_may_be_nowhere_is_refused() -> None:
+    everywhere = ["living_room", "kitchen", "bathroom", "bedroom", "storage"]
+    with pytest.raises(PlacementError, match="keep_out"):
+        run(flat(keep_out=everywhere, astro={"start": None}))
+
+
+@pytest.mark.parametrize("behavior", ["patrol", "find"])
+def test_a_run_is_the_same_however_it_is_cut_into_spans(behavior: str) -> None:
+    users = {"ana": {"type": "meander"}}
+    script = [{"at": "07:05", "put": "astro", "to": [6.5, 3.1]}]
+    content = flat(*BEHAVIORS[behavior], keep_out=["kitchen"], duration="20 min", users=users, script=script)  # fmt: skip
+    assert_same_for_every_max_span(content, 1)
+
+
+def test_a_robot_that_is_told_to_keep_out_of_all_other_rooms_stands_still() -> None:
+    script = [{"at": "07:10", "keep_out": "astro", "of": ["living_room", "bedroom"]}]
+    rooms = rooms_of(run(flat(keep_out=["kitchen"], script=script)))
+    assert 1 == len(set(rooms[700:]))
+
+
+def test_a_room_stays_forbidden_after_a_ban_of_it_ends() -> None:
+    """And another one opens again."""
+    script = [
+        {"at": "07:10", "keep_out": "astro", "of": ["kitchen", "bedroom"], "duration": "10 min"}
+    ]
+    stored = run(flat(keep_out=["kitchen"], script=script))
+    rooms = rooms_of(stored)
+    assert "kitchen_0" not in rooms
+    assert "bedroom_0" in rooms[:600]
+    assert "bedroom_0" not in rooms[660:1200]
+    assert "bedroom_0" in rooms[1200:]
+    assert {"banned", "allowed"} <= set(names(stored))
