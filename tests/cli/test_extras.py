@@ -1,6 +1,9 @@
 """Commands without the packages of an extra: one line, with the extra and how to install it."""
 
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,10 +20,11 @@ from fleet2d.cli import extra_with
 
 PROJECT = tomllib.loads((TESTS.parent / "pyproject.toml").read_text())["project"]
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
-HIDDEN = """
+HIDING = """
+import os
 import sys
 
-hidden = set(sys.argv.pop(1).split(","))
+hidden = set(os.environ["HIDDEN_MODULES"].split(","))
 
 class Absent:
     def find_spec(self, name, path=None, target=None):
@@ -28,9 +32,8 @@ class Absent:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Absent())
-import fleet2d.cli
-fleet2d.cli.main()
 """
+"""A `sitecustomize` that hides modules from a process and from the children that it starts."""
 OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun", "mlflow-skinny": "mlflow"}
 """Modules whose names aren't those of their packages."""
 TOOLS = ("test", "browser", "page", "lint", "docs", "build", "cluster")
@@ -75,6 +78,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("extras")
     for name, content in FILES.items():
         (root / name).write_text(yaml.safe_dump(content))
+    (root / "hiding").mkdir()
+    (root / "hiding" / "sitecustomize.py").write_text(HIDING)
     (root / "net.onnx").write_bytes((BOMBS / "pol-good.onnx").read_bytes())
     (root / "log.csv").write_text("distance,bearing,detected\n1,0,1\n" * 60)
     for name in ("plan.svg", "plan.dxf", "plan.ifc"):
@@ -83,6 +88,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     fleet2d.study(root / "study.yaml", out=root / "st", workers=1)
     make(root / "data")
     return root
+
+
+def without(folder: Path, hidden: str, command: str) -> subprocess.CompletedProcess[str]:
+    """Run a command without some modules."""
+    path = os.pathsep.join([str(folder / "hiding"), *sys.path])
+    arguments = ("-m", "fleet2d.cli", *command.split())
+    return process(*arguments, cwd=folder, PYTHONPATH=path, HIDDEN_MODULES=hidden)
 
 
 MAP = f"floorplan.path={BOMBS / 'bomb-mcap.mcap'}"
@@ -128,11 +140,12 @@ def test_a_command_says_in_one_line_what_to_install(
 ) -> None:
     """`view` printed a traceback of 41 lines."""
     before = sorted(folder.rglob("*"))
-    done = process("-c", HIDDEN, hidden or modules(), *command.split(), cwd=folder)
+    done = without(folder, hidden or modules(), command)
     assert 2 == done.returncode
     (line,) = done.stderr.splitlines()
     assert re.fullmatch(rf'error: .*: pip install "fleet2d\[({extra})\]"', line)
-    left = {path.name for path in folder.rglob("*") if path not in before}
+    new = (path for path in folder.rglob("*") if path not in before)
+    left = {path.name for path in new if "hiding" not in path.parts}
     assert left <= {"run.notes.json", "tables", "report", "figures"}  # of the run and the study
 
 
@@ -150,7 +163,7 @@ PLAIN = (
 @pytest.mark.parametrize("command", some(PLAIN, 3))
 def test_a_command_that_needs_no_extra_runs_without_any(folder: Path, command: str) -> None:
     """`dataset` simulated everything, and then failed as polars wasn't there."""
-    done = process("-c", HIDDEN, modules(), *command.split(), cwd=folder)
+    done = without(folder, modules(), command)
     assert 0 == done.returncode, done.stderr
 
 
