@@ -157,9 +157,13 @@ def _join(hills: _Hills, pass_share: float, least_cells: float) -> I64:
             continue  # one of the two has become part of another since
         is_small = min(hills.sizes[one], hills.sizes[other]) < least_cells
         if -openness > pass_share or is_small:
+            # Other passes are as open as before; a hill may have thousands.
+            changed = set(hills.passes[other])
+            if hills.tops[other] > hills.tops[one]:
+                changed.update(hills.passes[one])
             hills.join(one, other)
             part[other] = one
-            for third in hills.passes[one]:
+            for third in changed - {one, other}:
                 low, high = sorted((one, third))
                 heappush(waiting, (-hills.openness(low, high), low, high))
     while ((further := part[part]) != part).any():
