@@ -24,7 +24,7 @@ FIND = {"type": "find", "user": "ana", "source": "rtp", "at": [f"{h}:00" for h i
 
 def main() -> None:
     """Look for Ana by every policy at every call; print a row for each policy."""
-    behaviors = [{**FIND, "deadline": DEADLINE}, {"type": "hangout", "source": "ltp"}]
+    behaviors = [{**FIND, "deadline": f"{DEADLINE} s"}, {"type": "hangout", "source": "ltp"}]
     history = Simulation(
         "bundled:paper",
         f"simulation.duration={DAYS.stop} d",
@@ -32,7 +32,7 @@ def main() -> None:
         users={"ana": {"persona": "works_from_home"}},
         robots={"astro": {"behaviors": behaviors, "speed": SPEED}},
         algorithms={"rtp": {"type": "rtp"}},
-        metrics={"time_to_find": {"deadline": DEADLINE}},
+        metrics={"time_to_find": {"deadline": f"{DEADLINE} s"}},
     )
     rows = {policy: list[Any]() for policy in POLICIES}
     for call in (timedelta(days=day, hours=hour) for day in DAYS for hour in CALLS):

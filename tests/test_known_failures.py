@@ -330,6 +330,7 @@ ELSEWHERE = {
     (User, "lights"): "tests/engine/test_change_queue_lights: it is day here",
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (User, "height"): "tests/engine/test_heights: there is no furniture here",
+    (Robot, "keep_out"): "tests/entities/robots/test_keep_out",
     (Robot, "height"): "tests/engine/test_heights: there is no furniture here",
     (Camera, "height"): "tests/engine/test_heights: there is no furniture here",
     (SightSettings, "heights"): "tests/engine/test_heights: there is no furniture here",

@@ -505,7 +505,7 @@ except SystemExit:
     print(json.dumps([sorted(sys.modules), sorted(before)]))
 """
     done = subprocess.run(
-        [sys.executable, "-c", script, "run", "simulation.duration=1 min", "--quiet", "--seed", "1"],
+        [sys.executable, "-c", script, "run", "bundled:paper", "simulation.duration=1 min", "--quiet", "--seed", "1"],
         capture_output=True, text=True, check=True, cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
@@ -536,7 +536,7 @@ except SystemExit:
     print(counts)
 """
     done = subprocess.run(
-        [sys.executable, "-c", script, "run", "simulation.duration=1 min", "--quiet", "--seed", "1"],
+        [sys.executable, "-c", script, "run", "bundled:paper", "simulation.duration=1 min", "--quiet", "--seed", "1"],
         capture_output=True, text=True, check=True, cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip

@@ -15,7 +15,7 @@ from threading import Lock
 from typing import Any
 
 import pytest
-from tests.scenes import OWN, digests, everything, fleet2d_process, scenario
+from tests.scenes import digests, everything, fleet2d_process, scenario
 from tests.thorough import THOROUGH, some
 
 import fleet2d
@@ -261,11 +261,12 @@ def forks() -> Any:
 @pytest.mark.slow
 def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, forks: Any) -> None:
     found, rng = content("2 h"), random.Random(14)
-    own = [f"{OWN}.py"]
 
     def begin(out: Path, *, again: bool = False) -> Any:
-        target, arguments = (fleet2d.resume, (out, own)) if again else (fleet2d.run, (found,))
-        run = forks.Process(target=target, args=arguments, kwargs={} if again else {"out": out})
+        if again:
+            run = forks.Process(target=fleet2d.resume, args=(out,), kwargs={"trust": True})
+        else:
+            run = forks.Process(target=fleet2d.run, args=(found,), kwargs={"out": out})
         run.start()
         return run
 
@@ -287,13 +288,13 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, for
         if number % 2 and fleet2d.open_run(out).status != "complete":
             kill(begin(out, again=True))
         if fleet2d.open_run(out).status != "complete":
-            fleet2d.resume(out, own)
+            fleet2d.resume(out, trust=True)
         stored = fleet2d.open_run(out)
         assert expected == digests(stored), number
         assert verify_run(out).same, number
         if verify_run(out).foreign:  # killed when it was complete, but not yet cleaned up
             with pytest.raises(RunDirectoryError, match="a complete run: there is nothing to res"):
-                fleet2d.resume(out, own)
+                fleet2d.resume(out, trust=True)
         assert [] == verify_run(out).foreign
         resumed.add(tuple(stored.manifest["resumed"]))
         shutil.rmtree(out)

@@ -280,7 +280,7 @@ def test_command_says_what_a_large_robot_cannot_do(tmp_path: Path) -> None:
     words = ["validate", "family_home", "--out", picture, "--radius"]
 
     result = CliRunner().invoke(app, [*words, "0.44"])
-    assert 0 == result.exit_code
+    assert 2 == result.exit_code
     assert "1 wrong: a body of radius 0.44 m" in result.output
     result = CliRunner().invoke(app, [*words, "3"])
     assert 2 == result.exit_code

@@ -47,4 +47,6 @@ def test_a_test_fails_without_the_defence(tmp_path: Path, defence: Defence) -> N
         preexec_fn=limit_memory,
         check=False,
     )
+    if "1 skipped" in done.stdout.splitlines()[-1]:
+        pytest.skip("its test needs a library that isn't installed")
     assert "1 failed" in done.stdout.splitlines()[-1], done.stdout + done.stderr

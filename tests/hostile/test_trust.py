@@ -281,7 +281,7 @@ def test_without_a_key_no_checkpoint_is_written(
     assert undisturbed(run) == done.digest
     code, out, _ = fleet2d("verify", run, "--again")
     assert (0, True) == (code, "reproduced: digest" in out)
-    _, out, _ = fleet2d("run", *SETTINGS, "--seed", "4", "--out", "second")
+    _, out, _ = fleet2d("run", "bundled:paper", *SETTINGS, "--seed", "4", "--out", "second")
     assert 1 == out.count(f"note: {notes[0]}")
 
 

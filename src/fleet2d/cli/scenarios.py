@@ -113,7 +113,7 @@ def convert(
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Convert a floor plan of any format to our own, or to GeoJSON.
+    """Convert a floor plan to our own format, or to GeoJSON.
 
     What is odd or lost is listed.
 

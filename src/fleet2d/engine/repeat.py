@@ -152,7 +152,7 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
         >>> import fleet2d
         >>> run = fleet2d.run("bundled:paper", "simulation.duration=8 h", seed=4)
         >>> future = branch(run, step=3600)
-        >>> future.put("ana", "kitchen")
+        >>> future.do({"put": "ana", "to": "kitchen"})
         >>> future.run().digest == run.digest
         False
     """

@@ -28,8 +28,7 @@ DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results: those above the
 # engine in the order of imports.
 _LEAVES = (
-    "cli", "datasets", "fit", "gym", "live", "paper", "pictures", "published", "studies", "testing",
-    "viewer",
+    "__main__", "cli", "datasets", "fit", "gym", "live", "pictures", "studies", "testing", "viewer",
 )  # fmt: skip
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
