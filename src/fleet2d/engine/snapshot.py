@@ -312,7 +312,8 @@ class _StateReader(pickle.Unpickler):
 
     def __init__(self, file: BinaryIO, constants: Constants) -> None:
         super().__init__(file)
-        self._constants, self._packages = constants, _own_packages(constants["scenario"])
+        self._constants = constants
+        self._packages = _own_packages(constants["scenario"])
 
     def persistent_load(self, pid: Any) -> object:
         if isinstance(pid, tuple) and pid[0] == "space":
