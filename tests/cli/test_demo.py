@@ -1,5 +1,6 @@
 """`fleet2d demo` tells in sentences what a run measured, and shows its page."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,9 @@ def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
     assert f"Astro drove {metres['astro']:,.0f} m a day." in sentences
     events = family.tables["events"]["event"].to_pylist()
     asked = f"Astro asked {events.count('asks')} times: {events.count('accepted')} accepted, "
-    assert any(sentence.startswith(asked) for sentence in sentences)
+    (requests,) = (sentence for sentence in sentences if sentence.startswith(asked))
+    total, *parts = map(int, re.findall(r"\d+", requests))
+    assert total == sum(parts)
     assert f"Astro found Cleo in {events.count('found')} of 1 searches." in sentences
 
 

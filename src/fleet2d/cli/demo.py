@@ -13,17 +13,13 @@ from fleet2d.cli import named_extras
 from fleet2d.cli.run import print_verdict, run_with_progress, set_up
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
+from fleet2d.interactions.interaction import Outcome
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
-ANSWERS = {
-    "accepted": "accepted",
-    "declined": "declined",
-    "deferred": "put off",
-    "ignored": "ignored",
-}
-"""The events that are answers to a request, in words."""
+IN_WORDS = {Outcome.DEFERRED: "put off", Outcome.MISTAKEN: "asked of somebody else"}
+"""Outcomes of addressing a person whose names say too little."""
 
 
 def demo(
@@ -85,9 +81,12 @@ def _requests(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Yield how often a robot asked something of somebody, and with which answers."""
     counts = Counter(event["event"] for event in events)
     if counts["asks"]:
-        answers = [f"{counts[name]} {word}" for name, word in ANSWERS.items() if counts[name]]
-        listed = f": {', '.join(answers)}" if answers else ""
-        yield f"{_title(robot)} asked {counts['asks']} times{listed}."
+        answers = {
+            IN_WORDS.get(outcome, outcome.replace("_", " ")): counts[outcome] for outcome in Outcome
+        }
+        answers["not noticed"] = counts["asks"] - sum(answers.values())  # there is no event then
+        listed = ", ".join(f"{count} {word}" for word, count in answers.items() if count)
+        yield f"{_title(robot)} asked {counts['asks']} times: {listed}."
 
 
 def _searches(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:

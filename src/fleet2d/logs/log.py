@@ -218,7 +218,8 @@ def begin_of_run(
     Raises:
         LogError: All of the log lies outside of the run, or it has no dates.
     """
-    start, begins, ends = clock.start, *log.moments()
+    start = clock.start
+    begins, ends = log.moments()
     if isinstance(day, str):
         if log.first_day is None:
             raise LogError(f"day: {day} needs a log with dates, and this one has none")
