@@ -16,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 import fleet2d
+from fleet2d.engine.simulation import directory_of
 from fleet2d.runs.run import Run
 
 Cli = Callable[..., tuple[int, str, str]]
@@ -215,3 +216,15 @@ def process(
 def fleet2d_process(*arguments: str, **more: Any) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own."""
     return process("-m", "fleet2d.cli", *arguments, **more)
+
+
+def cut_off(simulation: fleet2d.Simulation) -> Path:
+    """Leave a run as the end of its process would."""
+    unfinished = simulation._store._unfinished
+    assert unfinished is not None
+    unfinished.journal.close()
+    assert unfinished._lock is not None
+    os.close(unfinished._lock._handle)
+    directory = directory_of(simulation)
+    assert directory is not None
+    return directory

@@ -15,7 +15,7 @@ from threading import Lock
 from typing import Any
 
 import pytest
-from tests.scenes import digests, everything, fleet2d_process, scenario
+from tests.scenes import cut_off, digests, everything, fleet2d_process, scenario
 from tests.thorough import THOROUGH, some
 
 import fleet2d
@@ -23,7 +23,6 @@ from fleet2d import Algorithm
 from fleet2d.artifacts import arrow
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
-from fleet2d.engine.simulation import directory_of
 from fleet2d.entities.plan import data_of
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 from fleet2d.interventions import Decide, Put, Replan
@@ -44,18 +43,6 @@ def content(duration: str = "1 h", **artifacts: Any) -> dict[str, Any]:
 @cache
 def undisturbed(duration: str = "1 h") -> dict[str, Any]:
     return digests(fleet2d.run(everything(duration)))
-
-
-def cut_off(simulation: fleet2d.Simulation) -> Path:
-    """Leave a run as the end of its process would."""
-    unfinished = simulation._store._unfinished
-    assert unfinished is not None
-    unfinished.journal.close()
-    assert unfinished._lock is not None
-    os.close(unfinished._lock._handle)
-    directory = directory_of(simulation)
-    assert directory is not None
-    return directory
 
 
 @pytest.mark.parametrize("minutes", some([0, 1, 9, 10, 11, 37, 59, 60], 3))

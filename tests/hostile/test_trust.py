@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scenes import Cli, fleet2d_process
+from tests.scenes import Cli, cut_off, fleet2d_process
 
 import fleet2d as package
 from fleet2d import Simulation, _core
@@ -26,7 +26,6 @@ from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.trust import UntrustedCodeError, running_code, stored_code
 from fleet2d.engine import checkpoint
 from fleet2d.engine.repeat import reopen
-from fleet2d.engine.simulation import directory_of
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions import Put
 from fleet2d.runtime.program import ExternalProgram
@@ -49,18 +48,6 @@ def evil(folder: Path) -> str:
 
 
 # Checkpoints
-
-
-def cut_off(simulation: Simulation) -> Path:
-    """Leave a run as the end of its process would."""
-    unfinished = simulation._store._unfinished
-    assert unfinished is not None
-    unfinished.journal.close()
-    assert unfinished._lock is not None
-    os.close(unfinished._lock._handle)
-    directory = directory_of(simulation)
-    assert directory is not None
-    return directory
 
 
 def cut_run(out: Path, seed: int = 4, **more: Any) -> Path:

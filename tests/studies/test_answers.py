@@ -308,7 +308,7 @@ def test_a_clear_difference_of_few_homes_is_told_without_its_amount() -> None:
     (row,) = compare(variants())
     assert row["clear"]
     assert "above old in 64 of 64 pairs; how much can't be told" in row["verdict"]
-    assert "8 values of home miss a kind" in row["doubt"]
+    assert "with 8 values of home, 43 % of studies miss a kind" in row["doubt"]
 
 
 def test_enough_homes_have_an_interval_that_is_told() -> None:

@@ -182,7 +182,8 @@ def test_one_home_in_ten_that_is_eight_times_the_others_is_told_from_forty_homes
 
 def test_a_doubt_names_the_units_and_how_many_more_would_do() -> None:
     doubt = estimate(np.arange(10.0), {"home": range(10)}).doubt
-    assert "10 values of home miss a kind that is one in 10 in 35 % of studies; 19 more" in doubt
+    missed = "with 10 values of home, 35 % of studies miss a kind that makes up a tenth of all"
+    assert f"{missed}; 19 more" in doubt
     assert not estimate(np.arange(29.0)).doubt
 
 

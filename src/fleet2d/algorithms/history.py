@@ -338,7 +338,7 @@ class Log:
         entry 1 the maximum over them.
         """
         begin = self._next_bin
-        self._next_bin = self._next_bin + len(bins)
+        self._next_bin = begin + len(bins)
         self._bins.append(begin, self._next_bin, bins)
 
     def evidence(self, first: int, end: int) -> Evidence:

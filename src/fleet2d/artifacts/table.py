@@ -297,11 +297,11 @@ class TableBuffer:
     def _copy(self, batch: Batch, start: int, stop: int) -> None:
         """Copy some rows of a batch behind those of the buffer, which doesn't count them yet."""
         a = self.rows
-        b = self.rows + stop - start
+        b = a + stop - start
         for column in self.spec.columns:
             name = column.name
-            values = batch.values[column.name]
-            valid = batch.valid[column.name]
+            values = batch.values[name]
+            valid = batch.valid[name]
             if column.takes_strings:
                 values = values[start:stop] if isinstance(values, list) else [values] * (b - a)
                 if column.kind == "string":

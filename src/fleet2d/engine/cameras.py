@@ -186,8 +186,8 @@ class Cameras(Watcher):
 
     def _set_up(self) -> SightMemory:
         owner = self.owner
-        lattice = self.owner.home.plan.lattice
-        clock = self.owner.clock
+        lattice = owner.home.plan.lattice
+        clock = owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
         units = lattice.units_per_m

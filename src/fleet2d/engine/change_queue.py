@@ -320,7 +320,7 @@ class ChangeQueue:
     def _close_unused(self, due: DueChange, step: int) -> list[Event]:
         """Shut a door that has not been used for its `closes_after`."""
         door = due.door
-        after = self.doors[self.names[due.door]].closes_after
+        after = self.doors[self.names[door]].closes_after
         if after is None or step * self.clock.step_us < self._used_us[door] + micros(after):
             return []
         return [] if door in self.home.shut else self._turn(door, False, due, step)

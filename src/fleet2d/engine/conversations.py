@@ -284,8 +284,8 @@ class Conversations(Watcher):
         person = self.actors[user]
         row = question.row
         home = person.home
-        walls = person.home.walls
-        lattice = person.home.plan.lattice
+        walls = home.walls
+        lattice = home.plan.lattice
         x, y = int(block.x[user, 0]), int(block.y[user, 0])
         robot_x = int(block.x[row, 0])
         robot_y = int(block.y[row, 0])
@@ -319,7 +319,7 @@ class Conversations(Watcher):
     def _activity_at(self, row: int, step: int) -> str:
         """Return what a user does at a step of the present plan; empty if that is unknown."""
         actor = self.actors[row]
-        time_us = step * self.actors[row].clock.step_us
+        time_us = step * actor.clock.step_us
         for note in reversed(actor.plan.notes):
             if note.event == EventKind.ACTIVITY and note.time_us <= time_us:
                 return note.detail

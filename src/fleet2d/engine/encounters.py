@@ -175,7 +175,7 @@ class Encounters(Watcher):
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first encounter, `end` if there is none."""
         first = self.next_step
-        block = bodies.block(self.next_step, end)
+        block = bodies.block(first, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
         planned = [c for robot in self._robots for c in notes_of(robot, EventKind.CALLS)]
         calls = [*self._calls, *planned]

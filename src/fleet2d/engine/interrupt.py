@@ -102,7 +102,7 @@ class Interruptions(Watcher):
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first interruption, `end` if there is none."""
         first = self.next_step
-        steps = end - self.next_step
+        steps = end - first
         block = bodies.block(first, end)
         self._ahead = {}
         for wait in self._held:

@@ -134,7 +134,7 @@ class SeenArea(Watcher):
             self._set_walls(walls)
         while self.next_step < end:
             first = self.next_step
-            until = min(end, self.next_step + MAX_BATCH_STEPS)
+            until = min(end, first + MAX_BATCH_STEPS)
             self.next_step = until
             runs = bodies.runs(self.row, first, until)
             record = self._record

@@ -135,7 +135,7 @@ def _asked(state: State, step: int) -> Sequence[int]:
 def _follow_plan(state: State, row: int) -> None:
     """Let a body follow its plan from the present step on."""
     actor = state.actors[row]
-    plan = state.actors[row].plan
+    plan = actor.plan
     state.bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
 
 
@@ -215,7 +215,7 @@ def learn(state: State, span: Span) -> None:
 
 def _update(state: State, log: Log, end: int) -> None:
     learners = state.learners
-    awaited = state.learners.awaited
+    awaited = learners.awaited
     events = log.happened(end - 1) if awaited else []
     if learners.next_due() == end or any(event.event in awaited for event in events):
         state.count_looks()

@@ -42,7 +42,7 @@ def table_specs(
         activities: Whether robots perceive activities.
     """
     scenario = basis.scenario
-    settings = basis.scenario.artifacts
+    settings = scenario.artifacts
     users = tuple(scenario.users)
     robots = tuple(scenario.robots)
     rooms = tuple(room.name for room in basis.home.rooms)

@@ -437,7 +437,7 @@ class Body:
         if known is not None and (isinstance(thing, str) or known.thing is thing):
             return known
         home = self.home
-        lattice = self.home.plan.lattice
+        lattice = home.plan.lattice
         thing = home.object(thing) if isinstance(thing, str) else thing
         if not thing.uses:
             raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")

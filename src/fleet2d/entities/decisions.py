@@ -280,7 +280,7 @@ class LeaveRoom:
         """Go to the nearest room that it may be in and isn't shut in by bans; once."""
         actor = now.actor
         room = now.room
-        banned = now.actor.banned(now.step)
+        banned = actor.banned(now.step)
         if self._has_tried or room is None or room.index not in banned:
             return None
         self._has_tried = True
@@ -451,9 +451,8 @@ class DecidingActor(Actor):
         """
         if self._runs_down(now):
             return False
-        if (
-            self.bans or self.kept_out != self.forbidden
-        ):  # they hold for its ways once it is outside of those rooms
+        # Bans hold for its ways once it is outside of those rooms.
+        if self.bans or self.kept_out != self.forbidden:
             banned = self.banned(now.step)
             if banned != self.kept_out and self._room_index() not in banned:
                 self.kept_out = banned
@@ -567,7 +566,7 @@ class DecidingActor(Actor):
     def follow_instead(self, plan: Plan, now: Situation) -> None:
         """Follow a plan from now on in place of the present one, which may have begun just now."""
         step = now.step
-        now_us = now.step * self.clock.step_us
+        now_us = step * self.clock.step_us
         self._runs_down(now)
         if self.plan.began[0] == step:  # its first rows happened, though it ends at once
             plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]

@@ -237,7 +237,7 @@ class WaitForPeople:
             distance: The gap to keep where there is room [m].
         """
         actor = now.actor
-        lattice = now.actor.home.plan.lattice
+        lattice = actor.home.plan.lattice
         for gap in (max(distance, PASSING_GAP_M) + lattice.cell, PASSING_GAP_M):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
             plan = self._stand_for_a_step(now)

@@ -115,7 +115,7 @@ class Plan:
         self.come_home()
         self._check_goes_on()
         body = self.body
-        space = self.body.space
+        space = body.space
         self.take("stand")
         off = body.step_off(self.x, self.y)
         if route is None and self._go_shortest(space, x, y, off):

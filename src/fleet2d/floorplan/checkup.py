@@ -114,7 +114,7 @@ def errors_in(home: Home, radii: Iterable[float]) -> list[str]:
         radii: The radii of its robots [m].
     """
     plan = home.plan
-    open_home = Home(home.plan, home.doors)
+    open_home = Home(plan, home.doors)
     findings = [*_scale(plan), *_no_go(plan), *_doors(plan), *_standing_in_walls(plan)]
     for radius in sorted(set(radii)):
         findings += _routes(open_home, radius)

@@ -380,7 +380,7 @@ class Interior:
         pieces of floor may in fact be connected, and too large to be cut off together.
         """
         plan = self.plan
-        fixed = len(self.plan.objects)
+        fixed = len(plan.objects)
         solid = [_solid(plan, plan.objects), *(_solid(plan, group) for group in self.groups)]
 
         @cache

@@ -368,7 +368,7 @@ def _crossing(
     edges = np.fromiter(chain.from_iterable(owner), np.int64, 2 * len(owner)).reshape(-1, 2)
     edges = edges[edges[:, 0] < edges[:, 1]]
     start = vertices[a]
-    along = vertices[b] - vertices[a]
+    along = vertices[b] - start
     side = np.sign(along[0] * (vertices[:, 1] - start[1]) - along[1] * (vertices[:, 0] - start[0]))
     apart = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0].tolist()
     return [(p, q) for p, q in apart if (q, p) in owner and _cross(vertices, a, b, p, q)]

@@ -417,7 +417,7 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
                 nothing has changed then.
         """
         life = self.life
-        before = self.life.simulation.step
+        before = life.simulation.step
         for robot in life.due:
             if robot not in actions:
                 raise InputError(f"{robot} has to choose: give its action")

@@ -30,7 +30,7 @@ def life_figure(env: RobotEnv, scores: F32 | None = None) -> Figure:
         )
     simulation = env.present.simulation
     plan = simulation.home.plan
-    figure = Figure(figsize=figure_size(simulation.home.plan))
+    figure = Figure(figsize=figure_size(plan))
     with drawing_style():
         axes = figure.add_axes((0, 0, 1, 1))
         floorplan_axes(plan, axes, names=scores is None)

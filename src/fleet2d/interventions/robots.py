@@ -128,7 +128,8 @@ class KeepOut(RobotIntervention, Lasting):
     """
 
     of: tuple[str, ...] | str
-    _told: tuple[int, ...] = ()  # the rooms when it began: kinds may change until it ends
+    # The rooms when it began: their kinds may change until it ends.
+    _banned_rooms: tuple[int, ...] = ()
 
     def check(self, world: World) -> None:
         """Refuse an unknown robot or room."""
@@ -138,7 +139,7 @@ class KeepOut(RobotIntervention, Lasting):
     def begin(self, world: World) -> None:
         """Tell it, and let it leave."""
         rooms = self._rooms(world)
-        self._told = tuple(room.index for room in rooms)
+        self._banned_rooms = tuple(room.index for room in rooms)
         for room in rooms:
             world.emit(self.entity, EventKind.BANNED, room.name)
             self.actor(world).keep_out(room.index, world.step, NEVER, room.name)
@@ -146,8 +147,8 @@ class KeepOut(RobotIntervention, Lasting):
     def end(self, world: World) -> None:
         """Let it in again, unless another one of these interventions doesn't."""
         actor = self.actor(world)
-        others = {room for act in self.active(world) for room in act._told}
-        for room in self._told:
+        others = {room for act in self.active(world) for room in act._banned_rooms}
+        for room in self._banned_rooms:
             if room not in others:
                 actor.bans = {r: until for r, until in actor.bans.items() if r != room}
                 world.emit(self.entity, EventKind.ALLOWED, world.home.rooms[room].name)

@@ -312,7 +312,7 @@ class Bridge:
 
     def _simulate(self) -> None:
         simulation = self.simulation
-        step_s = self.simulation.clock.step_us / 1e6
+        step_s = simulation.clock.step_us / 1e6
         began = time.monotonic()
         first = simulation.step
         while not simulation.done:

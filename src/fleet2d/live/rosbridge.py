@@ -90,7 +90,7 @@ class RosbridgePeer(Peer):
 
     def _map(self, simulation: Simulation) -> dict[str, Any]:
         plan = simulation.home.plan
-        lattice = simulation.home.plan.lattice
+        lattice = plan.lattice
         info = {
             "map_load_time": self._stamp(0),
             "resolution": lattice.cell,

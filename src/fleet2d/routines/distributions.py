@@ -88,7 +88,7 @@ class Distribution(NamedTuple):
         [10, 30, 50, 70]
         """
         first = self.first
-        wide = self.last - self.first
+        wide = self.last - first
         last = len(self.knots) - 1
         values = []
         for k in range(count):

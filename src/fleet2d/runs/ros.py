@@ -173,7 +173,7 @@ class RosMessages:
         plan = self._run.plan
         header = self._header(time, "map")
         lattice = plan.lattice
-        corner = self._pose(*plan.lattice.origin, 0.0, 1.0)
+        corner = self._pose(*lattice.origin, 0.0, 1.0)
         size = lattice.cell, lattice.columns, lattice.rows
         info = self._new("nav_msgs/msg/MapMetaData", header.stamp, *size, corner)
         grid = np.where(plan.free, 0, 100).astype(np.int8).ravel()

@@ -204,10 +204,11 @@ def _doubt(spread: Spread, variance: float) -> str:
     for number, (level, count) in enumerate(spread.units.items()):
         share = spread.components[level] / count / variance
         if count < ENOUGH_UNITS and (number == 0 or share > MINOR):
+            missing = 100 * (1 - RARE) ** count
             return (
-                f"{count} values of {level} miss a kind that is one in {1 / RARE:.0f} in"
-                f" {(1 - RARE) ** count:.0%} of studies; {ENOUGH_UNITS - count} more would do"
-            ).replace("%", " %")
+                f"with {count} values of {level}, {missing:.0f} % of studies miss a kind that makes"
+                f" up a tenth of all; {ENOUGH_UNITS - count} more would be enough"
+            )
     return ""
 
 

@@ -66,7 +66,7 @@ class TimeLeft:
             elapsed_s: The wall time since the first run began.
         """
         n = self.finished
-        rest = self.missing - self.finished
+        rest = self.missing - n
         if n < MIN_RUNS or not self._sum_s:
             return None
         mean_s = self._sum_s / n

@@ -160,7 +160,7 @@ def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
         room without furniture that is used there are no names, and points all over the floor.
     """
     home = actor.home
-    plan = actor.home.plan
+    plan = home.plan
     uses = [
         (thing.name, (use.x, use.y))
         for thing in home.objects

@@ -275,7 +275,7 @@ class Find(BeliefBehavior):
         start = now.actor.clock.start
         while self.due is not None and self.due <= now.time:
             due = self.due
-            self.due = self._next(self.due, start)
+            self.due = self._next(due, start)
         return due is not None and due <= now.time <= due + self.late
 
     def _note_empty_look(self, now: Situation, search: SearchState) -> None:

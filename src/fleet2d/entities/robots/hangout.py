@@ -54,7 +54,7 @@ class HangoutPlaces:
         """
         self._actor = actor
         home = actor.home
-        people = actor.home.space(PERSON, opens_doors=True)
+        people = home.space(PERSON, opens_doors=True)
         # The key has all that the places depend on: robots of other runs in this home share them.
         body = actor.space, actor.part, actor.entity.radius
         self._key = (*body, people, home.objects, avoid, off_doors)
@@ -97,7 +97,7 @@ class HangoutPlaces:
 
     def _candidates(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64]:
         actor = self._actor
-        plan = self._actor.home.plan
+        plan = actor.home.plan
         cells = actor.space.cells(None, actor.part)
         pitch = max(1, round(PITCH / plan.lattice.cell))
         on_grid = (cells[:, 0] % pitch == 0) & (cells[:, 1] % pitch == 0)
@@ -154,7 +154,7 @@ class HangoutPlaces:
     def _blocking(self) -> F64:
         """Return the share of people's ways from room to room that a robot at each place blocks."""
         actor = self._actor
-        home = self._actor.home
+        home = actor.home
         space = home.space(PERSON, opens_doors=True)
         anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
         stops = [space.nearest(x, y, 0, r) for r, (x, y) in enumerate(anchors)]

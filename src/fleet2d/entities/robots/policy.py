@@ -151,7 +151,7 @@ class WaitingPoses:
     def _best(self, room: Room) -> tuple[int, int, int]:
         """Return the place (x, y) and the heading at which most of a room is in view."""
         actor = self._actor
-        walls = self._actor.home.walls
+        walls = actor.home.walls
         stands = approach.stands_in(actor, room)
         goals = approach.floor_of(actor, room)
         limit = kernels.cosine(self._half_angle) / UNIT
@@ -304,7 +304,7 @@ class Policy(BeliefBehavior):
         actor = now.actor
         room = now.room
         time = now.time
-        memory = now.actor.recall().rooms
+        memory = actor.recall().rooms
         table: F32 = self._fixed.copy()
         part = table[: len(self.visited)]
         if room is not None:

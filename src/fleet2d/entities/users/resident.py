@@ -156,7 +156,7 @@ class Spots:
     def _grid(self, room: Room) -> tuple[Spot, ...]:
         """Return the spots of a room: a grid of cells, a finer one in a small room."""
         actor = self._actor
-        lattice = self._actor.home.plan.lattice
+        lattice = actor.home.plan.lattice
         cells = actor.space.cells(room.index, actor.part)
         pitch = math.ceil(SPACING / lattice.cell)
         while pitch:

@@ -234,7 +234,7 @@ def _to_walls(walls: _Walls, batches: Sequence[Corners], units_per_m: float) -> 
         near, wall = tree.query(_around(walls.start[batch], units_per_m))
         corner = batch[near]
         at = walls.start[wall]
-        along = walls.end[wall] - walls.start[wall]
+        along = walls.end[wall] - at
         away = walls.start[corner] - at
         share = (away * along).sum(axis=1) / (along * along).sum(axis=1)
         inside = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] > 0
