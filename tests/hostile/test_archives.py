@@ -307,6 +307,7 @@ def test_bomb_mcap_is_refused(read: Reader) -> None:
     assert "FLEET2D_MAX_CHUNK_BYTES" in refusal(BOMBS / "bomb-mcap.mcap", read)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory isn't known")
 def test_bomb_mcap_is_refused_before_it_fills_the_memory() -> None:
     """48 kB took 3.1 GB."""
@@ -420,6 +421,7 @@ METADATA: dict[str, Callable[[str], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METADATA)
 def test_forged_metadata_is_refused(good: Path, name: str) -> None:
     path = good / "metadata.yaml"
@@ -452,6 +454,7 @@ def test_a_map_far_away_is_refused(tmp_path: Path, storage: str, x: float) -> No
     assert "the map of /map is damaged" in refusal(folder, read_map)
 
 
+@pytest.mark.slow
 def test_a_map_of_many_cells_is_refused(tmp_path: Path, storage: str) -> None:
     folder = bag(tmp_path / "bag", [grid(messages(), 8000)], storage)
     assert "has 64000000 pixels, and at most 16777216" in refusal(folder, read_map)

@@ -279,6 +279,7 @@ def test_a_damaged_table_is_refused_or_harmless(
         assert damage == "empty" or f"{table}-00000.parquet can't be read" in message
 
 
+@pytest.mark.slow
 def test_rows_that_take_little_room_in_a_file_are_bounded(copy: Path, elsewhere: Path) -> None:
     """60 million equal rows in a file of 2 MB filled the memory."""
     path = copy / "train" / "labels-00000.parquet"
@@ -291,6 +292,7 @@ def test_rows_that_take_little_room_in_a_file_are_bounded(copy: Path, elsewhere:
     assert "FLEET2D_MAX_TABLE_BYTES" in attack(copy, elsewhere, learn)
 
 
+@pytest.mark.slow
 def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(
     copy: Path, elsewhere: Path
 ) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.hostile.defences import DEFENCES, Defence
+from tests.thorough import some
 
 TESTS = Path(__file__).parent.parent
 MEMORY = 8 << 30
@@ -19,15 +20,25 @@ def limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
-@pytest.mark.slow
+def source_of(defence: Defence) -> str:
+    spec = find_spec(f"fleet2d.{defence.module}")
+    assert spec is not None
+    return Path(str(spec.origin)).read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("defence", DEFENCES, ids=lambda defence: defence.name)
+def test_a_defence_is_there_once_and_so_is_its_test(defence: Defence) -> None:
+    file, _, test = defence.test.partition("::")
+
+    assert 1 == source_of(defence).count(defence.line)
+    assert f"def {test.partition('[')[0]}(" in (TESTS / file).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("defence", some(DEFENCES, 6), ids=lambda defence: defence.name)
 def test_a_test_fails_without_the_defence(tmp_path: Path, defence: Defence) -> None:
     module = f"fleet2d.{defence.module}"
-    spec = find_spec(module)
-    assert spec is not None
-    text = Path(str(spec.origin)).read_text(encoding="utf-8")
-    assert 1 == text.count(defence.line)
-    without = text.replace(defence.line, defence.instead)
+    without = source_of(defence).replace(defence.line, defence.instead)
     compile(without, module, "exec")
     (tmp_path / "module.py").write_text(without, encoding="utf-8")
     overlay = {

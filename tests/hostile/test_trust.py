@@ -101,6 +101,7 @@ def test_a_forged_checkpoint_runs_no_command(
     assert undisturbed(run) == json.loads(out)["digest"]
 
 
+@pytest.mark.slow
 def test_the_forgery_would_run_its_command_with_the_key_of_the_user(folder: Path) -> None:
     """So that the test above tests something."""
     run = forged(folder / "evil", f"touch {folder}/ran; exec sleep 1")

@@ -68,6 +68,7 @@ def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
     assert "work" in [detail for _, detail in events(run, "activity")]
 
 
+@pytest.mark.slow
 def test_what_was_learned_in_another_home_is_left_out(tmp_path: Path) -> None:
     """The run failed at the step of the intervention."""
     content = {"extends": "bundled:paper", "simulation": {"duration": "13 h"}}

@@ -233,6 +233,7 @@ def test_a_run_at_the_pace_of_a_clock_is_refused(place: Workspace) -> None:
             use("home.yaml", overrides=["simulation.speedup=0.001"])
 
 
+@pytest.mark.slow
 def test_a_call_simulates_for_a_limited_time(
     place: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

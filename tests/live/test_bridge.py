@@ -446,6 +446,7 @@ def test_a_message_before_the_last_one_of_its_body_is_late() -> None:
     assert peer.told == ["late: ana: a message was sent before the last one"]
 
 
+@pytest.mark.slow
 def test_a_pose_in_millimetres_is_told_as_such() -> None:
     x, y = place()
     _, peer, bridge = bridged({0: [pose(0) | {"x": 1000 * x % 1e4, "y": 1000 * y}]})
@@ -480,6 +481,7 @@ def test_a_goal_keeps_its_heading() -> None:
     assert run.manifest["interventions"][0]["heading_deg"] == 90
 
 
+@pytest.mark.slow
 def test_an_iterator_that_fails_is_told_in_a_line(capfd: pytest.CaptureFixture[str]) -> None:
     def messages() -> Iterator[dict[str, Any]]:
         yield pose(0)

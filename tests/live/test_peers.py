@@ -103,6 +103,7 @@ def test_a_client_hears_all_and_sends_goals() -> None:
     assert [act["do"] for act in runs[0].manifest["interventions"]] == ["send"]
 
 
+@pytest.mark.slow
 def test_a_client_that_leaves_does_not_stop_the_run() -> None:
     pytest.importorskip("websockets", reason="the extra live is not installed")
     from websockets.sync.client import connect
@@ -127,6 +128,7 @@ def shaken(port: int) -> socket.socket:
     return client
 
 
+@pytest.mark.slow
 def test_a_client_that_never_reads_is_disconnected_and_told(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -150,6 +152,7 @@ def test_a_client_that_never_reads_is_disconnected_and_told(
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_clients_that_speak_no_websocket_leave_no_traceback(
     capfd: pytest.CaptureFixture[str],
 ) -> None:

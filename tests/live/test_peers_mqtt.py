@@ -77,6 +77,7 @@ class Client:
         del self.mqtt  # closes its sockets
 
 
+@pytest.mark.slow
 def test_a_broker_passes_on_what_happens_and_what_arrives(broker: int) -> None:
     client = Client(broker)
     peer = open_peer(f"mqtt://127.0.0.1:{broker}/home/one")
@@ -111,6 +112,7 @@ def test_a_broker_passes_on_what_happens_and_what_arrives(broker: int) -> None:
     assert bridge.counts["applied"] >= 2
 
 
+@pytest.mark.slow
 def test_goals_are_withdrawn_when_the_broker_is_gone(
     mosquitto: tuple[int, "subprocess.Popen[bytes]"],
 ) -> None:
@@ -214,6 +216,7 @@ def test_user_and_password_of_an_address_are_sent() -> None:
     assert "lt" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_broker_that_was_restarted_gets_all_that_it_keeps() -> None:
     published: list[list[str]] = []
 
@@ -253,6 +256,7 @@ def test_a_broker_that_was_restarted_gets_all_that_it_keeps() -> None:
     assert bridge.counts["lost connections"] == 1
 
 
+@pytest.mark.slow
 def test_messages_before_the_run_begins_are_kept() -> None:
     """A broker sends what it retains at once, while the simulation is still being made."""
     reading = b'{"type": "reading", "sensor": "front_door", "on": true}'

@@ -109,6 +109,7 @@ def test_a_robot_program_hears_standard_messages_and_sends_goals() -> None:
     assert result["odom"][0]["header"]["stamp"]["sec"] == 1_767_614_400
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_libraries")
 def test_no_server_is_told() -> None:
     code = (

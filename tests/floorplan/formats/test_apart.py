@@ -118,6 +118,7 @@ def _read_in_a_fork(path: Path, pids: "multiprocessing.Queue[int]") -> None:
     pids.put(child())
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
     path = good(tmp_path)
@@ -136,6 +137,7 @@ def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
     assert first == child()
 
 
+@pytest.mark.slow
 def test_child_ends_with_its_parent(tmp_path: Path) -> None:
     program = (
         "import sys, fleet2d; from fleet2d.floorplan.formats import apart;"
@@ -184,6 +186,7 @@ def test_dead_child_is_replaced_without_a_word(tmp_path: Path) -> None:
     assert first != child()
 
 
+@pytest.mark.slow
 def test_time_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
 
@@ -191,6 +194,7 @@ def test_time_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         load_floorplan(endless(tmp_path))
 
 
+@pytest.mark.slow
 def test_processor_time_ends_before_the_clock_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -272,6 +272,7 @@ export_rosbag2(day(), Path(sys.argv[1]), part())
 """
 
 
+@pytest.mark.slow
 def test_a_killed_export_leaves_no_bag_and_the_same_command_makes_it(tmp_path: Path) -> None:
     """Half of a bag stayed, and the same command refused to replace it."""
     from rosbags.highlevel import AnyReader
