@@ -9,7 +9,7 @@
 namespace fleet2d {
 namespace {
 
-constexpr i64 FAR_AWAY = i64{1} << 40;  // lattice units: nobody who is further out sees a home
+constexpr i64 FARTHEST_BODY = i64{1} << 40;  // lattice units: nobody who is further out sees a home
 
 // The key of a pose in the cache.
 struct Stance {
@@ -81,7 +81,7 @@ public:
     // The cells that one camera shows from a pose of the robot; valid until the next call.
     const std::vector<Span>& of(i64 camera, View<const i64> pose, i64 step) {
         const Lenses& lenses = setup_.lenses;
-        const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FAR_AWAY, FAR_AWAY); };
+        const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FARTHEST_BODY, FARTHEST_BODY); };
         const Pose robot{clamped(pose[0]), clamped(pose[1]), pose[2] & (TURN - 1)};
         return finder_.cells_in_view(
             camera_pose(lenses, camera, robot, step * setup_.step_us),
