@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.cli import named_extras
-from fleet2d.cli.run import print_verdict, run_with_progress, set_up
+from fleet2d.cli.results import print_verdict
+from fleet2d.cli.run import run_with_progress, set_up
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.interactions.interaction import Outcome
