@@ -170,7 +170,11 @@ def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:
 @pytest.mark.slow
 def test_any_plan_goes_under_the_base_scenario(fleet2d: Cli, shared_data: Path) -> None:
     for plan in sorted((shared_data / "houseexpo").glob("*.json"))[:6]:
-        arguments = ["floorplan.type=he", f"floorplan.path={plan}", "simulation.duration=3 h"]
+        arguments = [
+            "floorplan.type=houseexpo",
+            f"floorplan.path={plan}",
+            "simulation.duration=3 h",
+        ]
         code, _, err = fleet2d("run", *arguments, "--quiet", "--out", plan.stem)
         assert (0, "") == (code, err), plan.stem
 
@@ -258,7 +262,7 @@ def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
             assert f"{kind}: {name}" in out
             for field in cls.model_fields:
                 assert re.search(rf"^ +{field}:", out, re.MULTILINE), (name, field)
-    for word in ("houseexpo or he", "[deg", "dwell", "5 min"):
+    for word in ("long_term_presence or ltp", "[deg", "dwell", "5 min"):
         assert word in out
 
 
@@ -459,15 +463,15 @@ UNUSED = (
     "fleet2d.entities.robots.search",
     "fleet2d.entities.users.scripted",
     "fleet2d.expectations",
-    "fleet2d.fit",
+    "fleet2d.learning.fit",
     "fleet2d.interventions.bodies",
     "fleet2d.interventions.home",
     "fleet2d.interventions.robots",
     "fleet2d.logs",
-    "fleet2d.pictures",
+    "fleet2d.viewing.pictures",
     "fleet2d.studies",
     "fleet2d.testing",
-    "fleet2d.viewer",
+    "fleet2d.viewing",
 )
 # The packages of others that a run needs, and what these need in turn.
 USED = {

@@ -5,11 +5,13 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
 from pydantic import Field, PydanticUserError, TypeAdapter, ValidationError
+from tests.own_errors import Missed
 
 from fleet2d.configuration import components as module
 from fleet2d.configuration.components import (
@@ -24,6 +26,7 @@ from fleet2d.configuration.components import (
     register,
     split_short_form,
 )
+from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.units import Duration, Length, Text
 from fleet2d.errors import InputError, ScenarioError
 
@@ -363,6 +366,26 @@ def test_short_form_beside_behaviors_is_refused() -> None:
     assert errors(SHORT, {"type": "lamp", "behaviors": []}) == {
         "behaviors": "give 'type' (one behavior) or 'behaviors', not both"
     }
+
+
+def test_file_beside_the_scenario_takes_no_plugin_s_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside = tmp_path / "tests" / "own_errors.py"
+    beside.parent.mkdir()
+    beside.write_text("raise SystemExit('code beside the scenario runs')", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+    assert Missed is import_class("tests.own_errors:Missed", is_plugin=True)
+
+
+def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = EntryPoint("fox", "no_such_package.foxes:Fox", "fleet2d.gadget")
+    monkeypatch.setattr(module, "_plugins", lambda kind: EntryPoints([entry]))
+
+    assert ["fan", "lamp"] == list(components("gadget"))
+    with pytest.raises(ScenarioError, match="there is no gadget 'fox'"):
+        lookup("gadget", "fox")
 
 
 def test_hook_that_nobody_registers_is_an_error_with_its_name() -> None:
