@@ -134,7 +134,23 @@ function Overview({ run }: { run: Run }) {
     const share = (event.clientX - box.left) / box.width;
     state.goTo(state.beginUs.value + share * (state.endUs.value - state.beginUs.value));
   };
-  return <canvas ref={canvas} class="overview" aria-hidden="true" onPointerDown={seek} onPointerMove={seek} />;
+  const { clock } = run;
+  return (
+    <div
+      class="overview"
+      role="slider"
+      tabIndex={0}
+      aria-label="Moment in the run"
+      aria-valuemin={0}
+      aria-valuemax={clock.steps - 1}
+      aria-valuenow={clock.stepAt(state.moment.value)}
+      aria-valuetext={clock.text(state.moment.value)}
+      onPointerDown={seek}
+      onPointerMove={seek}
+    >
+      <canvas ref={canvas} aria-hidden="true" />
+    </div>
+  );
 }
 
 function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number, height: number): void {

@@ -21,7 +21,8 @@ from fleet2d.viewing.page_server import PageServer
 
 from .browser import chromium, page_at
 
-AXE = Path(__file__).parents[2] / "page" / "node_modules" / "axe-core" / "axe.min.js"
+ROOT = Path(__file__).parents[2]
+AXE = ROOT / "page" / "node_modules" / "axe-core" / "axe.min.js"
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +71,64 @@ def add_new_picture(page: Any, pictures: set[bytes]) -> None:
     plan = page.locator(".plan canvas")
     until(page, lambda: plan.screenshot() not in pictures)
     pictures.add(plan.screenshot())
+
+
+@pytest.fixture(scope="module")
+def month(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A stored run of three days."""
+    folder = tmp_path_factory.mktemp("days") / "run"
+    fleet2d.run("bundled:paper", "simulation.duration=3 d", out=folder)
+    return folder
+
+
+def shown_step(page: Any) -> int:
+    return int(page.get_attribute(".overview", "aria-valuenow"))
+
+
+def test_run_opens_in_motion_in_a_morning(browser: Any, month: Path) -> None:
+    with served(month) as address, page_at(browser, f"{address}#") as page:
+        page.wait_for_selector("button.play[aria-pressed=true]")
+        first = shown_step(page)
+        assert 6 <= first % 86_400 / 3600 < 12
+        until(page, lambda: shown_step(page) > first)
+        assert 1 == page.locator(".calendar").count()
+
+
+def test_who_wants_less_motion_finds_the_run_paused(browser: Any, month: Path) -> None:
+    with (
+        served(month) as address,
+        page_at(browser, f"{address}#", reduced_motion="reduce") as page,
+    ):
+        page.wait_for_selector("button.play[aria-pressed=false]")
+        first = shown_step(page)
+        page.wait_for_timeout(500)
+        assert first == shown_step(page)
+
+
+def test_click_in_the_calendar_goes_to_that_day_and_hour(browser: Any, month: Path) -> None:
+    run = fleet2d.open_run(month)
+    activities = [e for e in run.tables["events"].to_pylist() if e["event"] == "activity"]
+    away = run.path("ana", every=timedelta(seconds=1)).away
+    written = (ROOT / "page" / "src" / "data" / "words.ts").read_text("utf-8")
+    doing = dict(re.findall(r"^  (\w+): \"(.+)\",$", written, re.M))
+    with (
+        served(month) as address,
+        page_at(browser, f"{address}#view=calendar&at=2026-01-05T00:00:00") as page,
+    ):
+        box = page.locator(".days").bounding_box()
+        rows = (box["height"] - 22 - 4) // 3
+        row = max(10, min(24, rows))
+        wide = box["width"] - 96 - 118
+        for day, hour in ((0, 7.5), (1, 12.25), (2, 20.75)):
+            x, y = 96 + wide * hour / 24, 22 + (day + 0.4) * row
+            page.mouse.move(box["x"] + x, box["y"] + y)
+            words = page.inner_text(".calendar .hover")
+            page.mouse.click(box["x"] + x, box["y"] + y)
+            step = round((24 * day + hour) * 3600)
+            until(page, lambda: abs(shown_step(page) - step) < 86_400 / wide)  # noqa: B023
+            activity = [e["detail"] for e in activities if e["step"] <= step][-1]
+            does = "out of home" if away[step] else doing.get(activity, activity)
+            assert words.startswith(f"Ana: {does} · {run.clock.time(step):%a %-d %b}")
 
 
 def shows_moment(page: Any, step: int) -> None:

@@ -111,7 +111,7 @@ function Days({ run }: { run: Run }) {
       const from = Math.max(0, Math.floor(sheet.scrolled / rowHeight));
       const to = Math.min(days, from + Math.ceil(sheet.height / rowHeight) + 1);
       for (let i = from; i < to; i++) drawDay(context, run, shown.value, sheet, dayTop(sheet, i), firstDay + i);
-      drawViolations(context, run, sheet, (day) => dayTop(sheet, day - firstDay));
+      drawFrames(context, run, sheet, (day) => dayTop(sheet, day - firstDay));
       context.clearRect(0, 0, sheet.width, HEAD - 2);
       drawHours(context, sheet);
     });
@@ -133,7 +133,7 @@ function Days({ run }: { run: Run }) {
     });
     const stops = [
       effect(() => {
-        void [shown.value, colors.value, run.version.value];
+        void [shown.value, colors.value, run.version.value, state.answer.value];
         paint();
       }),
       effect(() => {
@@ -253,20 +253,23 @@ function drawDay(context: CanvasRenderingContext2D, run: Run, strips: readonly S
   context.fillText(`${hours.toFixed(1)} h`, sheet.width - 8, top + tall / 2);
 }
 
-/** Stretches in which an expectation was violated are framed in red. */
-function drawViolations(context: CanvasRenderingContext2D, run: Run, sheet: Sheet, dayTop: (day: number) => number): void {
+/** Stretches in which an expectation was violated are framed in red, and answers to a question in the cursor's colour. */
+function drawFrames(context: CanvasRenderingContext2D, run: Run, sheet: Sheet, dayTop: (day: number) => number): void {
+  const { stepUs } = run.clock;
+  const violated = run.facts.marks.filter((mark) => mark.kind === "violated");
+  for (const mark of violated) drawFrame(context, run, sheet, dayTop, mark.step * stepUs, mark.end * stepUs, colors.value.alarm);
+  for (const { from, to } of state.answer.value?.spans ?? []) drawFrame(context, run, sheet, dayTop, from, to, colors.value.cursor);
+}
+
+function drawFrame(context: CanvasRenderingContext2D, run: Run, sheet: Sheet, dayTop: (day: number) => number, from: number, to: number, color: string): void {
   const { clock } = run;
   const wide = sheet.width - LEFT - sheet.right;
-  context.strokeStyle = colors.value.alarm;
+  context.strokeStyle = color;
   context.lineWidth = 1.6;
-  for (const mark of run.facts.marks) {
-    if (mark.kind !== "violated") continue;
-    const [from, to] = [mark.step * clock.stepUs, mark.end * clock.stepUs];
-    for (let day = clock.day(from); day <= clock.day(Math.max(from, to - 1)); day++) {
-      const begin = clock.dayStart(day);
-      const left = LEFT + (Math.max(0, from - begin) / DAY_US) * wide;
-      const right = LEFT + (Math.min(DAY_US, to - begin) / DAY_US) * wide;
-      context.strokeRect(left, dayTop(day) - 1, Math.max(3, right - left), sheet.rowHeight - GAP + 2);
-    }
+  for (let day = clock.day(from); day <= clock.day(Math.max(from, to - 1)); day++) {
+    const begin = clock.dayStart(day);
+    const left = LEFT + (Math.max(0, from - begin) / DAY_US) * wide;
+    const right = LEFT + (Math.min(DAY_US, to - begin) / DAY_US) * wide;
+    context.strokeRect(left, dayTop(day) - 1, Math.max(3, right - left), sheet.rowHeight - GAP + 2);
   }
 }
