@@ -15,6 +15,7 @@ from playwright.sync_api import sync_playwright
 
 import fleet2d
 from fleet2d.runs.run import Run
+from fleet2d.viewing.page_data import PageData
 from fleet2d.viewing.page_server import PageServer
 from fleet2d.viewing.pictures.run import draw_run
 
@@ -69,7 +70,8 @@ def pictures_of(
     run: Run, views: Sequence[str], size: dict[str, int], part: str
 ) -> list[Image.Image]:
     """Return pictures of a part of the page of a run, one of each view."""
-    stop = (server := PageServer([run.directory])).start()
+    server = PageServer([PageData(run)])
+    stop = server.start()
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
