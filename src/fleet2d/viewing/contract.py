@@ -63,13 +63,35 @@ class DoorFacts(TypedDict):
     locked: bool
 
 
+class DoorwayFacts(TypedDict):
+    """A passage between two rooms: its jambs [m], and whether a door can shut it."""
+
+    start: Point
+    end: Point
+    leaf: bool
+
+
+class UseFacts(TypedDict):
+    """A place from which a piece of furniture is used [m], and how a person is there [rad]."""
+
+    x: float
+    y: float
+    heading: float
+    posture: str
+
+
 class ObjectFacts(TypedDict):
-    """A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight."""
+    """A piece of furniture: its outline [m], the direction of its front [rad], its uses.
+
+    `blocks` says whether it is in the way of nothing, paths or sight.
+    """
 
     name: str
     type: str
     outline: list[Point]
     blocks: str
+    front: float
+    uses: list[UseFacts]
 
 
 class HomeFacts(TypedDict):
@@ -92,7 +114,7 @@ class HomeFacts(TypedDict):
     rooms: list[RoomFacts]
     room_cells: list[int]
     place_cells: list[int]
-    doorways: list[tuple[Point, Point]]
+    doorways: list[DoorwayFacts]
     doors: list[DoorFacts]
     objects: list[ObjectFacts]
     no_go: list[list[Point]]
