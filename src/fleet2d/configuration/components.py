@@ -51,7 +51,6 @@ from fleet2d.configuration.problems import (
 )
 from fleet2d.errors import (
     Fleet2DError,
-    InputError,
     ScenarioError,
     errors_as,
     may_be_ctrl_c,
@@ -479,21 +478,6 @@ def components(kind: str) -> dict[str, type[Component]]:
     _import_builtins(kind)
     plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind) if _is_there(e)}
     return dict(sorted((plugins | _REGISTRY.get(kind, {})).items()))
-
-
-def hook(kind: str, name: str) -> Any:
-    """Return what an installed package, or Fleet2D's own, registers as an entry point.
-
-    So a module can call what builds upon it, if that is installed.
-
-    Raises:
-        InputError: Nothing is registered under that name.
-    """
-    for entry in _plugins(kind).select(name=name):
-        return entry.load()
-    raise InputError(
-        f"no installed package registers {name!r} as fleet2d.{kind}: reinstall fleet2d"
-    )
 
 
 @cache
