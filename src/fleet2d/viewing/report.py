@@ -14,6 +14,7 @@ import yaml
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.metrics.metric import flat
+from fleet2d.metrics.results import Block, blocks_of
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY
 from fleet2d.viewing.notebook import figure_png, verdict_html
@@ -89,11 +90,28 @@ def _notes(run: Run) -> str:
 
 
 def _metrics(run: Run) -> str:
-    texts = [
+    if not run.metrics:
+        return "<p>The run has none.</p>"
+    blocks = blocks_of(run.metrics, run.manifest["scenario"]["metrics"])
+    numbers = [
         (name, f"{value:.4g}" if isinstance(value, float) else str(value))
         for name, value in flat(run.metrics)
     ]
-    return _table(texts) if run.metrics else "<p>The run has none.</p>"
+    every = f"<details><summary>All {len(numbers)} numbers</summary>{_table(numbers)}</details>"
+    return "".join(map(_block, blocks)) + every
+
+
+def _block(block: Block) -> str:
+    """Return the numbers of a metric as a table."""
+    head, *rows = block.rows
+    subjects = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in head.values)
+    lines = [f"<tr><th>{html.escape(head.name)}</th>{subjects}<th></th></tr>"]
+    for row in rows:
+        numbers = "".join(f"<td>{html.escape(value)}</td>" for value in row.values)
+        name = html.escape(row.name)
+        unit = html.escape(row.unit)
+        lines.append(f'<tr><th scope="row">{name}</th>{numbers}<td class="unit">{unit}</td></tr>')
+    return f'<table class="metric">{"".join(lines)}</table>'
 
 
 def _table(rows: list[tuple[str, str]]) -> str:
