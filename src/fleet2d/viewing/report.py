@@ -20,6 +20,7 @@ from fleet2d.runtime.clock import DAY
 from fleet2d.viewing.notebook import figure_png, verdict_html
 from fleet2d.viewing.page_data import POLICY, PageData, embedded_run, html_of, write_file
 from fleet2d.viewing.run_facts import run_title
+from fleet2d.viewing.story import story_of
 
 MAX_TIMELINE_CHARS = 20_000_000
 """The maximum number of characters of a page that is embedded in a report."""
@@ -52,6 +53,7 @@ def report_html(run: Run) -> str:
         verdict_html(run),
         _what_ran(run),
         _notes(run),
+        _story(run),
         "<h2>Metrics</h2>",
         _metrics(run),
         "<h2>Figures</h2>",
@@ -99,6 +101,16 @@ def _metrics(run: Run) -> str:
     ]
     every = f"<details><summary>All {len(numbers)} numbers</summary>{_table(numbers)}</details>"
     return "".join(map(_block, blocks)) + every
+
+
+def _story(run: Run) -> str:
+    """Return the moments of a run that are worth a look, as a list."""
+    moments = []
+    for moment in story_of(run):
+        title, words = html.escape(moment["title"]), html.escape(moment["words"])
+        time = f"{run.clock.time(moment['step']):%a %-d %b %H:%M}"
+        moments.append(f"<li><b>{title}</b>, {time}: {words}</li>")
+    return f"<h2>Story</h2><ul>{''.join(moments)}</ul>" if moments else ""
 
 
 def _block(block: Block) -> str:
