@@ -21,7 +21,8 @@ from fleet2d.algorithms.presence.belief import (
     belief_labels,
     check_distributions,
 )
-from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator, PresenceAlgorithm
+from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator
+from fleet2d.algorithms.presence.long_term import PresenceAlgorithm
 from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import PositiveDuration, whole_steps
 from fleet2d.errors import ComponentError
