@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter
 from typing_extensions import TypedDict  # pydantic reads that of typing from Python 3.12 on only
 
 from fleet2d.errors import InputError
+from fleet2d.runtime.events import EventKind
 
 Point = tuple[float, float]
 Shape = TypeVar("Shape")
@@ -262,7 +263,7 @@ class RunFacts(TypedDict):
     story: list[StoryFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
-    event_kinds: list[str]
+    event_kinds: list[EventKind]
     metrics: dict[str, Any]
     scenario: dict[str, Any]
     walks_every_s: float
