@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from fleet2d.cli.run import print_verdict
+from fleet2d.cli.results import print_verdict
 from fleet2d.configuration.problems import suggest, validating
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
