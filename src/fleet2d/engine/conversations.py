@@ -4,7 +4,7 @@ All of it follows from the poses and plans alone, step by step, so it doesn't de
 span ends with each question and answer, and where the robot's plan waits for requests to come up.
 """
 
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -61,7 +61,6 @@ class Conversations(Watcher):
         attitudes: The attitude of each user to each robot: truth, by their rows.
         log: How people answered: truth, for metrics.
         wanted: The requests that came up, for metrics.
-        awaited: Kinds of events that end a span, whatever plans wait for.
     """
 
     def __init__(self, basis: Basis, interventions: InterventionQueue) -> None:
@@ -77,7 +76,6 @@ class Conversations(Watcher):
         self.attitudes: dict[tuple[int, int], AttitudeState] = {}
         self.log: list[AnswerRecord] = []
         self.wanted: list[Wanted] = []
-        self.awaited: Set[str] = frozenset()
         self._interventions = interventions
         self._activity: dict[int, str] = {}  # of each user before the present plan
         self._questions: list[PlannedNote] = []  # at the ends of plans that were replaced
@@ -114,14 +112,17 @@ class Conversations(Watcher):
                     self._initiators.append((user, row))
 
     @property
-    def waits(self) -> bool:
+    def is_needed(self) -> bool:
         """Whether any robot wants something of people."""
         return bool(self.queues)
 
+    @property
+    def waits(self) -> bool:
+        """Whether any robot wants something of people."""
+        return self.is_needed
+
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Record what a plan that is replaced at a step has done until then."""
-        if not self.queues:
-            return
         if row < self.users:
             self._activity[row] = self._activity_at(row, step)
         elif row in self.queues:
@@ -168,7 +169,7 @@ class Conversations(Watcher):
         first = self.next_step
         self.next_step = end
         self._last = []
-        if not self.queues or end == first:
+        if end == first:
             return ()
         events = [
             Event(at, self.actors[row].name, EventKind.OPPORTUNITY, text)

@@ -163,14 +163,18 @@ class Encounters(Watcher):
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []
 
     @property
-    def waits(self) -> bool:
+    def is_needed(self) -> bool:
         """Whether any person reacts to robots."""
         return bool(self.pairs)
 
+    @property
+    def waits(self) -> bool:
+        """Whether any person reacts to robots."""
+        return self.is_needed
+
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Record the calls at `step` of a robot's plan that is replaced."""
-        if self.pairs:
-            self._calls += [call for call in notes_of(actor, EventKind.CALLS) if call.step == step]
+        self._calls += [call for call in notes_of(actor, EventKind.CALLS) if call.step == step]
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first encounter, `end` if there is none."""

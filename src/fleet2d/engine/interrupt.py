@@ -90,7 +90,7 @@ class Interruptions(Watcher):
         """Whether a plan waits for an interrupt."""
         return bool(self._held)
 
-    def expect(self, row: int) -> None:
+    def listen(self, row: int) -> None:
         """Wait for the interrupts that the present plan of a body names, and for no others."""
         names = self._actors[row].plan.interrupts - WATCHED_EVENTS
         if not names and not self._held:

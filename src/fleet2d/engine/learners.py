@@ -2,7 +2,7 @@
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -106,6 +106,14 @@ class Learners:
         self._due = self._earliest_due()
         self._show_outputs()
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
+
+    def results_at(self, step: int) -> dict[str, Callable[[], Any]]:
+        """Return how to read the results of the metrics that were updated at a step, by name."""
+        return {
+            learner.name: learner.component.result
+            for learner in self.all
+            if isinstance(learner.component, Metric) and learner.since == step
+        }
 
     def _show_outputs(self) -> None:
         """Set the outputs that behaviors read, after some have changed."""

@@ -59,17 +59,23 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     conversations = Conversations(basis, interventions)
     log = _log(basis, cameras, recorder, conversations) if learners.all else None
     names = [*(actor.name for actor in basis.actors), *scenario.objects]
+    watchers = [
+        Clearance(basis.users, basis.robots),
+        BlockedWays(basis),
+        *user_cameras,
+        *cameras,
+        Encounters(basis.users, basis.robots),
+        conversations,
+        Interruptions(basis),
+        sensors,
+        *layers.areas,
+    ]
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,
         home=basis.home,
         changes=changes,
-        clearance=Clearance(basis.users, basis.robots),
-        blocking=BlockedWays(basis),
-        encounters=Encounters(basis.users, basis.robots),
-        conversations=conversations,
-        interruptions=Interruptions(basis),
-        sensors=sensors,
+        watchers=[watcher for watcher in watchers if watcher.is_needed],
         user_cameras=user_cameras,
         cameras=cameras,
         layers=layers,

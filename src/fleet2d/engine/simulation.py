@@ -35,6 +35,7 @@ from fleet2d.engine.basis import input_files
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
+from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.setup import set_up
 from fleet2d.engine.snapshot import (
     Constants,
@@ -181,7 +182,8 @@ class Simulation:
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
         wrong = (f"wrong: {text}" for text in flaws_of(self))
-        sensors = self._state.sensors.notes
+        of_sensors = self._state.find(Sensors)
+        sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
         return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
 
@@ -216,9 +218,11 @@ class Simulation:
             name: {"open": i not in self.home.shut, "locked": i in self.home.locked}
             for i, name in enumerate(self._state.changes.names)
         }
-        if self._state.sensors.names:
-            self._state.settle(self.step)
-        return bodies | doors | {name: {"on": on} for name, on in self._state.sensors.on.items()}
+        sensors = self._state.find(Sensors)
+        if sensors is None:
+            return bodies | doors
+        self._state.settle(self.step)
+        return bodies | doors | {name: {"on": on} for name, on in sensors.on.items()}
 
     @property
     def actors(self) -> dict[str, DecidingActor]:
@@ -845,7 +849,7 @@ class Simulation:
         manifest.steps = self.step
         manifest.simulated_s = simulated_s
         manifest.metrics, manifest.wall_s = dict(results), self._wall_s
-        manifest.add_inputs(self._state.interruptions.files)
+        manifest.add_inputs([file for each in self._state.watchers for file in each.files])
         manifest.interventions = queue.done if self.done else queue.records
         speedup = pace.speedup_until(simulated_s) if pace else 0.0
         if pace and speedup < 0.98 * pace.speedup:
@@ -1053,7 +1057,9 @@ def has_to_choose(state: State, row: int, step: int) -> bool:
     policy: Any = actor.behaviors[0]
     if policy.given is not None:
         return False
-    if state.bodies.ask_at[row] > step and not state.clearance.looks(row, step):
+    if state.bodies.ask_at[row] > step and not any(
+        watcher.looks(row, step) for watcher in state.steering
+    ):
         return False
     now = state.situation(row, step)
     return actor.asks_first(now) and policy.asks(now)
