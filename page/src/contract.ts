@@ -139,6 +139,13 @@ export interface VerdictFacts {
   step: number | null;
 }
 
+/** A moment that is worth a look. */
+export interface StoryFacts {
+  step: number;
+  title: string;
+  words: string;
+}
+
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
 export interface SlowFacts {
   outline: [number, number][];
@@ -176,6 +183,7 @@ export interface RunFacts {
   marks: MarkFacts[];
   verdict: string;
   verdicts: VerdictFacts[];
+  story: StoryFacts[];
   slows: SlowFacts[];
   starts_unlit: boolean;
   event_kinds: EventKind[];

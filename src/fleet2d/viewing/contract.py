@@ -204,6 +204,14 @@ class VerdictFacts(TypedDict):
     step: int | None
 
 
+class StoryFacts(TypedDict):
+    """A moment that is worth a look."""
+
+    step: int
+    title: str
+    words: str
+
+
 class SlowFacts(TypedDict):
     """A floor that slows robots down from `step` to before `end`: its outline [m], its effect."""
 
@@ -252,6 +260,7 @@ class RunFacts(TypedDict):
     marks: list[MarkFacts]
     verdict: str
     verdicts: list[VerdictFacts]
+    story: list[StoryFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
     event_kinds: list[EventKind]

@@ -36,6 +36,7 @@ from fleet2d.viewing.contract import (
     WallsChange,
 )
 from fleet2d.viewing.home_facts import WallsHistory, door_facts, home_facts
+from fleet2d.viewing.story import story_of
 
 INTERVENTIONS = "interventions"
 
@@ -269,6 +270,7 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         verdicts=[
             VerdictFacts(name=v.name, outcome=v.outcome, says=v.says, step=v.step) for v in verdicts
         ],
+        story=story_of(run),
         slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(EventKind),
@@ -402,6 +404,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         marks=[],
         verdict="",
         verdicts=[],
+        story=[],
         slows=slow_floors(scenario, interventions_of(simulation), clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(EventKind),
