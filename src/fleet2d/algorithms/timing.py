@@ -134,11 +134,11 @@ class TimingAlgorithm(Algorithm):
         self.worth: dict[str, float] = {}  # of each interaction
 
     def remember(self) -> Mapping[str, Any]:
-        """Refuse: what it has learned belongs to a home and its people."""
+        """Return nothing: its learned state belongs to a home and its people."""
         return {}
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Refuse to restore what another run has learned.
+        """Refuse the learned state of another run.
 
         Raises:
             ComponentError: Always.

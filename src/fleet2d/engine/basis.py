@@ -1,4 +1,4 @@
-"""The basis of a run: what its parts share, what follows its bodies, its components and files."""
+"""The basis of a run: the parts that all share, the watchers of bodies, components and files."""
 
 from collections.abc import (
     Callable,
@@ -45,7 +45,7 @@ class ImmutableRows(list[T]):
 
 
 class PlannedNote(NamedTuple):
-    """What a plan has at a step: a question or a call, by its text.
+    """A note of a plan at a step: a question or a call, by its text.
 
     Attributes:
         step: The step.
@@ -146,7 +146,7 @@ class Watcher:
 
 @dataclass(frozen=True)
 class Basis:
-    """What the parts of a run are made from.
+    """The scenario, home and bodies from which the parts of a run are made.
 
     Attributes:
         scenario: The scenario.
@@ -206,7 +206,7 @@ def input_files(scenario: Scenario) -> list[Path]:
 
 
 def changed_inputs(manifest: Manifest) -> list[str]:
-    """Return the files that a run read and whose content has changed since.
+    """Return the input files of a run that have changed since.
 
     Raises:
         RunDirectoryError: One is missing, or is not a file.

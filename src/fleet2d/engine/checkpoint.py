@@ -99,7 +99,7 @@ class Checkpoint:
 
 
 def _fixed_part(manifest: Manifest, like: Manifest | None = None) -> tuple[object, ...]:
-    """Return what doesn't change in the manifest while a run goes on.
+    """Return the fields of the manifest that don't change while a run goes on.
 
     Args:
         manifest: The manifest.

@@ -124,7 +124,7 @@ class BlockedWays(Watcher):
         step_us = actor.clock.step_us
         wait = self._waits[row]
         since = wait.since if wait.until == step else step
-        # Of two who wait for each other, the later one in the scenario waits twice as long.
+        # Of two bodies that wait for each other, the later one in the scenario waits twice as long.
         is_later = other < row and self._avoids(other, row, step)
         patience_us = self._patience_us * (2 if is_later else 1)
         if (step - since) * step_us < patience_us:

@@ -18,7 +18,7 @@ from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I64, Bool, PoseBlock, line_of_sight, locate
 from fleet2d.runtime.events import Event, EventKind
 
-# The squared distance of a person who can't be met: larger than any home [lattice units²].
+# The squared distance of a person out of reach: larger than any home [lattice units²].
 FAR = 1 << 50
 LYING = POSTURES.index("lie")
 STANDING = POSTURES.index("stand")

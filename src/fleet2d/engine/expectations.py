@@ -162,7 +162,7 @@ class RunExpectations(Watcher):
     # Judging
 
     def verdicts(self, *, ended: bool) -> dict[str, Verdict]:
-        """Return the present verdicts on what has begun, by name.
+        """Return the present verdicts on the expectations that have begun, by name.
 
         Args:
             ended: Whether the run is over.
@@ -185,7 +185,7 @@ class RunExpectations(Watcher):
         )
 
     def evidence(self, name: str) -> VerdictEvidence:
-        """Return what an expectation is about, with its signals so far."""
+        """Return the subjects of an expectation, with its signals so far."""
         entry = self.entries[name]
         return evidence_of(entry.expectation, self._signals(entry, ended=True))
 

@@ -154,7 +154,7 @@ class Learners:
     def _start(
         self, path: str, origin: Algorithm | Metric, learned: Path | None
     ) -> Algorithm | Metric:
-        """Return a started copy of an algorithm or a metric, with what a file holds."""
+        """Return a started copy of an algorithm or a metric, with the learned state of a file."""
         component = origin.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
@@ -220,7 +220,7 @@ class Learners:
         ]
 
     def remember(self, directory: Path) -> list[str]:
-        """Write what each algorithm has learned to a file of its own; return notes on failures."""
+        """Write the learned state of each algorithm to its own file; return notes on failures."""
         notes = []
         for learner in self.all:
             if isinstance(learner.component, Algorithm):

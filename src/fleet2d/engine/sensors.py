@@ -76,7 +76,7 @@ class Sensors(Watcher):
 
     @property
     def notes(self) -> list[str]:
-        """What is to be said about the tables of replayed sensors."""
+        """Remarks on the tables of replayed sensors."""
         notes = {name: getattr(sensor, "notes", ()) for name, sensor in self.sensors.items()}
         return [f"objects.{name}: {note}" for name in notes for note in notes[name]]
 

@@ -91,7 +91,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         group.owner.in_view = InView(state, group)
     _remember(state, basis)
     state.wait_for(state.requested)
-    # What waits for an event comes last: the event may be one that another entry causes.
+    # Entries that wait for an event come last: another entry may cause the event.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
         errors = PlacementError, ScenarioError
@@ -136,7 +136,7 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
 
 
 def _cameras_of(row: int, shared: SightSetup) -> Cameras:
-    """Return the cameras of one body, or what it perceives in place of their view."""
+    """Return the cameras of one body, or its source of perceptions in their place."""
     if (source := getattr(shared.actors[row].entity, "perceives", None)) is None:
         return Cameras(row, shared)
     from fleet2d.engine.real_sight import RealSight  # few runs need it

@@ -178,7 +178,7 @@ class Simulation:
 
     @property
     def notes(self) -> list[str]:
-        """What is odd in the floor plan or won't work in it, and about bodies and their sources."""
+        """Oddities of the floor plan and its flaws, and remarks on bodies and their sources."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
         wrong = (f"wrong: {text}" for text in flaws_of(self))
@@ -189,7 +189,7 @@ class Simulation:
 
     @property
     def _unused_heights(self) -> Iterator[str]:
-        """What says how high something is, while heights don't matter."""
+        """Remarks on heights that have no effect."""
         for actor in () if self.scenario.sight.heights else self._state.actors:
             eyes = actor.entity.eyes
             only = ["camera"] if "camera" in eyes else [f"cameras.{name}" for name in eyes]
@@ -236,7 +236,7 @@ class Simulation:
 
     @property
     def algorithms(self) -> dict[str, Algorithm]:
-        """The algorithms in the run, by name: configuration, and what they have learned."""
+        """The algorithms in the run, by name: configuration and learned state."""
         pairs = ((each.name, each.component) for each in self._state.learners.all)
         return {name: component for name, component in pairs if isinstance(component, Algorithm)}
 
@@ -300,7 +300,7 @@ class Simulation:
             4
         """
         self._store.row_listeners.append(function)
-        self._state.recorder.keeps_none = True
+        self._state.recorder.flushes_every_span = True
 
     def _event_kinds(self) -> frozenset[str]:
         """Return the kinds of events that may happen in this run."""
@@ -960,7 +960,7 @@ def catch_up(simulation: Simulation, interventions: Sequence[Mapping[str, Any]])
 
 
 def flaws_of(simulation: Simulation) -> Sequence[str]:
-    """Return what will not work in a home from a file; other homes have been checked."""
+    """Return the flaws of a home from a file; other homes have been checked."""
     if not simulation.scenario.floorplan.files():
         return ()
     home = simulation.home
@@ -1026,7 +1026,7 @@ def run_until_asked(simulation: Simulation, *names: str) -> list[str]:
 
 
 def situation_of(simulation: Simulation, name: str) -> Situation:
-    """Return what the behaviors of a body know when they are asked at the present step.
+    """Return the situation in which the behaviors of a body decide at the present step.
 
     Raises:
         ScenarioError: There is no such body.
@@ -1046,7 +1046,7 @@ def perceived_s(simulation: Simulation, robot: str) -> float:
 
 
 def evidence_of(simulation: Simulation, name: str) -> "VerdictEvidence":
-    """Return the signals of an expectation so far, and what it is about, for pictures."""
+    """Return the signals of an expectation so far, and its subjects, for pictures."""
     assert simulation._state.expectations is not None
     return simulation._state.expectations.evidence(name)
 

@@ -231,7 +231,7 @@ class State:
     _situation: Situation | None = None  # the newest one
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what follows from the rest."""
+        """Leave out the situation, which follows from the rest."""
         return {**self.__dict__, "_situation": None}
 
     def __post_init__(self) -> None:
@@ -283,7 +283,7 @@ class State:
     # Decisions
 
     def situation(self, row: int, step: int) -> Situation:
-        """Return what a body knows at a step; the same object, as long as it knows the same."""
+        """Return the situation of a body at a step; the same object while nothing in it changes."""
         actor = self.actors[row]
         events = tuple(self.pending.get(row, ()))
         now = self._situation
@@ -423,7 +423,7 @@ class InView:
 
 @dataclass(frozen=True)
 class Recall:
-    """What a robot remembers of its sightings up to the present step, for its behaviors."""
+    """The memory of a robot's sightings up to the present step, for its behaviors."""
 
     state: State
     cameras: Cameras | None

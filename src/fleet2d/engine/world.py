@@ -80,7 +80,7 @@ class EngineWorld:
             act.end(self)
 
     def keeps_truth(self, robot: str) -> bool:
-        """Whether the run stores the truth beside what a robot perceives."""
+        """Whether the run stores the truth beside the sightings of a robot."""
         return any(c.owner.name == robot and c.errs for c in self._state.cameras)
 
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
@@ -115,7 +115,7 @@ class EngineWorld:
             sensors.stuck[sensor] = says
 
     def reset(self, algorithm: str, learned: Path | None) -> None:
-        """Restart an algorithm with nothing learned, or with what a file holds."""
+        """Restart an algorithm with nothing learned, or with the learned state of a file."""
         self._state.learners.reset(algorithm, learned)
 
     def replace(self, algorithm: str, output: object) -> None:

@@ -141,7 +141,7 @@ class ChainPresence(Presence):
         super().__init__(users, home[-1], away[-1], time, track=track)
 
     def corrected(self) -> "ChainPresence":
-        """Return a copy whose forecasts start from the last belief of the track."""
+        """Return a copy with forecasts from the last belief of the track on."""
         assert self.track is not None
         people = []
         for row, person in enumerate(self._people):

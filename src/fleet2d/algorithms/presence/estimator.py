@@ -1,4 +1,4 @@
-"""Estimators of long-term presence: their base, what they count, and shares of sightings."""
+"""Estimators of long-term presence: their base, their counts, and shares of sightings."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime

@@ -37,7 +37,7 @@ class PresenceAlgorithm(Algorithm):
         raise NotImplementedError
 
     def _prepare(self, learner: Any, users: Sequence[str], start: datetime) -> None:
-        """Begin a run with what was learned in another one."""
+        """Begin a run with the learned state of another one."""
         raise NotImplementedError
 
     def _begin_once(self, state: Present) -> None:
