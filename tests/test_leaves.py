@@ -29,9 +29,10 @@ REST = """
 import sys
 import fleet2d
 from fleet2d.cli.__main__ import app
-from fleet2d.configuration.components import PACKAGES, components
+from fleet2d.configuration.built_in import COMPONENTS
+from fleet2d.configuration.components import components
 
-for kind in PACKAGES:
+for kind in COMPONENTS:
     components(kind)
 run = fleet2d.run(None, "simulation.duration=10 min", seed=1)
 assert run.status == "complete"

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.interactions.attitude import Attitude, AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome
@@ -72,7 +72,6 @@ class AnswerPart(Component):
         raise NotImplementedError
 
 
-@register("answer_part", "notice")
 class NoticePart(AnswerPart):
     """Whether the robot is heard or seen.
 
@@ -137,7 +136,6 @@ LOADS: Mapping[str, float] = {
 }
 
 
-@register("answer_part", "activity")
 class ActivityPart(AnswerPart):
     """The load of the activity: asleep never, on the phone hardly, at breakfast well.
 
@@ -156,7 +154,6 @@ class ActivityPart(AnswerPart):
         return self.base - self.loads.get(now.activity, LOADS.get(now.activity, 0.0))
 
 
-@register("answer_part", "company")
 class CompanyPart(AnswerPart):
     """Other people in the room.
 
@@ -173,7 +170,6 @@ class CompanyPart(AnswerPart):
         return self.each * min(now.company, 3)
 
 
-@register("answer_part", "movement")
 class MovementPart(AnswerPart):
     """Whether the person is going somewhere.
 
@@ -201,7 +197,6 @@ KIND_LOGITS: Mapping[str, float] = {
 }
 
 
-@register("answer_part", "importance")
 class ImportancePart(AnswerPart):
     """Its kind, and its value to the person.
 
@@ -223,7 +218,6 @@ class ImportancePart(AnswerPart):
         return kind + self.worth * worth / (worth + self.half_worth)
 
 
-@register("answer_part", "manner")
 class MannerPart(AnswerPart):
     """How the robot comes: too near, from far away, from behind, in the way.
 
@@ -251,7 +245,6 @@ class MannerPart(AnswerPart):
         return total
 
 
-@register("answer_part", "recency")
 class RecencyPart(AnswerPart):
     """The time since the robot addressed the person last.
 
@@ -270,7 +263,6 @@ class RecencyPart(AnswerPart):
         return self.at_once * max(0.0, 1 - (now.time - state.last) / self.over)
 
 
-@register("answer_part", "burden")
 class BurdenPart(AnswerPart):
     """Too many prompts of late.
 
@@ -287,7 +279,6 @@ class BurdenPart(AnswerPart):
         return self.each * max(0.0, state.burden - self.tolerance)
 
 
-@register("answer_part", "attitude")
 class AttitudePart(AnswerPart):
     """What months have made of the person: novelty, habit, trust and annoyance.
 
@@ -388,7 +379,6 @@ class Start(NamedTuple):
     kind: str
 
 
-@register("initiative", "rates")
 class Initiative(Component):
     """What people start by themselves: on average so often a day, at any time of it.
 
@@ -424,7 +414,6 @@ PARTS = (
 """The parts of a person's answers, which are types of `answer_part`, too."""
 
 
-@register("answers", "stages")
 class Answers(Component):
     """How a person answers robots; each part may be replaced by a class of your own.
 
@@ -453,17 +442,17 @@ class Answers(Component):
 
     kind: ClassVar[str] = "answers"
 
-    notice: Annotated[AnswerPart, OneOf("answer_part")] = NoticePart()
-    activity: Annotated[AnswerPart, OneOf("answer_part")] = ActivityPart()
-    company: Annotated[AnswerPart, OneOf("answer_part")] = CompanyPart()
-    movement: Annotated[AnswerPart, OneOf("answer_part")] = MovementPart()
-    importance: Annotated[AnswerPart, OneOf("answer_part")] = ImportancePart()
-    manner: Annotated[AnswerPart, OneOf("answer_part")] = MannerPart()
-    recency: Annotated[AnswerPart, OneOf("answer_part")] = RecencyPart()
-    burden: Annotated[AnswerPart, OneOf("answer_part")] = BurdenPart()
-    attitude: Annotated[AnswerPart, OneOf("answer_part")] = AttitudePart()
-    months: Annotated[Attitude, OneOf("attitude")] = Attitude()
-    initiative: Annotated[Initiative, OneOf("initiative")] = Initiative()
+    notice: OneOf[AnswerPart] = NoticePart()
+    activity: OneOf[AnswerPart] = ActivityPart()
+    company: OneOf[AnswerPart] = CompanyPart()
+    movement: OneOf[AnswerPart] = MovementPart()
+    importance: OneOf[AnswerPart] = ImportancePart()
+    manner: OneOf[AnswerPart] = MannerPart()
+    recency: OneOf[AnswerPart] = RecencyPart()
+    burden: OneOf[AnswerPart] = BurdenPart()
+    attitude: OneOf[AnswerPart] = AttitudePart()
+    months: OneOf[Attitude] = Attitude()
+    initiative: OneOf[Initiative] = Initiative()
     defers: Share = 0.3
     later: tuple[Duration, Duration] = (timedelta(minutes=15), timedelta(hours=1))
     answer_takes: tuple[Duration, Duration] = (timedelta(seconds=2), timedelta(seconds=8))
@@ -540,5 +529,5 @@ def _with_type(value: Any) -> Any:
     return {"type": "stages", **value} if is_untyped else value
 
 
-AnswersField = Annotated[Answers, OneOf("answers"), BeforeValidator(_with_type)]
+AnswersField = Annotated[OneOf[Answers], BeforeValidator(_with_type)]
 """A field for how somebody answers; without a type: stages."""

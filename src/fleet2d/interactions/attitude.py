@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.runtime.clock import DAY, DAY_S, midnight_of
@@ -47,7 +47,6 @@ class AttitudeState:
         return strength if min(off_s, DAY_S - off_s) <= window.total_seconds() else 0.0
 
 
-@register("attitude", "fading")
 class Attitude(Component):
     """How a person's attitude to a robot changes: interest that fades, some patience.
 
@@ -115,7 +114,6 @@ class Attitude(Component):
             state.trust *= 1 - self.loses / 10
 
 
-@register("attitude", "steady")
 class SteadyAttitude(Attitude):
     """A person whose interest doesn't fade, and who is soon at peace: about a quarter of people."""
 
@@ -124,7 +122,6 @@ class SteadyAttitude(Attitude):
     annoyed_by: float = Field(default=0.2, ge=0, le=100)
 
 
-@register("attitude", "leaving")
 class LeavingAttitude(Attitude):
     """A person who soon loses interest and is easily annoyed: more than half of app users."""
 

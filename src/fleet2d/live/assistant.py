@@ -23,7 +23,7 @@ from fleet2d.errors import Fleet2DError, InputError, errors_as, extra, os_errors
 from fleet2d.inputs import open_input, within
 from fleet2d.live import questions
 from fleet2d.runs.run import Run, open_run
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import write_atomically
 
 MAX_TEXT = 1 << 20

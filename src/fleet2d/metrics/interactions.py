@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
@@ -24,7 +23,6 @@ from fleet2d.runtime.events import EventKind
 TOLD = frozenset({"called", "question", "replies", "sent_away", "banned", "switched_off"})
 
 
-@register("metric", "interactions")
 class Interactions(Metric):
     """What came of what robots wanted of people: value, answers, interruptions, annoyance.
 
@@ -150,7 +148,6 @@ class OpenRequest:
     value: float = 0.0
 
 
-@register("metric", "timing_regret")
 class TimingRegret(Metric):
     """How much more value asking at the best time of the same life would have had.
 

@@ -13,7 +13,6 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence, presence_of
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration, Share, micros
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
@@ -243,7 +242,6 @@ class LongTermMetric(Metric):
         return {user: row for user, row in rows.items() if len(rows) != 2 or user != ANYONE}
 
 
-@register("metric", "ltp_error")
 class LtpError(LongTermMetric):
     """Distance of long-term presence from the true occupancy, over time.
 
@@ -377,7 +375,6 @@ class LtpError(LongTermMetric):
         return results
 
 
-@register("metric", "ltp_gap")
 class LtpGap(LongTermMetric):
     """Gap of long-term presence per room, over time: |p - q|, given at home.
 

@@ -10,13 +10,11 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_json_schema
 from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
 
-from fleet2d.configuration.components import PACKAGES, Component, Settings, aliases, components
+from fleet2d.configuration.built_in import COMPONENTS
+from fleet2d.configuration.components import Component, Settings, aliases, components
 from fleet2d.interventions.intervention import verbs
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
-
-UNTYPED = {"type": "object", "not": {"required": ["type"]}}
-"""The schema of an entry whose type is its name."""
 
 
 class _SchemaGenerator(GenerateJsonSchema):
@@ -57,7 +55,7 @@ class ComponentDescription:
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
     # Interrupts are named by behaviors, not by the scenario.
-    registry = {kind: components(kind) for kind in PACKAGES if kind != "interrupt"}
+    registry = {kind: components(kind) for kind in COMPONENTS if kind != "interrupt"}
     classes = [cls for types in registry.values() for cls in types.values()]
     models: list[type[BaseModel]] = [Scenario, *classes]
     references, definitions = models_json_schema(
@@ -137,8 +135,6 @@ def _expand(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
     result = {k: _expand(v, kinds) for k, v in value.items() if k != "x-short-form"}
     if (kind := result.pop("x-kind", None)) is not None:
         result["$ref"] = f"#/$defs/{kind}"
-        if result.pop("x-by-name", False):
-            result = {"anyOf": [result, UNTYPED]}
     if (mark := value.get("x-short-form")) is not None:
         for definition in kinds[mark["kind"]].values():
             properties = definition["properties"] | mark["body"]
@@ -157,10 +153,7 @@ def _allow_composition(properties: dict[str, Any]) -> None:
     deletion = {"type": "null", "description": "null deletes an entry of the extended file"}
     for section in ENTRIES:
         entry = properties[section]["additionalProperties"]
-        forms = [entry, UNTYPED, deletion]
-        if section in ("users", "robots"):  # only algorithms and metrics are typed by their name
-            del forms[1]
-        properties[section]["additionalProperties"] = {"anyOf": forms}
+        properties[section]["additionalProperties"] = {"anyOf": [entry, deletion]}
 
 
 def describe_components() -> list[ComponentDescription]:
@@ -169,7 +162,7 @@ def describe_components() -> list[ComponentDescription]:
     First the sections of every scenario (kind `scenario`, with their names in Python), then every
     registered type, and the groups of keys in their fields (kind `part`).
     """
-    types = {(kind, name): cls for kind in PACKAGES for name, cls in components(kind).items()}
+    types = {(kind, name): cls for kind in COMPONENTS for name, cls in components(kind).items()}
     sections = _parts_of(Scenario)
     parts = [part for cls in types.values() for part in _parts_of(cls) if part not in sections]
     return [
@@ -228,7 +221,8 @@ def _type_of(value: Mapping[str, Any]) -> str:
         return str(value["$ref"]).rpartition("/")[2]
     options = value.get("anyOf", value.get("oneOf"))
     if options:
-        return " | ".join(dict.fromkeys(_type_of(option) for option in options))
+        types = [_type_of(option) for option in options if "not" not in option]
+        return " | ".join(dict.fromkeys(types))
     if "prefixItems" in value:
         return f"[{', '.join(map(_type_of, value['prefixItems']))}]"
     if value.get("type") == "array":

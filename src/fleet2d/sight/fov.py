@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import problem_at
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.home import Home
@@ -178,7 +178,6 @@ class FieldOfView(Component):
         return self.sees(home, x, y, heading, reach, centres.astype(np.int64)).reshape(rows.shape)
 
 
-@register("sight", "line_of_sight")
 class LineOfSight(FieldOfView):
     """Follow the line to each point through the home, without a cache.
 
@@ -207,7 +206,6 @@ class Regions(NamedTuple):
     wall: I32
 
 
-@register("sight", "visibility_polygon")
 class VisibilityPolygon(FieldOfView):
     """Compute the region visible from a place once, then look points up in it.
 
@@ -337,7 +335,6 @@ class CellBits(NamedTuple):
     bits: U8
 
 
-@register("sight", "flashlight")
 class Flashlight(FieldOfView):
     """Cache the set of cells in view of each pose, and look points up by their cell.
 

@@ -14,7 +14,6 @@ from fleet2d.algorithms.presence.estimator import normalized
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.people import DayEvidence, StateLayout
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, Bool, StayModel, advance, follow
@@ -209,7 +208,6 @@ def steps_of(model: StayModel) -> F64:
     return steps
 
 
-@register("presence_model", "hmm")
 class Filter(Model):
     """The filter of a hidden Markov model: P(room now | all evidence so far).
 
@@ -286,7 +284,6 @@ class Filter(Model):
         self.learner.recall(learned, self.day)
 
 
-@register("presence_model", "semi_markov")
 class SemiMarkov(Filter):
     """The filter with stays in stages, so that the time already spent in a room matters.
 
@@ -298,7 +295,6 @@ class SemiMarkov(Filter):
     stages: ClassVar[int] = 2
 
 
-@register("presence_model", "routine")
 class RoutineModel(SemiMarkov):
     """The semi-Markov filter with transitions by the hour, towards the rooms usual at that time.
 
@@ -332,7 +328,6 @@ class RoutineModel(SemiMarkov):
         return Habits(week[:, columns], total[columns], self.smoothing)
 
 
-@register("presence_model", "markov")
 class MarkovDecay(Filter):
     """The row of P^g for the room in which the user was perceived last, g bins ago.
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence, Set
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ from fleet2d.algorithms.algorithm import Algorithm, Present, array_of, check_num
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
@@ -340,7 +340,6 @@ def natural_log(values: ArrayLike) -> F64:
     return e * LN_2 + 2 * s * series
 
 
-@register("presence_estimator", "sighting_share")
 class SightingShare(Estimator):
     """Share of a user's sightings in each room: n_r / sum of n.
 
@@ -415,7 +414,6 @@ class PresenceAlgorithm(Algorithm):
         self.learned_state = learned or None
 
 
-@register("algorithm", "long_term_presence", aliases=("ltp",))
 class LongTermPresence(PresenceAlgorithm):
     """Share of time that each user, and anyone, spends in each room, from robots' evidence.
 
@@ -430,7 +428,7 @@ class LongTermPresence(PresenceAlgorithm):
         interval: Coverage of its intervals, such as 0.9.
     """
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "exposure_ratio")
+    estimator: OneOf[Estimator] = cast("Any", "exposure_ratio")
     by: Literal["overall", "hour_of_week"] = "overall"
     smoothing: PositiveDuration = timedelta(hours=1)
     half_life: PositiveDuration | None = None

@@ -10,7 +10,6 @@ from pydantic import Field
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import MIN_DAYS, Estimator, normalized
 from fleet2d.algorithms.presence.people import DayEvidence, People, Prior, StateLayout
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, Bool, PeoplePlaces, sum_places
@@ -20,7 +19,6 @@ REVISITS = 2
 STORED_DAYS = 64
 
 
-@register("presence_estimator", "likelihood", aliases=("hmm",))
 class Likelihood(Estimator):
     """Expected share of time in each room given all evidence, in a hidden Markov chain.
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
@@ -22,7 +22,7 @@ from fleet2d.algorithms.presence.belief import (
     check_distributions,
 )
 from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator, PresenceAlgorithm
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import PositiveDuration, whole_steps
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
@@ -91,7 +91,6 @@ class Model(Component):
         """Restore what `remember` returned; called after `begin`."""
 
 
-@register("presence_model", "last_seen")
 class LastSeen(Model):
     """Probability 1 for the room in which the user was perceived last; uniform before that.
 
@@ -119,7 +118,6 @@ class LastSeen(Model):
         return home, np.zeros(home.shape[:2])
 
 
-@register("presence_model", "long_term")
 class LongTerm(Model):
     """Long-term presence, regardless of recent sightings.
 
@@ -127,7 +125,7 @@ class LongTerm(Model):
         estimator: The estimator of long-term presence.
     """
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "likelihood")
+    estimator: OneOf[Estimator] = cast("Any", "likelihood")
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
@@ -150,7 +148,6 @@ class LongTerm(Model):
         self.estimator.recall(learned, self.day)
 
 
-@register("presence_model", "hour_of_week")
 class HourOfWeek(LongTerm):
     """Long-term presence of the hour of the week, regardless of recent sightings.
 
@@ -178,7 +175,6 @@ class HourOfWeek(LongTerm):
         return WeeklyPresence(users, self.week(), time, track=track)
 
 
-@register("algorithm", "real_time_presence", aliases=("rtp",))
 class RealTimePresence(PresenceAlgorithm):
     """Where each user, and anyone, is now: P(room | all evidence so far).
 
@@ -192,7 +188,7 @@ class RealTimePresence(PresenceAlgorithm):
     """
 
     period: PositiveDuration = timedelta(minutes=5)
-    model: Annotated[Model, OneOf("presence_model")] = cast("Any", "hmm")
+    model: OneOf[Model] = cast("Any", "hmm")
 
     def start(self, home: Home) -> None:
         """Begin without evidence, with a model whose files can be used."""
@@ -240,7 +236,6 @@ class RealTimePresence(PresenceAlgorithm):
         check_distributions(home, away, (*state.users, ANYONE), source)
 
 
-@register("algorithm", "belief_table")
 class BeliefTable(RealTimePresence):
     """The belief of a model of real-time presence at regular times, as rows of a table.
 
@@ -305,7 +300,6 @@ class Told(NamedTuple):
     where: str
 
 
-@register("algorithm", "told_presence")
 class ToldPresence(Algorithm):
     """Real-time presence, corrected by the answers to questions like "is Ben at home?".
 

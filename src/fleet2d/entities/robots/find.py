@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share, TimeOfDay
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Command, Situation
@@ -137,7 +136,6 @@ class SearchState:
     blocked: set[int] = field(default_factory=set)
 
 
-@register("behavior", "find")
 class Find(BeliefBehavior):
     """Look for a person at given times or on command, until found, given up or believed out.
 

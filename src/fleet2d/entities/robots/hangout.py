@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
 from fleet2d.entities.place import avoided_rooms
@@ -204,7 +203,6 @@ SHARE_TO_SHOW = 0.95
 MAX_VIEWS = 4
 
 
-@register("behavior", "hangout")
 class Hangout(BeliefBehavior):
     """Stand near where people likely are, out of their way.
 

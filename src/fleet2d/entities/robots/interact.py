@@ -6,7 +6,6 @@ from typing import ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.giving_way import resumed
@@ -126,7 +125,6 @@ class ServedRequest(NamedTuple):
     came_from: tuple[int, int] = (0, 0)
 
 
-@register("behavior", "interact")
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
@@ -419,7 +417,6 @@ class Interact(BeliefBehavior):
         return plan.interrupt_on("user_seen")
 
 
-@register("behavior", "opportunistic")
 class Opportunistic(Behavior):
     """Approach a person who comes into view, and interact for a while.
 

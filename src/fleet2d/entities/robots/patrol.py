@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, InputPath, Length, OnDays, TimeOfDay, weekdays_of
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Behavior, Situation
@@ -34,7 +34,6 @@ from fleet2d.runtime.clock import DAY, midnight_of
 MAX_NAMED = 6  # how many rooms a note names
 
 
-@register("behavior", "patrol")
 class Patrol(Behavior):
     """Make rounds: go to each room or waypoint in turn, look around, stay a while, go on.
 
@@ -139,7 +138,6 @@ class ScheduledVisit(Settings):
     task: str = ""
 
 
-@register("behavior", "scheduled")
 class Scheduled(Behavior):
     """Visit rooms at fixed times of the day; between visits, later behaviors decide.
 
@@ -219,7 +217,6 @@ class Scheduled(Behavior):
             yield from (entry for entry in sorted(today) if entry[0] > since)
 
 
-@register("behavior", "retrace")
 class Retrace(Behavior):
     """Drive the path in the map of a Valetudo robot, in the home of that map, at the robot's speed.
 

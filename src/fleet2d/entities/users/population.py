@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Literal
 
-from fleet2d.configuration.components import register
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
@@ -15,7 +14,6 @@ from fleet2d.routines.planner import REST, Episode
 from fleet2d.runtime.determinism import Draws, stream_key
 
 
-@register("behavior", "population")
 class Population(ResidentBehavior):
     """Live as a person drawn from the American Time Use Survey 2022-2023.
 

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from fleet2d.configuration import units
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import Duration, InputFileOrFolder, Length, PositiveDuration, Speed
 from fleet2d.entities.behavior import Actor, Behavior, Situation
@@ -441,7 +440,6 @@ RoomMap = Annotated[
 ]
 
 
-@register("behavior", "replay")
 class Replay(Behavior, LogKeys):
     """Be where a person was according to a log: a smart home's events, a script, or positions.
 

@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import available_places, available_rooms
@@ -30,7 +29,6 @@ POINTS_PER_M = 10
 MILLION = 1_000_000
 
 
-@register("behavior", "room_sampling")
 class RoomSampling(Behavior):
     """Be in each room for a given share of the time, in visits of random length.
 
@@ -148,7 +146,6 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
 NAPS = 10
 
 
-@register("behavior", "pet")
 class Pet(Behavior):
     """Nap somewhere, roam through a few spots of the home, nap somewhere else.
 
