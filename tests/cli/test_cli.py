@@ -259,11 +259,12 @@ def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components")
     assert 0 == code
     for kind in COMPONENTS:
-        result = components(kind)
-        for name, cls in result.items():
+        for name, cls in components(kind).items():
             assert f"{kind}: {name}" in out
             for field in cls.model_fields:
                 assert re.search(rf"^ +{field}:", out, re.MULTILINE), (name, field)
+    assert "    and the keys of Behavior, BeliefBehavior\n" in out
+    assert "shared: Behavior\n" in out
     for word in ("long_term_presence or ltp", "[deg", "dwell", "5 min"):
         assert word in out
 

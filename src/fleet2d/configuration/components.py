@@ -282,11 +282,10 @@ class ShortForm:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Return a mark with the body's keys, for `fleet2d.scenario.schema` to add short forms."""
+        """Return a mark for `fleet2d.scenario.schema` to add short forms."""
         long = handler(schema)
-        body = dict(handler.resolve_ref_schema(long)["properties"])
-        kind = body.pop("behaviors")["items"]["x-kind"]
-        return {"anyOf": [long], "x-short-form": {"kind": kind, "body": body}}
+        behaviors = handler.resolve_ref_schema(long)["properties"]["behaviors"]
+        return {"anyOf": [long], "x-short-form": behaviors["items"]["x-kind"]}
 
 
 class Settings(DescribedModel):

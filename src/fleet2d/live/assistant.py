@@ -363,9 +363,10 @@ def server(folder: Path) -> Any:
         from fleet2d.scenario.schema import describe_components
 
         return [
-            f"{c.kind} {c.type}: {c.summary} Keys: {', '.join(f.name for f in c.fields)}"
+            f"{c.kind} {c.type}: {c.summary} Keys: {', '.join(f.name for f in c.fields)}; those of"
+            f" {', '.join(c.shares) or 'no other'}, too"
             for c in describe_components()
-            if kind in ("", c.kind)
+            if kind in ("", c.kind) or c.kind == "shared"
         ]
 
     def picture(run: str) -> Image:
