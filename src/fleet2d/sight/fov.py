@@ -25,6 +25,8 @@ from fleet2d.kernels import visible_region as visible_region_fast
 __all__ = ["Bool", "FieldOfView", "Flashlight", "LineOfSight", "Reach", "VisibilityPolygon"]
 Pieces = tuple[I32, I32]
 FORMAT = 1
+# Memory for the poses of a flashlight; the least recently used go first.
+MEMORY_BYTES = 64e6
 # Memory of an entry besides its bits: keys, tuple and array.
 ENTRY_BYTES = 450
 
@@ -340,12 +342,7 @@ class Flashlight(FieldOfView):
 
     A point is in view if the centre of its cell is, so it is exact for the centres of cells, and
     up to half a cell elsewhere. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
-
-    Attributes:
-        memory_mb: Memory for poses; the least recently used go first.
     """
-
-    memory_mb: float = Field(default=64.0, gt=0)
 
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points lie in cells whose centre is visible from (x, y)."""
@@ -385,7 +382,7 @@ class Flashlight(FieldOfView):
             cells = _pack(filled_cells(home, x, y, heading, reach))
             self._bytes += ENTRY_BYTES + cells.bits.nbytes
         self._cache[key] = cells
-        while self._bytes > self.memory_mb * 1e6 and len(self._cache) > 1:
+        while self._bytes > MEMORY_BYTES and len(self._cache) > 1:
             _, oldest = self._cache.popitem(last=False)
             self._bytes -= ENTRY_BYTES + oldest.bits.nbytes
         return cells

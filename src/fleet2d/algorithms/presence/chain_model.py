@@ -221,21 +221,17 @@ class Filter(Model):
 
     Attributes:
         detection: Chance that somebody in view is perceived.
-        restless: Chance per bin that a person in a room changes patch, before it is learned.
     """
 
     is_by_bin: ClassVar[bool] = True
     detection: Share = Field(default=0.95, gt=0, lt=1)
-    restless: Share = 0.05
     stages: ClassVar[int] = 1
     negative: ClassVar[bool] = True
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
         super().begin(home, users, start)
-        self.learner = Likelihood(
-            detection=self.detection, restless=self.restless, stages=self.stages
-        )
+        self.learner = Likelihood(detection=self.detection, stages=self.stages)
         self.learner.begin(self.rooms, self.users)
         self.followers: list[Follower] = []
 

@@ -142,6 +142,8 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
     return [(room, float(np.cumsum(weights)[-1] / total)) for room, weights in by_room]
 
 
+# Probability that the next spot is in the same room.
+STAYS_IN_ROOM = 0.6
 # How many naps are planned at once.
 NAPS = 10
 
@@ -150,14 +152,13 @@ class Pet(Behavior):
     """Nap somewhere, roam through a few spots of the home, nap somewhere else.
 
     The durations of naps and stops are drawn at random. The next spot is in the same room
-    with probability `stays_in_room`, else in any room that it may enter.
+    with probability 0.6, else in any room that it may enter.
 
     Attributes:
         rooms: Rooms and kinds of rooms that it may enter; none: all.
         nap: How long it sleeps at a time.
         stop: How long it stops at a spot while it roams.
         spots: Smallest and largest number of stops between two naps.
-        stays_in_room: Probability that its next spot is in the same room.
     """
 
     usual_height: ClassVar[float] = 0.3
@@ -170,7 +171,6 @@ class Pet(Behavior):
         mean=timedelta(seconds=40), std=timedelta(seconds=40)
     )
     spots: tuple[int, int] = (3, 12)
-    stays_in_room: float = Field(default=0.6, ge=0, le=1)
 
     def model_post_init(self, _: object, /) -> None:
         """Require a range of spots."""
@@ -204,6 +204,6 @@ class Pet(Behavior):
 
     def _walk(self, plan: Plan, draws: Draws) -> None:
         """Walk to the next spot."""
-        if draws.uniform() >= self.stays_in_room:
+        if draws.uniform() >= STAYS_IN_ROOM:
             self.room = draws.choice(self.allowed_rooms)
         draws.choice(self.places.in_room(self.room)).walk(plan)
