@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 
 import fleet2d
-from fleet2d.pictures.run import draw_run
-from fleet2d.viewer.film import write_film
+from fleet2d.viewing.film import write_film
+from fleet2d.viewing.pictures.run import draw_run
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 DAY = "simulation.duration=1 d"

@@ -1,4 +1,4 @@
-// Written by `python -m tools.contract_types` from fleet2d.viewer.contract.
+// Written by `python -m tools.contract_types` from fleet2d.viewing.contract.
 
 /** A room: its colours on the plan and in lanes, and the anchor of its name [m]. */
 export interface RoomFacts {

@@ -466,15 +466,15 @@ UNUSED = (
     "fleet2d.entities.robots.search",
     "fleet2d.entities.users.scripted",
     "fleet2d.expectations",
-    "fleet2d.fit",
+    "fleet2d.learning.fit",
     "fleet2d.interventions.bodies",
     "fleet2d.interventions.home",
     "fleet2d.interventions.robots",
     "fleet2d.logs",
-    "fleet2d.pictures",
+    "fleet2d.viewing.pictures",
     "fleet2d.studies",
     "fleet2d.testing",
-    "fleet2d.viewer",
+    "fleet2d.viewing",
 )
 # The packages of others that a run needs, and what these need in turn.
 USED = {

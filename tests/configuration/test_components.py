@@ -5,11 +5,13 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
 from pydantic import Field, PydanticUserError, TypeAdapter, ValidationError
+from tests.own_errors import Missed
 
 from fleet2d.configuration.built_in import COMPONENTS
 from fleet2d.configuration.components import (
@@ -24,6 +26,7 @@ from fleet2d.configuration.components import (
     lookup,
     split_short_form,
 )
+from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.units import Duration, Length, Text
 from fleet2d.errors import InputError, ScenarioError
 
@@ -140,17 +143,20 @@ def test_every_class_of_the_table_is_of_its_kind_and_knows_its_name(kind: str) -
 
     assert all(cls.kind == kind for cls in types.values())
     assert all(lookup(kind, name) is types[cls.type_name] for name, cls in types.items())
-    assert {name for name in COMPONENTS[kind] if lookup(kind, name).type_name == name} == set(types)
+    assert {lookup(kind, name).type_name for name in COMPONENTS[kind]} <= set(types)
 
 
-def test_component_of_a_package_that_is_not_there_is_unknown(
+def test_class_of_a_plugin_that_nobody_looked_up_is_dumped_by_its_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(COMPONENTS["gadget"], "torch", "fleet2d.torches.torch:Torch")
+    path = f"{__name__}:Lamp"
+    entry = EntryPoint("torch", path, "fleet2d.gadget")
+    monkeypatch.setattr(Lamp, "type_name", path)
+    monkeypatch.setattr(
+        "fleet2d.configuration.components._plugins", lambda kind: EntryPoints([entry])
+    )
 
-    assert ["fan", "lamp"] == list(components("gadget"))
-    with pytest.raises(ScenarioError, match="there is no gadget 'torch'"):
-        lookup("gadget", "torch")
+    assert "torch" == Shelf(top=Lamp()).model_dump()["top"]["type"]
 
 
 def test_base_is_the_class_that_declares_the_kind() -> None:
@@ -400,6 +406,28 @@ def test_short_form_beside_behaviors_is_refused() -> None:
     assert errors(SHORT, {"type": "lamp", "behaviors": []}) == {
         "behaviors": "give 'type' (one behavior) or 'behaviors', not both"
     }
+
+
+def test_file_beside_the_scenario_takes_no_plugin_s_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside = tmp_path / "tests" / "own_errors.py"
+    beside.parent.mkdir()
+    beside.write_text("raise SystemExit('code beside the scenario runs')", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+    assert Missed is import_class("tests.own_errors:Missed", is_plugin=True)
+
+
+def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = EntryPoint("fox", "no_such_package.foxes:Fox", "fleet2d.gadget")
+    monkeypatch.setattr(
+        "fleet2d.configuration.components._plugins", lambda kind: EntryPoints([entry])
+    )
+
+    assert ["fan", "lamp"] == list(components("gadget"))
+    with pytest.raises(ScenarioError, match="there is no gadget 'fox'"):
+        lookup("gadget", "fox")
 
 
 def test_hook_that_nobody_registers_is_an_error_with_its_name() -> None:

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 import shapely
-from tests.homes import plan_files
+from tests.meshed_homes import plan_files
 from typer.testing import CliRunner
 
 from fleet2d.cli.__main__ import app
 from fleet2d.floorplan.checkup import Finding, checkup
-from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.native import native_document
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine

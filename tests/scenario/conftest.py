@@ -1,10 +1,12 @@
 """Stand-in components: the scenario layer is tested without what it will configure."""
 
 from datetime import timedelta
+from importlib.metadata import EntryPoints
 from typing import ClassVar
 
 import pytest
 
+from fleet2d.configuration import components
 from fleet2d.configuration.built_in import COMPONENTS
 from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import Duration, InputPath, Length, Share
@@ -85,6 +87,7 @@ STAND_INS: dict[str, dict[str, type[Component]]] = {
 @pytest.fixture
 def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the stand-ins be all the components that there are."""
+    monkeypatch.setattr(components, "_plugins", lambda kind: EntryPoints())
     for kind in COMPONENTS:
         types = STAND_INS.get(kind, {})
         paths = {name: f"{cls.__module__}:{cls.__qualname__}" for name, cls in types.items()}

@@ -85,7 +85,7 @@ def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None
     findings = checkup(plan, radius)
     picture = str(out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png"))
     try:
-        from fleet2d.pictures.floorplan import draw_checkup
+        from fleet2d.viewing.pictures.floorplan import draw_checkup
     except InputError as error:
         if out is not None:
             raise
@@ -169,7 +169,7 @@ def components(
 
 def _print_schema(of: Literal["scenario", "floorplan"]) -> None:
     if of == "floorplan":
-        from fleet2d.floorplan.formats.native import native_schema as content
+        from fleet2d.floorplan.native import native_schema as content
     else:
         from fleet2d.scenario.schema import schema as content
     typer.echo(json.dumps(content(), indent=2))

@@ -2,20 +2,8 @@
 
 COMPONENTS: dict[str, dict[str, str]] = {
     "floorplan": {
-        "bag": "fleet2d.floorplan.formats.bag:BagMap",
-        "bundled": "fleet2d.floorplan.formats.native:Bundled",
-        "dxf": "fleet2d.floorplan.formats.dxf:Dxf",
-        "geojson": "fleet2d.floorplan.formats.geojson:GeoJson",
-        "houseexpo": "fleet2d.floorplan.formats.houseexpo:HouseExpo",
-        "ifc": "fleet2d.floorplan.formats.ifc:Ifc",
-        "image": "fleet2d.floorplan.formats.drawing:Image",
-        "native": "fleet2d.floorplan.formats.native:Native",
-        "roomplan": "fleet2d.floorplan.formats.roomplan:RoomPlan",
-        "ros": "fleet2d.floorplan.formats.ros:Ros",
-        "svg": "fleet2d.floorplan.formats.svg:Svg",
-        "sweethome": "fleet2d.floorplan.formats.sweethome:SweetHome",
-        "synthetic": "fleet2d.floorplan.synthetic.source:Synthetic",
-        "valetudo": "fleet2d.floorplan.formats.valetudo:Valetudo",
+        "bundled": "fleet2d.floorplan.native:Bundled",
+        "native": "fleet2d.floorplan.native:Native",
     },
     "behavior": {
         "come": "fleet2d.entities.robots.follow:Come",

@@ -13,7 +13,7 @@ Its name is in the table of `fleet2d.configuration.built_in`; an installed packa
 its own, the group of entry points `fleet2d.KIND`.
 """
 
-import importlib
+import importlib.util
 import inspect
 import re
 from collections import Counter
@@ -70,7 +70,7 @@ from fleet2d.errors import (
 )
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import EntryPoint, EntryPoints
 
 
 T = TypeVar("T")
@@ -436,13 +436,14 @@ def lookup(kind: str, name: str) -> type[Component]:
     """
     if ":" in name:
         return _check_class(kind, name, import_class(name))
-    cls = _built_in(COMPONENTS.get(kind, {}).get(name, ""))
-    if cls is not None:
-        return cls
+    path = COMPONENTS.get(kind, {}).get(name)
+    if path is not None:
+        return _built_in(path)
     for entry in _plugins(kind).select(name=name):
-        cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
-        cls.type_name = name
-        return cls
+        if _is_there(entry):
+            cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
+            cls.type_name = name
+            return cls
     known = components(kind)
     near = did_you_mean(name, [*known, *COMPONENTS.get(kind, ())])
     raise ScenarioError(
@@ -453,22 +454,15 @@ def lookup(kind: str, name: str) -> type[Component]:
 
 def components(kind: str) -> dict[str, type[Component]]:
     """Return every component of a kind, built in or from an entry point, by name, sorted."""
-    built_in = map(_built_in, COMPONENTS.get(kind, {}).values())
-    types = {cls.type_name: cls for cls in built_in if cls is not None}
-    plugins = {entry.name: lookup(kind, entry.name) for entry in _plugins(kind)}
+    types = {cls.type_name: cls for cls in map(_built_in, COMPONENTS.get(kind, {}).values())}
+    plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind) if _is_there(e)}
     return dict(sorted((plugins | types).items()))
 
 
 @cache
-def _built_in(path: str) -> type[Component] | None:
-    """Return a class by its path; None if the package that has it isn't there."""
+def _built_in(path: str) -> type[Component]:
     module, _, name = path.partition(":")
-    try:
-        return getattr(importlib.import_module(module), name) if path else None
-    except ModuleNotFoundError as error:
-        if not f"{module}.".startswith(f"{error.name}."):
-            raise
-        return None
+    return getattr(importlib.import_module(module), name)
 
 
 def hook(kind: str, name: str) -> Any:
@@ -492,6 +486,23 @@ def _plugins(kind: str) -> "EntryPoints":
     from importlib.metadata import entry_points  # slow to import, and seldom used
 
     return entry_points(group=f"fleet2d.{kind}")
+
+
+def _name_of(cls: type[Component]) -> str:
+    """Return the name of a class in a table, else its path."""
+    if ":" in cls.type_name and "/" not in cls.type_name:  # maybe one that was unpickled
+        for entry in _plugins(cls.kind):
+            if entry.value == cls.type_name:
+                cls.type_name = entry.name
+    return cls.type_name
+
+
+def _is_there(entry: "EntryPoint") -> bool:
+    """Return whether the module of an entry point exists; that of a limb may be taken away."""
+    try:
+        return importlib.util.find_spec(entry.module) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def aliases(kind: str, name: str) -> tuple[str, ...]:
@@ -588,7 +599,7 @@ class _Typed(Codec):
             exclude_defaults=info.exclude_defaults,
             exclude_unset=info.exclude_unset,
         )
-        return {"type": value.type_name, **fields}
+        return {"type": _name_of(type(value)), **fields}
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

@@ -14,9 +14,9 @@ from fleet2d.configuration.components import components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import named_path
 from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
-from fleet2d.floorplan.formats.foreign import foreign_document, foreign_file
-from fleet2d.floorplan.formats.native import (
+from fleet2d.floorplan.files import YAML, read_document, read_yaml
+from fleet2d.floorplan.foreign import foreign_document, foreign_file
+from fleet2d.floorplan.native import (
     FORMAT,
     bundled_names,
     native_document,
@@ -96,7 +96,7 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
     try:
         return load_floorplan(plan, **lengths)
     except FloorPlanError as error:
-        from fleet2d.floorplan.formats.raster import UnclearPlaceError
+        from fleet2d.homes.formats.raster import UnclearPlaceError
 
         if not isinstance(error.__cause__, UnclearPlaceError):
             raise
@@ -249,7 +249,7 @@ def _load_image(
     path: Path, resolution: float | None, cell: float | None, scale: float | None
 ) -> FloorPlan:
     if resolution is None:
-        from fleet2d.floorplan.formats.drawing import guess_resolution
+        from fleet2d.homes.formats.drawing import guess_resolution
 
         guess = guess_resolution(path)
         by_doors = "" if guess is None else f": {guess[0]:g}, if its {guess[1]} doors are as usual"
@@ -277,7 +277,7 @@ def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".geojson":
-        from fleet2d.floorplan.formats.geojson import geojson_document
+        from fleet2d.homes.formats.geojson import geojson_document
 
         text = _json(geojson_document(plan))
     elif suffix == ".json":

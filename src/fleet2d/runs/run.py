@@ -144,7 +144,7 @@ class Run:
             ArtifactError: The run directory holds none.
         """
         if self._plan is None:
-            from fleet2d.floorplan.formats.native import read_native
+            from fleet2d.floorplan.native import read_native
 
             path = path_in(self.directory or Path(), FLOORPLAN_NAME)
             if self.directory is None or not path.is_file():

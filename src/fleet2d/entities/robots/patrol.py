@@ -250,7 +250,7 @@ class Retrace(Behavior):
             PlacementError: The map has no path, or none that the robot can drive here.
         """
         # Imported here, as other rounds need no maps.
-        from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
+        from fleet2d.homes.formats.valetudo import read_valetudo_paths
 
         try:
             pieces = read_valetudo_paths(self.path)

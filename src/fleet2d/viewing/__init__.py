@@ -1,0 +1,1 @@
+"""Viewing: pictures, films, pages, reports and notebooks of homes and runs."""
