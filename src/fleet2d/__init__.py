@@ -4,6 +4,8 @@ The public names are those of this package and of `fleet2d.testing`. They are im
 are first used; `__init__.pyi` has them for editors and type checkers.
 """
 
+import sys
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
@@ -16,7 +18,7 @@ _NAMES = {
     "fleet2d.learning.datasets.generate": ("dataset",),
     "fleet2d.learning.datasets.reader": ("Dataset", "open_dataset"),
     "fleet2d.engine.interrupt": ("Interrupt", "SpanView"),
-    "fleet2d.engine.repeat": ("branch", "reproduce", "resume"),
+    "fleet2d.engine.repeat": ("branch", "judge", "reproduce", "resume"),
     "fleet2d.engine.simulation": ("Simulation", "run"),
     "fleet2d.entities.behavior": ("Actor", "Behavior", "Situation"),
     "fleet2d.entities.drive": ("Drive", "Leg", "Moment", "Route"),
@@ -34,6 +36,7 @@ _NAMES = {
     "fleet2d.sight.perception_error": ("CameraSightings", "PerceptionError"),
     "fleet2d.studies.api": ("map_runs", "study"),
     "fleet2d.studies.reader": ("Study", "open_study"),
+    "fleet2d.viewing.notebook": ("draw", "view"),
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
@@ -55,3 +58,18 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     """List the public names."""
     return __all__
+
+
+def _join_notebook() -> None:
+    """Load the extensions of IPython that limbs register, if this is a session of IPython."""
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    if shell is not None:
+        from importlib.metadata import entry_points  # slow to import, and only needed here
+
+        for entry in entry_points(group="fleet2d.notebook"):
+            with suppress(ModuleNotFoundError):  # a limb that was taken away
+                shell.extension_manager.load_extension(entry.value)
+
+
+_join_notebook()

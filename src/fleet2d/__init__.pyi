@@ -9,6 +9,7 @@ from fleet2d.configuration.units import Share as Share
 from fleet2d.engine.interrupt import Interrupt as Interrupt
 from fleet2d.engine.interrupt import SpanView as SpanView
 from fleet2d.engine.repeat import branch as branch
+from fleet2d.engine.repeat import judge as judge
 from fleet2d.engine.repeat import reproduce as reproduce
 from fleet2d.engine.repeat import resume as resume
 from fleet2d.engine.simulation import Simulation as Simulation
@@ -47,5 +48,7 @@ from fleet2d.studies.api import map_runs as map_runs
 from fleet2d.studies.api import study as study
 from fleet2d.studies.reader import Study as Study
 from fleet2d.studies.reader import open_study as open_study
+from fleet2d.viewing.notebook import draw as draw
+from fleet2d.viewing.notebook import view as view
 
 __version__: str

@@ -21,14 +21,13 @@ from fleet2d.configuration.components import (
     ShortForm,
     base_of,
     components,
-    hook,
     kind_at,
     lookup,
     split_short_form,
 )
 from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.units import Duration, Length, Text
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import ScenarioError
 
 
 class Gadget(Component):
@@ -428,17 +427,6 @@ def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.Monkey
     assert ["fan", "lamp"] == list(components("gadget"))
     with pytest.raises(ScenarioError, match="there is no gadget 'fox'"):
         lookup("gadget", "fox")
-
-
-def test_hook_that_nobody_registers_is_an_error_with_its_name() -> None:
-    with pytest.raises(InputError, match=r"'paint' as fleet2d\.run"):
-        hook("run", "paint")
-
-
-def test_methods_of_runs_and_plans_find_their_hooks() -> None:
-    names = {"run": ("draw", "html", "judge", "view"), "plan": ("draw", "png")}
-
-    assert all(callable(hook(kind, name)) for kind in names for name in names[kind])
 
 
 def test_type_in_a_module_of_another_name_loads_that_module_alone() -> None:

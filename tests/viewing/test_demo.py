@@ -34,7 +34,8 @@ def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
     assert first.startswith("1 d with Ana, Ben, Cleo and Astro took ")
     seen, metres = (family.metrics[name] for name in ("sightings", "distance"))
     shares = [f"{name} in {100 * seen[name.lower()]:.0f} %" for name in ("Ana", "Ben", "Cleo")]
-    assert f"Astro saw {shares[0]}, {shares[1]} and {shares[2]} of the time at home." in sentences
+    saw = f"Astro saw {shares[0]}, {shares[1]} and {shares[2]}"
+    assert f"{saw} of the time at home, nights included." in sentences
     assert f"Astro drove {metres['astro']:,.0f} m a day." in sentences
     events = family.tables["events"]["event"].to_pylist()
     asked = f"Astro asked {events.count('asks')} times: {events.count('accepted')} accepted, "
@@ -42,6 +43,17 @@ def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
     total, *parts = map(int, re.findall(r"\d+", requests))
     assert total == sum(parts)
     assert f"Astro found Cleo in {events.count('found')} of 1 searches." in sentences
+
+
+def test_sentence_tells_how_wrong_beliefs_were_at_first_and_at_the_end() -> None:
+    run = package.run("bundled:paper", "simulation.duration=3 d")
+    errors = [row["tv"] for row in run.tables["ltp_error"].to_pylist() if row["user"] == "ana"]
+
+    sentences = list(demo.sentences(run))
+
+    first, last = f"{100 * errors[0]:.0f} %", f"{100 * errors[-1]:.0f} %"
+    believed = "What was believed of their rooms was wrong by"
+    assert f"{believed} {first} for Ana at first, and by {last} at the end." in sentences
 
 
 def test_sentences_leave_out_what_the_run_did_not_measure() -> None:

@@ -52,8 +52,8 @@ COMPONENTS: dict[str, dict[str, str]] = {
     "algorithm": {
         "belief_table": "fleet2d.algorithms.presence.model:BeliefTable",
         "evidence_table": "fleet2d.algorithms.external:EvidenceTable",
-        "long_term_presence": "fleet2d.algorithms.presence.estimator:LongTermPresence",
-        "ltp": "fleet2d.algorithms.presence.estimator:LongTermPresence",
+        "long_term_presence": "fleet2d.algorithms.presence.long_term:LongTermPresence",
+        "ltp": "fleet2d.algorithms.presence.long_term:LongTermPresence",
         "process": "fleet2d.algorithms.external:Process",
         "real_time_presence": "fleet2d.algorithms.presence.model:RealTimePresence",
         "rtp": "fleet2d.algorithms.presence.model:RealTimePresence",

@@ -62,7 +62,6 @@ from fleet2d.configuration.problems import (
 )
 from fleet2d.errors import (
     Fleet2DError,
-    InputError,
     ScenarioError,
     errors_as,
     may_be_ctrl_c,
@@ -463,21 +462,6 @@ def components(kind: str) -> dict[str, type[Component]]:
 def _built_in(path: str) -> type[Component]:
     module, _, name = path.partition(":")
     return getattr(importlib.import_module(module), name)
-
-
-def hook(kind: str, name: str) -> Any:
-    """Return what an installed package, or Fleet2D's own, registers as an entry point.
-
-    So a module can call what builds upon it, if that is installed.
-
-    Raises:
-        InputError: Nothing is registered under that name.
-    """
-    for entry in _plugins(kind).select(name=name):
-        return entry.load()
-    raise InputError(
-        f"no installed package registers {name!r} as fleet2d.{kind}: reinstall fleet2d"
-    )
 
 
 @cache

@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter
 from typing_extensions import TypedDict  # pydantic reads that of typing from Python 3.12 on only
 
 from fleet2d.errors import InputError
+from fleet2d.runtime.events import EventKind
 
 Point = tuple[float, float]
 Shape = TypeVar("Shape")
@@ -63,13 +64,35 @@ class DoorFacts(TypedDict):
     locked: bool
 
 
+class DoorwayFacts(TypedDict):
+    """A passage between two rooms: its jambs [m], and whether a door can shut it."""
+
+    start: Point
+    end: Point
+    leaf: bool
+
+
+class UseFacts(TypedDict):
+    """A place from which a piece of furniture is used [m], and how a person is there [rad]."""
+
+    x: float
+    y: float
+    heading: float
+    posture: str
+
+
 class ObjectFacts(TypedDict):
-    """A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight."""
+    """A piece of furniture: its outline [m], the direction of its front [rad], its uses.
+
+    `blocks` says whether it is in the way of nothing, paths or sight.
+    """
 
     name: str
     type: str
     outline: list[Point]
     blocks: str
+    front: float
+    uses: list[UseFacts]
 
 
 class HomeFacts(TypedDict):
@@ -92,7 +115,7 @@ class HomeFacts(TypedDict):
     rooms: list[RoomFacts]
     room_cells: list[int]
     place_cells: list[int]
-    doorways: list[tuple[Point, Point]]
+    doorways: list[DoorwayFacts]
     doors: list[DoorFacts]
     objects: list[ObjectFacts]
     no_go: list[list[Point]]
@@ -181,6 +204,14 @@ class VerdictFacts(TypedDict):
     step: int | None
 
 
+class StoryFacts(TypedDict):
+    """A moment that is worth a look."""
+
+    step: int
+    title: str
+    words: str
+
+
 class SlowFacts(TypedDict):
     """A floor that slows robots down from `step` to before `end`: its outline [m], its effect."""
 
@@ -229,9 +260,10 @@ class RunFacts(TypedDict):
     marks: list[MarkFacts]
     verdict: str
     verdicts: list[VerdictFacts]
+    story: list[StoryFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
-    event_kinds: list[str]
+    event_kinds: list[EventKind]
     metrics: dict[str, Any]
     scenario: dict[str, Any]
     walks_every_s: float

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fleet2d.cli import named_extras
-from fleet2d.cli.run import print_verdict, run_with_progress, set_up
+from fleet2d.cli.results import print_verdict
+from fleet2d.cli.run import run_with_progress, set_up
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.interactions.interaction import Outcome
+from fleet2d.runtime.events import EventKind
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -66,7 +68,8 @@ def sentences(run: "Run") -> Iterator[str]:
     seen = _result(run, "sightings")
     if seen and robots:
         shares = _listed([f"{name} in {100 * share:.0f} %" for name, share in seen.items()])
-        yield f"{_listed(robots)} saw {shares} of the time at home."
+        yield f"{_listed(robots)} saw {shares} of the time at home, nights included."
+    yield from _learning(run)
     metres = _result(run, "distance")
     events = run.tables["events"].select(["entity", "event", "detail"]).to_pylist()
     for robot in robots:
@@ -77,24 +80,44 @@ def sentences(run: "Run") -> Iterator[str]:
         yield from _searches(robot, own)
 
 
+def _learning(run: "Run") -> Iterator[str]:
+    """Yield how wrong the beliefs about each user were at first, and how wrong at the end."""
+    configured = run.manifest["scenario"]["metrics"]
+    name = next((name for name in configured if configured[name]["type"] == "ltp_error"), None)
+    if name is None or name not in run.tables:
+        return
+    errors: dict[str, list[float]] = {}
+    for row in run.tables[name].select(["user", "tv"]).to_pylist():
+        if row["user"] in run.manifest["entities"]["users"]:
+            errors.setdefault(row["user"], []).append(row["tv"])
+    if not errors or any(len(of_user) < 2 for of_user in errors.values()):
+        return
+    first = _listed([f"{100 * of_user[0]:.0f} % for {_title(u)}" for u, of_user in errors.items()])
+    last = _listed([f"{100 * of_user[-1]:.0f} %" for of_user in errors.values()])
+    believed = "What was believed of their rooms was wrong by"
+    yield f"{believed} {first} at first, and by {last} at the end."
+
+
 def _requests(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Yield how often a robot asked something of somebody, and with which answers."""
     counts = Counter(event["event"] for event in events)
-    if counts["asks"]:
+    asked = counts[EventKind.ASKS]
+    if asked:
         answers = {
             IN_WORDS.get(outcome, outcome.replace("_", " ")): counts[outcome] for outcome in Outcome
         }
-        answers["not noticed"] = counts["asks"] - sum(answers.values())  # there is no event then
+        # A question that nobody notices has no event of its own.
+        answers["not noticed"] = asked - sum(answers.values())
         listed = ", ".join(f"{count} {word}" for word, count in answers.items() if count)
-        yield f"{_title(robot)} asked {counts['asks']} times: {listed}."
+        yield f"{_title(robot)} asked {asked} times: {listed}."
 
 
 def _searches(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Yield how often a robot found whom it searched."""
     counts = Counter((event["event"], event["detail"]) for event in events)
     for (event, user), searches in counts.items():
-        if event == "find_begins":
-            found = counts["found", user]
+        if event == EventKind.FIND_BEGINS:
+            found = counts[EventKind.FOUND, user]
             yield f"{_title(robot)} found {_title(user)} in {found} of {searches} searches."
 
 

@@ -1,5 +1,6 @@
 """The home on the page: its rooms and pieces, and its walls and doors as they change in a run."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,12 +21,15 @@ from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.kernels import I16, Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.runs.run import Run
+from fleet2d.runtime.events import EventKind
 from fleet2d.viewing.contract import (
     DoorFacts,
+    DoorwayFacts,
     HomeFacts,
     ObjectFacts,
     Point,
     RoomFacts,
+    UseFacts,
     WallsChange,
     WallsFacts,
 )
@@ -61,7 +65,7 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         rooms=list(_rooms_facts(plan.rooms)),
         room_cells=runs_of(plan.room_of_cell),
         place_cells=runs_of(plan.room_of_place),
-        doorways=[(d.start, d.end) for d in plan.doorways],
+        doorways=[DoorwayFacts(start=d.start, end=d.end, leaf=d.leaf) for d in plan.doorways],
         doors=list(doors),
         objects=[object_facts(item) for item in (*plan.objects, *_panes(plan))],
         no_go=[points(shapely.get_coordinates(area.exterior)[:-1]) for area in plan.no_go],
@@ -78,7 +82,26 @@ def _panes(plan: FloorPlan) -> list[PlacedObject]:
 def object_facts(item: PlacedObject) -> ObjectFacts:
     """Return the facts of a piece of furniture."""
     outline = shapely.get_coordinates(item.footprint.exterior)[:-1]
-    return ObjectFacts(name=item.name, type=item.type, outline=points(outline), blocks=item.blocks)
+    return ObjectFacts(
+        name=item.name,
+        type=item.type,
+        outline=points(outline),
+        blocks=item.blocks,
+        front=front_of(item),
+        uses=[UseFacts(x=u.x, y=u.y, heading=u.heading, posture=u.posture) for u in item.uses],
+    )
+
+
+def front_of(item: PlacedObject) -> float:
+    """Return the direction of the front of a piece of furniture [rad].
+
+    Where it isn't given, people who sit or lie on it look to its front, and who stands at it looks
+    at it.
+    """
+    if item.heading or not item.uses:
+        return item.heading
+    rests = [use.heading for use in item.uses if use.posture != "stand"]
+    return rests[0] if rests else item.uses[0].heading + math.pi
 
 
 def walls_facts(mesh: Mesh) -> WallsFacts:
@@ -184,9 +207,9 @@ class WallsHistory:
         return self.meshes[number]
 
     def _replay(self, step: int, entity: str, event: str, detail: str) -> None:
-        if event in ("opened", "shut") and entity in self._names:
-            self._home.set_door(self._names.index(entity), is_open=event == "opened")
-        elif event == "moved" and (place := _MOVE.fullmatch(detail)):
+        if event in (EventKind.OPENED, EventKind.SHUT) and entity in self._names:
+            self._home.set_door(self._names.index(entity), is_open=event == EventKind.OPENED)
+        elif event == EventKind.MOVED and (place := _MOVE.fullmatch(detail)):
             item = self._home.object(place[1])
             to = (float(place[2]), float(place[3]))
             try:
@@ -224,6 +247,8 @@ def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
     except ArtifactError:  # the run's notes say that it is damaged
         return []
     events = compute.cast(table["event"], "string")
-    rows = table.filter(compute.is_in(events, array(["opened", "shut", "moved"])))
+    rows = table.filter(
+        compute.is_in(events, array([EventKind.OPENED, EventKind.SHUT, EventKind.MOVED]))
+    )
     columns = ("step", "entity", "event", "detail")
     return [tuple(row.values()) for row in rows.select(columns).to_pylist()]

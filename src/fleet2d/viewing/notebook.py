@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import Any
 
 from fleet2d.errors import Fleet2DError
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.moments import step_of
 from fleet2d.runs.run import Run
@@ -16,8 +17,28 @@ from fleet2d.viewing.run_facts import run_title
 NOTEBOOK_DPI = 100
 
 
-def draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
-    """Draw a run, or a moment of it; see `Run.draw`."""
+def draw(shown: Run | FloorPlan | Home, at: str | int | None = None, ax: Any = None) -> Any:
+    """Draw a run, one moment of it, or a home; needs the extra `viz`.
+
+    Args:
+        shown: The run or home.
+        at: Of a run: a moment, such as "day 3 18:30", or a step; None: the whole run.
+        ax: Matplotlib axes to draw on, in metres: a home, or a moment (the last one, if `at` is
+            None); None for a new figure.
+
+    Returns:
+        A matplotlib figure, or `ax`.
+
+    Raises:
+        InputError: `at` names no moment, or matplotlib is missing.
+        ArtifactError: The run stored no floor plan or no key frames.
+    """
+    if isinstance(shown, Run):
+        return _draw_run(shown, at, ax)
+    return _draw_plan(shown.plan if isinstance(shown, Home) else shown, ax)
+
+
+def _draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
     from fleet2d.viewing.figures import moment_figure, moment_on_axes
     from fleet2d.viewing.pictures.run import run_figure
 
@@ -29,8 +50,7 @@ def draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
     return run_figure(run) if at is None else moment_figure(run, step)
 
 
-def draw_plan(plan: FloorPlan, axes: Any) -> Any:
-    """Draw a floor plan; see `FloorPlan.draw`."""
+def _draw_plan(plan: FloorPlan, axes: Any) -> Any:
     from matplotlib.figure import Figure
 
     from fleet2d.viewing.pictures.floorplan import drawing_style, figure_size, floorplan_axes
@@ -44,15 +64,24 @@ def draw_plan(plan: FloorPlan, axes: Any) -> Any:
         return figure
 
 
-def plan_png(plan: FloorPlan) -> bytes | None:
-    """Return a PNG of a floor plan; None if matplotlib is not installed."""
+def home_png(home: FloorPlan | Home) -> bytes | None:
+    """Return a PNG of a home; None if matplotlib is not installed."""
     with suppress(Fleet2DError, ImportError):
-        return figure_png(draw_plan(plan, None))
+        return figure_png(draw(home))
     return None
 
 
-def run_widget(run: Run, height: int) -> Any:
-    """Return the page of a run as a widget; see `Run.view`."""
+def view(run: Run, height: int = 720) -> Any:
+    """Return the page of a run as a widget, for Jupyter and marimo; needs the extra `view`.
+
+    Args:
+        run: The run.
+        height: Height of the widget [pixels].
+
+    Raises:
+        InputError: anywidget is not installed.
+        ArtifactError: The run stored no floor plan.
+    """
     from fleet2d.viewing import widget
 
     return widget.run_widget(run, height)
@@ -87,7 +116,7 @@ def run_html(run: Run) -> str:
     text = html.escape(" · ".join(facts))
     picture = ""
     with suppress(Fleet2DError, ImportError):  # no matplotlib or no floor plan
-        content = base64.b64encode(figure_png(draw_run(run, None, None))).decode()
+        content = base64.b64encode(figure_png(draw(run))).decode()
         image = f"data:image/png;base64,{content}"
         picture = f'<img alt="The run in its home" style="max-width:100%" src="{image}">'
     title = html.escape(run_title(run))

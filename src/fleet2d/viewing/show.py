@@ -5,10 +5,12 @@ from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from fleet2d.cli.run import print_verdict
+from fleet2d.cli.results import print_verdict
 from fleet2d.configuration.problems import suggest, validating
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import (
+    BODY_RADIUS_M,
+    Radius,
     Resolution,
     Scale,
     Trust,
@@ -99,6 +101,10 @@ def show(  # noqa: PLR0913 - options of the command line
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="Of a run: where it ends.")] = None,
     figure: Figure = "life",
+    checkup: Annotated[
+        bool, typer.Option("--checkup", help="Of a floor plan: mark what `validate` finds.")
+    ] = False,
+    radius: Radius = BODY_RADIUS_M,
     trust: Trust = False,
 ) -> None:
     """Draw a floor plan, a stored run or a persona's diary.
@@ -109,7 +115,9 @@ def show(  # noqa: PLR0913 - options of the command line
       fleet2d show retired --diary --days 3
     """
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
-    if diary:
+    if checkup:
+        typer.echo(_draw_checkup(source, out, radius, resolution=resolution, scale=scale))
+    elif diary:
         for line in show_diary(None if source is None else str(source), out, days, seed):
             typer.echo(line)
     else:
@@ -213,6 +221,20 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture, *, trust: 
         first, end = steps_of(run, picture.begin, picture.end)
         target = out or directory / f"{picture.figure}-{first}-{end}.png"
         draw_stretch(run, first, end, target, picture.figure)
+    return target
+
+
+def _draw_checkup(
+    source: Path | None, out: Path | None, radius: float, **lengths: float | None
+) -> Path:
+    """Draw a floor plan with what is wrong or odd in it; return the path of the picture."""
+    from fleet2d.floorplan.checkup import checkup
+    from fleet2d.floorplan.load import load_or_mark
+    from fleet2d.viewing.pictures.floorplan import draw_checkup
+
+    plan = load_or_mark(source or "family_home", **lengths)
+    target = out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png")
+    draw_checkup(plan, checkup(plan, radius), target)
     return target
 
 

@@ -32,7 +32,7 @@ from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import FILE_BYTES, JSON_VALUES, READ_MB, READ_SECONDS, Bound, one_line
 from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, os_errors_as
-from fleet2d.homes.formats.raster import UnclearPlaceError
+from fleet2d.homes.formats.raster import UnclearPixelError
 
 try:
     import resource
@@ -112,7 +112,7 @@ def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
     if not isinstance(result, _Failure):
         return result
     place = result.place
-    unclear = place and UnclearPlaceError(result.text, place[:2], place[2])
+    unclear = place and UnclearPixelError(result.text, place[:2], place[2])
     raise result.error(path) from unclear
 
 
@@ -299,7 +299,7 @@ def _answer(read: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
         return _encode({"value": read(*arguments)})
     except Fleet2DError as error:
         cause = error.__cause__
-        at = (*cause.place, cause.radius) if isinstance(cause, UnclearPlaceError) else None
+        at = (*cause.place, cause.radius) if isinstance(cause, UnclearPixelError) else None
         failure = _Failure("file" if isinstance(error, FloorPlanError) else "input", str(error), at)
     except RecursionError:
         failure = _Failure("other", "its parts are nested too deeply")

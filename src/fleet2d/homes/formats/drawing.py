@@ -15,12 +15,13 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import in_file, read_file
 from fleet2d.floorplan.lattice import MAX_CELL_M
 from fleet2d.floorplan.plan import largest_part
+from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.homes.formats.apart import apart
 from fleet2d.homes.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyMap
 from fleet2d.homes.formats.drawn_walls import LINE_M, find_gaps, told_apart, wall_candidates
 from fleet2d.homes.formats.occupancy import OBJECT_M2, PictureSource
 from fleet2d.homes.formats.parts import PlanParts
-from fleet2d.homes.formats.raster import GreyPicture, UnclearPlaceError, grey_picture
+from fleet2d.homes.formats.raster import GreyPicture, UnclearPixelError, grey_picture
 from fleet2d.kernels import Bool, label_parts, squared_distance
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
@@ -68,6 +69,26 @@ class Image(PictureSource):
     bridge_pixels: int = Field(default=0, ge=0, le=10)
     close_gaps: Length = Field(default=1.2, ge=0, le=5)
     negate: bool = False
+
+    @classmethod
+    def of_file(cls, **settings: Any) -> FloorPlanSource:
+        """Return the source of a picture with its scale; without it, guess what that could be.
+
+        Raises:
+            FloorPlanError: The scale is missing.
+        """
+        path = settings["path"]
+        if settings.get("resolution") is None:
+            guess = guess_resolution(path)
+            by_doors = (
+                "" if guess is None else f": {guess[0]:g}, if its {guess[1]} doors are as usual"
+            )
+            raise FloorPlanError(
+                f"{path} is an image, without its scale: name the YAML file that goes with the map"
+                f" of a robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the"
+                f" metres per pixel as resolution{by_doors}"
+            )
+        return super().of_file(**settings)
 
     @classmethod
     def usual_cell(cls, settings: Mapping[str, Any]) -> float:
@@ -269,7 +290,7 @@ def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> B
     for width, closed in wider:
         if _largest(closed) >= max(MOST * at_most, OBJECT_M2 / pixel**2):
             row, column = _first_gap(light, inside, closed)
-            raise UnclearPlaceError(
+            raise UnclearPixelError(
                 f"no space is enclosed by walls: one gap is at pixel ({column}, {row}), at most"
                 f" {width:g} m wide. Draw the outer walls without gaps, or set"
                 f" floorplan.close_gaps={width:g}",

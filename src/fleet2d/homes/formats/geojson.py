@@ -316,6 +316,11 @@ class GeoJson(ForeignSource):
     wall_m: Length = Field(default=0.1, ge=0, le=1)
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
+    @classmethod
+    def document(cls, plan: FloorPlan) -> dict[str, Any]:
+        """Return a plan as a FeatureCollection; see `geojson_document`."""
+        return geojson_document(plan)
+
     def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the plan.
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fleet2d.bounds import PIXELS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.foreign import foreign_file
+from fleet2d.floorplan.source import UnclearPlaceError
 from fleet2d.kernels import U8, Bool
 
 MAX_SIDE = 2**15
@@ -84,7 +85,7 @@ class GreyPicture:
         return np.flatnonzero(is_filled[: counts.argmax() - FILLED_CONTRAST]).tolist()
 
 
-class UnclearPlaceError(FloorPlanError):
+class UnclearPixelError(UnclearPlaceError):
     """A picture is no home because of one place in it.
 
     Attributes:

@@ -310,6 +310,10 @@ class Valetudo(PixelSource, ForeignSource):
         """Return the side of the map's pixels."""
         return pixel_side(check_map(read_json(settings["path"]))) * settings["scale"]
 
+    def driven_ways(self) -> list[F64]:
+        """Return the path that the vacuum drove, in pieces; see `read_valetudo_paths`."""
+        return read_valetudo_paths(self.path)
+
     def read(self, files: Mapping[Path, bytes]) -> PlanParts:
         """Read the map.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fleet2d.errors import RunDirectoryError
-from fleet2d.homes.formats.geojson import geojson_document
+from fleet2d.floorplan.load import source_type
 from fleet2d.live.exporters import Chunk, Records, Selection, new_file
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
@@ -132,7 +132,7 @@ def export_geojson(run: Run, path: Path, part: Selection) -> str:
     Raises:
         RunDirectoryError: The file can't be written.
     """
-    home = geojson_document(run.plan)
+    home = source_type("geojson").document(run.plan)
     features = home.pop("features")
     count = len(features)
     tables = [name for name in ("events",) if name in run.tables]
