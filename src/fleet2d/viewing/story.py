@@ -10,12 +10,19 @@ from pyarrow import array, compute
 from fleet2d.errors import ArtifactError
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import EventKind
 from fleet2d.viewing.contract import StoryFacts
 
 KINDS = (
-    "accepted", "activity", "asks", "came_home", "find_begins", "found", "left_home", "user_lost",
-    "user_seen",
-)  # fmt: skip
+    EventKind.ACCEPTED,
+    EventKind.ACTIVITY,
+    EventKind.CAME_HOME,
+    EventKind.FIND_BEGINS,
+    EventKind.FOUND,
+    EventKind.LEFT_HOME,
+    EventKind.USER_LOST,
+    EventKind.USER_SEEN,
+)
 ASLEEP = "sleep"
 EVENING_H = 20
 """A night begins at this hour: who goes to bed at one is later than who goes at eleven."""
@@ -60,7 +67,7 @@ def _events_of(run: Run) -> list[Event]:
 def _requests(events: Sequence[Event]) -> Iterator[StoryFacts]:
     """Yield the first time that anybody accepted what a robot wanted."""
     for event in events:
-        if event.event == "accepted":
+        if event.event == EventKind.ACCEPTED:
             about, _, user = event.detail.rpartition(" ")
             words = f"{_title(user)} accepts what {_title(event.entity)} asks: {_plain(about)}"
             yield StoryFacts(step=event.step, title="The first yes", words=words)
@@ -73,9 +80,9 @@ def _searches(events: Sequence[Event], clock: Clock) -> Iterator[StoryFacts]:
     longest: tuple[int, Event] | None = None
     for event in events:
         key = event.entity, event.detail
-        if event.event == "find_begins":
+        if event.event == EventKind.FIND_BEGINS:
             begun[key] = event.step
-        elif event.event == "found" and key in begun:
+        elif event.event == EventKind.FOUND and key in begun:
             steps = event.step - begun.pop(key)
             if longest is None or steps > longest[0]:
                 longest = steps, event
@@ -93,7 +100,7 @@ def _people(run: Run, events: Sequence[Event]) -> Iterator[StoryFacts]:
     for user in run.manifest["entities"]["users"]:
         unseen += _unseen(run, user, events)
         nights += _nights(run.clock, user, events)
-    if unseen and any(event.event == "user_seen" for event in events):
+    if unseen and any(event.event == EventKind.USER_SEEN for event in events):
         lasted, step, user = max(unseen)
         if lasted >= LEAST_UNSEEN:
             words = f"{_title(user)} is up and at home, and out of view for {_duration(lasted)}"
@@ -111,12 +118,12 @@ def _unseen(run: Run, user: str, events: Sequence[Event]) -> Iterator[tuple[time
     seen_by = 0
     since: int | None = None
     for event in events:
-        if event.entity == user and event.event == "activity":
+        if event.entity == user and event.event == EventKind.ACTIVITY:
             is_asleep = event.detail == ASLEEP
-        elif event.entity == user and event.event in ("left_home", "came_home"):
-            is_out = event.event == "left_home"
-        elif event.user == user and event.event in ("user_seen", "user_lost"):
-            seen_by += 1 if event.event == "user_seen" else -1
+        elif event.entity == user and event.event in (EventKind.LEFT_HOME, EventKind.CAME_HOME):
+            is_out = event.event == EventKind.LEFT_HOME
+        elif event.user == user and event.event in (EventKind.USER_SEEN, EventKind.USER_LOST):
+            seen_by += 1 if event.event == EventKind.USER_SEEN else -1
         else:
             continue
         counts = not is_asleep and not is_out and seen_by == 0
@@ -130,7 +137,7 @@ def _unseen(run: Run, user: str, events: Sequence[Event]) -> Iterator[tuple[time
 
 def _nights(clock: Clock, user: str, events: Sequence[Event]) -> Iterator[tuple[float, int, str]]:
     """Yield when a user went to bed, in hours since the evening began: once a night, to sleep."""
-    activities = [e for e in events if e.entity == user and e.event == "activity"]
+    activities = [e for e in events if e.entity == user and e.event == EventKind.ACTIVITY]
     nights = set()
     for event, following in pairwise(activities):
         lasts = timedelta(microseconds=(following.step - event.step) * clock.step_us)
