@@ -10,7 +10,7 @@ from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
 
 from fleet2d.errors import ScenarioError
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.design import _LEAVES, build_design, code_version, input_hash
 from fleet2d.studies.driver import Observer, check_study
 from fleet2d.studies.executors import (

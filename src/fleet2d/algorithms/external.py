@@ -13,7 +13,6 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Algorithm, Present, RoomDistribution
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PositiveDuration, micros
@@ -35,7 +34,6 @@ NAMES = {
 """The names that a column may have, if the user gives none."""
 
 
-@register("algorithm", "process")
 class Process(Algorithm):
     """An algorithm in another process, of any language.
 
@@ -169,7 +167,6 @@ def _poses(history: History, state: Present) -> dict[str, bytes]:
 _TABLES = {"observations": _observations, "evidence": _evidence, "poses": _poses}
 
 
-@register("algorithm", "replay")
 class ReplayedOutput(Algorithm, LogKeys):
     """Put out the beliefs of an algorithm from a table: shares of rooms at some times.
 
@@ -231,7 +228,6 @@ class ReplayedOutput(Algorithm, LogKeys):
         return None if row < 0 else RoomDistribution(self._shares[row])
 
 
-@register("algorithm", "evidence_table")
 class EvidenceTable(Algorithm):
     """The views of robots, and the people perceived in them, as rows of a table.
 

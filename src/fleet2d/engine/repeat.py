@@ -25,7 +25,7 @@ from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import Run, open_run
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import path_in, refuse_links
 
 # The beginning of the note about the messages of a live run, which its repetition doesn't get.

@@ -60,7 +60,8 @@ from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.runtime.memory import free_bodies, rare_collections
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation

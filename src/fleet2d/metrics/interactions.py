@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
@@ -29,7 +28,6 @@ TOLD = frozenset(
 )  # fmt: skip
 
 
-@register("metric", "interactions")
 class Interactions(Metric):
     """What came of what robots wanted of people: value, answers, interruptions, annoyance.
 
@@ -162,7 +160,6 @@ class OpenRequest:
     value: float = 0.0
 
 
-@register("metric", "timing_regret")
 class TimingRegret(Metric):
     """How much more value asking at the best time of the same life would have had.
 

@@ -10,7 +10,8 @@ from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.cluster_executors import RayExecutor, SlurmExecutor
 from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import check_study, run_study

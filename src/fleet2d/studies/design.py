@@ -19,7 +19,8 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, ScenarioError, errors_as, os_errors_as
 from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
-from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.scenario.load import scenario_of
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Choice, Label, key_path
 from fleet2d.studies.simulator import input_files
 from fleet2d.studies.specification import SEED, Specification

@@ -25,7 +25,8 @@ from fleet2d.errors import (
 )
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.compose import apply_changes, assignment
-from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.scenario.load import scenario_of
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import OptionsAxis, Parameter, key_path, rounded
 from fleet2d.studies.design import (
     Design,

@@ -138,7 +138,7 @@ def job_of(target: str, space: "SearchSpace") -> "TryJob":
         InputError: There is no such scenario or test, or the scenario expects nothing.
     """
     from fleet2d.scenario.compose import compose
-    from fleet2d.scenario.model import scenario_of
+    from fleet2d.scenario.load import scenario_of
     from fleet2d.testing.search import TryJob, claimed_test
 
     path, separator, name = target.partition("::")

@@ -20,7 +20,8 @@ from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_doc
 from fleet2d.configuration.problems import did_you_mean, suggest, validating
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
 from fleet2d.scenario.compose import apply_changes, assignment
-from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.scenario.load import scenario_of
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
 from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
 from fleet2d.studies.simulator import describe_error

@@ -14,7 +14,6 @@ from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel, split
 from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.bounds import WEIGHTS_BYTES, one_line
-from fleet2d.configuration.components import register
 from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
@@ -225,7 +224,6 @@ class CorrectedRoutine(RoutineModel):
         self.traces = array_of(learned, "traces", self.traces.shape)
 
 
-@register("presence_model", "learned")
 class LearnedModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network that was trained on simulated homes.
 
@@ -278,7 +276,6 @@ def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:
     return TracedEvidence(evidence.day, evidence.minute, evidence.watched, seen, unknown, belief)
 
 
-@register("presence_model", "onnx")
 class OnnxModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network of your own in an ONNX file.
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
@@ -23,7 +23,7 @@ from fleet2d.algorithms.presence.belief import (
 )
 from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator
 from fleet2d.algorithms.presence.long_term import PresenceAlgorithm
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import PositiveDuration, whole_steps
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
@@ -93,7 +93,6 @@ class Model(Component):
         """Restore what `remember` returned; called after `begin`."""
 
 
-@register("presence_model", "last_seen")
 class LastSeen(Model):
     """Probability 1 for the room in which the user was perceived last; uniform before that.
 
@@ -121,7 +120,6 @@ class LastSeen(Model):
         return home, np.zeros(home.shape[:2])
 
 
-@register("presence_model", "long_term")
 class LongTerm(Model):
     """Long-term presence, regardless of recent sightings.
 
@@ -129,7 +127,7 @@ class LongTerm(Model):
         estimator: The estimator of long-term presence.
     """
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "likelihood")
+    estimator: OneOf[Estimator] = cast("Any", "likelihood")
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
@@ -152,7 +150,6 @@ class LongTerm(Model):
         self.estimator.recall(learned, self.day)
 
 
-@register("presence_model", "hour_of_week")
 class HourOfWeek(LongTerm):
     """Long-term presence of the hour of the week, regardless of recent sightings.
 
@@ -180,7 +177,6 @@ class HourOfWeek(LongTerm):
         return WeeklyPresence(users, self.week(), time, track=track)
 
 
-@register("algorithm", "real_time_presence", aliases=("rtp",))
 class RealTimePresence(PresenceAlgorithm):
     """Where each user, and anyone, is now: P(room | all evidence so far).
 
@@ -194,7 +190,7 @@ class RealTimePresence(PresenceAlgorithm):
     """
 
     period: PositiveDuration = timedelta(minutes=5)
-    model: Annotated[Model, OneOf("presence_model")] = cast("Any", "hmm")
+    model: OneOf[Model] = cast("Any", "hmm")
 
     def start(self, home: Home) -> None:
         """Begin without evidence, with a model that has usable files."""
@@ -242,7 +238,6 @@ class RealTimePresence(PresenceAlgorithm):
         check_distributions(home, away, (*state.users, ANYONE), source)
 
 
-@register("algorithm", "belief_table")
 class BeliefTable(RealTimePresence):
     """The belief of a model of real-time presence at regular times, as rows of a table.
 
@@ -307,7 +302,6 @@ class Told(NamedTuple):
     where: str
 
 
-@register("algorithm", "told_presence")
 class ToldPresence(Algorithm):
     """Real-time presence, corrected by the answers to questions like "is Ben at home?".
 

@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms
@@ -24,7 +23,6 @@ WORTH = 0.002
 RETRY_INTERVAL = timedelta(minutes=1)
 
 
-@register("behavior", "explore")
 class Explore(Behavior):
     """Complete the layer `explored` of the robot, frontier by frontier.
 
