@@ -316,7 +316,7 @@ class Behavior(Component):
         ('office', 'kitchen')
     """
 
-    kind: ClassVar[str] = "behavior"
+    kind = "behavior"
     # Whether, after an interruption by a behavior before it, it resumes the rest of its plan.
     resumes: ClassVar[bool] = False
     # Layers of what its robot has seen that it reads: explored, first_seen, last_seen …

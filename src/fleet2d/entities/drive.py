@@ -5,7 +5,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isqrt, sqrt
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -79,7 +79,7 @@ class Drive(Component):
         ...         return [Moment(length / (route.speed / 2), length, route.heading)]
     """
 
-    kind: ClassVar[str] = "drive"
+    kind = "drive"
 
     @abstractmethod
     def moments(self, route: Route) -> Iterable[Moment]:

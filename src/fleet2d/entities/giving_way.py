@@ -20,9 +20,10 @@ from fleet2d.entities.body import Arrangement, Body, Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
 
-Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
+Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
 
 
 def resumed(plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None) -> Plan | None:
@@ -284,7 +285,7 @@ class RoutesAround:
         for x, y, reach in people.tolist():
             self.cost[(xs - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach] = CLOSED
 
-    def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+    def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
         return route_by_cost(self._space, self.cost, start, goal)
 
@@ -399,7 +400,7 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def _beside(actor: Actor, goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
+def _beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan = actor.home.plan
     space = actor.space

@@ -15,6 +15,7 @@ from fleet2d.configuration.units import MAX_DURATION, micros
 from fleet2d.entities.body import STANDING, Body, Motion, RandomWalk, Track
 from fleet2d.entities.place import Point, RoomChoice, seat_at
 from fleet2d.errors import ComponentError, NoWayError, errors_as
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
@@ -135,7 +136,7 @@ class Plan:
         self._walk(route)
         return self
 
-    def _go_shortest(self, space: Space, x: int, y: int, off: tuple[int, int] | None) -> bool:
+    def _go_shortest(self, space: Space, x: int, y: int, off: LatticePoint | None) -> bool:
         """Step `off` an object and walk a shortest route, if that is all; return whether it was."""
         body = self.body
         routes = space.shortest

@@ -6,7 +6,6 @@ and ranges of all of them.
 
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 from pydantic import Field
 
@@ -62,7 +61,7 @@ class Attitude(Component):
         habit_forms: Part of the distance to a full habit that an accepted interaction gains.
     """
 
-    kind: ClassVar[str] = "attitude"
+    kind = "attitude"
 
     novelty_lasts: PositiveDuration = timedelta(days=14)
     annoyance_lasts: PositiveDuration = timedelta(days=2)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import timedelta
 from itertools import pairwise
 from math import dist
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -27,8 +27,8 @@ MAX_PLACES = 4  # places per user in the closing table
 class Distance(Metric):
     """Metres that each body covers per day, as the sum of its moves from step to step."""
 
-    unit: ClassVar[str] = "m a day"
-    least: ClassVar[Mapping[str, float]] = {"": 0}
+    unit = "m a day"
+    least = {"": 0}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -63,8 +63,8 @@ class Travel(Metric):
         apart: Distance between two places of rest [m].
     """
 
-    units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
+    units = {"relocations": "a day", "metres": "m a day"}
+    least = {"": 0}
 
     rest: PositiveDuration = timedelta(minutes=1)
     apart: Length = Field(default=0.5, ge=0)
@@ -118,9 +118,9 @@ class BatteryUse(Metric):
     too. `empty` is the share of steps with an empty battery, from which on the robot stands still.
     """
 
-    unit: ClassVar[str] = "share of time"
-    units: ClassVar[Mapping[str, str]] = {"lowest": "share of a full charge", "dockings": "a day"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
+    unit = "share of time"
+    units = {"lowest": "share of a full charge", "dockings": "a day"}
+    least = {"": 0}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -171,7 +171,7 @@ class RoomShare(Metric):
     Stored per period; the result is over the whole run. Shares of a user sum to one.
     """
 
-    unit: ClassVar[str] = "share of time"
+    unit = "share of time"
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -245,7 +245,7 @@ class CoPresence(Metric):
     the user is at home. Between two rooms, where no room is, they don't count as together.
     """
 
-    unit: ClassVar[str] = "share of time at home"
+    unit = "share of time at home"
 
     def start(self, home: Home) -> None:
         """Begin counting."""

@@ -31,7 +31,7 @@ class Metric(Component):
         on: Events that update it, instead of the period: those of the events table, and sensor.
     """
 
-    kind: ClassVar[str] = "metric"
+    kind = "metric"
     # How far before its period it reads the history; timedelta.max: all of it.
     looks_back: ClassVar[timedelta] = timedelta(0)
     # What has to be computed for it: exposure, explored, first_seen, last_seen …

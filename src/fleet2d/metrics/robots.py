@@ -1,8 +1,7 @@
 """Metrics of robots toward people: how soon they find them, and how often they are in the way."""
 
-from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -12,10 +11,10 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration, Speed, micros
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.space import PointXY, Space
+from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, points_in_sight
 from fleet2d.metrics.metric import (
-    BetterValues,
     Metric,
     columns_of,
     in_sight,
@@ -48,11 +47,11 @@ class ReachTime(Metric):
         radius: The robot's radius [m].
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"calls"})
-    unit: ClassVar[str] = "s"
-    units: ClassVar[Mapping[str, str]] = {"calls": "calls", "unreached": "calls"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"": "lower"}
+    hidden = frozenset({"calls"})
+    unit = "s"
+    units = {"calls": "calls", "unreached": "calls"}
+    least = {"": 0}
+    better = {"": "lower"}
 
     every: PositiveDuration = timedelta(minutes=10)
     speed: Speed = Field(default=0.6, gt=0)
@@ -102,7 +101,7 @@ class ReachTime(Metric):
         return results
 
 
-def _route(space: Space, part: int, start: PointXY, target: PointXY) -> I64 | None:
+def _route(space: Space, part: int, start: LatticePoint, target: LatticePoint) -> I64 | None:
     """Return the shortest route in a part of the space to its place nearest to the target."""
     goal = target if space.part_at(*target) == part else space.nearest(*target, part)
     return None if goal is None else space.route(start, goal)
@@ -170,16 +169,16 @@ class TimeToFind(Metric):
         radius: The robot's radius [m].
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"p90", "spl", "out_mean"})
-    unit: ClassVar[str] = "s"
-    units: ClassVar[Mapping[str, str]] = {
+    hidden = frozenset({"p90", "spl", "out_mean"})
+    unit = "s"
+    units = {
         "searches": "in all",
         **dict.fromkeys(("success", "spl", "out_told"), "share of searches"),
         "ratio": "times the way",
         **dict.fromkeys(("false", "false_out"), "searches"),
     }
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {
+    least = {"": 0}
+    better = {
         **dict.fromkeys(("success", "spl", "out_told"), "higher"),
         **dict.fromkeys(("mean", "median", "p90", "ratio", "false", "false_out"), "lower"),
     }
@@ -326,10 +325,10 @@ class Blocking(Metric):
         clearance: Distance between the centres [m].
     """
 
-    unit: ClassVar[str] = "a day"
-    units: ClassVar[Mapping[str, str]] = {"seconds": "s a day"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"": "lower"}
+    unit = "a day"
+    units = {"seconds": "s a day"}
+    least = {"": 0}
+    better = {"": "lower"}
 
     clearance: Length = Field(default=0.4, gt=0, le=3)
 
@@ -383,10 +382,10 @@ class Intrusion(Metric):
     how people feel about a robot depends on much else.
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"social"})
-    unit: ClassVar[str] = "min a day"
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"": "lower"}
+    hidden = frozenset({"social"})
+    unit = "min a day"
+    least = {"": 0}
+    better = {"": "lower"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

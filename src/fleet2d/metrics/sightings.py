@@ -1,7 +1,7 @@
 """Metrics of sightings: how much of the home robots observe, whom they see, and mistake."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from fleet2d.algorithms.history import History
 from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, UNKNOWN_TRUTH
-from fleet2d.metrics.metric import BetterValues, Metric
+from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import HOUR_S
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized
@@ -25,8 +25,8 @@ class Sightings(Metric):
     Detections of a real robot count while the user is known to be at home.
     """
 
-    unit: ClassVar[str] = "share of time at home"
-    better: ClassVar[BetterValues] = {"": "higher"}
+    unit = "share of time at home"
+    better = {"": "higher"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -75,8 +75,8 @@ class Detections(Metric):
     detections, false positives and identities, by robot and user.
     """
 
-    unit: ClassVar[str] = "share"
-    better: ClassVar[BetterValues] = dict.fromkeys(("recall", "precision", "recognized"), "higher")
+    unit = "share"
+    better = dict.fromkeys(("recall", "precision", "recognized"), "higher")
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -176,11 +176,11 @@ class Coverage(Metric):
     if that never happened.
     """
 
-    needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
-    unit: ClassVar[str] = "h"
-    units: ClassVar[Mapping[str, str]] = {"share": "share of the floor"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"share": "higher"}
+    needs = frozenset({"first_seen"})
+    unit = "h"
+    units = {"share": "share of the floor"}
+    least = {"": 0}
+    better = {"share": "higher"}
 
     def start(self, home: Home) -> None:
         """Begin without any cells seen."""

@@ -226,7 +226,7 @@ class Filter(Model):
         restless: Chance per bin that a person in a room changes patch, before it is learned.
     """
 
-    is_by_bin: ClassVar[bool] = True
+    is_by_bin = True
     detection: Share = Field(default=0.95, gt=0, lt=1)
     restless: Share = 0.05
     stages: ClassVar[int] = 1
@@ -295,7 +295,7 @@ class SemiMarkov(Filter):
     while one who has been there for long stays for long; or the other way round, as is learned.
     """
 
-    stages: ClassVar[int] = 2
+    stages = 2
 
 
 @register("presence_model", "routine")
@@ -340,4 +340,4 @@ class MarkovDecay(Filter):
     Before the first sighting it is the result of the transitions from the uniform distribution.
     """
 
-    negative: ClassVar[bool] = False
+    negative = False

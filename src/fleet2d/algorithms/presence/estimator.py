@@ -1,6 +1,6 @@
 """Long-term presence: the algorithm, the base of its estimators, and shares of sightings."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, cast
@@ -190,7 +190,7 @@ class Estimator(Component):
     forgetting, and intervals by resampling days.
     """
 
-    kind: ClassVar[str] = "presence_estimator"
+    kind = "presence_estimator"
     has_interval: ClassVar[bool] = True  # whether its output is `shares` of the sum of all days
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
@@ -376,7 +376,7 @@ class SightingShare(Estimator):
 class PresenceAlgorithm(Algorithm):
     """Base of algorithms of presence: a component of theirs learns from the evidence."""
 
-    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+    needs = frozenset({"evidence"})
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""

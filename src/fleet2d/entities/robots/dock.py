@@ -1,7 +1,6 @@
 """Dock: drive to the charger before the battery is empty, and charge."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
@@ -10,6 +9,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.lattice import LatticePoint
 
 # How long it rests at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)
@@ -32,8 +32,8 @@ class Dock(Behavior):
             as there is another way.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"charged", "docks"})
-    answers: ClassVar[frozenset[str]] = frozenset({"dock"})
+    records = frozenset({"charged", "docks"})
+    answers = frozenset({"dock"})
 
     threshold: Share = 0.2
     until: Share = 1.0
@@ -103,7 +103,7 @@ class Dock(Behavior):
             return plan.stay(REST)
         return None
 
-    def _go(self, plan: Plan, actor: Actor, charger: tuple[int, int]) -> Plan:
+    def _go(self, plan: Plan, actor: Actor, charger: LatticePoint) -> Plan:
         """Add the way to the charger to a plan: round the rooms to avoid, else the shortest."""
         route = None
         if self.avoided:

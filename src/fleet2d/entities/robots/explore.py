@@ -1,7 +1,6 @@
 """Explore: drive from frontier to frontier of the floor seen so far, until all of it is seen."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -42,8 +41,8 @@ class Explore(Behavior):
             round in none of them, and their floor needn't be seen.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"explored", "explores"})
-    needs: ClassVar[frozenset[str]] = frozenset({"explored"})
+    records = frozenset({"explored", "explores"})
+    needs = frozenset({"explored"})
 
     enough: Share = 0.98
     reach: Length = Field(default=1.0, ge=0.1, le=5)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -34,6 +33,7 @@ from fleet2d.entities.robots.search import (
     search_problem,
 )
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
@@ -111,7 +111,7 @@ class Sites:
             self._times = version, travel, np.array(look, np.float64)
         return self._times[1:]
 
-    def _seconds(self, start: tuple[int, int], goal: tuple[int, int]) -> float:
+    def _seconds(self, start: LatticePoint, goal: LatticePoint) -> float:
         seconds = way_seconds(self._actor, start, goal)
         return BLOCKED_ROUTE_S if seconds is None else seconds
 
@@ -169,10 +169,8 @@ class Find(BeliefBehavior):
         avoid: Rooms, or kinds of rooms if the home has them, that it looks into from outside only.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {"find_begins", "found", "gave_up", "not_at_home"}
-    )
-    answers: ClassVar[frozenset[str]] = frozenset({"find"})
+    records = frozenset({"find_begins", "found", "gave_up", "not_at_home"})
+    answers = frozenset({"find"})
 
     policy: Policy = "receding"
     at: tuple[TimeOfDay, ...] = ()

@@ -1,7 +1,6 @@
 """Follow and come: stay behind a person in view, or drive to the one who called."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -12,6 +11,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in, stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, centres, check_has_camera, is_in_rooms
+from fleet2d.floorplan.lattice import LatticePoint
 
 # Distance from where a person was lost at which it looks for the person [m].
 SEARCH_DISTANCE_M = 0.3
@@ -41,8 +41,8 @@ class Follow(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"follows", "lost"})
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
+    records = frozenset({"follows", "lost"})
+    listens = frozenset({"user_seen"})
 
     user: str = Field(default="", min_length=0)
     distance: Length = Field(default=1.5, ge=0.3, le=10)
@@ -128,9 +128,9 @@ class Come(Behavior):
             of them, it waits outside, near the door.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"visits"})
-    answers: ClassVar[frozenset[str]] = frozenset({"come"})
-    resumes: ClassVar[bool] = True
+    records = frozenset({"visits"})
+    answers = frozenset({"come"})
+    resumes = True
 
     stay: Duration = timedelta(minutes=10)
     avoid: tuple[str, ...] = ()
@@ -158,7 +158,7 @@ class Come(Behavior):
         self.command = None
         return plan.stay(self.stay)
 
-    def _outside(self, actor: Actor, goal: tuple[int, int]) -> tuple[int, int]:
+    def _outside(self, actor: Actor, goal: LatticePoint) -> LatticePoint:
         """Return a goal, or where the robot waits for it if that is in a room it doesn't enter."""
         if not lies_in(actor, goal, self.avoided):
             return goal

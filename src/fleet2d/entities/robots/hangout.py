@@ -3,7 +3,7 @@
 from datetime import datetime, timedelta
 from functools import partial
 from itertools import combinations
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -16,6 +16,7 @@ from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import BeliefBehavior, centres, sight_range, viewpoints_of
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB, points_in_sight
@@ -241,7 +242,7 @@ class Hangout(BeliefBehavior):
         off_doors: How far from doorways it stands at least [m].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"explores", "relocates"})
+    records = frozenset({"explores", "relocates"})
 
     period: PositiveDuration = timedelta(minutes=30)
     near: Nearness = "path"
@@ -267,7 +268,7 @@ class Hangout(BeliefBehavior):
             )
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
-        self.ways: tuple[Space, dict[tuple[int, int], F64]] = actor.space, {}
+        self.ways: tuple[Space, dict[LatticePoint, F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.rated_by: F64 | None = None  # the probabilities behind `worth`
         self.worth = -self.penalty

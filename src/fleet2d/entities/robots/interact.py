@@ -2,7 +2,7 @@
 
 import math
 from datetime import datetime, timedelta
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
@@ -20,6 +20,7 @@ from fleet2d.entities.robots.approach import (
     is_in_rooms,
 )
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.interactions.interaction import Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import exp2, sum_in_order
@@ -123,7 +124,7 @@ class ServedRequest(NamedTuple):
     step: Step
     text: str
     place: Point = (0.0, 0.0)
-    came_from: tuple[int, int] = (0, 0)
+    came_from: LatticePoint = (0, 0)
 
 
 @register("behavior", "interact")
@@ -162,12 +163,10 @@ class Interact(BeliefBehavior):
             waits for a better moment.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {"asks", "collects", "delivered", "withdraws", "opportunity", "replies"}
-    )
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen", "due", "question"})
+    records = frozenset({"asks", "collects", "delivered", "withdraws", "opportunity", "replies"})
+    listens = frozenset({"user_seen", "due", "question"})
 
-    serves_requests: ClassVar[bool] = True
+    serves_requests = True
 
     timing: str | None = None
     look: PositiveDuration = timedelta(minutes=20)
@@ -438,10 +437,10 @@ class Opportunistic(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {"approaches", "asks", "collects", "delivered", "interaction_over", "interacts"}
     )
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
+    listens = frozenset({"user_seen"})
 
     users: tuple[str, ...] = ()
     distance: Length = Field(default=1.2, ge=0.3, le=10)

@@ -9,7 +9,7 @@ robot's sightings (`SightingMemory`).
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -248,11 +248,9 @@ class Policy(BeliefBehavior):
         deadline: Duration of a search after which it gives up (find).
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {"docks", "find_begins", "found", "gave_up", "relocates", "visits"}
-    )
+    records = frozenset({"docks", "find_begins", "found", "gave_up", "relocates", "visits"})
 
-    remembers: ClassVar[bool] = True
+    remembers = True
 
     task: Literal["hangout", "find", "patrol"] = "hangout"
     file: InputPath | None = None

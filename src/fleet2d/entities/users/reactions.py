@@ -1,13 +1,13 @@
 """Reactions: how people react to robots."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
@@ -40,7 +40,7 @@ class Reactions(Behavior):
         manners: The manners; left out: those of the persona.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"reacts"})
+    records = frozenset({"reacts"})
 
     manners: Manners | None = None
 
@@ -134,8 +134,8 @@ class Reactions(Behavior):
         plan.stay(timedelta(seconds=lasts.draw(draws)))
 
     def _points_around(
-        self, now: Situation, center: tuple[int, int], distance_m: float
-    ) -> list[tuple[int, int]]:
+        self, now: Situation, center: LatticePoint, distance_m: float
+    ) -> list[LatticePoint]:
         """Return free points at a distance [m] from a point, in the same room."""
         distance = round(distance_m * now.home.plan.lattice.units_per_m)
         return list(points_at_distance(now.actor, center, distance, DIRECTIONS))
@@ -146,7 +146,7 @@ class Reactions(Behavior):
                 behavior.give_up(now)
 
 
-def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
+def _robot(now: Situation, event: SightEvent) -> LatticePoint:
     return now.home.plan.lattice.point_at((event.x, event.y))
 
 

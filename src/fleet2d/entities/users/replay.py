@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -17,6 +17,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
 from fleet2d.logs import placement
@@ -271,7 +272,7 @@ class RoomFollower:
         else:
             plan.go_to_point(*self._spot(visit, plan))
 
-    def _spot(self, visit: LoggedVisit, plan: Plan) -> tuple[int, int]:
+    def _spot(self, visit: LoggedVisit, plan: Plan) -> LatticePoint:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
         return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
@@ -302,7 +303,7 @@ class RoomFollower:
         if visit.place == AWAY:
             plan.jump(arrive_us, away=1).note("left_home")
 
-    def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
+    def _near(self, plan: Plan, spot: LatticePoint) -> LatticePoint:
         """Return the place in the room of a spot that is nearest to the body."""
         room = self.actor.home.plan.room_of_point(*spot)
         if room is None:
@@ -312,7 +313,7 @@ class RoomFollower:
         ((x, y),) = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64)).tolist()
         return x, y
 
-    def _way(self, plan: Plan, spot: tuple[int, int]) -> I64:
+    def _way(self, plan: Plan, spot: LatticePoint) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
         route = self.actor.space.route((plan.x, plan.y), spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
@@ -467,7 +468,7 @@ class Replay(Behavior, LogKeys):
         fastest: Walks faster than this are reported as implausible [m/s].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
+    records = frozenset({"known", "replay", "unknown"})
 
     path: InputFileOrFolder
     format: Layout = "auto"

@@ -16,6 +16,7 @@ from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import POSTURES, UsePlace
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S, CoreVenue, Resident
@@ -347,7 +348,7 @@ class KnownHome:
         """Return how long to wait before the body may use a room [us]; None: not now."""
         return self._person.wait_for(room, self._actor.clock, now_us, takes_us)
 
-    def way_out(self) -> tuple[int, int]:
+    def way_out(self) -> LatticePoint:
         """Return the lattice point where the body leaves the home."""
         return self._actor.way_out
 

@@ -1,7 +1,6 @@
 """Roaming: people whose rooms are drawn from given shares of time, and pets."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -163,7 +162,7 @@ class Pet(Behavior):
         stays_in_room: Probability that its next spot is in the same room.
     """
 
-    usual_height: ClassVar[float] = 0.3
+    usual_height = 0.3
 
     rooms: tuple[str, ...] = ()
     nap: AnyDurationDistribution = DurationDistribution(
