@@ -278,7 +278,7 @@ class Situation:
         at_x, at_y = lattice.point_at((x, y))
         if actor.space.part_at(at_x, at_y) != actor.part:
             near = actor.space.nearest(at_x, at_y, actor.part)
-            at_x, at_y = near or (actor.state.x, actor.state.y)
+            at_x, at_y = near or actor.state.position
         return lattice.xy_of(at_x, at_y)
 
     def random(self, purpose: str) -> Draws:

@@ -54,6 +54,11 @@ class Pose(NamedTuple):
     heading: int
     away: int
 
+    @property
+    def position(self) -> LatticePoint:
+        """Where the body is [lattice]."""
+        return self.x, self.y
+
 
 # Makes a pose from a tuple of its fields without calling Python code, as a run has many.
 new_pose: Callable[[tuple[int, int, int, int]], Pose] = partial(tuple.__new__, Pose)
@@ -396,7 +401,7 @@ class Body:
     def _present_part(self) -> int:
         """Return the part of a changed space that it is in, or nearest to."""
         space = self._space[1]
-        position = (self.state.x, self.state.y)
+        position = self.state.position
         x, y = self.home.approach_of(position) or position
         part = space.part_at(x, y)
         return part if part >= 0 else space.part_near(x, y)

@@ -81,7 +81,7 @@ def _rest(
         return None
     goes_on_us = max(int(track.time[stop]), interrupted_us)
     goal = int(track.x[stop]), int(track.y[stop])
-    route = detour((plan.x, plan.y), goal) if detour else None
+    route = detour(plan.position, goal) if detour else None
     if detour and route is None:
         return None
     try:
@@ -346,7 +346,7 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         goal = beside
         rest[:, 1:3] = goal
     plan = now.plan()
-    route = detour((plan.x, plan.y), goal)
+    route = detour(plan.position, goal)
     if route is None:
         return None
     since_us = max(int(rows[stop, 0]), begin_us)

@@ -43,7 +43,7 @@ class Distance(Metric):
             between = dist(self.last[name], poses.at(0)) if name in self.last else 0.0
             self.metres[name] = self.metres.get(name, 0.0) + between + poses.distance
             self.last[name] = poses.at(-1)
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
 
     def result(self) -> dict[str, Any]:
         """Return {name: metres per day}."""
@@ -97,7 +97,7 @@ class Travel(Metric):
                         self.relocations[robot] += 1
                         self.last_rest[robot] = place
             self.standing[robot] = standing
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {relocations, metres}}, both per day."""
@@ -254,7 +254,7 @@ class CoPresence(Metric):
     def update(self, history: History, state: Present) -> Any:
         """Count the steps together."""
         for pair in pairs_of(history, state):
-            counts = self.steps.setdefault((pair.robot, pair.user), [0, 0])
+            counts = self.steps.setdefault(pair.names, [0, 0])
             counts[0] += pair.user_poses.steps_together(pair.robot_poses)
             counts[1] += pair.user_poses.steps_at_home
 

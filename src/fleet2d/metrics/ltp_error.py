@@ -21,7 +21,7 @@ from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB
 from fleet2d.kernels import earth_mover as minimal_cost
 from fleet2d.metrics.metric import Metric
-from fleet2d.runtime.clock import DAY_S, HOUR_US
+from fleet2d.runtime.clock import HOUR_US
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
@@ -226,7 +226,7 @@ class LongTermMetric(Metric):
 
     def count(self, counts: I64, history: History) -> tuple[I64, int]:
         """Add a period; return the counts of the window and its steps."""
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
         self.periods.append((counts, len(history)))
         if self.window is not None:
             del self.periods[: -max(1, math.floor(self.window / self.period))]

@@ -161,6 +161,11 @@ class RobotUserPair(NamedTuple):
     user_poses: BodyPoses
 
     @property
+    def names(self) -> tuple[str, str]:
+        """The names of the robot and the user."""
+        return self.robot, self.user
+
+    @property
     def at_home(self) -> Bool:
         """Whether both are at home at each step: bool (steps,)."""
         return ~(self.robot_poses.away | self.user_poses.away)

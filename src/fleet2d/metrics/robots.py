@@ -24,7 +24,6 @@ from fleet2d.metrics.metric import (
     quantile,
     restricted_mean,
 )
-from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event
 from fleet2d.sight.camera import DEFAULT_RANGE_M
@@ -70,7 +69,7 @@ class ReachTime(Metric):
         space = state.home.space(self.radius)
         lattice = state.home.plan.lattice
         for pair in pairs_of(history, state):
-            key = (pair.robot, pair.user)
+            key = pair.names
             seconds = self.seconds.setdefault(key, [])
             self.unreached.setdefault(key, 0)
             for i in calls[pair.at_home[calls]].tolist():
@@ -341,7 +340,7 @@ class Blocking(Metric):
     def update(self, history: History, state: Present) -> Any:
         """Count the steps in which a user walks into a robot."""
         for pair in pairs_of(history, state):
-            key = (pair.robot, pair.user)
+            key = pair.names
             is_near = pair.distance < self.clearance
             xy = pair.user_poses.xy
             # A step leads from one pose to the next: the first from the last of the last period.
@@ -361,7 +360,7 @@ class Blocking(Metric):
                 met = self.counts.get((steps_aside[event.detail], event.entity))
                 if met is not None:  # else a robot stepped aside, by a behavior of its own
                     met["asides"] = met.get("asides", 0) + 1
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
@@ -397,14 +396,14 @@ class Intrusion(Metric):
         rows = []
         for pair in pairs_of(history, state):
             distance = pair.distance
-            key = (pair.robot, pair.user)
+            key = pair.names
             near = np.flatnonzero(distance < max(ZONES.values()))
             near = near[in_sight(state.home.plan, pair, near)]
             counts, _ = np.histogram(distance[near], [0.0, *ZONES.values()])
             minutes = counts * history.step_s / 60
             self.minutes[key] = self.minutes.get(key, 0.0) + minutes
             rows.append((*key, *minutes.tolist()))
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
         return columns_of(("robot", "user", *ZONES), rows)
 
     def result(self) -> dict[str, Any]:

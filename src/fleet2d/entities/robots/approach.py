@@ -280,7 +280,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     """
     actor = now.actor
     lattice = now.home.plan.lattice
-    position = (actor.state.x, actor.state.y)
+    position = actor.state.position
     person = lattice.to_lattice((x, y))
     goal = lattice.point_at(now.nearest_free(x, y))
     route = actor.space.route(position, (goal[0], goal[1]))
@@ -316,7 +316,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     actor = now.actor
     home = now.home
     lattice = home.plan.lattice
-    position = (actor.state.x, actor.state.y)
+    position = actor.state.position
     person = lattice.point_at((x, y))
     reach = math.ceil(distance * lattice.units_per_m)
     if _distance(person, position) >= reach:
@@ -328,7 +328,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
 def approach(now: Situation, plan: Plan, x: float, y: float, distance: float) -> Plan:
     """Drive to `spot_near` a person at (x, y) [m], unless the robot is already there."""
     spot = spot_near(now, x, y, distance)
-    if spot != (plan.x, plan.y):
+    if spot != plan.position:
         plan.go_to_point(*spot)
     return plan
 

@@ -87,7 +87,7 @@ class Dock(Behavior):
         has_command = now.take_command("dock") is not None
         is_low = charge.level <= self.threshold
         if has_command or is_low or (self.charging and charge.level < self.until):
-            if not self.charging or (plan.x, plan.y) != charger:
+            if not self.charging or plan.position != charger:
                 self._go(plan, now.actor, charger).note("docks", charge.percent)
             self.charging = True
             return plan.stay(timedelta(microseconds=charge.time_to_charge(self.until)))
@@ -98,7 +98,7 @@ class Dock(Behavior):
                 # The row needs a plan; the shortest one, so that later behaviors are asked next.
                 return plan.stay(timedelta(microseconds=1))
         if self.rest:
-            if (plan.x, plan.y) != charger:
+            if plan.position != charger:
                 self._go(plan, now.actor, charger)
             return plan.stay(REST)
         return None
@@ -107,5 +107,5 @@ class Dock(Behavior):
         """Add the way to the charger to a plan: round the rooms to avoid, else the shortest."""
         route = None
         if self.avoided:
-            route = actor.space_without(self.avoided).route((plan.x, plan.y), charger)
+            route = actor.space_without(self.avoided).route(plan.position, charger)
         return plan.go_to_point(*charger, route=route)

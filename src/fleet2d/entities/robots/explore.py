@@ -113,7 +113,7 @@ class Explore(Behavior):
         if not len(near):
             return None
         actor = now.actor
-        position = (actor.state.x, actor.state.y)
+        position = actor.state.position
         metres = actor.space.distances(position, centres(self.stands[near]))
         seconds = actor.seconds(metres) + TURN / actor.turn_rate
         best = int(np.argmax(gain / seconds))

@@ -90,7 +90,7 @@ class Sites:
             prior: Probability that the person is in each room, float64 (n,).
         """
         travel, look = self._travel()
-        position = (now.actor.state.x, now.actor.state.y)
+        position = now.actor.state.position
         reach = [self._seconds(position, points[0]) for points in self._points]
         return search_problem(prior, reach, travel, look, self.share)
 
@@ -289,12 +289,12 @@ class Find(BeliefBehavior):
         """End the search: approach the person, at (x, y) [m], and stay."""
         self._end(plan, "found")
         if is_in_rooms(now, x, y, self.avoided):
-            return plan.face(*now.home.plan.lattice.point_at((x, y))).stay(self.stay)
+            return plan.face_place((x, y)).stay(self.stay)
         approach(now, plan, x, y, self.distance)
         back = spot_back(now, x, y, self.distance)
-        if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
+        if plan.position == now.actor.state.position != back:
             plan.go_to_point(*back)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         return plan.stay(self.stay)
 
     def _look_further(self, now: Situation, plan: Plan, search: SearchState) -> Plan | None:

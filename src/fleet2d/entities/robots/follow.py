@@ -106,7 +106,7 @@ class Follow(Behavior):
         self.last = x, y
         if not is_in_rooms(now, x, y, self.avoided):
             approach(now, plan, x, y, self.distance)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         until = now.time + self.pause
         if self.longest:
             until = min(until, self.since + self.longest)
@@ -163,7 +163,7 @@ class Come(Behavior):
         if not lies_in(actor, goal, self.avoided):
             return goal
         space = actor.space_without(self.avoided)
-        cells = centres(space.cells(None, space.part_near(actor.state.x, actor.state.y)))
+        cells = centres(space.cells(None, space.part_near(*actor.state.position)))
         metres = actor.space.distances(goal, cells)
         if not np.isfinite(metres).any():
             return goal  # behind a shut door: there is no way at present

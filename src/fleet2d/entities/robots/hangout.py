@@ -298,7 +298,7 @@ class Hangout(BeliefBehavior):
             if explores:
                 self._explore(now, plan, draws.choice(self.explored))
         x, y = self.places.points[self.place].tolist()
-        if (plan.x, plan.y) != (x, y) and not self.is_blocked:
+        if plan.position != (x, y) and not self.is_blocked:
             plan.go_to_point(x, y)
             self._face_room(now, plan)
         if quiet_until is not None:
@@ -357,7 +357,7 @@ class Hangout(BeliefBehavior):
             self.ways = space, {}
         cell = actor.state.x // SUB, actor.state.y // SUB
         if cell not in self.ways[1]:
-            seconds = actor.seconds(space.distances((actor.state.x, actor.state.y), points))
+            seconds = actor.seconds(space.distances(actor.state.position, points))
             is_reachable = np.isfinite(seconds)
             way = np.where(is_reachable, seconds, 0.0)
             move = way / (way + self.tau.total_seconds())
@@ -368,5 +368,5 @@ class Hangout(BeliefBehavior):
         """Turn to the middle of the room that it stands in."""
         room = now.home.plan.rooms[int(self.places.room[self.place])]
         x, y = now.home.plan.lattice.point_at(room.anchor_xy)
-        if (x, y) != (plan.x, plan.y):
+        if (x, y) != plan.position:
             plan.face(x, y)

@@ -248,7 +248,7 @@ class Interact(BeliefBehavior):
         event = next((event for event in now.events if event.event == "question"), None)
         if event is None:
             return None
-        plan = now.plan().face(*now.home.plan.lattice.point_at((event.x, event.y)))
+        plan = now.plan().face_place((event.x, event.y))
         return plan.note("replies", event.user).stay(REPLY_TAKES)
 
     def _address(
@@ -361,7 +361,7 @@ class Interact(BeliefBehavior):
         self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
-        plan.face(*now.home.plan.lattice.point_at(place))
+        plan.face_place(place)
         plan.note("asks", request.text).stay(self.patience).interrupt_on(*ANSWERS)
         self.plan = plan.root
         return plan
@@ -485,7 +485,7 @@ class Opportunistic(Behavior):
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note("approaches", name)
         approach(now, plan, x, y, self.distance)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         plan.note("interacts", name)
         ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
         self.asked = (ready[0], ready[0].text) if ready else None

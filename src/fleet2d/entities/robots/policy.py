@@ -453,7 +453,7 @@ class Policy(BeliefBehavior):
         charge = now.actor.charge
         lasts = MINUTE if self.task == "find" else self.period
         if charge is not None and plan.reaches(*charge.charger):
-            if (plan.x, plan.y) != charge.charger:
+            if plan.position != charge.charger:
                 plan.go_to_point(*charge.charger).note("docks", charge.percent)
             lasts = max(timedelta(microseconds=charge.time_to_charge(1.0)), MINUTE)
         plan.stay(lasts)
@@ -470,7 +470,7 @@ class Policy(BeliefBehavior):
             self._tally["relocations"] += 1
             return plan.interrupt_on("user_seen")
         x, y = self.poses.points[number].tolist()
-        if (plan.x, plan.y) != (x, y):
+        if plan.position != (x, y):
             self._tally["relocations"] += 1
             plan.note("relocates" if self.task == "hangout" else "visits", name).go_to_point(x, y)
             plan.turn_to(int(self.poses.headings[number]))

@@ -119,7 +119,7 @@ class Reactions(Behavior):
         # Across the robot's way; along it, the robot would come closer again.
         across = [
             (x, y)
-            for x, y in self._points_around(now, (plan.x, plan.y), STEP_M)
+            for x, y in self._points_around(now, plan.position, STEP_M)
             if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
             <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
         ]

@@ -315,9 +315,9 @@ class RoomFollower:
 
     def _way(self, plan: Plan, spot: LatticePoint) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
-        route = self.actor.space.route((plan.x, plan.y), spot)
+        route = self.actor.space.route(plan.position, spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
-            route = straight_way((plan.x, plan.y), spot)
+            route = straight_way(plan.position, spot)
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(

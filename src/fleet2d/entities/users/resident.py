@@ -42,7 +42,7 @@ class Spot(NamedTuple):
 
     def walk(self, plan: "Plan") -> None:
         """Go there."""
-        if plan.away or (plan.x, plan.y) != (self.x, self.y):
+        if plan.away or plan.position != (self.x, self.y):
             plan.go_to_point(self.x, self.y)
 
 

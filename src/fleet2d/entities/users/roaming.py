@@ -109,7 +109,7 @@ class RoomSampling(Behavior):
 
     def _walk(self, actor: Actor, plan: Plan, goal: Spot) -> None:
         """Walk to a spot, and add the time on the way to the debt of the rooms it leads through."""
-        start = (plan.x, plan.y)
+        start = plan.position
         began_us = plan.time_us
         if start == goal and not plan.away:
             return
