@@ -138,7 +138,9 @@ def breakpoints(
         x, y = ax + round((bx - ax) * share), ay + round((by - ay) * share)
         return round(moment.seconds * 1e6), x, y, moment.heading % TURN, 0
 
-    rows, leg, last = [], 0, Moment(0.0, 0.0, heading)
+    rows = []
+    leg = 0
+    last = Moment(0.0, 0.0, heading)
     route = Route(tuple(legs), heading, rates[0] / units_per_m, rates[1])
     for moment in _checked(drive, route, ends[-1]) if legs else ():
         while moment.metres > ends[leg + 1] + NEAR_M:

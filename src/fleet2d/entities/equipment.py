@@ -240,7 +240,8 @@ class Drift:
             displacements: When it was carried off; a list that may grow.
         """
         self._displacements = displacements
-        self._step_us, self._every_us = step_us, micros(settings.corrected_every)
+        self._step_us = step_us
+        self._every_us = micros(settings.corrected_every)
         hours = settings.corrected_every / timedelta(hours=1)
         self._jump_chance = settings.jumps_per_hour * hours
         self._drift, self._jump, self._residual = (

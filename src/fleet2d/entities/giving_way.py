@@ -111,7 +111,8 @@ def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
     """Return the heading at a moment between a breakpoint and the next."""
     times = track.time
     headings = track.heading
-    begin, end = int(times[stop]), int(times[stop + 1])
+    begin = int(times[stop])
+    end = int(times[stop + 1])
     turn = int(turn_between(int(headings[stop]), int(headings[stop + 1])))
     return (int(headings[stop]) + turn * (time_us - begin) // max(end - begin, 1)) % TURN
 

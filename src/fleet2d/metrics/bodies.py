@@ -147,7 +147,8 @@ class BatteryUse(Metric):
             elif event.event == "charged" and name in self.docked_at:
                 steps = event.step - self.docked_at.pop(name)
                 self.charging[name] = self.charging.get(name, 0) + steps
-        self.steps, self.step_s = history.end, history.step_s
+        self.steps = history.end
+        self.step_s = history.step_s
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {lowest, dockings, charging}}, and empty of those that ran empty."""
@@ -195,10 +196,11 @@ class RoomShare(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {user: {room: share}} for the rooms that the user was in."""
-        return {
-            user: {n: float(s / steps.sum()) for n, s in zip(self.names, steps, strict=True) if s}
-            for user, steps in self.seconds.items()
-        }
+        result = {}
+        for user, steps in self.seconds.items():
+            shares = zip(self.names, (steps / steps.sum()).tolist(), strict=True)
+            result[user] = {room: share for room, share in shares if share}
+        return result
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:

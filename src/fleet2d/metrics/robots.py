@@ -211,7 +211,8 @@ class TimeToFind(Metric):
             self.driven[robot] = float(driven[-1])
         for search in ended:
             self.done.setdefault(search.robot, []).append(search)
-        self.end, self.step_s = history.end, history.step_s
+        self.end = history.end
+        self.step_s = history.step_s
         return columns_of(SearchRecord._fields, ended)
 
     def _driven(self, history: History, robot: str) -> F64:
@@ -364,12 +365,10 @@ class Blocking(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
-        return nested(
-            {
-                pair: {name: value / self.days for name, value in counts.items()}
-                for pair, counts in self.counts.items()
-            }
-        )
+        rates = {}
+        for pair, counts in self.counts.items():
+            rates[pair] = {name: value / self.days for name, value in counts.items()}
+        return nested(rates)
 
 
 @register("metric", "intrusion")
@@ -408,9 +407,7 @@ class Intrusion(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {zone: minutes a day}}}."""
-        return nested(
-            {
-                pair: dict(zip(ZONES, (minutes / self.days).tolist(), strict=True))
-                for pair, minutes in self.minutes.items()
-            }
-        )
+        rates = {}
+        for pair, minutes in self.minutes.items():
+            rates[pair] = dict(zip(ZONES, (minutes / self.days).tolist(), strict=True))
+        return nested(rates)

@@ -440,19 +440,20 @@ class RtpScore(Metric):
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return each user's main scores over all gaps."""
-        return {
-            user: {name: scores[ALL][name] for name in SUMMARY_SCORES if name in scores[ALL]}
-            for user, scores in result.items()
-            if ALL in scores
-        }
+        summary = {}
+        for user, scores in result.items():
+            if ALL in scores:
+                main = [name for name in SUMMARY_SCORES if name in scores[ALL]]
+                summary[user] = {name: scores[ALL][name] for name in main}
+        return summary
 
 
 def _sums(scored: ScoredBins) -> list[tuple[Any, ...]]:
     """Return the number of bins and the sums of scores of each class of gaps that occurs."""
-    bins = np.bincount(scored.gap, minlength=len(GAPS))
+    bins = np.bincount(scored.gap, minlength=len(GAPS)).tolist()
     scores = _scores(scored.belief, scored.truth).values()
     sums = [np.bincount(scored.gap, values, len(GAPS)).tolist() for values in scores]
-    return [(GAPS[g], int(bins[g]), *(sum_[g] for sum_ in sums)) for g in np.flatnonzero(bins)]
+    return [row for row in zip(GAPS, bins, *sums, strict=True) if row[1]]
 
 
 def _mean_scores(belief: F64, truth: I64) -> dict[str, float]:

@@ -142,15 +142,11 @@ class Detections(Metric):
         numbers: dict[str, Any] = {
             name: int(part) / int(whole) for name, (part, whole) in ratios.items() if whole
         }
-        confusion = {
-            true: {
-                perceived: int(counts[t, p]) / int(counts[t].sum())
-                for p, perceived in enumerate((*users, UNKNOWN))
-                if counts[t, p]
-            }
-            for t, true in enumerate((*users, NO_ONE))
-            if counts[t].sum()
-        }
+        confusion = {}
+        for true, row in zip((*users, NO_ONE), counts.tolist(), strict=True):
+            perceived = zip((*users, UNKNOWN), row, strict=True)
+            if any(row):
+                confusion[true] = {name: count / sum(row) for name, count in perceived if count}
         if confusion:
             numbers["confusion"] = confusion
         if self.unknown[robot]:
@@ -160,10 +156,10 @@ class Detections(Metric):
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return all numbers but the confusion of identities."""
-        return {
-            robot: {key: value for key, value in numbers.items() if key != "confusion"}
-            for robot, numbers in result.items()
-        }
+        summary = {}
+        for robot, numbers in result.items():
+            summary[robot] = {name: each for name, each in numbers.items() if name != "confusion"}
+        return summary
 
 
 @register("metric", "coverage")

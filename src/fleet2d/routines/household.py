@@ -105,7 +105,8 @@ def with_absences(
         firsts = [*(a for a, _ in stays), end]
         absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
     for leaves, returns in absences:
-        first, last = max(leaves, begin), min(returns, end)
+        first = max(leaves, begin)
+        last = min(returns, end)
         if first < last:
             day = with_episode(day, Episode(AWAY, first, last))
     return list(day)

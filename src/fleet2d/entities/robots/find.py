@@ -101,14 +101,14 @@ class Sites:
         """
         version = self._actor.home.version
         if self._times is None or self._times[0] != version:
-            last, first = [p[-1] for p in self._points], [p[0] for p in self._points]
-            travel = np.array([[self._seconds(a, b) for b in first] for a in last], np.float64)
-            turn = TURN / self._actor.turn_rate
-            look = [
-                len(points) * turn + sum_in_order(self._seconds(a, b) for a, b in pairwise(points))
-                for points in self._points
-            ]
-            self._times = version, travel, np.array(look, np.float64)
+            travel = np.empty((len(self), len(self)))
+            look = np.empty(len(self))
+            turn_s = TURN / self._actor.turn_rate
+            for site, points in enumerate(self._points):
+                ways = [self._seconds(start, goal) for start, goal in pairwise(points)]
+                look[site] = len(points) * turn_s + sum_in_order(ways)
+                travel[site] = [self._seconds(points[-1], other[0]) for other in self._points]
+            self._times = version, travel, look
         return self._times[1:]
 
     def _seconds(self, start: LatticePoint, goal: LatticePoint) -> float:

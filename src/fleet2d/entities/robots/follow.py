@@ -99,7 +99,8 @@ class Follow(Behavior):
 
     def _follow(self, now: Situation, plan: Plan) -> Plan:
         self.is_searching = False
-        (x, y), (old_x, old_y) = now.in_view[self.person or ""], self.last
+        x, y = now.in_view[self.person or ""]
+        old_x, old_y = self.last
         is_resting = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL_M**2
         longest = max(MAX_INTERVAL, self.update)
         self.pause = min(2 * self.pause, longest) if is_resting else self.update

@@ -391,7 +391,8 @@ class Interact(BeliefBehavior):
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
         total = sum_in_order(float(joint[room.index]) for room in rooms)
-        self.served, self.plan = ServedRequest(request, "seek", request.text), now.plan()
+        self.served = ServedRequest(request, "seek", request.text)
+        self.plan = now.plan()
         looked = 0.0
         for room in rooms:
             if looked > ENOUGH * total:

@@ -195,9 +195,9 @@ class Scheduled(Behavior):
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:
-        visit, (x, y) = self.visits[number], self.stops[number]
+        visit = self.visits[number]
         name = visit.task or self._room_name(now.actor, number)
-        plan = now.plan().go_to_point(x, y).note("visits", name)
+        plan = now.plan().go_to_point(*self.stops[number]).note("visits", name)
         if visit.look_around:
             plan.turn_by(1.0)
         return plan.stay(visit.dwell)

@@ -315,7 +315,8 @@ class Policy(BeliefBehavior):
         away = 0.0
         if self.source is not None:
             belief = self.belief(now, self.user)
-            part[:, _AT["belief"]], away = belief.joint, belief.away
+            part[:, _AT["belief"]] = belief.joint
+            away = belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
                 part[:, _AT[f"belief_{number}"]] = self.belief(now, name).joint
         step_s = actor.clock.step_us / 1e6
@@ -349,7 +350,8 @@ class Policy(BeliefBehavior):
         types = {kind: name for name, kinds in KINDS.items() for kind in kinds}
         for room in actor.home.rooms:
             row = table[room.index]
-            row[_AT["room"]], row[_AT["area"]] = 1, room.cells / cells
+            row[_AT["room"]] = 1
+            row[_AT["area"]] = room.cells / cells
             if self.source is None:
                 row[_AT["belief"]] = row[_AT["area"]]
             row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1

@@ -210,7 +210,8 @@ def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]
         problem: The problem.
         worth: A function of the time of travel and look [s] and the probability of detection.
     """
-    gain, look = problem.gain.tolist(), problem.look.tolist()
+    gain = problem.gain.tolist()
+    look = problem.look.tolist()
     remaining = list(range(len(gain)))
     order = list[int]()
     while remaining:

@@ -51,7 +51,8 @@ class Population(ResidentBehavior):
         self.cache: dict[int, Sequence[Episode]] = {}
         known = catalogue()
         used = {*survey.activities(self.people), REST}
-        self.rules, self.interruptions = None, actor.stream("needs")
+        self.rules = None
+        self.interruptions = actor.stream("needs")
         if self.bodily_needs:
             needs = interruptions.population_needs()
             errands = interruptions.usual_errands()

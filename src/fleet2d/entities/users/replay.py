@@ -341,7 +341,8 @@ class RoomFollower:
             self.implausible += speed > self.limit
             self.top_speed = max(self.top_speed, speed)
         block = np.zeros((len(rows) + 1, 5), np.int64)
-        block[:-1, 0], block[:-1, 1:4] = leave + times, rows[:, 1:]
+        block[:-1, 0] = leave + times
+        block[:-1, 1:4] = rows[:, 1:]
         block[-1] = block[-2]
         block[-1, 0] = arrive_us
         plan.follow(block)

@@ -208,10 +208,9 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
 
 SECOND_US = 1_000_000
 # How the core numbers ways of choosing rooms, small moves, and what happens.
-POLICIES, MOVE_KINDS, EVENTS = (
-    tuple(member.name.lower() for member in numbers)
-    for numbers in (kernels.RoomPolicy, kernels.MoveKind, kernels.Happening)
-)
+POLICIES = tuple(member.name.lower() for member in kernels.RoomPolicy)
+MOVE_KINDS = tuple(member.name.lower() for member in kernels.MoveKind)
+EVENTS = tuple(member.name.lower() for member in kernels.Happening)
 
 
 @lru_cache(512)  # most are the same for all people
