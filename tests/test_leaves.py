@@ -20,10 +20,10 @@ from fleet2d.cli.__main__ import app
 
 SOURCE = Path(fleet2d.__file__).parent
 LEAVES = {
-    "fit": "fit",
-    "floorplan/synthetic": "",
+    "learning/fit": "fit",
+    "homes/synthetic": "",
     "studies": "study",
-    "viewer": "view",
+    "viewing": "view",
 }
 REST = """
 import sys
@@ -96,7 +96,7 @@ def test_rest_works_without_leaves(folders: str, copy: Path) -> None:
 
 @pytest.mark.slow
 def test_command_of_a_missing_leaf_is_unknown(copy: Path) -> None:
-    with without(copy, "fit"):
+    with without(copy, "learning/fit"):
         done = process(copy, "-m", "fleet2d.cli", "fit")
 
     assert done.returncode == 2

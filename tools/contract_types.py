@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from typing_extensions import is_typeddict
 
-from fleet2d.viewer import contract
+from fleet2d.viewing import contract
 
-HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewer.contract.\n"
+HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewing.contract.\n"
 _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
 
 

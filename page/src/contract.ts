@@ -1,4 +1,4 @@
-// Written by `python -m tools.contract_types` from fleet2d.viewer.contract.
+// Written by `python -m tools.contract_types` from fleet2d.viewing.contract.
 
 /** A room: its colours on the plan and in lanes, and the anchor of its name [m]. */
 export interface RoomFacts {
@@ -19,12 +19,29 @@ export interface DoorFacts {
   locked: boolean;
 }
 
-/** A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight. */
+/** A passage between two rooms: its jambs [m], and whether a door can shut it. */
+export interface DoorwayFacts {
+  start: [number, number];
+  end: [number, number];
+  leaf: boolean;
+}
+
+/** A place from which a piece of furniture is used [m], and how a person is there [rad]. */
+export interface UseFacts {
+  x: number;
+  y: number;
+  heading: number;
+  posture: string;
+}
+
+/** A piece of furniture: its outline [m], the direction of its front [rad], its uses. `blocks` says whether it is in the way of nothing, paths or sight. */
 export interface ObjectFacts {
   name: string;
   type: string;
   outline: [number, number][];
   blocks: string;
+  front: number;
+  uses: UseFacts[];
 }
 
 /** A home: outlines in metres, cells as runs of equal rooms. `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of cells), row by row from the lowest; -1 is no room. `place_cells` are such pairs, too, in which cells that a wall cuts have the room of a cell beside them: somebody may be in their free part. */
@@ -41,7 +58,7 @@ export interface HomeFacts {
   rooms: RoomFacts[];
   room_cells: number[];
   place_cells: number[];
-  doorways: [[number, number], [number, number]][];
+  doorways: DoorwayFacts[];
   doors: DoorFacts[];
   objects: ObjectFacts[];
   no_go: [number, number][][];

@@ -7,6 +7,8 @@ import type { Run } from "./data/run";
 import { firstAtLeast, lastAtMost } from "./data/search";
 
 export const SPEEDS = [1, 10, 60, 600, 3600, 14_400, 86_400];
+/** The speed that follows what happens: dull time flies. */
+export const ADAPTIVE = 0;
 export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs", "lights", "slows"] as const;
 export type Switch = (typeof SWITCHES)[number];
 export const PANELS = ["now", "inspect", "beliefs", "events", "metrics", "layers", "notes"] as const;
@@ -21,7 +23,9 @@ export const range = signal<[number, number]>([0, 1]);
 /** A range whose totals are shown [us]. */
 export const marked = signal<[number, number] | null>(null);
 export const playing = signal(false);
-export const speed = signal(60);
+export const speed = signal(ADAPTIVE);
+/** How the timeline shows the run: a row a day, or a lane for each body. */
+export const view = signal<"calendar" | "lanes">("calendar");
 export const selected = signal("");
 /** The body that the plan follows; empty: none. */
 export const followed = signal("");
@@ -136,7 +140,8 @@ export function toggle(name: Switch): void {
 }
 
 export function faster(by: 1 | -1): void {
-  const at = SPEEDS.findIndex((entry) => entry >= speed.value);
+  const from = speed.value === ADAPTIVE ? 60 : speed.value;
+  const at = SPEEDS.findIndex((entry) => entry >= from);
   const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, (at < 0 ? SPEEDS.length : at) + by))];
   speed.value = next ?? speed.value;
 }

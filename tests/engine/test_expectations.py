@@ -14,7 +14,7 @@ from tests.scenes import AGENDA, OWN, digests, run, scenario, table
 
 import fleet2d
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
-from fleet2d.expectations import Verdict, always, distance, eventually, judge, moving, seen
+from fleet2d.expectations import Verdict, always, distance, eventually, moving, seen
 from fleet2d.kernels import F64, Bool
 from fleet2d.runs.run import Run
 
@@ -323,26 +323,28 @@ def test_a_simulation_says_when_it_is_decided() -> None:
     simulation.advance(60)
 
     assert simulation.verdicts()["still"].decided
-    assert not judge(always(distance("ana", "ben") > 0), simulation_after(simulation)).decided
+    assert not fleet2d.judge(
+        always(distance("ana", "ben") > 0), simulation_after(simulation)
+    ).decided
 
 
 def simulation_after(simulation: fleet2d.Simulation) -> fleet2d.Simulation:
     """Ask once, so that something is expected, and go on."""
     with pytest.raises(InputError, match="was added after the last step"):
-        judge(always(distance("ana", "ben") > 0), simulation)
+        fleet2d.judge(always(distance("ana", "ben") > 0), simulation)
     simulation.advance(10)
     return simulation
 
 
 def test_a_finished_run_is_judged_by_running_it_again() -> None:
     stored, verdicts = finished(None)
-    verdict = judge(always(distance("ana", "astro") > 1.5), stored, "keeps_off")
+    verdict = fleet2d.judge(always(distance("ana", "astro") > 1.5), stored, "keeps_off")
 
     assert verdicts["keeps_off"] == verdict
     broken = fleet2d.Simulation(home())
     broken.advance(10)
     with pytest.raises(RunDirectoryError, match="only a complete run"):
-        judge(always(moving("ana")), broken.finish())
+        fleet2d.judge(always(moving("ana")), broken.finish())
 
 
 WRONG = {

@@ -14,7 +14,7 @@ import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tests.homes import home_of
+from tests.meshed_homes import home_of
 
 import fleet2d
 from fleet2d import _core, kernels

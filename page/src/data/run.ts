@@ -211,6 +211,23 @@ export class Run {
     return computed;
   }
 
+  private readonly seenBy = new Map<string, { read: readonly SightingFacts[]; stretches: Stretches }>();
+
+  /** When any robot noticed somebody; taken for somebody else doesn't count. */
+  seen(name: string): Stretches {
+    let known = this.seenBy.get(name);
+    if (known?.read !== this.sightings) {
+      const { stepUs } = this.clock;
+      const spans = this.sightings
+        .filter((lane) => lane.user === name)
+        .flatMap((lane) => lane.first.flatMap((first, i) => (lane.false[i] ? [] : [[first * stepUs, (lane.last[i]! + 1) * stepUs] as const])));
+      spans.sort(([one], [other]) => one - other);
+      const stretches = { from: spans.map(([from]) => from), to: spans.map(([, to]) => to), value: spans.map(() => 1) };
+      this.seenBy.set(name, (known = { read: this.sightings, stretches }));
+    }
+    return known.stretches;
+  }
+
   /** What ends sight at a moment; null while it isn't read yet. */
   wallsAt(us: number): Walls | null {
     const { walls } = this.facts;

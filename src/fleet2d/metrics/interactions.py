@@ -43,8 +43,15 @@ class Interactions(Metric):
     """
 
     hidden = frozenset({"interrupted", "wait_s", "trust", "asked"})
+    units = {
+        "wanted": "requests",
+        "kept": "share of requests",
+        **dict.fromkeys(("answered", "accepted"), "share of times asked"),
+        **dict.fromkeys(("value", "missed"), "worth"),
+        **dict.fromkeys(("annoyance", "mean_annoyance", "trust"), "of 1"),
+        "woke": "times",
+    }
     least = {"": 0}
-    largest = dict.fromkeys(("answered", "accepted", "kept"), 1)
     better = {
         **dict.fromkeys(("answered", "accepted", "kept", "value", "trust"), "higher"),
         **dict.fromkeys(("missed", "wait_s", "woke", "annoyance", "mean_annoyance"), "lower"),

@@ -16,7 +16,6 @@ from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
 from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
-from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from fleet2d.artifacts.store import RunStore
-    from fleet2d.expectations.expectation import Expectation
-    from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
 
@@ -144,7 +141,7 @@ class Run:
             ArtifactError: The run directory holds none.
         """
         if self._plan is None:
-            from fleet2d.floorplan.formats.native import read_native
+            from fleet2d.floorplan.native import read_native
 
             path = path_in(self.directory or Path(), FLOORPLAN_NAME)
             if self.directory is None or not path.is_file():
@@ -186,52 +183,6 @@ class Run:
         from fleet2d.runs.trajectory import rebuild_path
 
         return rebuild_path(self, self.plan, entity, every)
-
-    def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
-        """Judge the run by an expectation; the run is repeated exactly for this, from its manifest.
-
-        Args:
-            expectation: What is expected, from the first step on.
-            name: A name for the verdict.
-
-        Raises:
-            InputError: It names something unknown, or an event that can never happen; or the run
-                isn't complete.
-            ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
-        """
-        return hook("run", "judge")(self, expectation, name)
-
-    def draw(self, at: str | int | None = None, ax: Any = None) -> Any:
-        """Draw the run, or one moment of it; needs the extra `viz`.
-
-        Args:
-            at: A moment, such as "day 3 18:30", or a step; None: the whole run.
-            ax: Matplotlib axes to draw the moment on (the last one, if `at` is None).
-
-        Returns:
-            A matplotlib figure, or `ax`.
-
-        Raises:
-            InputError: `at` names no moment, or matplotlib is missing.
-            ArtifactError: The run stored no floor plan or no key frames.
-        """
-        return hook("run", "draw")(self, at, ax)
-
-    def view(self, height: int = 720) -> Any:
-        """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
-
-        Args:
-            height: Height of the widget [pixels].
-
-        Raises:
-            InputError: anywidget is not installed.
-            ArtifactError: The run stored no floor plan.
-        """
-        return hook("run", "view")(self, height)
-
-    def _repr_html_(self) -> str:
-        """Show the run in a notebook."""
-        return hook("run", "html")(self)
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as an Arrow table.
@@ -304,7 +255,7 @@ def open_run(directory: Path | str, *, trust: bool = False) -> Run:
 
     Args:
         directory: The run directory.
-        trust: Whether its own code and programs may run when it is repeated, as by `Run.judge`;
+        trust: Whether its own code and programs may run when it is repeated, as by `judge`;
             to read it, none is needed.
 
     Raises:

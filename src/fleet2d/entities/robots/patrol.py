@@ -28,6 +28,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import stops_with_view, unwatched
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.floorplan.load import source_of
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64
 from fleet2d.runtime.clock import DAY, midnight_of
@@ -254,11 +255,8 @@ class Retrace(Behavior):
         Raises:
             PlacementError: The map has no path, or none that the robot can drive here.
         """
-        # Imported here, as other rounds need no maps.
-        from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
-
         try:
-            pieces = read_valetudo_paths(self.path)
+            pieces = source_of("valetudo", path=self.path).driven_ways()
         except FloorPlanError as error:
             raise PlacementError(
                 f"{actor.path}: {error}; it retraces the map of a Valetudo robot, and a log of"

@@ -73,7 +73,7 @@ INPUTS = ("observation", "action_mask")
 PERSON = 2
 
 TALLIED = ("relocations", "found", "gave_up", "searching_min", "overdue_h")
-"""What a policy counts for rewards: see `fleet2d.gym.task.REWARDS`."""
+"""What a policy counts for rewards: see `fleet2d.learning.gym.task.REWARDS`."""
 MAX_OVERDUE_H = 24.0
 MINUTE = timedelta(minutes=1)
 SATURDAY = 5
@@ -415,7 +415,7 @@ class Policy(BeliefBehavior):
         if self.file is None:
             raise ComponentError(
                 "the policy has no file: give one, as file: hangout.onnx, derive a class from"
-                " Policy that overrides act, or use fleet2d.gym"
+                " Policy that overrides act, or use fleet2d.learning.gym"
             )
         output = compute(self.file, {INPUTS[0]: observation[None], INPUTS[1]: mask[None]})
         scores = output[0] if output.ndim else output
