@@ -16,6 +16,7 @@ from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import BELL_STD, F64, I64, TURN, BatteryState, Breakpoints, Window
+from fleet2d.runtime.clock import MINUTE_US
 from fleet2d.runtime.determinism import stream_key
 
 # The table of events gets a row `battery` when the charge has changed by this much.
@@ -133,7 +134,6 @@ def _track(motion: Motion) -> Breakpoints:
 
 
 MAX_CORRECTION_INTERVAL = timedelta(days=1)
-MINUTE_US = 60_000_000
 # Noise is in 1/65536 of the unit of what it is added to, per unit of random_bell.
 FINE = 1 << 16
 ALONG_AXES = [f"{kind} {axis}" for kind in ("drift", "left", "jump") for axis in "xy"]

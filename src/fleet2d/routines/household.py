@@ -29,9 +29,8 @@ from fleet2d.routines.activity import (
 )
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, values_in
 from fleet2d.routines.planner import Episode, with_episode
-from fleet2d.runtime.clock import DAY
+from fleet2d.runtime.clock import DAY, SECOND
 
-SECOND = timedelta(seconds=1)
 AWAY = "holiday"
 
 

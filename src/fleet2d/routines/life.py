@@ -14,12 +14,12 @@ from fleet2d.kernels import ANY_ROOM, NO_GAP_S, RoomUse
 from fleet2d.routines import planner
 from fleet2d.routines.activity import find_activity, seconds
 from fleet2d.routines.distributions import exponential, uniform
-from fleet2d.routines.household import SECOND, Household, Period, RandomVisits, with_absences
+from fleet2d.routines.household import Household, Period, RandomVisits, with_absences
 from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.persona import Persona, YearEvent, holds_on
 from fleet2d.routines.planner import PLANNED, SLEEP, DayPlan, Episode, Job, PrivateRooms
 from fleet2d.routines.templates import starts
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import DAY_S, SECOND
 from fleet2d.runtime.determinism import Draws, stream_key
 
 Days = tuple[int, int]

@@ -32,11 +32,17 @@ from fleet2d.logs.log import (
     begin_of_run,
     files_of,
 )
-from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
+from fleet2d.logs.placement import (
+    COORDINATE_LIMIT_M,
+    DOOR,
+    UNKNOWN,
+    LogFrame,
+    LoggedVisit,
+    LoggedVisits,
+    RoomChoice,
+)
 from fleet2d.runtime.determinism import sum_in_order
 
-# Coordinates are clipped to this, far outside of any home [m].
-COORDINATE_LIMIT_M = 1e6
 # A move shorter than this is ignored for the heading [m].
 MIN_HEADING_MOVE_M = 0.1
 

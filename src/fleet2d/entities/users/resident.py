@@ -23,7 +23,7 @@ from fleet2d.kernels import ANY_ROOM, NO_GAP_S, CoreVenue, Resident
 from fleet2d.routines.activity import Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import SECOND_US, Clock
 from fleet2d.runtime.determinism import Draws
 
 T = TypeVar("T")
@@ -206,7 +206,6 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     return things[rank % members :: members] or [things[rank % len(things)]]
 
 
-SECOND_US = 1_000_000
 # How the core numbers ways of choosing rooms, small moves, and what happens.
 POLICIES = tuple(member.name.lower() for member in kernels.RoomPolicy)
 MOVE_KINDS = tuple(member.name.lower() for member in kernels.MoveKind)

@@ -16,17 +16,17 @@ from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.routines.distributions import draw_weighted
+from fleet2d.routines.planner import MILLION
+from fleet2d.runtime.clock import SECOND_US
 from fleet2d.runtime.determinism import Draws, sum_in_order
 
 AWAY = "away"
-SECOND_US = 1_000_000
 # How many visits are planned at once.
 VISITS = 20
 # The minimum length of a stay after subtracting the time of travel.
 SHORTEST_US = 10 * SECOND_US
 # Points per metre of a way at which the room is looked up.
 POINTS_PER_M = 10
-MILLION = 1_000_000
 
 
 @register("behavior", "room_sampling")

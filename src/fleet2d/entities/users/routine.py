@@ -12,7 +12,7 @@ from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
 from fleet2d.entities.users import resident
-from fleet2d.entities.users.resident import SECOND_US, ResidentBehavior, Seat, Spots, Venue
+from fleet2d.entities.users.resident import EPISODES_PER_DAY, ResidentBehavior, Seat, Spots, Venue
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
@@ -20,10 +20,10 @@ from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S
 from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
-from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms
+from fleet2d.routines.life import CACHED_DAYS, WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import PLANNED, REST, RESUMES, SLEEP, Episode
-from fleet2d.runtime.clock import DAY_S, Clock
+from fleet2d.runtime.clock import DAY_S, SECOND_US, Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 
 # All members must get the same rooms, whatever their radius: those of a body of this radius [m].
@@ -77,9 +77,6 @@ def _rooms_of(activity: Activity, reachable: list[Room]) -> list[Room]:
 
 # Bodies of the usual radius that are nearer to each other touch [m].
 TOUCHING_M = 2 * DEFAULT_RADIUS
-# The number of days whose places are kept, and of episodes of a day that have draws of their own.
-CACHED_DAYS = 3
-EPISODES_PER_DAY = 1024
 
 Places = Mapping[tuple[int, int], Seat | None]
 """The place of each member's episode, by the numbers of both; None: others have all places."""
