@@ -1,5 +1,8 @@
 // Written by `python -m tools.contract_types` from fleet2d.viewing.contract.
 
+/** Every kind of event that Fleet2D records. */
+export type EventKind = "user_lost" | "user_seen" | "robot_lost" | "robot_seen" | "activity" | "came_home" | "known" | "left_home" | "reacts" | "unknown" | "uses" | "accepted" | "allowed" | "approaches" | "asks" | "banned" | "battery" | "called" | "calls" | "charged" | "collects" | "declined" | "deferred" | "delivered" | "docks" | "due" | "expired" | "explored" | "explores" | "find_begins" | "follows" | "found" | "gave_up" | "gives_up" | "gives_way" | "ignored" | "interaction_over" | "interacts" | "localization_lost" | "lost" | "mistaken" | "not_at_home" | "opportunity" | "question" | "relocalized" | "relocates" | "replay" | "replies" | "retraced" | "retraces" | "sent_away" | "switched_off" | "told" | "visits" | "way_blocked" | "withdraws" | "light_off" | "light_on" | "locked" | "moved" | "opened" | "room_changed" | "sensor" | "shut" | "unlocked";
+
 /** A room: its colours on the plan and in lanes, and the anchor of its name [m]. */
 export interface RoomFacts {
   name: string;
@@ -136,6 +139,13 @@ export interface VerdictFacts {
   step: number | null;
 }
 
+/** A moment that is worth a look. */
+export interface StoryFacts {
+  step: number;
+  title: string;
+  words: string;
+}
+
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
 export interface SlowFacts {
   outline: [number, number][];
@@ -173,9 +183,10 @@ export interface RunFacts {
   marks: MarkFacts[];
   verdict: string;
   verdicts: VerdictFacts[];
+  story: StoryFacts[];
   slows: SlowFacts[];
   starts_unlit: boolean;
-  event_kinds: string[];
+  event_kinds: EventKind[];
   metrics: Record<string, unknown>;
   scenario: Record<string, unknown>;
   walks_every_s: number;

@@ -1,5 +1,6 @@
 /** The state of the page: signals that all parts read, and the few functions that change them. */
 
+import type { EventKind } from "./contract";
 import { batch, computed, signal } from "@preact/signals";
 import { type Answer, ask, withWords } from "./data/ask";
 import type { EventRow } from "./data/events";
@@ -54,7 +55,7 @@ export const foundEvents = computed<readonly EventRow[]>(() => {
   if (!entry) return [];
   void entry.version.value;
   const [kind, words] = [eventKind.value, search.value.trim()];
-  const rows = kind ? entry.events.ofKind(kind) : entry.events.rows;
+  const rows = kind ? entry.events.ofKind(kind as EventKind) : entry.events.rows;
   return words ? withWords(entry, rows, words) : rows;
 });
 

@@ -1,12 +1,13 @@
 /** How fast time should pass where a run is dull, and where it is lively. */
 
+import type { EventKind } from "../contract";
 import type { Run } from "./run";
 
 const CELL_US = 10e6;
 /** Times real time at which a stretch is watched, by what happens in it: nothing, robots move, people move, they meet. */
 const SPEEDS = [12_000, 600, 80, 20] as const;
 type Level = 0 | 1 | 2 | 3;
-const MEETS = ["asks", "accepted", "declined", "deferred", "found"];
+const MEETS: readonly EventKind[] = ["asks", "accepted", "declined", "deferred", "found"];
 /** Stretches of this length around a meeting are watched at ease. */
 const AROUND_US = 20e6;
 const MORNING = [6, 11] as const;

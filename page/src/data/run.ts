@@ -1,7 +1,7 @@
 /** One run: everything that the page shows of it, read when it is needed. */
 
 import { signal } from "@preact/signals";
-import type { BodyFacts, NoteFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
+import type { BodyFacts, EventKind, NoteFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
 import { type Beliefs, readBeliefs } from "./beliefs";
 import { Clock } from "./clock";
 import { Decisions, readDecisions } from "./decisions";
@@ -299,7 +299,7 @@ export class Run {
   private readonly switched = new Map<string, Switches & { seen: number }>();
 
   /** When something was switched on and off, by the events of an entity. */
-  private switches(key: string, entity: string, isAbout: (row: EventRow) => boolean, on: string, off: string): Switches {
+  private switches(key: string, entity: string, isAbout: (row: EventRow) => boolean, on: EventKind, off: EventKind): Switches {
     let found = this.switched.get(key);
     if (!found || found.seen !== this.events.rows.length) {
       const rows = this.events.ofEntity(entity).filter((row) => (row.event === on || row.event === off) && isAbout(row));

@@ -77,6 +77,7 @@ function NowOf({ run, title: heading }: { run: Run; title: string }) {
       </table>
       <Expectations run={run} />
       <Tiles run={run} />
+      <Story run={run} />
     </>
   );
 }
@@ -139,6 +140,28 @@ function Expectations({ run }: { run: Run }) {
           </li>
         ))}
       </ul>
+    </section>
+  );
+}
+
+/** Moments that are worth a look. */
+function Story({ run }: { run: Run }) {
+  const { story } = run.facts;
+  if (story.length === 0) return null;
+  return (
+    <section class="story">
+      <h3>Story</h3>
+      <ol>
+        {story.map(({ step, title: words, words: about }) => (
+          <li key={words}>
+            <button type="button" class="link" onClick={() => state.goTo(step * run.clock.stepUs)}>
+              <b>{words}</b>
+              <span>{about}</span>
+              <time>{run.clock.text(step * run.clock.stepUs).slice(0, -3)}</time>
+            </button>
+          </li>
+        ))}
+      </ol>
     </section>
   );
 }

@@ -3,10 +3,10 @@
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -15,11 +15,7 @@ from fleet2d.runs.verdicts import verdict_line, verdicts_of
 from fleet2d.runtime.memory import peak_memory_mb
 
 if TYPE_CHECKING:
-    from fleet2d.metrics.metric import Metric
     from fleet2d.runs.run import Run
-
-MAX_COLUMNS = 6
-"""With more subjects than this, a metric has a row for each of them instead of a column."""
 
 _LOADED = time.perf_counter()
 
@@ -71,6 +67,7 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
     from rich.table import Table
 
     from fleet2d.configuration.units import format_duration
+    from fleet2d.metrics.results import blocks_of
 
     print_verdict(run)
     console = Console(highlight=False, markup=False, soft_wrap=True)
@@ -84,18 +81,18 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
         f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
         f" save {wall['save']:.2f} s; whole process {wall['total']:.2f} s{memory})"
     )
-    blocks = [block_of(name, _class_of(run, name), result) for name, result in run.metrics.items()]
+    blocks = blocks_of(run.metrics, run.manifest["scenario"]["metrics"])
     width = max((len(row.name) for block in blocks for row in block.rows), default=0)
     for block in blocks:
-        if len(block.rows) == 1:  # nothing was measured
-            continue
         table = Table.grid(padding=(0, 2, 0, 0))
-        table.add_column(min_width=width)
-        for _ in block.rows[0].values:
+        table.add_column(min_width=width + 2)
+        head, *rows = block.rows
+        for _ in head.values:
             table.add_column(justify="right")
         table.add_column(style="dim")
-        for row in block.rows:
-            table.add_row(row.name, *row.values, row.unit)
+        table.add_row(head.name, *head.values)
+        for row in rows:
+            table.add_row(f"  {row.name}", *row.values, row.unit)
         console.print(table, soft_wrap=False)
     hidden = sum(block.hidden for block in blocks)
     lines = [f"{hidden} more numbers are in the run: --json shows them"] if hidden else []
@@ -106,79 +103,12 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
     console.print(*lines, sep="\n")
 
 
-class Row(NamedTuple):
-    """A line of the closing table."""
-
-    name: str
-    values: Sequence[str]
-    unit: str
-
-
-class Block(NamedTuple):
-    """The lines of a metric: the first names its subjects, each of the others has one measure."""
-
-    rows: Sequence[Row]
-    hidden: int  # numbers that it leaves out
-
-
-def _class_of(run: "Run", metric: str) -> "type[Metric]":
-    from fleet2d.configuration.components import lookup
-
-    kind = run.manifest["scenario"]["metrics"][metric]["type"]
-    return cast("type[Metric]", lookup("metric", kind))
-
-
-def block_of(metric: str, metric_class: "type[Metric]", result: Any) -> Block:
-    """Lay out the result of a metric: a column for each subject, such as a person.
-
-    Only the numbers next to the subjects are in it, not what is nested in them.
-    """
-    numbers = dict(_numbers(metric_class.summary(result)))
-    depth = min(map(len, numbers), default=0)
-    shown = {path: number for path, number in numbers.items() if len(path) == depth}
-    hidden = len(list(_numbers(result))) - len(shown)
-    subjects = list(dict.fromkeys(path[:-1] for path in shown))
-    measures = list(dict.fromkeys(path[-1:] for path in shown))
-    has_names_alone = depth == 1 and not any(name in metric_class.units for (name,) in shown)
-    if has_names_alone and len(shown) <= MAX_COLUMNS:
-        subjects, measures = measures, [()]
-    rows = [Row(metric, [" · ".join(subject) for subject in subjects], "")]
-    last_unit = ""
-    for measure in measures:
-        unit = metric_class.units.get("".join(measure), metric_class.unit)
-        values = [
-            _text(shown[subject + measure], unit) if subject + measure in shown else ""
-            for subject in subjects
-        ]
-        rows.append(Row(f"  {''.join(measure)}", values, "" if unit == last_unit else unit))
-        last_unit = unit
-    return Block(rows, hidden)
-
-
-def _numbers(result: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield the numbers of a result with the names on the way to each."""
-    if not isinstance(result, Mapping):
-        yield path, result
-        return
-    for name, value in result.items():
-        yield from _numbers(value, (*path, str(name)))
-
-
 def print_verdict(run: "Run", *, err: bool = False) -> None:
     """Print what became of the expectations, a line for each violated one; red if one is."""
     verdicts = verdicts_of(run)
     violated = [verdict.says for verdict in verdicts if verdict.outcome == "violated"]
     if line := verdict_line(run, verdicts):
         typer.secho("\n".join([line, *violated]), fg="red" if violated else None, err=err)
-
-
-def _text(value: Any, unit: str) -> str:
-    """Return a value as text: shares in percent, other numbers with few digits."""
-    if not isinstance(value, float):
-        return str(value)
-    if unit.startswith("share"):
-        return f"{100 * value:.1f} %" if value >= 0.001 or value == 0 else "< 0.1 %"
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
 def _since_start() -> float:

@@ -20,7 +20,12 @@ from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
 # What happens between a person and a robot without a request.
-TOLD = frozenset({"called", "question", "replies", "sent_away", "banned", "switched_off"})
+TOLD = frozenset(
+    {
+        EventKind.CALLED, EventKind.QUESTION, EventKind.REPLIES, EventKind.SENT_AWAY,
+        EventKind.BANNED, EventKind.SWITCHED_OFF,
+    }
+)  # fmt: skip
 
 
 @register("metric", "interactions")

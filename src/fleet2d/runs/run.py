@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
-from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
-from fleet2d.floorplan.layers import Layer
 from fleet2d.runtime.clock import Clock
 from fleet2d.storage.files import PARTIAL, path_in
 
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
 LAYER_PREFIX = "layer."
 ALL_CELLS = -1
 """Row and column of the entry that holds the fill value: of all cells without an entry."""
-LAYER_KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64"}
 
 
 class Tables(Mapping[str, "pa.Table"]):
@@ -356,36 +353,6 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
     if names := sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}")):
         notes.append(f"cut off and not readable: {printable(', '.join(names))}")
     return notes
-
-
-def layer_table(layer: Layer) -> TableSpec:
-    """Return the table that a layer is stored in."""
-    kind = LAYER_KINDS[layer.dtype.kind]
-    return TableSpec(
-        f"{LAYER_PREFIX}{layer.name}",
-        (
-            Column("step", "step", description="the layer as it was after this step"),
-            Column("time", "time", description="local time"),
-            Column("row", "int32", description="of the cell; -1: all cells not named"),
-            Column("column", "int32"),
-            Column("value", kind, layer.unit, kind == "float64", description=layer.description),
-        ),
-        layer.description,
-    )
-
-
-def layer_rows(layer: Layer) -> dict[str, NDArray[Any]]:
-    """Return the present values of a layer as rows: columns row, column and value."""
-    values = layer.values
-    fill = np.array(layer.fill)
-    differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
-    row, column = np.nonzero(differs)
-    kind = DTYPES[LAYER_KINDS[layer.dtype.kind]]
-    return {
-        "row": np.concatenate([[ALL_CELLS], row]).astype(np.int32),
-        "column": np.concatenate([[ALL_CELLS], column]).astype(np.int32),
-        "value": np.concatenate([[fill.astype(kind)], values[differs].astype(kind)]),
-    }
 
 
 def layer_names(run: Run) -> list[str]:

@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter
 from typing_extensions import TypedDict  # pydantic reads that of typing from Python 3.12 on only
 
 from fleet2d.errors import InputError
+from fleet2d.runtime.events import EventKind
 
 Point = tuple[float, float]
 Shape = TypeVar("Shape")
@@ -203,6 +204,14 @@ class VerdictFacts(TypedDict):
     step: int | None
 
 
+class StoryFacts(TypedDict):
+    """A moment that is worth a look."""
+
+    step: int
+    title: str
+    words: str
+
+
 class SlowFacts(TypedDict):
     """A floor that slows robots down from `step` to before `end`: its outline [m], its effect."""
 
@@ -251,9 +260,10 @@ class RunFacts(TypedDict):
     marks: list[MarkFacts]
     verdict: str
     verdicts: list[VerdictFacts]
+    story: list[StoryFacts]
     slows: list[SlowFacts]
     starts_unlit: bool
-    event_kinds: list[str]
+    event_kinds: list[EventKind]
     metrics: dict[str, Any]
     scenario: dict[str, Any]
     walks_every_s: float

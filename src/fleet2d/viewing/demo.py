@@ -15,6 +15,7 @@ from fleet2d.cli.run import run_with_progress, set_up
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.interactions.interaction import Outcome
+from fleet2d.runtime.events import EventKind
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -100,21 +101,23 @@ def _learning(run: "Run") -> Iterator[str]:
 def _requests(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Yield how often a robot asked something of somebody, and with which answers."""
     counts = Counter(event["event"] for event in events)
-    if counts["asks"]:
+    asked = counts[EventKind.ASKS]
+    if asked:
         answers = {
             IN_WORDS.get(outcome, outcome.replace("_", " ")): counts[outcome] for outcome in Outcome
         }
-        answers["not noticed"] = counts["asks"] - sum(answers.values())  # there is no event then
+        # A question that nobody notices has no event of its own.
+        answers["not noticed"] = asked - sum(answers.values())
         listed = ", ".join(f"{count} {word}" for word, count in answers.items() if count)
-        yield f"{_title(robot)} asked {counts['asks']} times: {listed}."
+        yield f"{_title(robot)} asked {asked} times: {listed}."
 
 
 def _searches(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Yield how often a robot found whom it searched."""
     counts = Counter((event["event"], event["detail"]) for event in events)
     for (event, user), searches in counts.items():
-        if event == "find_begins":
-            found = counts["found", user]
+        if event == EventKind.FIND_BEGINS:
+            found = counts[EventKind.FOUND, user]
             yield f"{_title(robot)} found {_title(user)} in {found} of {searches} searches."
 
 

@@ -21,6 +21,7 @@ from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.kernels import I16, Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.runs.run import Run
+from fleet2d.runtime.events import EventKind
 from fleet2d.viewing.contract import (
     DoorFacts,
     DoorwayFacts,
@@ -206,9 +207,9 @@ class WallsHistory:
         return self.meshes[number]
 
     def _replay(self, step: int, entity: str, event: str, detail: str) -> None:
-        if event in ("opened", "shut") and entity in self._names:
-            self._home.set_door(self._names.index(entity), is_open=event == "opened")
-        elif event == "moved" and (place := _MOVE.fullmatch(detail)):
+        if event in (EventKind.OPENED, EventKind.SHUT) and entity in self._names:
+            self._home.set_door(self._names.index(entity), is_open=event == EventKind.OPENED)
+        elif event == EventKind.MOVED and (place := _MOVE.fullmatch(detail)):
             item = self._home.object(place[1])
             to = (float(place[2]), float(place[3]))
             try:
@@ -246,6 +247,8 @@ def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
     except ArtifactError:  # the run's notes say that it is damaged
         return []
     events = compute.cast(table["event"], "string")
-    rows = table.filter(compute.is_in(events, array(["opened", "shut", "moved"])))
+    rows = table.filter(
+        compute.is_in(events, array([EventKind.OPENED, EventKind.SHUT, EventKind.MOVED]))
+    )
     columns = ("step", "entity", "event", "detail")
     return [tuple(row.values()) for row in rows.select(columns).to_pylist()]

@@ -14,11 +14,13 @@ import yaml
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.metrics.metric import flat
+from fleet2d.metrics.results import Block, blocks_of
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY
 from fleet2d.viewing.notebook import figure_png, verdict_html
 from fleet2d.viewing.page_data import POLICY, PageData, embedded_run, html_of, write_file
 from fleet2d.viewing.run_facts import run_title
+from fleet2d.viewing.story import story_of
 
 MAX_TIMELINE_CHARS = 20_000_000
 """The maximum number of characters of a page that is embedded in a report."""
@@ -51,6 +53,7 @@ def report_html(run: Run) -> str:
         verdict_html(run),
         _what_ran(run),
         _notes(run),
+        _story(run),
         "<h2>Metrics</h2>",
         _metrics(run),
         "<h2>Figures</h2>",
@@ -89,11 +92,38 @@ def _notes(run: Run) -> str:
 
 
 def _metrics(run: Run) -> str:
-    texts = [
+    if not run.metrics:
+        return "<p>The run has none.</p>"
+    blocks = blocks_of(run.metrics, run.manifest["scenario"]["metrics"])
+    numbers = [
         (name, f"{value:.4g}" if isinstance(value, float) else str(value))
         for name, value in flat(run.metrics)
     ]
-    return _table(texts) if run.metrics else "<p>The run has none.</p>"
+    every = f"<details><summary>All {len(numbers)} numbers</summary>{_table(numbers)}</details>"
+    return "".join(map(_block, blocks)) + every
+
+
+def _story(run: Run) -> str:
+    """Return the moments of a run that are worth a look, as a list."""
+    moments = []
+    for moment in story_of(run):
+        title, words = html.escape(moment["title"]), html.escape(moment["words"])
+        time = f"{run.clock.time(moment['step']):%a %-d %b %H:%M}"
+        moments.append(f"<li><b>{title}</b>, {time}: {words}</li>")
+    return f"<h2>Story</h2><ul>{''.join(moments)}</ul>" if moments else ""
+
+
+def _block(block: Block) -> str:
+    """Return the numbers of a metric as a table."""
+    head, *rows = block.rows
+    subjects = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in head.values)
+    lines = [f"<tr><th>{html.escape(head.name)}</th>{subjects}<th></th></tr>"]
+    for row in rows:
+        numbers = "".join(f"<td>{html.escape(value)}</td>" for value in row.values)
+        name = html.escape(row.name)
+        unit = html.escape(row.unit)
+        lines.append(f'<tr><th scope="row">{name}</th>{numbers}<td class="unit">{unit}</td></tr>')
+    return f'<table class="metric">{"".join(lines)}</table>'
 
 
 def _table(rows: list[tuple[str, str]]) -> str:

@@ -20,7 +20,7 @@ from fleet2d.palette import body_color
 from fleet2d.runs.run import LAYER_PREFIX, Run
 from fleet2d.runs.verdicts import verdict_line, verdicts_of, violations_of
 from fleet2d.runtime.clock import Clock
-from fleet2d.runtime.events import KINDS
+from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in
 from fleet2d.viewing.contract import (
@@ -36,6 +36,7 @@ from fleet2d.viewing.contract import (
     WallsChange,
 )
 from fleet2d.viewing.home_facts import WallsHistory, door_facts, home_facts
+from fleet2d.viewing.story import story_of
 
 INTERVENTIONS = "interventions"
 
@@ -269,9 +270,10 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         verdicts=[
             VerdictFacts(name=v.name, outcome=v.outcome, says=v.says, step=v.step) for v in verdicts
         ],
+        story=story_of(run),
         slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
         starts_unlit=_starts_unlit(scenario),
-        event_kinds=sorted(KINDS),
+        event_kinds=sorted(EventKind),
         metrics=run.metrics,
         scenario=scenario,
         walks_every_s=0.0,
@@ -402,9 +404,10 @@ def live_facts(simulation: Simulation) -> RunFacts:
         marks=[],
         verdict="",
         verdicts=[],
+        story=[],
         slows=slow_floors(scenario, interventions_of(simulation), clock),
         starts_unlit=_starts_unlit(scenario),
-        event_kinds=sorted(KINDS),
+        event_kinds=sorted(EventKind),
         metrics={},
         scenario=scenario,
         walks_every_s=0.0,

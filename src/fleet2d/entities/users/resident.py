@@ -25,6 +25,7 @@ from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
 from fleet2d.runtime.clock import SECOND_US, Clock
 from fleet2d.runtime.determinism import Draws
+from fleet2d.runtime.events import EventKind
 
 T = TypeVar("T")
 
@@ -206,10 +207,10 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     return things[rank % members :: members] or [things[rank % len(things)]]
 
 
-# How the core numbers ways of choosing rooms, small moves, and what happens.
-POLICIES = tuple(member.name.lower() for member in kernels.RoomPolicy)
-MOVE_KINDS = tuple(member.name.lower() for member in kernels.MoveKind)
-EVENTS = tuple(member.name.lower() for member in kernels.Happening)
+# How the core numbers ways of choosing rooms, small moves, and events.
+POLICIES = tuple(policy.name.lower() for policy in kernels.RoomPolicy)
+MOVE_KINDS = tuple(kind.name.lower() for kind in kernels.MoveKind)
+EVENTS = tuple(EventKind[event.name] for event in kernels.Happening)
 
 
 @lru_cache(512)  # most are the same for all people

@@ -13,6 +13,7 @@ from fleet2d.artifacts.arrow import number_array, string_array, values_of
 from fleet2d.kernels import I64
 from fleet2d.learning.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.events import EventKind
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -144,7 +145,7 @@ def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
     activity: Any = np.zeros(0, object)
     if "events" in run.tables:
         events = columns_of(run, "events", ["event", "entity", "step", "detail"])
-        is_own = (events["event"] == "activity") & (events["entity"] == user)
+        is_own = (events["event"] == EventKind.ACTIVITY) & (events["entity"] == user)
         since = events["step"][is_own]
         activity = events["detail"][is_own]
     stay = np.searchsorted(begin, steps, side="right") - 1

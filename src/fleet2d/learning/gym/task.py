@@ -20,6 +20,7 @@ from fleet2d.entities.robots.policy import Policy
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.floorplan.home import HOME_CACHE
 from fleet2d.floorplan.source import PLAN_CACHE
+from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario, explain, load_scenario
 from fleet2d.studies.axes import check_count
 
@@ -32,8 +33,8 @@ HOMES = 128
 REWARDS = {
     "in_view_min": "minutes for which a person is perceived, summed over the people",
     "relocations": "times that it goes to another place",
-    "found": "searches that end with the person in view",
-    "gave_up": "searches that end without",
+    EventKind.FOUND: "searches that end with the person in view",
+    EventKind.GAVE_UP: "searches that end without",
     "searching_min": "minutes of searching",
     "overdue_h": "hours, 24 at most, since the last visit of each room that it visits",
 }

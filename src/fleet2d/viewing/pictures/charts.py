@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.configuration.units import WEEKDAYS
 from fleet2d.errors import ArtifactError, InputError
+from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.rtp_score import calibration_error, classwise_error, reliability_curve, top_k
 from fleet2d.routines.interruptions import without_interruptions
@@ -24,6 +25,7 @@ from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Episode
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.runtime.clock import HOUR_S, midnight_of
+from fleet2d.runtime.events import EventKind
 from fleet2d.viewing.pictures.floorplan import picture, write_picture
 
 MONDAY = date(2026, 1, 5)
@@ -234,22 +236,24 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
 
 # What came of a request or question, in the order in which it is stacked, and its color.
 ANSWER_COLORS = {
-    "accepted": "#009988",
-    "deferred": "#77aadd",
-    "declined": "#ee7733",
+    Outcome.ACCEPTED: "#009988",
+    Outcome.DEFERRED: "#77aadd",
+    Outcome.DECLINED: "#ee7733",
     "no answer": "#bbbbbb",
     "sent away": "#cc3311",
 }
 SHOWN_AS = {
-    "accepted": "accepted",
-    "deferred": "deferred",
-    "declined": "declined",
-    "sent_away": "sent away",
-    "banned": "sent away",
-    "switched_off": "sent away",
+    Outcome.ACCEPTED: Outcome.ACCEPTED,
+    Outcome.DEFERRED: Outcome.DEFERRED,
+    Outcome.DECLINED: Outcome.DECLINED,
+    Outcome.SENT_AWAY: "sent away",
+    Outcome.BANNED: "sent away",
+    Outcome.SWITCHED_OFF: "sent away",
 }
 # Events by which a robot is no longer with the person whom it addressed.
-ENDS_TALK = frozenset({"delivered", "collects", "withdraws", "interaction_over"})
+ENDS_TALK = frozenset(
+    {EventKind.DELIVERED, EventKind.COLLECTS, EventKind.WITHDRAWS, EventKind.INTERACTION_OVER}
+)
 MOOD_COLOR = "#aa3377"
 EXPIRED_COLOR = "#9a9a9a"
 WEEKLY_FROM = 70  # days of a run from which on bars are weeks
@@ -297,12 +301,12 @@ def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
     for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
         if event in ENDS_TALK and robot in open_ones:
             asked.append(open_ones.pop(robot)._replace(end=step))
-        elif event == "asks":
+        elif event == EventKind.ASKS:
             asked += [open_ones.pop(robot)] if robot in open_ones else []
             open_ones[robot] = AskedTime(robot, detail, step, "no answer")
         elif event in SHOWN_AS and robot in open_ones and open_ones[robot].answered is None:
             open_ones[robot] = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
-        elif event == "expired":
+        elif event == EventKind.EXPIRED:
             expired.append(AskedTime(robot, detail, step, event))
     return [*asked, *open_ones.values()], expired
 
@@ -342,7 +346,7 @@ def answers_figure(run: Run) -> Figure:
         _stack(by_day, [(hours / 24, answer) for hours, answer in times], width, days)
         _stack(by_hour, [(hours % 24, answer) for hours, answer in times], 1, 24)
         by_day.plot(late, np.zeros(len(late)), "|", color=EXPIRED_COLOR, clip_on=False)
-        accepted = sum(each.answer == "accepted" for each in own)
+        accepted = sum(each.answer == Outcome.ACCEPTED for each in own)
         title = f"{robot} asked {user} {len(own)} times: {accepted} accepted, {len(late)} expired"
         by_day.set_title(title, loc="left", fontsize=10)
         by_day.set(xlabel="day", ylabel="times a week" if width == 7 else "times a day")

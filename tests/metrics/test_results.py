@@ -1,9 +1,9 @@
-"""The closing table of a run."""
+"""Results of metrics as tables."""
 
-from fleet2d.cli.results import Row, block_of
 from fleet2d.metrics.bodies import Distance
 from fleet2d.metrics.interactions import Interactions
 from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.results import Row, block_of
 
 
 def test_people_are_columns_and_measures_rows() -> None:
@@ -11,8 +11,8 @@ def test_people_are_columns_and_measures_rows() -> None:
 
     block = block_of("requests", Interactions, {"astro": astro})
 
-    kept = Row("  kept", ["50.0 %", "100.0 %"], "share of requests")
-    wanted = Row("  wanted", ["2", "30"], "requests")
+    kept = Row("kept", ["50.0 %", "100.0 %"], "share of requests")
+    wanted = Row("wanted", ["2", "30"], "requests")
     assert [Row("requests", ["astro · ana", "astro · ben"], ""), kept, wanted] == block.rows
     assert 0 == block.hidden
 
@@ -30,7 +30,7 @@ def test_numbers_nested_in_a_subject_are_counted_as_hidden() -> None:
 
     block = block_of("requests", Interactions, {"astro": {"ana": numbers}})
 
-    assert ["requests", "  wanted"] == [row.name for row in block.rows]
+    assert ["requests", "wanted"] == [row.name for row in block.rows]
     assert 3 == block.hidden
 
 
@@ -39,7 +39,7 @@ def test_subjects_alone_stand_in_one_row() -> None:
 
     assert [
         Row("distance", ["ana", "astro"], ""),
-        Row("  ", ["743", "1,095"], "m a day"),
+        Row("", ["743", "1,095"], "m a day"),
     ] == block.rows
 
 
@@ -47,13 +47,13 @@ def test_more_subjects_than_columns_are_rows() -> None:
     block = block_of("distance", Distance, {f"user{i}": float(i) for i in range(7)})
 
     assert 8 == len(block.rows)
-    assert Row("  user3", ["3"], "") == block.rows[4]
+    assert Row("user3", ["3"], "") == block.rows[4]
 
 
 def test_measures_without_a_subject_are_rows() -> None:
     block = block_of("team", Interactions, {"kept": 0.5, "woke": 3})
 
-    assert ["team", "  kept", "  woke"] == [row.name for row in block.rows]
+    assert ["team", "kept", "woke"] == [row.name for row in block.rows]
 
 
 def test_result_without_numbers_has_no_rows_but_the_head() -> None:
