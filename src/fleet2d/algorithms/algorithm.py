@@ -366,7 +366,7 @@ class Algorithm(Component):
         1800.0
     """
 
-    kind: ClassVar[str] = "algorithm"
+    kind = "algorithm"
     # How far before its period it reads the history; timedelta.max: all of it.
     looks_back: ClassVar[timedelta] = timedelta(0)
     # The data that it needs computed: evidence, exposure, explored, first_seen, last_seen …

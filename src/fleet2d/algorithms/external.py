@@ -1,9 +1,9 @@
 """Algorithms for other programs: evidence as a table, a program that is asked, recorded output."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -241,7 +241,7 @@ class EvidenceTable(Algorithm):
     view, averaged over the bin; `seen`, the steps at which the user was perceived there.
     """
 
-    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+    needs = frozenset({"evidence"})
 
     def start(self, home: Home) -> None:
         """Keep the names and the kinds of rooms."""

@@ -41,7 +41,7 @@ from fleet2d.kernels import (
     rooms_at,
     sum_moves,
 )
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import DAY_S, Clock
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 
@@ -450,6 +450,11 @@ class History:
     def __len__(self) -> int:
         """Return the number of steps."""
         return self.end - self.first
+
+    @property
+    def days(self) -> float:
+        """How long its steps last [days]."""
+        return len(self) * self.step_s / DAY_S
 
     @cached_property
     def observations(self) -> Observations:

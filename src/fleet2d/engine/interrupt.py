@@ -7,7 +7,7 @@ first of them, and the body decides right after it.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, cast
+from typing import cast
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Interrupt(Component):
     no keys, and whether it holds must follow from the arguments of `holds` alone.
     """
 
-    kind: ClassVar[str] = "interrupt"
+    kind = "interrupt"
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps of a span the condition holds, bool (steps,)."""

@@ -40,7 +40,7 @@ class Model(Component):
     A scenario names a model of your own, such as one learned elsewhere, by `model: module:Class`.
     """
 
-    kind: ClassVar[str] = "presence_model"
+    kind = "presence_model"
     # Whether the belief after a bin is the same however many bins `observe` gets at a time.
     is_by_bin: ClassVar[bool] = False
 
@@ -100,7 +100,7 @@ class LastSeen(Model):
     away. The naive baseline: right just after a sighting, and overconfident later.
     """
 
-    is_by_bin: ClassVar[bool] = True
+    is_by_bin = True
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
