@@ -34,7 +34,7 @@ class Absent:
 sys.meta_path.insert(0, Absent())
 """
 """A `sitecustomize` that hides modules from a process and from the children that it starts."""
-OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun", "mlflow-skinny": "mlflow"}
+OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun"}
 """Modules whose names aren't those of their packages."""
 TOOLS = ("test", "browser", "page", "lint", "docs", "build", "cluster")
 
@@ -113,8 +113,6 @@ LACKING = [
     ("export run run.rrd", "", "rerun"),
     ("study report st", "", "viz"),
     ("study report st", "polars", "polars|study"),
-    ("study track st --to mlflow", "", "mlflow"),
-    ("study track st --to wandb", "", "wandb"),
     ("study run study.yaml --out ray --executor ray", "", "ray"),
     ("study run study.yaml --out slurm --executor slurm", "", "slurm"),
     ("study tune tune.yaml --out tuned", "", "tune"),

@@ -1,4 +1,4 @@
-"""The commands `fleet2d study run`, `tune`, `status`, `rerun`, `report`, `power` and `track`."""
+"""The commands `fleet2d study run`, `tune`, `status`, `rerun`, `report` and `power`."""
 
 import gc
 import itertools
@@ -249,29 +249,6 @@ def power(
         tbl_formatting="NOTHING", tbl_width_chars=200,
     ):  # fmt: skip
         _print(str(table).replace("null", "–"))
-
-
-@studying.command()
-def track(
-    location: Where,
-    to: Annotated[Literal["mlflow", "wandb"], typer.Option(help="The tracker.")],
-    project: Annotated[
-        str, typer.Option(help="The experiment of MLflow, or the project of Weights & Biases.")
-    ] = "fleet2d",
-    uri: Annotated[
-        str | None, typer.Option(help="MLflow's store; left out: as MLFLOW_TRACKING_URI says.")
-    ] = None,
-) -> None:
-    """Store a study in MLflow or Weights & Biases.
-
-    Examples:
-      fleet2d study track studies/speeds --to mlflow --project speeds
-    """
-    from fleet2d.studies.reader import open_study
-    from fleet2d.studies.trackers import track as store
-
-    count = store(open_study(location), to, project, uri)
-    _print(f"{count} variants stored in {project}")
 
 
 def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str, Any]:
