@@ -2,18 +2,18 @@
 
 import os
 import shutil
-from collections.abc import Generator
+from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studies.scenes import SPEED, base, digests, run, small
+from tests.studies.scenes import SPEED, CountingExecutor, base, digests, run, small
 from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
 from fleet2d.studies import design, driver
-from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.executors import LocalExecutor, SerialExecutor
 from fleet2d.studies.plan import Changed
 from fleet2d.studies.reader import open_study
 
@@ -26,26 +26,6 @@ class Fails(Algorithm):
         if self.at == 2:
             raise ValueError("no more")
 """
-
-
-class CountingExecutor(SerialExecutor):
-    """Runs up to a number of tasks in this process, in the order of their numbers or backwards."""
-
-    def __init__(self, most: int = 1000, *, backwards: bool = False) -> None:
-        self.most, self.backwards = most, backwards
-        self.ran: list[int] = []
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        single = TaskSchedule([])
-        pending = []
-        while (task := tasks.take("all")) is not None:
-            pending.append(task)
-        for task in sorted(pending, key=lambda t: t.number, reverse=self.backwards):
-            if len(self.ran) == self.most:
-                raise KeyboardInterrupt
-            single.put_back(task)
-            self.ran.append(task.number)
-            yield from super().run(job, single)
 
 
 class CollectingObserver(driver.Observer):
@@ -86,14 +66,11 @@ def test_run_again_it_runs_nothing(copied: Path) -> None:
     assert (6, []) == (counts.complete, executor.ran)
 
 
-@pytest.mark.parametrize("backwards", [False, True])
-def test_it_goes_on_where_it_was_interrupted(
-    undisturbed_dir: Path, tmp_path: Path, backwards: bool
-) -> None:
+def test_it_goes_on_where_it_was_interrupted(undisturbed_dir: Path, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     ran = []
     for most in (2, 1, 0, 9):
-        executor = CountingExecutor(most, backwards=backwards)
+        executor = CountingExecutor(most)
         with suppress(KeyboardInterrupt):
             _, study = run(small(**ROWS), folder, executor)
         ran += executor.ran
@@ -267,10 +244,10 @@ def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
 
 def test_two_processes_can_not_run_the_same_study(tmp_path: Path) -> None:
     class Nested(SerialExecutor):
-        def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
             with pytest.raises(RunDirectoryError, match="is being written by process"):
                 run(small(), tmp_path / "study")
-            yield from super().run(job, tasks)
+            return super().submit(function, *args, **kwargs)
 
     assert 6 == run(small(), tmp_path / "study", Nested())[0].complete
 
@@ -314,10 +291,10 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
     failing: dict[str, Any], tmp_path: Path
 ) -> None:
     class Meddling(SerialExecutor):
-        def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
+        def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
             with (tmp_path / "broken.py").open("a") as file:
                 file.write("# changed\n")
-            yield from super().run(job, tasks)
+            return super().submit(function, *args, **kwargs)
 
     counts, study = run(failing, tmp_path / "study", Meddling())
     assert 3 == counts.failed
@@ -329,7 +306,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
 def test_results_are_the_same_with_any_number_of_workers(
     undisturbed_dir: Path, tmp_path: Path, workers: int
 ) -> None:
-    counts, study = run(small(**ROWS), tmp_path / "study", LocalExecutor(workers))
+    counts, study = run(small(**ROWS), tmp_path / "study", LocalExecutor(workers), workers)
     assert 6 == counts.complete
     assert digests(open_study(undisturbed_dir)) == digests(study)
     undisturbed = open_study(undisturbed_dir)

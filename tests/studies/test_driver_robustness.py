@@ -95,7 +95,8 @@ def start(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
 
 
 def workers_of(process: "subprocess.Popen[bytes]") -> list[int]:
-    pids = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    files = Path(f"/proc/{process.pid}/task").glob("*/children")  # a thread starts each
+    pids = [pid for file in files for pid in file.read_text().split()]
     commands = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids}
     return [pid for pid, command in commands.items() if b"spawn_main" in command]
 

@@ -13,11 +13,8 @@ from fleet2d.errors import ScenarioError
 from fleet2d.scenario.model import load_scenario
 from fleet2d.studies.design import _LEAVES, build_design, code_version, input_hash
 from fleet2d.studies.driver import Observer, check_study
-from fleet2d.studies.executors import (
-    SerialExecutor,
-)
+from fleet2d.studies.executors import Crew, SerialExecutor
 from fleet2d.studies.plan import (
-    PlanSchedule,
     StudyPlan,
     check_setups,
     make_plan,
@@ -99,7 +96,7 @@ def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:
 
 def test_who_can_not_stand_in_a_home_is_found_before_the_first_run() -> None:
     with pytest.raises(ScenarioError, match=r"variant 3 \(start = attic"):
-        check_setups(plan(axes={"start": ATTIC}), SerialExecutor())
+        check_setups(plan(axes={"start": ATTIC}), Crew(SerialExecutor()))
 
 
 def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
@@ -243,21 +240,3 @@ def test_a_plan_takes_at_most_48_bytes_a_variant() -> None:
 def test_equal_seeds_are_refused() -> None:
     with pytest.raises(ScenarioError, match=r"variant 0 .* and variant 2 .* are the same scenario"):
         plan(replicates=[7, 8, 7])
-
-
-def test_tasks_are_made_from_both_ends_and_put_back_in_their_place() -> None:
-    variants = plan(replicates=4).variants
-    schedule = PlanSchedule(variants, np.arange(1, len(variants)))
-    assert len(variants) - 1 == len(schedule)
-    first, second = schedule.take("a"), schedule.take("a")
-    last = schedule.take("b")
-    assert first is not None
-    assert second is not None
-    assert last is not None
-    assert (1, 2, len(variants) - 1) == (first.index, second.index, last.index)
-    assert variants[1].identity == first.identity
-    schedule.put_back(second)
-    assert schedule.take("a") == second
-    rest = [task.index for task in iter(lambda: schedule.take("a"), None)]
-    assert list(range(3, len(variants) - 1)) == rest
-    assert not schedule

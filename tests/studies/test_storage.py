@@ -1,7 +1,7 @@
 """Where studies lie: folders, and an S3 server on this machine."""
 
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,26 +9,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.fs as pafs
 import pytest
-from tests.studies.scenes import digests, optional, run, small
+from tests.studies.scenes import CountingExecutor, digests, optional, run, small
 
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.studies import driver
 from fleet2d.studies.directory import StudyDirectory
-from fleet2d.studies.executors import Event, SerialExecutor, TaskSchedule, WorkerJob
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.storage import Storage
 
 ROWS = small(keep={"tables": ["room_share"]})
-
-
-class Interrupted(SerialExecutor):
-    """Ends after two tasks."""
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        for number, event in enumerate(super().run(job, tasks)):
-            if number == 2:
-                raise KeyboardInterrupt
-            yield event
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +57,7 @@ def test_a_study_on_s3_is_the_same_as_in_a_folder(location: str, tmp_path: Path)
 
 def test_a_study_on_s3_goes_on_where_it_was_interrupted(location: str, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
-        run(ROWS, location, Interrupted())  # type: ignore[arg-type]
+        run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
     assert 2 == open_study(location).counts.complete
     _, remote = run(ROWS, location)  # type: ignore[arg-type]
     _, local = run(ROWS, tmp_path / "study")
@@ -80,7 +69,7 @@ def test_what_is_on_s3_is_there_for_another_machine(
 ) -> None:
     monkeypatch.setattr(driver, "PART_S_REMOTE", 0.0)  # each result becomes a part at once
     with pytest.raises(KeyboardInterrupt):
-        run(ROWS, location, Interrupted())  # type: ignore[arg-type]
+        run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
     shutil.rmtree(tmp_path / "cache")
     assert 2 == open_study(location).counts.complete
 

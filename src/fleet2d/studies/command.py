@@ -78,7 +78,7 @@ def run(  # noqa: PLR0913 - options of the command line
       fleet2d study run speeds.yaml --dry-run
       fleet2d study run speeds.yaml --workers 8 --out speeds
     """
-    from fleet2d.studies.api import default_location, make_executor
+    from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
 
@@ -88,10 +88,13 @@ def run(  # noqa: PLR0913 - options of the command line
         return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    with _interruptible(location), observing(quiet=quiet) as observer:
-        where = make_executor(executor, workers, slurm_parameters(slurm))
+    with (
+        _interruptible(location),
+        observing(quiet=quiet) as observer,
+        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+    ):
         counts = run_study(
-            checked, location, where, fail_fast=fail_fast, changed=changed, observer=observer
+            checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
         )
     if as_json:
         _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
@@ -284,12 +287,13 @@ def _print_size(count: int) -> None:
 
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and how much all of them are."""
-    from fleet2d.studies.executors import LocalExecutor, cores
+    from fleet2d.studies.api import open_crew
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.progress import in_words
 
     plan = checked.plan
-    check_setups(plan, LocalExecutor(workers or cores()))
+    with open_crew("local", workers) as crew:
+        check_setups(plan, crew)
     for column, labels in plan.design.labels.items():
         values = ", ".join(map(str, labels[:MAX_LINES]))
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
@@ -375,16 +379,19 @@ def tune(
     Examples:
       fleet2d study tune search.yaml --workers 8
     """
-    from fleet2d.studies.api import default_location, make_executor
+    from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.progress import observing_trials
     from fleet2d.studies.specification import read_specification
     from fleet2d.studies.tuning import tune as search
 
     specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    runner = make_executor(executor, workers, slurm_parameters(slurm))
-    with _interruptible(folder), observing_trials(show=not quiet) as bar:
-        result = search(specification, folder, runner, bar, changed=changed, storage=storage)
+    with (
+        _interruptible(folder),
+        observing_trials(show=not quiet) as bar,
+        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+    ):
+        result = search(specification, folder, crew, bar, changed=changed, storage=storage)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())

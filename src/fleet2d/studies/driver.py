@@ -1,15 +1,13 @@
 """Running a study: missing variants are run, and each result is stored at once."""
 
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import ComponentError, Fleet2DError
@@ -32,13 +30,12 @@ from fleet2d.studies.directory import (
     MetricFacts,
     StudyDirectory,
 )
-from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
 from fleet2d.studies.intervals import LEVEL
 from fleet2d.studies.parts import Part
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
-    PlanSchedule,
     ScenarioFile,
     StudyPlan,
     check_setups,
@@ -62,8 +59,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-class AdaptiveSchedule(TaskSchedule):
-    """The tasks of a study in rounds of seeds; between rounds the results so far decide.
+class AdaptiveRounds:
+    """The variants of a study in rounds of seeds; between rounds the results so far decide.
 
     All values of the axis have the same seeds as long as they get any, so pairs stay fair. To give
     up a value, its difference must be significant at 5 % over all rounds together (Bonferroni).
@@ -73,87 +70,69 @@ class AdaptiveSchedule(TaskSchedule):
         self,
         settings: AdaptSettings,
         plan: StudyPlan,
-        missing: NDArray[np.integer[Any]],
         directory: StudyDirectory,
         on_note: Callable[[str], None],
     ) -> None:
-        """Start the first round.
+        """Prepare the rounds.
 
         Args:
             settings: The section `adapt` of the study file.
             plan: All variants.
-            missing: The places of variants without results.
             directory: The study, for results so far.
             on_note: Receives a remark for each decision.
         """
-        super().__init__(())
-        self._settings = settings
-        self._design = plan.design
+        self._settings, self._plan = settings, plan
         self._directory, self._on_note = directory, on_note
-        self._planned = plan.variants
-        self._is_missing = np.zeros(len(plan.variants), np.bool_)
-        self._is_missing[missing] = True
         self._dropped = set[object]()
-        seeds = len(plan.design.seeds)
-        round_of = plan.variants.index % seeds // settings.seeds
-        rounds = range(-(-seeds // settings.seeds))
-        self._rounds = deque(np.flatnonzero(round_of == number) for number in rounds)
-        self._looks = len(self._rounds) - 1
-        self._unfinished = 0
         self._places = list[int]()
-        self._start_round()
 
     @property
     def plan(self) -> StudyPlan:
         """The variants of all rounds so far."""
         places = np.array(sorted(self._places), np.int64)
-        return StudyPlan(self._design, self._planned.take(places))
+        return StudyPlan(self._plan.design, self._plan.variants.take(places))
 
-    def on_end(self) -> None:
-        """Count a task that has ended; after the last of a round, the next one starts."""
-        self._unfinished -= 1
-        if not self._unfinished:
-            self._start_round()
+    def __iter__(self) -> Iterator[list[int]]:
+        """Yield the places of the variants of each round, after those of the last have results."""
+        ((axis, _),) = self._settings.against.items()
+        design, index = self._plan.design, self._plan.variants.index
+        seeds = len(design.seeds)
+        round_of = index % seeds // self._settings.seeds
+        looks = int(round_of.max())
+        for number in range(looks + 1):
+            if self._places and not self._goes_on(looks):
+                return
+            places = np.flatnonzero(round_of == number).tolist()
+            labels = (design.parameters(int(index[place]))[axis] for place in places)
+            found = zip(places, labels, strict=True)
+            new = [place for place, label in found if label not in self._dropped]
+            self._places += new
+            yield new
 
-    def _start_round(self) -> None:
-        while self._rounds and not self._unfinished:
-            if self._places:
-                self._decide()
-            ((axis, _),) = self._settings.against.items()
-            labels = self._design.parameters
-            part = self._rounds.popleft().tolist() if self._rounds else []
-            index = self._planned.index
-            places = [i for i in part if labels(int(index[i]))[axis] not in self._dropped]
-            self._places += places
-            for place in places:
-                if self._is_missing[place]:
-                    self.add(self._planned.task(place))
-                    self._unfinished += 1
-
-    def _decide(self) -> None:
-        """Give up values that are clearly worse, and all further rounds if intervals are narrow."""
+    def _goes_on(self, looks: int) -> bool:
+        """Give up values that are clearly worse; return whether others need more seeds."""
         settings = self._settings
+        variants = self._plan.variants
         study = Study(self._directory)
         ((axis, _),) = settings.against.items()
         # Not those of later rounds, which an interrupted or larger study may have.
-        numbers = self._planned.number[self._places].tolist()
-        seeds = len(np.unique(self._planned.index[self._places] % len(self._design.seeds)))
+        numbers = variants.number[self._places].tolist()
+        seeds = len(np.unique(variants.index[self._places] % len(self._plan.design.seeds)))
         table = study.paired(settings.metric, settings.against, variants=numbers).to_dicts()
         open_rows = [row for row in table if row[axis] not in self._dropped]
         sign = -1 if settings.goal == "maximize" else 1
         for row in open_rows if settings.goal else ():
-            if sign * row["difference"] > 0 and row["p"] < (1 - LEVEL) / self._looks:
+            if sign * row["difference"] > 0 and row["p"] < (1 - LEVEL) / looks:
                 self._dropped.add(row[axis])
                 self._on_note(f"{axis} = {row[axis]} is clearly worse after {seeds} seeds: dropped")
         left = [row for row in open_rows if row[axis] not in self._dropped]
         # NaN, that of an interval which can't be told, is the largest, and never narrow.
         width = np.max([row["high"] - row["low"] for row in left], initial=0.0)
-        if not left or (settings.width is not None and width <= settings.width):
-            self._rounds.clear()
-            self._on_note(
-                f"no more than {seeds} seeds: "
-                + (f"intervals are {width:.3g} wide" if left else "all values are worse")
-            )
+        if left and (settings.width is None or not width <= settings.width):
+            return True
+        reason = f"intervals are {width:.3g} wide" if left else "all values are worse"
+        self._on_note(f"no more than {seeds} seeds: {reason}")
+        return False
 
 
 PART_BYTES = 32_000_000  # size at which a journal becomes a part
@@ -276,7 +255,7 @@ def check_study(
 def run_study(
     checked: CheckedStudy,
     location: str | Path,
-    executor: Executor,
+    crew: Crew,
     *,
     fail_fast: bool = False,
     changed: Changed | None = None,
@@ -287,7 +266,7 @@ def run_study(
     Args:
         checked: The study.
         location: Its folder or store.
-        executor: Where variants run.
+        crew: Where variants run.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
             to continue.
@@ -302,7 +281,7 @@ def run_study(
     directory = StudyDirectory(location)
     directory.check_empty()
     if not directory.exists():
-        check_setups(checked.plan, executor, observer.on_check)
+        check_setups(checked.plan, crew, observer.on_check)
     with directory.locked():
         parts = directory.intact_parts(observer.on_note)
         status = directory.statuses(parts)
@@ -314,38 +293,47 @@ def run_study(
         variants = plan.variants
         _write_plan(directory, checked, plan)
         status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
-        missing = np.flatnonzero(status[variants.number] != COMPLETE)
+        is_missing = status[variants.number] != COMPLETE
+        missing = np.flatnonzero(is_missing)
         keeper = _ResultKeeper(directory, parts)
         counts = Counts(len(variants), len(variants) - len(missing), 0)
-        observer.on_start(counts, executor.workers)
-        failed = 0
+        observer.on_start(counts, crew.workers)
+        has_failed = False
         is_checked = False
-        schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
+        rounds: Iterable[list[int]] = [missing.tolist()]
+        if adapt is not None:
+            rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note)
         try:
-            if adapt is not None:
-                schedule = AdaptiveSchedule(adapt, plan, missing, directory, observer.on_note)
-            with closing(executor.run(checked.job, schedule)) as events:
-                for event in events:
-                    record = _record(event)
+            for places in rounds:
+                queue = TaskQueue(variants.task(place) for place in places if is_missing[place])
+                for record in _records(crew, checked.job, queue):
                     keeper.add(record)
-                    schedule.on_end()
                     observer.on_result(record)
-                    failed += not record.is_complete
+                    has_failed |= not record.is_complete
                     if record.is_complete and not is_checked:
                         checked.note_missing([record.header], observer)
                         is_checked = True
-                    if failed and fail_fast:
+                    if has_failed and fail_fast:
                         break
+                if has_failed and fail_fast:
+                    break
         except BaseException:
             keeper.pause()
             raise
         keeper.finish()
-        if isinstance(schedule, AdaptiveSchedule) and not schedule:
-            write_plan(directory, schedule.plan)
+        if isinstance(rounds, AdaptiveRounds) and not (has_failed and fail_fast):
+            write_plan(directory, rounds.plan)
         summary = VariantSummary(checked)
         directory.write_variants(summary.add)
     summary.note_missing(observer)
     return summary.counts
+
+
+def _records(crew: Crew, job: StudyJob, queue: TaskQueue) -> Iterator[VariantRecord]:
+    """Yield the record of each task as it ends."""
+    with closing(run_tasks(crew, job, queue)) as rounds:
+        for ends in rounds:
+            yield from map(_record, ends)
 
 
 class VariantSummary:
@@ -396,11 +384,11 @@ class VariantSummary:
                 )
 
 
-def _record(event: Event) -> VariantRecord:
-    if isinstance(event, LostTask):
-        return record_of(event.task, VariantOutcome("failed", error=event.reason), event.attempts)
-    record: VariantRecord = event.payload
-    return VariantRecord({**record.header, "attempts": event.attempts}, record.body)
+def _record(end: TaskEnd) -> VariantRecord:
+    if end.loss is not None:
+        return record_of(end.task, VariantOutcome("failed", error=end.loss), end.attempts)
+    record: VariantRecord = end.payload
+    return VariantRecord({**record.header, "attempts": end.attempts}, record.body)
 
 
 class _ResultKeeper:

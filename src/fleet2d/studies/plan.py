@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -29,7 +28,13 @@ from fleet2d.studies.design import (
     scenario_hashes,
 )
 from fleet2d.studies.directory import PLAN, MetricFacts, StudyDirectory
-from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import (
+    Crew,
+    SerialExecutor,
+    TaskQueue,
+    WorkerTask,
+    run_tasks,
+)
 from fleet2d.studies.records import VARIANT, array_of, numbers_of
 from fleet2d.studies.simulator import check_setup, is_kept
 from fleet2d.studies.specification import SEED, Specification
@@ -301,48 +306,6 @@ def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
     return next((pair for pair in pairs if pair[0] != pair[1]), None)
 
 
-class PlannedTasks(deque[WorkerTask]):
-    """Tasks of variants that share a home; of those that nobody had yet only places are there."""
-
-    def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
-        """Take the places of variants, in their order."""
-        super().__init__()
-        self._variants, self._places = variants, places
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return super().__len__() + len(self._places)
-
-    def popleft(self) -> WorkerTask:
-        """Remove the first task, one that was put back if there is one, and return it."""
-        if super().__len__():
-            return super().popleft()
-        place = self._places[0]
-        self._places = self._places[1:]
-        return self._variants.task(place)
-
-    def pop(self) -> WorkerTask:  # type: ignore[override]
-        """Remove the last task and return it."""
-        if not len(self._places):
-            return super().pop()
-        place = self._places[-1]
-        self._places = self._places[:-1]
-        return self._variants.task(place)
-
-
-class PlanSchedule(TaskSchedule):
-    """The tasks of some variants of a plan, grouped by home."""
-
-    def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
-        """Group variants, by their places, by home."""
-        super().__init__()
-        homes = variants.home[variants.index[places] // variants.seeds]
-        _, first = np.unique(homes, return_index=True)
-        for home in homes[np.sort(first)].tolist():
-            tasks = PlannedTasks(variants, places[homes == home].astype(np.int32))
-            self._groups[variants.home_keys[home]] = tasks
-
-
 def setups_to_check(plan: StudyPlan) -> list[int]:
     """Return the places of variants in which each home meets each choice of every other axis.
 
@@ -387,7 +350,7 @@ def setup_problem(design: Design, task: WorkerTask) -> str:
 
 
 def check_setups(
-    plan: StudyPlan, executor: Executor, on_progress: Callable[[int, int], None] = lambda *_: None
+    plan: StudyPlan, crew: Crew, on_progress: Callable[[int, int], None] = lambda *_: None
 ) -> None:
     """Set up the variants that `setups_to_check` returns: homes with people and robots in them.
 
@@ -396,17 +359,20 @@ def check_setups(
     """
     problems: dict[int, str] = {}
     tasks = list(map(plan.variants.task, setups_to_check(plan)))
-    runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
+    if len(tasks) <= FEW_SETUPS:
+        crew = Crew(SerialExecutor())
     job = partial(setup_problem, plan.design)
-    with closing(runner.run(job, TaskSchedule(tasks))) as events:
-        for done, event in enumerate(events):
-            on_progress(done + 1, len(tasks))
-            text = event.reason if isinstance(event, LostTask) else event.payload
-            if text:
-                problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
-            if len(problems) == MAX_PROBLEMS:
+    done = 0
+    with closing(run_tasks(crew, job, TaskQueue(tasks))) as rounds:
+        for ends in rounds:
+            done += len(ends)
+            on_progress(done, len(tasks))
+            for end in ends:
+                if text := end.loss or end.payload:
+                    problems[end.task.index] = f"{plan.design.describe(end.task.index)}: {text}"
+            if len(problems) >= MAX_PROBLEMS:
                 break
-    _raise_problems([problems[index] for index in sorted(problems)])
+    _raise_problems([problems[index] for index in sorted(problems)[:MAX_PROBLEMS]])
 
 
 def _raise_problems(problems: list[str]) -> None:
