@@ -22,7 +22,7 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor, WorkerTask
 from fleet2d.studies.reader import open_study
-from fleet2d.studies.records import VariantRecord, record_of
+from fleet2d.studies.results import VariantResult, result_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
@@ -33,18 +33,18 @@ class InstantExecutor(SerialExecutor):
     """Returns results without simulating: what is left is the driver."""
 
     def __init__(self) -> None:
-        """Make a record of usual size; making it is the work of a worker."""
+        """Make a result of usual size; making it is the work of a worker."""
         numbers = {f"metric_{i}.ana.value": 0.1 * i for i in range(30)}
         outcome = VariantOutcome("complete", "0" * 64, numbers, {}, {"total": 0.03})
-        self._header = record_of(WorkerTask(0, 0, ""), outcome).header
+        self._row = result_of(WorkerTask(0, 0, ""), outcome).row
 
     def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return a record for each task, or that its set-up has no problem."""
+        """Return a result for each task, or that its set-up has no problem."""
         content, tasks, _ = args
         if b"StudyJob" not in content:
             return super().submit(lambda: [""] * len(tasks))
-        own = ({"number": task.number, "identity": task.identity} for task in tasks)
-        return super().submit(lambda: [VariantRecord({**self._header, **each}) for each in own])
+        own = ({"variant": task.number, "identity": task.identity} for task in tasks)
+        return super().submit(lambda: [VariantResult({**self._row, **each}) for each in own])
 
 
 def run(study: Any, folder: Path, executor: Executor, workers: int = 1) -> float:

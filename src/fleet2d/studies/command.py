@@ -1,7 +1,6 @@
 """The commands `fleet2d study run`, `tune`, `status`, `rerun`, `report` and `power`."""
 
 import gc
-import itertools
 import json
 import signal
 from collections.abc import Iterator, Mapping
@@ -272,7 +271,7 @@ def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str,
 
     axis, _, text = against.partition("=")
     check_axes([axis], study.columns)
-    labels = study.arrow_variants.column(axis).unique().to_pylist()
+    labels = study.variants[axis].unique().to_list()
     by_text = {str(label): label for label in labels if label is not None}
     if text not in by_text:
         raise InputError(f"--against: {axis} has no value {text!r}{suggest(text, by_text)}")
@@ -299,21 +298,20 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
         _print(f"{column}: {values}{more}")
     _print("")
-    for variant in itertools.islice(plan.variants, MAX_LINES):
-        _print(f"  {plan.design.describe(variant.index)}")
+    for index in plan.variants["index"].head(MAX_LINES):
+        _print(f"  {plan.design.describe(index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
-    simulated = in_words(timedelta(seconds=plan.variants.total_simulated_s))
+    simulated = in_words(timedelta(seconds=plan.variants["simulated_s"].sum()))
     variants = counted(len(plan.variants), "variant")
-    homes = counted(len(plan.variants.home_keys), "home")
+    homes = counted(plan.variants["home_key"].n_unique(), "home")
     _print(f"\n{variants}, {homes}, {simulated} of simulated time")
 
 
 def _print_failures(location: str) -> None:
     from fleet2d.studies.reader import open_study
 
-    table = open_study(location).arrow_variants.select(["variant", "status", "error"])
-    failed = [row for row in table.to_pylist() if row["status"] == "failed"]
+    failed = open_study(location).failures.to_dicts()
     for row in failed[:MAX_LINES]:
         _print(f"variant {row['variant']} failed: {row['error']}", err=True)
     if len(failed) > MAX_LINES:
@@ -326,8 +324,7 @@ def _row_of(study: "Study", variant: str) -> dict[str, Any]:
     Raises:
         InputError: There is no such variant, or several.
     """
-    columns = ["variant", "identity", "digest", *study.columns]
-    rows: list[dict[str, Any]] = study.arrow_variants.select(columns).to_pylist()
+    rows = study.variants.select("variant", "identity", "digest", *study.columns).to_dicts()
     found = [row for row in rows if str(row["variant"]) == variant]
     if not found and len(variant) >= IDENTITY_START:
         found = [row for row in rows if (row["identity"] or "").startswith(variant)]

@@ -128,7 +128,7 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 
 NOT_APPLICABLE = -1
-MAX_VARIANTS = 10_000_000
+MAX_VARIANTS = 1_000_000
 SWITCHES = ("key_frames", "observations", "events", "decisions")
 """Keys of `artifacts` that are named after their tables."""
 

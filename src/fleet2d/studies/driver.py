@@ -1,7 +1,6 @@
 """Running a study: missing variants are run, and each result is stored at once."""
 
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,6 @@ from fleet2d.studies.design import (
 )
 from fleet2d.studies.directory import (
     COMPLETE,
-    SCENARIOS,
     VARIANTS,
     Counts,
     Meta,
@@ -32,7 +30,6 @@ from fleet2d.studies.directory import (
 )
 from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
 from fleet2d.studies.intervals import LEVEL
-from fleet2d.studies.parts import Part
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
@@ -44,19 +41,22 @@ from fleet2d.studies.plan import (
     write_plan,
 )
 from fleet2d.studies.reader import Study
-from fleet2d.studies.records import (
+from fleet2d.studies.results import (
     RESULT_COLUMNS,
-    Journal,
-    VariantRecord,
-    array_of,
-    record_of,
-    results_table,
+    VARIANT,
+    ResultWriter,
+    VariantResult,
+    drop_damaged,
+    read_results,
+    result_of,
+    results_frame,
 )
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
 from fleet2d.studies.specification import AdaptSettings, Specification, read_specification
+from fleet2d.studies.storage import Storage
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    import polars as pl
 
 
 class AdaptiveRounds:
@@ -89,13 +89,13 @@ class AdaptiveRounds:
     @property
     def plan(self) -> StudyPlan:
         """The variants of all rounds so far."""
-        places = np.array(sorted(self._places), np.int64)
-        return StudyPlan(self._plan.design, self._plan.variants.take(places))
+        return StudyPlan(self._plan.design, self._plan.variants[sorted(self._places)])
 
     def __iter__(self) -> Iterator[list[int]]:
         """Yield the places of the variants of each round, after those of the last have results."""
         ((axis, _),) = self._settings.against.items()
-        design, index = self._plan.design, self._plan.variants.index
+        design = self._plan.design
+        index = self._plan.variants["index"].to_numpy()
         seeds = len(design.seeds)
         round_of = index % seeds // self._settings.seeds
         looks = int(round_of.max())
@@ -112,12 +112,12 @@ class AdaptiveRounds:
     def _goes_on(self, looks: int) -> bool:
         """Give up values that are clearly worse; return whether others need more seeds."""
         settings = self._settings
-        variants = self._plan.variants
         study = Study(self._directory)
         ((axis, _),) = settings.against.items()
         # Not those of later rounds, which an interrupted or larger study may have.
-        numbers = variants.number[self._places].tolist()
-        seeds = len(np.unique(variants.index[self._places] % len(self._plan.design.seeds)))
+        so_far = self._plan.variants[self._places]
+        numbers = so_far[VARIANT].to_list()
+        seeds = (so_far["index"] % len(self._plan.design.seeds)).n_unique()
         table = study.paired(settings.metric, settings.against, variants=numbers).to_dicts()
         open_rows = [row for row in table if row[axis] not in self._dropped]
         sign = -1 if settings.goal == "maximize" else 1
@@ -135,8 +135,6 @@ class AdaptiveRounds:
         return False
 
 
-PART_BYTES = 32_000_000  # size at which a journal becomes a part
-PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only
 CHANGED_MESSAGE = (
     "a file that the variant reads, or Fleet2D itself, changed after the study began: run the study"
     " again"
@@ -157,15 +155,15 @@ class StudyJob:
     metrics: tuple[str, ...]
     tables: tuple[str, ...]
 
-    def __call__(self, task: WorkerTask) -> VariantRecord:
-        """Run a variant; return its record, with the error if it fails."""
+    def __call__(self, task: WorkerTask) -> VariantResult:
+        """Run a variant; return its results, with the error if it fails."""
         try:
             scenario = self.scenario(task)
         except Fleet2DError as error:  # a file changed after the study was planned
             outcome = VariantOutcome("failed", error=describe_error(error))
         else:
             outcome = execute(scenario, self.metrics, self.tables)
-        return record_of(task, outcome)
+        return result_of(task, outcome)
 
     def scenario(self, task: WorkerTask) -> Scenario:
         """Return the scenario of a variant.
@@ -192,7 +190,7 @@ class Observer:
     def on_start(self, counts: Counts, workers: int) -> None:
         """Receive how many variants have results, and how many workers run the others."""
 
-    def on_result(self, record: VariantRecord) -> None:
+    def on_result(self, result: VariantResult) -> None:
         """Receive the results of a variant."""
 
 
@@ -212,11 +210,27 @@ class CheckedStudy:
     scenarios: ScenarioFile
     metrics: Mapping[str, MetricFacts]
 
-    def note_missing(self, headers: Iterable[Mapping[str, Any]], observer: Observer) -> None:
-        """Note which metrics that the study names are missing in complete variants, by headers."""
-        summary = VariantSummary(self)
-        summary.add(results_table(headers))
-        summary.note_missing(observer)
+    def note_missing(self, variants: "pl.DataFrame", observer: Observer) -> None:
+        """Note which metrics that the study names are missing in complete variants."""
+        import polars as pl
+
+        complete = variants.filter(status=COMPLETE)
+        others = {*RESULT_COLUMNS, *self.plan.design.columns, "simulated_s"}
+        metrics = [name for name in complete.columns if name not in others]
+        named = [each for each in self.specification.file.named_metrics() if each[0][0] != "tune"]
+        place_of = self.specification.places.place
+        places = {name: place_of(location) for location, name in reversed(named)}
+        for name in dict.fromkeys(name for _, name in named if name != "*"):
+            fitting = [metric for metric in metrics if is_kept(metric, [name])]
+            lacks = pl.all_horizontal(pl.lit(value=True), pl.col(fitting).is_null())
+            lacking = len(complete.filter(lacks))
+            if lacking:
+                hint = did_you_mean(name, metrics) if lacking == len(complete) else ""
+                place = f"{places[name]}: " if places[name] else ""
+                observer.on_note(
+                    f"{place}{lacking} of {len(complete)} complete variants have no metric"
+                    f" {name}{hint}"
+                )
 
     @property
     def job(self) -> StudyJob:
@@ -283,148 +297,73 @@ def run_study(
     if not directory.exists():
         check_setups(checked.plan, crew, observer.on_check)
     with directory.locked():
-        parts = directory.intact_parts(observer.on_note)
-        status = directory.statuses(parts)
+        for problem in drop_damaged(directory.storage):
+            observer.on_note(problem)
+        results = read_results(directory.storage)
         adapt = checked.specification.file.adapt
         # Of an adaptive study, new variants may be those of rounds that it doesn't need.
         plan = reconcile(
-            checked.plan, directory, status > 0, changed, observer.on_note, notes_new=adapt is None
+            checked.plan,
+            directory,
+            results[VARIANT],
+            changed,
+            observer.on_note,
+            notes_new=adapt is None,
         )
-        variants = plan.variants
         _write_plan(directory, checked, plan)
-        status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
-        is_missing = status[variants.number] != COMPLETE
-        missing = np.flatnonzero(is_missing)
-        keeper = _ResultKeeper(directory, parts)
-        counts = Counts(len(variants), len(variants) - len(missing), 0)
-        observer.on_start(counts, crew.workers)
-        has_failed = False
-        is_checked = False
-        rounds: Iterable[list[int]] = [missing.tolist()]
-        if adapt is not None:
-            rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note)
-        try:
-            for places in rounds:
-                queue = TaskQueue(variants.task(place) for place in places if is_missing[place])
-                for record in _records(crew, checked.job, queue):
-                    keeper.add(record)
-                    observer.on_result(record)
-                    has_failed |= not record.is_complete
-                    if record.is_complete and not is_checked:
-                        checked.note_missing([record.header], observer)
-                        is_checked = True
-                    if has_failed and fail_fast:
-                        break
-                if has_failed and fail_fast:
-                    break
-        except BaseException:
-            keeper.pause()
-            raise
-        keeper.finish()
-        if isinstance(rounds, AdaptiveRounds) and not (has_failed and fail_fast):
-            write_plan(directory, rounds.plan)
-        summary = VariantSummary(checked)
-        directory.write_variants(summary.add)
-    summary.note_missing(observer)
-    return summary.counts
-
-
-def _records(crew: Crew, job: StudyJob, queue: TaskQueue) -> Iterator[VariantRecord]:
-    """Yield the record of each task as it ends."""
-    with closing(run_tasks(crew, job, queue)) as rounds:
-        for ends in rounds:
-            yield from map(_record, ends)
-
-
-class VariantSummary:
-    """What is to be said of the variants of a study, of which some rows come after the other."""
-
-    def __init__(self, checked: CheckedStudy) -> None:
-        """Start without variants."""
-        file = checked.specification.file
-        self.counts = Counts(0, 0, 0)
-        self._others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
-        named = [each for each in file.named_metrics() if each[0][0] != "tune"]
-        place = checked.specification.places.place
-        self._places = {name: place(location) for location, name in reversed(named)}
-        self._lacking = {name: 0 for _, name in named if name != "*"}
-        self._metrics: list[str] = []
-
-    def add(self, variants: "pa.Table") -> "pa.Table":
-        """Add some variants; return them."""
-        import pyarrow as pa
-
-        from fleet2d.artifacts.arrow import values_of
-
-        statuses = variants.column("status").to_pylist()
-        new, old = Counts.of(statuses), self.counts
-        self.counts = Counts(
-            old.total + new.total, old.complete + new.complete, old.failed + new.failed
+        complete = results.filter(status=COMPLETE)
+        is_missing = ~plan.variants[VARIANT].is_in(complete[VARIANT].implode())
+        done = len(is_missing) - int(is_missing.sum())
+        observer.on_start(Counts(len(is_missing), done, 0), crew.workers)
+        rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note) if adapt else None
+        places = rounds or [list(range(len(is_missing)))]
+        queues = (
+            TaskQueue(plan.tasks(plan.variants[round_].filter(is_missing[round_])))
+            for round_ in places
         )
-        complete = variants.filter(array_of((s == "complete" for s in statuses), pa.bool_()))
-        self._metrics = [name for name in complete.column_names if name not in self._others]
-        for pattern in self._lacking:
-            lacks = np.ones(len(complete), bool)
-            for name in self._metrics:
-                if is_kept(name, [pattern]):
-                    lacks &= values_of(complete[name].is_null())
-            self._lacking[pattern] += int(np.count_nonzero(lacks))
-        return variants
-
-    def note_missing(self, observer: Observer) -> None:
-        """Note which of the metrics that the study names are missing in complete variants."""
-        complete = self.counts.complete
-        for pattern, lacking in self._lacking.items():
-            if lacking:
-                hint = did_you_mean(pattern, self._metrics) if lacking == complete else ""
-                place = self._places[pattern]
-                observer.on_note(
-                    f"{place}{': ' * bool(place)}{lacking} of {complete} complete variants have no"
-                    f" metric {pattern}{hint}"
-                )
+        is_checked = False
+        is_whole = True
+        with closing(_results(crew, checked.job, queues, directory.storage)) as found:
+            for result in found:
+                observer.on_result(result)
+                if result.is_complete and not is_checked:
+                    checked.note_missing(results_frame([result.row]), observer)
+                    is_checked = True
+                if fail_fast and not result.is_complete:
+                    is_whole = False
+                    break
+        if rounds and is_whole:
+            write_plan(directory, rounds.plan)
+        variants = directory.variants()
+        directory.storage.write_table(VARIANTS, variants.to_arrow())
+    checked.note_missing(variants, observer)
+    return Counts.of(variants)
 
 
-def _record(end: TaskEnd) -> VariantRecord:
+def _results(
+    crew: Crew, job: StudyJob, queues: Iterable[TaskQueue], storage: Storage
+) -> Generator[VariantResult]:
+    """Run the tasks of one queue after the other; yield and store their results."""
+    writer = ResultWriter(storage)
+    try:
+        for queue in queues:
+            with closing(run_tasks(crew, job, queue)) as steps:
+                for ends in steps:
+                    for result in map(_result, ends):
+                        writer.add(result)
+                        yield result
+                    writer.flush()
+            writer.flush(now=True)
+    finally:
+        writer.flush(now=True)
+
+
+def _result(end: TaskEnd) -> VariantResult:
     if end.loss is not None:
-        return record_of(end.task, VariantOutcome("failed", error=end.loss), end.attempts)
-    record: VariantRecord = end.payload
-    return VariantRecord({**record.header, "attempts": end.attempts}, record.body)
-
-
-class _ResultKeeper:
-    """Stores results: each in the journal at once, and many together in parts."""
-
-    def __init__(self, directory: StudyDirectory, parts: list[Part]) -> None:
-        self._directory, self._parts = directory, parts
-        self._journal: Journal | None = directory.open_journal(parts)
-        self._commit_time = time.monotonic()
-
-    def add(self, record: VariantRecord) -> None:
-        """Store the results of a variant."""
-        if self._journal is None:
-            self._journal = self._directory.open_journal(self._parts)
-        self._journal.append(record)
-        age_s = time.monotonic() - self._commit_time
-        is_due = self._directory.storage.folder is None and age_s > PART_S_REMOTE
-        if is_due or self._journal.size > PART_BYTES:
-            self._commit(self._journal)
-
-    def finish(self) -> None:
-        """Move all results into parts."""
-        if self._journal is not None and len(self._journal):
-            self._commit(self._journal)
-        elif self._journal is not None:
-            self._journal.close()
-            self._journal.path.unlink()
-
-    def pause(self) -> None:
-        """Close the journal; its results stay there until the study is continued."""
-        if self._journal is not None:
-            self._journal.close()
-
-    def _commit(self, journal: Journal) -> None:
-        self._parts.append(self._directory.commit(journal, self._parts))
-        self._journal, self._commit_time = None, time.monotonic()
+        result = result_of(end.task, VariantOutcome("failed", error=end.loss))
+    else:
+        result = end.payload
+    return VariantResult({**result.row, "attempts": end.attempts}, result.tables)
 
 
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
@@ -432,19 +371,19 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
     file = checked.specification.file
     source = checked.specification.source
     directory.storage.delete(VARIANTS)  # it may belong to another plan
-    directory.storage.write(SCENARIOS, checked.scenarios.content())
+    checked.scenarios.write(directory)
     write_plan(directory, plan)
     meta = Meta(
-        checked.specification.name,
-        file.description,
-        code_version(),
-        checked.plan.design.columns,
-        file.populations,
-        file.keep.tables,
-        tuple(comparison.model_dump() for comparison in file.compare),
-        source.read_text(encoding="utf-8") if source else "",
-        checked.metrics,
-        file.tags,
-        file.notes,
+        name=checked.specification.name,
+        description=file.description,
+        code=code_version(),
+        columns=checked.plan.design.columns,
+        populations=file.populations,
+        tables=file.keep.tables,
+        compare=tuple(comparison.model_dump() for comparison in file.compare),
+        source=source.read_text(encoding="utf-8") if source else "",
+        metrics=dict(checked.metrics),
+        tags=file.tags,
+        notes=file.notes,
     )
     directory.write_meta(meta)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from fleet2d.studies.directory import Counts
-    from fleet2d.studies.records import VariantRecord
+    from fleet2d.studies.results import VariantResult
     from fleet2d.studies.tuning import TuneObserver
 
 
@@ -106,13 +106,13 @@ class BarObserver(Observer):
             self._task, total=counts.total, completed=counts.complete, description="running"
         )
 
-    def on_result(self, record: "VariantRecord") -> None:
+    def on_result(self, result: "VariantResult") -> None:
         """Show one more variant, with rate, failures and the time left."""
-        seconds = record.header.get("wall_s", {}).get("total", 0.0)
+        seconds = result.row["wall_s"] or 0.0
         if not self._left.finished:
             self._start_s = time.monotonic() - seconds  # workers take a while to start
         self._left.add(seconds)
-        self._failed += not record.is_complete
+        self._failed += not result.is_complete
         elapsed_s = max(time.monotonic() - self._start_s, 1e-9)
         text = _rate(self._left.finished / elapsed_s)
         if self._failed:

@@ -219,9 +219,9 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
         storage: Where the trials are stored, without secrets.
     """
     scenarios: dict[bool, list[str]] = {False: [], True: []}
-    for variant in plan.variants:
-        is_held_out = matches(settings.held_out, plan.design.parameters(variant.index))
-        scenarios[is_held_out].append(variant.scenario)
+    for index, scenario in plan.variants.select("index", "scenario").iter_rows():
+        is_held_out = matches(settings.held_out, plan.design.parameters(index))
+        scenarios[is_held_out].append(scenario)
     content = {key: content_hash(value) for key, value in settings.model_dump(mode="json").items()}
     return {
         "the training (homes, base scenario or seeds)": content_hash(sorted(scenarios[False])),
@@ -234,7 +234,7 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
         "the sampler": content["sampler"],
         "the storage": storage,
         "the version of Fleet2D": code_version(),
-        INPUTS: content_hash(sorted(variant.identity for variant in plan.variants)),
+        INPUTS: content_hash(sorted(plan.variants["identity"])),
     }
 
 
@@ -315,15 +315,16 @@ def _training(plan: StudyPlan, settings: TuneSettings) -> list[tuple[int, str]]:
         ScenarioError: There is none, or it isn't clear whether one is held out.
     """
     (axis,) = settings.held_out
-    labels = [plan.design.parameters(variant.index) for variant in plan.variants]
+    labels = [plan.design.parameters(index) for index in plan.variants["index"]]
     if any(label[axis] is None for label in labels):
         raise ScenarioError(
             f"tune.held_out: the axis {axis!r} doesn't apply to all variants, some of which would"
             " be neither trained on nor held out: hold out values of another axis"
         )
+    variants = plan.variants.select("index", "home_key").iter_rows()
     training = [
-        (variant.index, variant.home_key)
-        for variant, label in zip(plan.variants, labels, strict=True)
+        variant
+        for variant, label in zip(variants, labels, strict=True)
         if not matches(settings.held_out, label)
     ]
     if not training:
@@ -339,18 +340,17 @@ def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
         ScenarioError: A held-out variant and one of the training differ by names of files only.
     """
     first_of = dict[str, tuple[bool, int]]()
-    first_seed = {variant.template: variant for variant in reversed(plan.variants)}
-    for variant in reversed(first_seed.values()):
-        scenario = plan.design.scenario(variant.index)
+    for index in plan.variants["index"].gather_every(len(plan.design.seeds)):
+        scenario = plan.design.scenario(index)
         content = scenario_content(scenario)
         text = json.dumps({**content, "simulation": {**content["simulation"], "seed": None}})
         for path in input_files(scenario):
             text = text.replace(json.dumps(str(path)), json.dumps(file_hash(path)))
-        is_held_out = matches(settings.held_out, plan.design.parameters(variant.index))
-        was_held_out, other = first_of.setdefault(text, (is_held_out, variant.index))
+        is_held_out = matches(settings.held_out, plan.design.parameters(index))
+        was_held_out, other = first_of.setdefault(text, (is_held_out, index))
         if is_held_out != was_held_out:
             raise ScenarioError(
-                f"tune.held_out: {plan.design.describe(variant.index)} and"
+                f"tune.held_out: {plan.design.describe(index)} and"
                 f" {plan.design.describe(other)} are the same but for the names of files, and only"
                 " one of them is held out: hold out both, or leave one out"
             )
