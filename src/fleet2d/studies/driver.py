@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.errors import ComponentError, Fleet2DError, extra
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import (
     Design,
@@ -250,8 +250,11 @@ def check_study(
         on_size: Receives the number of variants before they are built.
 
     Raises:
-        InputError: The study is wrong; the message names file and line, or axis and value.
+        InputError: The study is wrong; the message names file and line, or axis and value. Or
+            polars is not installed.
     """
+    with extra("study", "studies need polars"):
+        import polars as pl  # noqa: F401 - whether it is there
     specification = read_specification(source)
     scenarios, names = ScenarioFile(), KnownNames()
 
