@@ -53,7 +53,6 @@ from fleet2d.studies.results import (
 )
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
 from fleet2d.studies.specification import AdaptSettings, Specification, read_specification
-from fleet2d.studies.storage import Storage
 
 if TYPE_CHECKING:
     import polars as pl
@@ -91,8 +90,8 @@ class AdaptiveRounds:
         """The variants of all rounds so far."""
         return StudyPlan(self._plan.design, self._plan.variants[sorted(self._places)])
 
-    def __iter__(self) -> Iterator[list[int]]:
-        """Yield the places of the variants of each round, after those of the last have results."""
+    def __iter__(self) -> "Iterator[pl.DataFrame]":
+        """Yield the variants of each round, after those of the last have results."""
         ((axis, _),) = self._settings.against.items()
         design = self._plan.design
         index = self._plan.variants["index"].to_numpy()
@@ -107,7 +106,7 @@ class AdaptiveRounds:
             found = zip(places, labels, strict=True)
             new = [place for place, label in found if label not in self._dropped]
             self._places += new
-            yield new
+            yield self._plan.variants[new]
 
     def _goes_on(self, looks: int) -> bool:
         """Give up values that are clearly worse; return whether others need more seeds."""
@@ -314,51 +313,65 @@ def run_study(
             notes_new=adapt is None,
         )
         _write_plan(directory, checked, plan)
-        complete = results.filter(status=COMPLETE)
-        is_missing = ~plan.variants[VARIANT].is_in(complete[VARIANT].implode())
-        done = len(is_missing) - int(is_missing.sum())
-        observer.on_start(Counts(len(is_missing), done, 0), crew.workers)
-        rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note) if adapt else None
-        places = rounds or [list(range(len(is_missing)))]
-        queues = (
-            TaskQueue(plan.tasks(plan.variants[round_].filter(is_missing[round_])))
-            for round_ in places
-        )
-        is_checked = False
-        is_whole = True
-        with closing(_results(crew, checked.job, queues, directory.storage)) as found:
-            for result in found:
-                observer.on_result(result)
-                if result.is_complete and not is_checked:
-                    checked.note_missing(results_frame([result.row]), observer)
-                    is_checked = True
-                if fail_fast and not result.is_complete:
-                    is_whole = False
-                    break
-        if rounds and is_whole:
-            write_plan(directory, rounds.plan)
+        complete = results.filter(status=COMPLETE)[VARIANT]
+        run = _StudyRun(checked, plan, directory, crew, observer, fail_fast)
+        if adapt is None:
+            run.run_missing([plan.variants], complete)
+        else:
+            rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note)
+            if run.run_missing(rounds, complete):
+                write_plan(directory, rounds.plan)
         variants = directory.variants()
         directory.storage.write_table(VARIANTS, variants.to_arrow())
     checked.note_missing(variants, observer)
     return Counts.of(variants)
 
 
-def _results(
-    crew: Crew, job: StudyJob, queues: Iterable[TaskQueue], storage: Storage
-) -> Generator[VariantResult]:
-    """Run the tasks of one queue after the other; yield and store their results."""
-    writer = ResultWriter(storage)
-    try:
-        for queue in queues:
-            with closing(run_tasks(crew, job, queue)) as steps:
-                for ends in steps:
-                    for result in map(_result, ends):
-                        writer.add(result)
-                        yield result
-                    writer.flush()
+@dataclass
+class _StudyRun:
+    """Runs variants of a study, and stores their results."""
+
+    checked: CheckedStudy
+    plan: StudyPlan
+    directory: StudyDirectory
+    crew: Crew
+    observer: Observer
+    fail_fast: bool
+
+    def run_missing(self, rounds: "Iterable[pl.DataFrame]", complete: "pl.Series") -> bool:
+        """Run the variants of each round that are not complete; return whether all were run."""
+        import polars as pl
+
+        total = len(self.plan.variants)
+        is_complete = pl.col(VARIANT).is_in(complete.implode())
+        done = len(self.plan.variants.filter(is_complete))
+        self.observer.on_start(Counts(total, done, 0), self.crew.workers)
+        queues = (TaskQueue(self.plan.tasks(round_.filter(~is_complete))) for round_ in rounds)
+        is_checked = False
+        with closing(self._results(queues)) as found:
+            for result in found:
+                self.observer.on_result(result)
+                if result.is_complete and not is_checked:
+                    self.checked.note_missing(results_frame([result.row]), self.observer)
+                    is_checked = True
+                if self.fail_fast and not result.is_complete:
+                    return False
+        return True
+
+    def _results(self, queues: Iterable[TaskQueue]) -> Generator[VariantResult]:
+        """Run the tasks of one queue after the other; yield and store their results."""
+        writer = ResultWriter(self.directory.storage)
+        try:
+            for queue in queues:
+                with closing(run_tasks(self.crew, self.checked.job, queue)) as steps:
+                    for ends in steps:
+                        for result in map(_result, ends):
+                            writer.add(result)
+                            yield result
+                        writer.flush()
+                writer.flush(now=True)  # the next queue may depend on it
+        finally:
             writer.flush(now=True)
-    finally:
-        writer.flush(now=True)
 
 
 def _result(end: TaskEnd) -> VariantResult:
