@@ -80,7 +80,8 @@ def test_only_packages_that_run_or_show_simulations_are_no_part_of_that_version(
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
     above_the_engine = " | ".join(layers[: layers.index("engine")]).split(" | ")
-    assert sorted(above_the_engine) == sorted(_LEAVES)
+    # The limb `homes` reads and makes the homes in which runs take place.
+    assert sorted({*above_the_engine} - {"homes"}) == sorted(_LEAVES)
 
 
 def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:
