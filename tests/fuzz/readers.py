@@ -31,7 +31,7 @@ from fleet2d.routines.persona import BUNDLED as PERSONAS
 from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.specification import read_specification
 
-RUN = Path(__file__).parents[1] / "fixtures" / "runs" / "v2"
+RUN = Path(__file__).parents[1] / "fixtures" / "run"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ class TimingPolicy(Component):
         ...         return np.zeros((24, self.rooms))
     """
 
-    kind: ClassVar[str] = "timing_policy"
+    kind = "timing_policy"
 
     def start(self, rooms: int) -> None:
         """Begin without experience in a home with a number of rooms."""
@@ -133,11 +133,11 @@ class TimingAlgorithm(Algorithm):
         self.worth: dict[str, float] = {}  # of each interaction
 
     def remember(self) -> Mapping[str, Any]:
-        """Refuse: what it has learned belongs to a home and its people."""
+        """Return nothing: its learned state belongs to a home and its people."""
         return {}
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Refuse to restore what another run has learned.
+        """Refuse the learned state of another run.
 
         Raises:
             ComponentError: Always.

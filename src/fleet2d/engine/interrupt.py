@@ -7,7 +7,7 @@ first of them, and the body decides right after it.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, cast
+from typing import cast
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Interrupt(Component):
     no keys, and whether it holds must follow from the arguments of `holds` alone.
     """
 
-    kind: ClassVar[str] = "interrupt"
+    kind = "interrupt"
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps of a span the condition holds, bool (steps,)."""
@@ -90,7 +90,7 @@ class Interruptions(Watcher):
         """Whether a plan waits for an interrupt."""
         return bool(self._held)
 
-    def expect(self, row: int) -> None:
+    def listen(self, row: int) -> None:
         """Wait for the interrupts that the present plan of a body names, and for no others."""
         names = self._actors[row].plan.interrupts - WATCHED_EVENTS
         if not names and not self._held:

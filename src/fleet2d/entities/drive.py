@@ -5,7 +5,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isqrt, sqrt
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -79,7 +79,7 @@ class Drive(Component):
         ...         return [Moment(length / (route.speed / 2), length, route.heading)]
     """
 
-    kind: ClassVar[str] = "drive"
+    kind = "drive"
 
     @abstractmethod
     def moments(self, route: Route) -> Iterable[Moment]:
@@ -138,7 +138,9 @@ def breakpoints(
         x, y = ax + round((bx - ax) * share), ay + round((by - ay) * share)
         return round(moment.seconds * 1e6), x, y, moment.heading % TURN, 0
 
-    rows, leg, last = [], 0, Moment(0.0, 0.0, heading)
+    rows = []
+    leg = 0
+    last = Moment(0.0, 0.0, heading)
     route = Route(tuple(legs), heading, rates[0] / units_per_m, rates[1])
     for moment in _checked(drive, route, ends[-1]) if legs else ():
         while moment.metres > ends[leg + 1] + NEAR_M:

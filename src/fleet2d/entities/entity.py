@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -40,7 +40,7 @@ class EvidenceSource(Component):
     After `start` it has `notes`, lines about its log: what was left out, and what doesn't fit.
     """
 
-    kind: ClassVar[str] = "evidence_source"
+    kind = "evidence_source"
 
     besides_cameras: bool = False
 
@@ -123,9 +123,9 @@ class User(Entity):
     camera: Camera | None = None
     answers: AnswersField | None = None
     lights: LightHours = ()
-    sight_events: ClassVar[tuple[str, str]] = (EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN)
-    uses_furniture: ClassVar[bool] = True
-    uses_portals: ClassVar[bool] = True
+    sight_events = (EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN)
+    uses_furniture = True
+    uses_portals = True
 
     def model_post_init(self, _: object, /) -> None:
         """Refuse errors of perception."""
@@ -173,15 +173,15 @@ class Robot(Entity):
     perception: Perception | None = None
     perceives: OneOf[EvidenceSource] | None = None
 
-    usual_height: ClassVar[float] = 0.4
-    minds_costs: ClassVar[bool] = True
-    minds_floor: ClassVar[bool] = True
+    usual_height = 0.4
+    minds_costs = True
+    minds_floor = True
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None
     keep_out: tuple[str, ...] = ()
-    sight_events: ClassVar[tuple[str, str]] = (EventKind.USER_LOST, EventKind.USER_SEEN)
-    request_events: ClassVar[frozenset[str]] = REQUEST_EVENTS
+    sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
+    request_events = REQUEST_EVENTS
 
     @model_validator(mode="before")
     @classmethod

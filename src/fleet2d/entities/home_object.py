@@ -1,7 +1,5 @@
 """Objects of a home that have a state during a run, and doors."""
 
-from typing import ClassVar
-
 from pydantic import Field
 
 from fleet2d.configuration.components import Component, Settings
@@ -20,7 +18,7 @@ class HomeObject(Component):
     Furniture that just stands there is part of the floor plan.
     """
 
-    kind: ClassVar[str] = "object"
+    kind = "object"
 
 
 class Turn(Settings):

@@ -2,7 +2,7 @@
 
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -46,7 +46,7 @@ class ContactSensor(Sensor):
 
     of: str
 
-    words: ClassVar[tuple[str, str]] = ("OPEN", "CLOSE")
+    words = ("OPEN", "CLOSE")
 
     def watch(self, door: int) -> None:
         """Set the door that it watches, by its number in the home."""

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import shapely
@@ -356,7 +356,7 @@ class Native(FloorPlanSource):
         path: The plan's JSON or YAML file.
     """
 
-    marks: ClassVar = (("format", FORMAT),)
+    marks = (("format", FORMAT),)
 
     path: InputPath
 

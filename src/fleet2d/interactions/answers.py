@@ -64,7 +64,7 @@ class AnswerPart(Component):
         ...         return -9.0 if now.time.weekday() == 0 else 0.0
     """
 
-    kind: ClassVar[str] = "answer_part"
+    kind = "answer_part"
     stage: ClassVar[Stage] = "accept"
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
@@ -87,7 +87,7 @@ class NoticePart(AnswerPart):
         per_metre: Added for each metre beyond the second.
     """
 
-    stage: ClassVar[Stage] = "notice"
+    stage = "notice"
 
     base: float = 3.0
     asleep: float = -4.0
@@ -146,7 +146,7 @@ class ActivityPart(AnswerPart):
         loads: What each activity takes off; these come before the built-in ones.
     """
 
-    stage: ClassVar[Stage] = "available"
+    stage = "available"
 
     base: float = 1.2
     loads: dict[str, float] = Field(default={})
@@ -163,7 +163,7 @@ class CompanyPart(AnswerPart):
         each: Added for each of them, up to three.
     """
 
-    stage: ClassVar[Stage] = "available"
+    stage = "available"
 
     each: float = -0.5
 
@@ -179,7 +179,7 @@ class MovementPart(AnswerPart):
         going: Added if so.
     """
 
-    stage: ClassVar[Stage] = "available"
+    stage = "available"
 
     going: float = -1.5
 
@@ -392,7 +392,7 @@ class Initiative(Component):
             enough sends it away, bans it or switches it off.
     """
 
-    kind: ClassVar[str] = "initiative"
+    kind = "initiative"
 
     calls: float = Field(default=0.0, ge=0, le=1000)
     questions: float = Field(default=0.0, ge=0, le=1000)
@@ -445,7 +445,7 @@ class Answers(Component):
         off_for: For how long it is switched off.
     """
 
-    kind: ClassVar[str] = "answers"
+    kind = "answers"
 
     notice: OneOf[AnswerPart] = NoticePart()
     activity: OneOf[AnswerPart] = ActivityPart()

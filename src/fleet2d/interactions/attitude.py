@@ -6,7 +6,6 @@ and ranges of all of them.
 
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 from pydantic import Field
 
@@ -66,7 +65,7 @@ class Attitude(Component):
         annoyed_by: What a prompt adds to annoyance at the worst moment; at a good one nothing.
     """
 
-    kind: ClassVar[str] = "attitude"
+    kind = "attitude"
 
     novelty_lasts: PositiveDuration = timedelta(days=14)
     annoyance_lasts: PositiveDuration = timedelta(days=2)

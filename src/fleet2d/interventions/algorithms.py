@@ -1,6 +1,6 @@
 """Interventions on algorithms: what they have learned, and what others read of them."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field
 
@@ -26,7 +26,7 @@ class ResetAlgorithm(Intervention):
         'ltp'
     """
 
-    subject: ClassVar[str] = "algorithm"
+    subject = "algorithm"
     algorithm: str
     learned: InputPath | None = None
 
@@ -61,7 +61,7 @@ class ReplaceOutput(Lasting):
         {'kitchen_0': 1.0}
     """
 
-    subject: ClassVar[str] = "algorithm"
+    subject = "algorithm"
     algorithm: str
     rooms: dict[str, float] = Field(default={}, min_length=0)
     values: dict[str, float | str] = Field(default={})

@@ -1,6 +1,6 @@
 """Interventions on the home: its doors, furniture, rooms and sensors; and the end of others."""
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -42,7 +42,7 @@ class ChangeHome(HomeIntervention):
         'bath_door'
     """
 
-    subject: ClassVar[str] = "change"
+    subject = "change"
     change: HomeChange
 
     @property
@@ -58,7 +58,7 @@ class DoorIntervention(HomeIntervention):
         door: The door.
     """
 
-    subject: ClassVar[str] = "door"
+    subject = "door"
     door: str
 
 
@@ -111,7 +111,7 @@ class MoveFurniture(HomeIntervention):
         (2.0, 1.0)
     """
 
-    subject: ClassVar[str] = "object"
+    subject = "object"
     object: str
     to: Point
     turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
@@ -129,7 +129,7 @@ class SetRoomType(HomeIntervention):
         'bedroom'
     """
 
-    subject: ClassVar[str] = "name"
+    subject = "name"
     name: str
     type: str
 
@@ -146,7 +146,7 @@ class SwitchLights(HomeIntervention):
         'off'
     """
 
-    subject: ClassVar[str] = "room"
+    subject = "room"
     room: str
     turn: Literal["on", "off"]
 
@@ -164,7 +164,7 @@ class SlowFloor(SlowArea, Lasting):
         0.2
     """
 
-    subject: ClassVar[str] = "area"
+    subject = "area"
 
     def begin(self, world: World) -> None:
         """Apply all that are active."""
@@ -178,7 +178,7 @@ class SensorIntervention(Intervention):
         sensor: The sensor.
     """
 
-    subject: ClassVar[str] = "sensor"
+    subject = "sensor"
     sensor: str
 
     def check(self, world: World) -> None:
@@ -245,7 +245,7 @@ class Restore(Intervention):
         'astro'
     """
 
-    subject: ClassVar[str] = "name"
+    subject = "name"
     name: str
 
     def check(self, world: World) -> None:

@@ -1,9 +1,9 @@
 """Errors of long-term presence: distances of the estimate from the true occupancy of rooms."""
 
 import math
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB
 from fleet2d.kernels import earth_mover as minimal_cost
-from fleet2d.metrics.metric import BetterValues, Metric
-from fleet2d.runtime.clock import DAY_S, HOUR_US
+from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import HOUR_US
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
@@ -226,7 +226,7 @@ class LongTermMetric(Metric):
 
     def count(self, counts: I64, history: History) -> tuple[I64, int]:
         """Add a period; return the counts of the window and its steps."""
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
         self.periods.append((counts, len(history)))
         if self.window is not None:
             del self.periods[: -max(1, math.floor(self.window / self.period))]
@@ -270,17 +270,17 @@ class LtpError(LongTermMetric):
         given: The shares that are compared.
     """
 
-    hidden: ClassVar[Set[str]] = frozenset({"js", "kl", "max_gap", "mean_gap", "tau", "flips"})
-    unit: ClassVar[str] = "at the end"
-    units: ClassVar[Mapping[str, str]] = {
+    hidden = frozenset({"js", "kl", "max_gap", "mean_gap", "tau", "flips"})
+    unit = "at the end"
+    units = {
         "tv": "share of time in wrong rooms",
         "earth_mover_m": "m on foot from the truth",
         "inside": "share of rooms in interval",
         "burn_in_day": "day from which tv is small",
     }
-    least: ClassVar[Mapping[str, float]] = {"": 0, "tau": -1}
-    largest: ClassVar[Mapping[str, float]] = {"js": 1, "tau": 1}
-    better: ClassVar[BetterValues] = {"": "lower", "inside": "higher", "tau": "higher"}
+    least = {"": 0, "tau": -1}
+    largest = {"js": 1, "tau": 1}
+    better = {"": "lower", "inside": "higher", "tau": "higher"}
 
     given: Literal["home", "away", "hour_of_week"] = "home"
 
@@ -381,8 +381,8 @@ class LtpGap(LongTermMetric):
     Users who were never at home are left out.
     """
 
-    unit: ClassVar[str] = "share of time, gap at the end"
-    better: ClassVar[BetterValues] = {"": "lower"}
+    unit = "share of time, gap at the end"
+    better = {"": "lower"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

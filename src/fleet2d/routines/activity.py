@@ -15,6 +15,7 @@ from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
 from fleet2d.routines import distributions
 from fleet2d.routines.distributions import Distribution
+from fleet2d.runtime.clock import SECOND
 
 FORMS: dict[str, dict[str, Any]] = {
     "text": {"type": "string"},
@@ -40,7 +41,6 @@ class SchemaForms:
 SettingsType = TypeVar("SettingsType", bound=Settings)
 
 FOLDER = Path(__file__).parent
-SECOND = timedelta(seconds=1)
 # Standard deviation of a duration of which only the mean is given, relative to the mean.
 DEFAULT_SPREAD = 0.3
 

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections import OrderedDict
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -134,7 +134,7 @@ class FieldOfView(Component):
         [True, False]
     """
 
-    kind: ClassVar[str] = "sight"
+    kind = "sight"
 
     def start(self, home: Home) -> None:
         """Prepare for a run."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import radians
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -304,7 +304,7 @@ class PerceptionError(Component):
         True
     """
 
-    kind: ClassVar[str] = "perception_error"
+    kind = "perception_error"
 
     @abstractmethod
     def distort(self, sightings: "CameraSightings") -> "CameraSightings":

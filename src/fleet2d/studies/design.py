@@ -27,7 +27,7 @@ from fleet2d.studies.specification import SEED, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results: those above the
-# engine in the order of imports.
+# engine in the order of imports, but `homes`.
 _LEAVES = ("__main__", "cli", "learning", "live", "studies", "testing", "viewing")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
@@ -127,7 +127,7 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 
 NOT_APPLICABLE = -1
-MAX_VARIANTS = 10_000_000
+MAX_VARIANTS = 1_000_000
 SWITCHES = ("key_frames", "observations", "events", "decisions")
 """Keys of `artifacts` that are named after their tables."""
 

@@ -140,7 +140,7 @@ class ChainPresence(Presence):
         super().__init__(users, home[-1], away[-1], time, track=track)
 
     def corrected(self) -> "ChainPresence":
-        """Return a copy whose forecasts start from the last belief of the track."""
+        """Return a copy with forecasts from the last belief of the track on."""
         assert self.track is not None
         people = []
         for row, person in enumerate(self._people):
@@ -223,7 +223,7 @@ class Filter(Model):
         detection: Chance that somebody in view is perceived.
     """
 
-    is_by_bin: ClassVar[bool] = True
+    is_by_bin = True
     detection: Share = Field(default=0.95, gt=0, lt=1)
     stages: ClassVar[int] = 1
     negative: ClassVar[bool] = True
@@ -288,7 +288,7 @@ class SemiMarkov(Filter):
     while one who has been there for long stays for long; or the other way round, as is learned.
     """
 
-    stages: ClassVar[int] = 2
+    stages = 2
 
 
 class RoutineModel(SemiMarkov):
@@ -332,4 +332,4 @@ class MarkovDecay(Filter):
     Before the first sighting it is the result of the transitions from the uniform distribution.
     """
 
-    negative: ClassVar[bool] = False
+    negative = False

@@ -1,4 +1,4 @@
-"""Estimators of long-term presence: their base, what they count, and shares of sightings."""
+"""Estimators of long-term presence: their base, their counts, and shares of sightings."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -183,7 +183,7 @@ class Estimator(Component):
     forgetting, and intervals by resampling days.
     """
 
-    kind: ClassVar[str] = "presence_estimator"
+    kind = "presence_estimator"
     has_interval: ClassVar[bool] = True  # whether its output is `shares` of the sum of all days
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -204,7 +204,7 @@ class Fremen(Estimator):
         detection: Chance that somebody in view is perceived.
     """
 
-    has_interval: ClassVar[bool] = False
+    has_interval = False
 
     detection: Share = Field(default=0.95, gt=0)
 

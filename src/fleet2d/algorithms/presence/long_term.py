@@ -1,8 +1,8 @@
 """Long-term presence: where people usually are; and the base of algorithms of presence."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import Field
@@ -23,7 +23,7 @@ from fleet2d.runtime.determinism import stream_key
 class PresenceAlgorithm(Algorithm):
     """Base of algorithms of presence: a component of theirs learns from the evidence."""
 
-    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+    needs = frozenset({"evidence"})
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""
@@ -37,7 +37,7 @@ class PresenceAlgorithm(Algorithm):
         raise NotImplementedError
 
     def _prepare(self, learner: Any, users: Sequence[str], start: datetime) -> None:
-        """Begin a run with what was learned in another one."""
+        """Begin a run with the learned state of another one."""
         raise NotImplementedError
 
     def _begin_once(self, state: Present) -> None:

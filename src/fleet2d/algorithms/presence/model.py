@@ -1,4 +1,4 @@
-"""Real-time presence: the algorithm, the base of its models, simple ones, and what people say."""
+"""Real-time presence: the algorithm, the base of its models, simple ones, and answers of people."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -40,7 +40,7 @@ class Model(Component):
     A scenario names a model of your own, such as one learned elsewhere, by `model: module:Class`.
     """
 
-    kind: ClassVar[str] = "presence_model"
+    kind = "presence_model"
     # Whether the belief after a bin is the same however many bins `observe` gets at a time.
     is_by_bin: ClassVar[bool] = False
 
@@ -100,7 +100,7 @@ class LastSeen(Model):
     away. The naive baseline: right just after a sighting, and overconfident later.
     """
 
-    is_by_bin: ClassVar[bool] = True
+    is_by_bin = True
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
@@ -193,7 +193,7 @@ class RealTimePresence(PresenceAlgorithm):
     model: OneOf[Model] = cast("Any", "hmm")
 
     def start(self, home: Home) -> None:
-        """Begin without evidence, with a model whose files can be used."""
+        """Begin without evidence, with a model that has usable files."""
         super().start(home)
         self.model.check()
 
@@ -266,7 +266,7 @@ class BeliefTable(RealTimePresence):
         first, end = evidence.begin, evidence.begin + len(evidence) * bin_steps
         due = np.arange(first // every + 1, end // every + 1) * every
         bins = (due - first) // bin_steps  # that are over by then
-        # With islands, what is watched in the whole evidence says where people can be.
+        # With islands, the rooms watched in the whole evidence bound the places of people.
         is_whole = self.model.is_by_bin and evidence.by_patch.island is None
         ends = [len(evidence)] if is_whole else [*bins.tolist(), len(evidence)]
         parts = [evidence.between(a, b) for a, b in pairwise([0, *ends]) if a < b]
@@ -291,7 +291,7 @@ class BeliefTable(RealTimePresence):
 
 
 class Told(NamedTuple):
-    """What somebody said about where a person is.
+    """An answer to the question where a person is.
 
     Attributes:
         step: When.
@@ -323,7 +323,7 @@ class ToldPresence(Algorithm):
         self.told: dict[str, list[Told]] = {}  # in the present period, the last one before it first
 
     def check_sources(self, sources: Mapping[str, Algorithm]) -> None:
-        """Refuse anything but one presence; what a class of yours returns shows in the run."""
+        """Refuse anything but one presence; the output of your own class shows in the run."""
         if len(sources) != 1:
             raise ComponentError("give `reads: [rtp]`, the presence that answers correct")
         for name, source in sources.items():
@@ -336,7 +336,7 @@ class ToldPresence(Algorithm):
         return ComponentError(f"{name!r} is not a real-time presence: name one in `reads`")
 
     def update(self, history: History, state: Present) -> Any:
-        """Correct each bin of the belief by what the robot was told before."""
+        """Correct each bin of the belief by earlier answers of people."""
         belief = state.outputs.get(self.reads[0])
         if belief is None:
             return None

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -33,6 +32,7 @@ from fleet2d.entities.robots.search import (
     search_problem,
 )
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
@@ -92,7 +92,7 @@ class Sites:
             prior: Probability that the person is in each room, float64 (n,).
         """
         travel, look = self._travel()
-        position = (now.actor.state.x, now.actor.state.y)
+        position = now.actor.state.position
         reach = [self._seconds(position, points[0]) for points in self._points]
         return search_problem(prior, reach, travel, look, self.share)
 
@@ -103,17 +103,17 @@ class Sites:
         """
         version = self._actor.home.version
         if self._times is None or self._times[0] != version:
-            last, first = [p[-1] for p in self._points], [p[0] for p in self._points]
-            travel = np.array([[self._seconds(a, b) for b in first] for a in last], np.float64)
-            turn = TURN / self._actor.turn_rate
-            look = [
-                len(points) * turn + sum_in_order(self._seconds(a, b) for a, b in pairwise(points))
-                for points in self._points
-            ]
-            self._times = version, travel, np.array(look, np.float64)
+            travel = np.empty((len(self), len(self)))
+            look = np.empty(len(self))
+            turn_s = TURN / self._actor.turn_rate
+            for site, points in enumerate(self._points):
+                ways = [self._seconds(start, goal) for start, goal in pairwise(points)]
+                look[site] = len(points) * turn_s + sum_in_order(ways)
+                travel[site] = [self._seconds(points[-1], other[0]) for other in self._points]
+            self._times = version, travel, look
         return self._times[1:]
 
-    def _seconds(self, start: tuple[int, int], goal: tuple[int, int]) -> float:
+    def _seconds(self, start: LatticePoint, goal: LatticePoint) -> float:
         seconds = way_seconds(self._actor, start, goal)
         return BLOCKED_ROUTE_S if seconds is None else seconds
 
@@ -169,10 +169,10 @@ class Find(BeliefBehavior):
         avoid: Rooms, or kinds of rooms if the home has them, that it looks into from outside only.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME}
     )
-    answers: ClassVar[frozenset[str]] = frozenset({"find"})
+    answers = frozenset({"find"})
 
     policy: Policy = "receding"
     at: tuple[TimeOfDay, ...] = ()
@@ -290,12 +290,12 @@ class Find(BeliefBehavior):
         """End the search: approach the person, at (x, y) [m], and stay."""
         self._end(plan, EventKind.FOUND)
         if is_in_rooms(now, x, y, self.avoided):
-            return plan.face(*now.home.plan.lattice.point_at((x, y))).stay(self.stay)
+            return plan.face_place((x, y)).stay(self.stay)
         approach(now, plan, x, y, self.distance)
         back = spot_back(now, x, y, self.distance)
-        if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
+        if plan.position == now.actor.state.position != back:
             plan.go_to_point(*back)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         return plan.stay(self.stay)
 
     def _look_further(self, now: Situation, plan: Plan, search: SearchState) -> Plan | None:

@@ -3,7 +3,7 @@
 from datetime import timedelta
 from functools import partial
 from itertools import combinations
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -15,6 +15,7 @@ from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import BeliefBehavior, centres, sight_range, viewpoints_of
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB, points_in_sight
@@ -237,7 +238,7 @@ class Hangout(BeliefBehavior):
         quiet: Hours in which it doesn't move.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.EXPLORES, EventKind.RELOCATES})
+    records = frozenset({EventKind.EXPLORES, EventKind.RELOCATES})
 
     period: PositiveDuration = timedelta(minutes=30)
     near: Nearness = "path"
@@ -259,7 +260,7 @@ class Hangout(BeliefBehavior):
             )
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.places.block + SEAT_WEIGHT * self.places.prox
-        self.ways: tuple[Space, dict[tuple[int, int], F64]] = actor.space, {}
+        self.ways: tuple[Space, dict[LatticePoint, F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.rated_by: F64 | None = None  # the probabilities behind `worth`
         self.worth = -self.penalty
@@ -288,7 +289,7 @@ class Hangout(BeliefBehavior):
             if explores:
                 self._explore(now, plan, draws.choice(self.explored))
         x, y = self.places.points[self.place].tolist()
-        if (plan.x, plan.y) != (x, y) and not self.is_blocked:
+        if plan.position != (x, y) and not self.is_blocked:
             plan.go_to_point(x, y)
             self._face_room(now, plan)
         if quiet_until is not None:
@@ -343,7 +344,7 @@ class Hangout(BeliefBehavior):
             self.ways = space, {}
         cell = actor.state.x // SUB, actor.state.y // SUB
         if cell not in self.ways[1]:
-            seconds = actor.seconds(space.distances((actor.state.x, actor.state.y), points))
+            seconds = actor.seconds(space.distances(actor.state.position, points))
             is_reachable = np.isfinite(seconds)
             way = np.where(is_reachable, seconds, 0.0)
             move = way / (way + self.tau.total_seconds())
@@ -354,5 +355,5 @@ class Hangout(BeliefBehavior):
         """Turn to the middle of the room that it stands in."""
         room = now.home.plan.rooms[int(self.places.room[self.place])]
         x, y = now.home.plan.lattice.point_at(room.anchor_xy)
-        if (x, y) != (plan.x, plan.y):
+        if (x, y) != plan.position:
             plan.face(x, y)

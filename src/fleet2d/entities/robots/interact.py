@@ -2,7 +2,7 @@
 
 import math
 from datetime import datetime, timedelta
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
@@ -19,6 +19,7 @@ from fleet2d.entities.robots.approach import (
     is_in_rooms,
 )
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.interactions.interaction import OUTCOMES, Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import exp2, sum_in_order
@@ -124,7 +125,7 @@ class ServedRequest(NamedTuple):
     step: Step
     text: str
     place: Point = (0.0, 0.0)
-    came_from: tuple[int, int] = (0, 0)
+    came_from: LatticePoint = (0, 0)
 
 
 class Interact(BeliefBehavior):
@@ -159,17 +160,15 @@ class Interact(BeliefBehavior):
         seek: Whether it looks for people; else it serves only those who come into view.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {
             EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED, EventKind.WITHDRAWS,
             EventKind.OPPORTUNITY, EventKind.REPLIES,
         }
     )  # fmt: skip
-    listens: ClassVar[frozenset[str]] = frozenset(
-        {EventKind.USER_SEEN, EventKind.DUE, EventKind.QUESTION}
-    )
+    listens = frozenset({EventKind.USER_SEEN, EventKind.DUE, EventKind.QUESTION})
 
-    serves_requests: ClassVar[bool] = True
+    serves_requests = True
 
     timing: str | None = None
     look: PositiveDuration = timedelta(minutes=20)
@@ -249,7 +248,7 @@ class Interact(BeliefBehavior):
         event = next((event for event in now.events if event.event == EventKind.QUESTION), None)
         if event is None:
             return None
-        plan = now.plan().face(*now.home.plan.lattice.point_at((event.x, event.y)))
+        plan = now.plan().face_place((event.x, event.y))
         return plan.note(EventKind.REPLIES, event.user).stay(REPLY_TAKES)
 
     def _address(
@@ -361,7 +360,7 @@ class Interact(BeliefBehavior):
         self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
-        plan.face(*now.home.plan.lattice.point_at(place))
+        plan.face_place(place)
         plan.note(EventKind.ASKS, request.text).stay(self.patience).interrupt_on(*OUTCOMES)
         self.plan = plan.root
         return plan
@@ -391,7 +390,8 @@ class Interact(BeliefBehavior):
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
         total = sum_in_order(float(joint[room.index]) for room in rooms)
-        self.served, self.plan = ServedRequest(request, "seek", request.text), now.plan()
+        self.served = ServedRequest(request, "seek", request.text)
+        self.plan = now.plan()
         looked = 0.0
         for room in rooms:
             if looked > ENOUGH * total:
@@ -436,13 +436,13 @@ class Opportunistic(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {
             EventKind.APPROACHES, EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED,
             EventKind.INTERACTION_OVER, EventKind.INTERACTS,
         }
     )  # fmt: skip
-    listens: ClassVar[frozenset[str]] = frozenset({EventKind.USER_SEEN})
+    listens = frozenset({EventKind.USER_SEEN})
 
     users: tuple[str, ...] = ()
     distance: Length = Field(default=1.2, ge=0.3, le=10)
@@ -487,7 +487,7 @@ class Opportunistic(Behavior):
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note(EventKind.APPROACHES, name)
         approach(now, plan, x, y, self.distance)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         plan.note(EventKind.INTERACTS, name)
         ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
         self.asked = (ready[0], ready[0].text) if ready else None

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -27,6 +27,7 @@ from fleet2d.entities.place import (
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import stops_with_view, unwatched
 from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.load import source_of
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64
@@ -54,7 +55,7 @@ class Patrol(Behavior):
             from which it sees all places at the room's furniture (without any, 95 % of the floor).
     """
 
-    resumes: ClassVar[bool] = True
+    resumes = True
 
     rooms: Literal["all"] | tuple[Place, ...] = "all"
     waypoints: tuple[Point, ...] = ()
@@ -94,13 +95,13 @@ class Patrol(Behavior):
                 f" {', '.join(hidden[:MAX_NAMED])}{more}{hint}"
             )
 
-    def _stops_at(self, actor: Actor, place: Place) -> list[tuple[int, int]]:
+    def _stops_at(self, actor: Actor, place: Place) -> list[LatticePoint]:
         if self.stop_at == "middle" or is_point(place) or furniture_of(actor, place) is not None:
             return stops_at(actor, place)
         rooms = actor.rooms(place)  # type: ignore[arg-type]
         return [stop for room in rooms for stop in self._stops_in(actor, room)]
 
-    def _stops_in(self, actor: Actor, room: Room) -> Sequence[tuple[int, int]]:
+    def _stops_in(self, actor: Actor, room: Room) -> Sequence[LatticePoint]:
         return stops_with_view(actor, room) if self.stop_at == "view" else [actor.middle(room)]
 
     def decide(self, now: Situation) -> Plan:
@@ -156,7 +157,7 @@ class Scheduled(Behavior):
             are left out, with a note.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
+    records = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
 
     visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
     late: Duration = timedelta(minutes=30)
@@ -195,9 +196,9 @@ class Scheduled(Behavior):
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:
-        visit, (x, y) = self.visits[number], self.stops[number]
+        visit = self.visits[number]
         name = visit.task or self._room_name(now.actor, number)
-        plan = now.plan().go_to_point(x, y).note(EventKind.VISITS, name)
+        plan = now.plan().go_to_point(*self.stops[number]).note(EventKind.VISITS, name)
         if visit.look_around:
             plan.turn_by(1.0)
         return plan.stay(visit.dwell)
@@ -234,8 +235,8 @@ class Retrace(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.RETRACED, EventKind.RETRACES})
-    resumes: ClassVar[bool] = True
+    records = frozenset({EventKind.RETRACED, EventKind.RETRACES})
+    resumes = True
 
     path: InputPath
     reach: Length = Field(default=1.0, ge=0)
@@ -284,9 +285,9 @@ class Retrace(Behavior):
         return plan.note(EventKind.RETRACED)
 
 
-def _thin_out(points: I64, spacing: float) -> list[tuple[int, int]]:
+def _thin_out(points: I64, spacing: float) -> list[LatticePoint]:
     """Return points in order, each farther than `spacing` from the one before [lattice]."""
-    path: list[tuple[int, int]] = []
+    path: list[LatticePoint] = []
     for x, y in points.tolist():
         if not path or (x - path[-1][0]) ** 2 + (y - path[-1][1]) ** 2 > spacing * spacing:
             path.append((x, y))

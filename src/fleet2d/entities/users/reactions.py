@@ -1,12 +1,12 @@
 """Reactions: how people react to robots."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.routines.activity import DurationDistribution
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
@@ -42,7 +42,7 @@ class Reactions(Behavior):
         manners: The manners; left out: those of the persona.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.REACTS})
+    records = frozenset({EventKind.REACTS})
 
     manners: Manners | None = None
 
@@ -125,7 +125,7 @@ class Reactions(Behavior):
         # Across the robot's way; along it, the robot would come closer again.
         across = [
             (x, y)
-            for x, y in self._points_around(now, (plan.x, plan.y), STEP_M)
+            for x, y in self._points_around(now, plan.position, STEP_M)
             if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
             <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
         ]
@@ -140,8 +140,8 @@ class Reactions(Behavior):
         plan.stay(timedelta(seconds=lasts.draw(draws)))
 
     def _points_around(
-        self, now: Situation, center: tuple[int, int], distance_m: float
-    ) -> list[tuple[int, int]]:
+        self, now: Situation, center: LatticePoint, distance_m: float
+    ) -> list[LatticePoint]:
         """Return free points at a distance [m] from a point, in the same room."""
         distance = round(distance_m * now.home.plan.lattice.units_per_m)
         return list(points_at_distance(now.actor, center, distance, DIRECTIONS))
@@ -152,7 +152,7 @@ class Reactions(Behavior):
                 behavior.give_up(now)
 
 
-def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
+def _robot(now: Situation, event: SightEvent) -> LatticePoint:
     return now.home.plan.lattice.point_at((event.x, event.y))
 
 

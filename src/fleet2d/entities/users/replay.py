@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -16,6 +16,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
 from fleet2d.logs import placement
@@ -30,12 +31,18 @@ from fleet2d.logs.log import (
     begin_of_run,
     files_of,
 )
-from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
+from fleet2d.logs.placement import (
+    COORDINATE_LIMIT_M,
+    DOOR,
+    UNKNOWN,
+    LogFrame,
+    LoggedVisit,
+    LoggedVisits,
+    RoomChoice,
+)
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
-# Coordinates are clipped to this, far outside of any home [m].
-COORDINATE_LIMIT_M = 1e6
 # A leg faster than this is counted as implausible.
 FASTEST_M_S = 3.0
 # A move shorter than this is ignored for the heading [m].
@@ -269,7 +276,7 @@ class RoomFollower:
         else:
             plan.go_to_point(*self._spot(visit, plan))
 
-    def _spot(self, visit: LoggedVisit, plan: Plan) -> tuple[int, int]:
+    def _spot(self, visit: LoggedVisit, plan: Plan) -> LatticePoint:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
         return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
@@ -300,7 +307,7 @@ class RoomFollower:
         if visit.place == AWAY:
             plan.jump(arrive_us, away=1).note(EventKind.LEFT_HOME)
 
-    def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
+    def _near(self, plan: Plan, spot: LatticePoint) -> LatticePoint:
         """Return the place in the room of a spot that is nearest to the body."""
         room = self.actor.home.plan.room_of_point(*spot)
         if room is None:
@@ -310,11 +317,11 @@ class RoomFollower:
         ((x, y),) = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64)).tolist()
         return x, y
 
-    def _way(self, plan: Plan, spot: tuple[int, int]) -> I64:
+    def _way(self, plan: Plan, spot: LatticePoint) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
-        route = self.actor.space.route((plan.x, plan.y), spot)
+        route = self.actor.space.route(plan.position, spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
-            route = straight_way((plan.x, plan.y), spot)
+            route = straight_way(plan.position, spot)
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(
@@ -338,7 +345,8 @@ class RoomFollower:
             self.implausible += speed > FASTEST_M_S
             self.top_speed = max(self.top_speed, speed)
         block = np.zeros((len(rows) + 1, 5), np.int64)
-        block[:-1, 0], block[:-1, 1:4] = leave + times, rows[:, 1:]
+        block[:-1, 0] = leave + times
+        block[:-1, 1:4] = rows[:, 1:]
         block[-1] = block[-2]
         block[-1, 0] = arrive_us
         plan.follow(block)
@@ -463,9 +471,7 @@ class Replay(Behavior, LogKeys):
         reach: A position farther than this from free space is left out.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN}
-    )
+    records = frozenset({EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN})
 
     path: InputFileOrFolder
     format: Layout = "auto"

@@ -16,13 +16,14 @@ from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import POSTURES, UsePlace
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S, CoreVenue, Resident
 from fleet2d.routines.activity import NOT_LIVED_IN, Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import SECOND_US, Clock
 from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.events import EventKind
 
@@ -42,7 +43,7 @@ class Spot(NamedTuple):
 
     def walk(self, plan: "Plan") -> None:
         """Go there."""
-        if plan.away or (plan.x, plan.y) != (self.x, self.y):
+        if plan.away or plan.position != (self.x, self.y):
             plan.go_to_point(self.x, self.y)
 
 
@@ -206,7 +207,6 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     return things[rank % members :: members] or [things[rank % len(things)]]
 
 
-SECOND_US = 1_000_000
 # How the core numbers ways of choosing rooms, small moves, and events.
 POLICIES = tuple(policy.name.lower() for policy in kernels.RoomPolicy)
 MOVE_KINDS = tuple(kind.name.lower() for kind in kernels.MoveKind)
@@ -347,7 +347,7 @@ class KnownHome:
         """Return how long to wait before the body may use a room [us]; None: not now."""
         return self._person.wait_for(room, self._actor.clock, now_us, takes_us)
 
-    def way_out(self) -> tuple[int, int]:
+    def way_out(self) -> LatticePoint:
         """Return the lattice point where the body leaves the home."""
         return self._actor.way_out
 

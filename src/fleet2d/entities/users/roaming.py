@@ -1,7 +1,6 @@
 """Roaming: people whose rooms are drawn from given shares of time, and pets."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -16,17 +15,17 @@ from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.routines.distributions import draw_weighted
+from fleet2d.routines.planner import MILLION
+from fleet2d.runtime.clock import SECOND_US
 from fleet2d.runtime.determinism import Draws, sum_in_order
 
 AWAY = "away"
-SECOND_US = 1_000_000
 # How many visits are planned at once.
 VISITS = 20
 # The minimum length of a stay after subtracting the time of travel.
 SHORTEST_US = 10 * SECOND_US
 # Points per metre of a way at which the room is looked up.
 POINTS_PER_M = 10
-MILLION = 1_000_000
 
 
 class RoomSampling(Behavior):
@@ -108,7 +107,7 @@ class RoomSampling(Behavior):
 
     def _walk(self, actor: Actor, plan: Plan, goal: Spot) -> None:
         """Walk to a spot, and add the time on the way to the debt of the rooms it leads through."""
-        start = (plan.x, plan.y)
+        start = plan.position
         began_us = plan.time_us
         if start == goal and not plan.away:
             return
@@ -161,7 +160,7 @@ class Pet(Behavior):
         spots: Smallest and largest number of stops between two naps.
     """
 
-    usual_height: ClassVar[float] = 0.3
+    usual_height = 0.3
 
     rooms: tuple[str, ...] = ()
     nap: AnyDurationDistribution = DurationDistribution(

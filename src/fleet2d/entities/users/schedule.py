@@ -101,7 +101,8 @@ class Schedule(Behavior):
             if is_point(place):
                 actor.point(place)  # type: ignore[arg-type]
         available = {(), *available_places(actor, "schedule.days", places)}
-        self.week = [[entry for entry in day if entry.place in available] for day in self.week]
+        for day in self.week:
+            day[:] = [entry for entry in day if entry.place in available]
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
         """Return the place of the last item before the run."""

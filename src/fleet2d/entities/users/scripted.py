@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field
 
@@ -40,7 +40,7 @@ class Unknown(Behavior):
     what would need their place. Event: `unknown`.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.UNKNOWN})
+    records = frozenset({EventKind.UNKNOWN})
 
     def decide(self, now: Situation) -> Plan:
         """Be away, without having walked out."""

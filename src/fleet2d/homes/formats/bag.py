@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class BagMap(OccupancySource):
         topic: The topic of the map, if the bag has several maps and none on `/map`.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".bag", ".mcap", ".db3")
+    suffixes = (".bag", ".mcap", ".db3")
 
     path: InputFileOrFolder
     topic: str | None = None

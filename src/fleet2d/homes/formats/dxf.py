@@ -4,7 +4,7 @@ import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -51,7 +51,7 @@ class Dxf(ForeignSource):
             windows, or all lines if there are none.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".dxf",)
+    suffixes = (".dxf",)
 
     path: InputPath
     scale: float | None = Field(default=None, gt=0)

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 import shapely
@@ -309,7 +309,7 @@ class GeoJson(ForeignSource):
         level: The floor, by id, name or ordinal; left out: the one of ordinal 0.
     """
 
-    marks: ClassVar = (("type", COLLECTION),)
+    marks = (("type", COLLECTION),)
 
     path: InputPath
     units: Units = "auto"

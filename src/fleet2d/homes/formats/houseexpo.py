@@ -1,7 +1,7 @@
 """Floor plans of the HouseExpo data set: one outline and boxes with a room category each."""
 
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import shapely
 from pydantic import BaseModel, ConfigDict, TypeAdapter
@@ -46,7 +46,7 @@ class HouseExpo(FloorPlanSource):
         path: The plan's JSON file.
     """
 
-    marks: ClassVar = (("verts", None),)
+    marks = (("verts", None),)
 
     path: InputPath
 

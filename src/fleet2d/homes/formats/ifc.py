@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -47,7 +47,7 @@ class Ifc(ForeignSource):
         level: The storey, by name or GlobalId; left out: the lowest that is not below the ground.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".ifc",)
+    suffixes = (".ifc",)
 
     path: InputPath
     level: str | None = Field(default=None, coerce_numbers_to_str=True)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 import shapely
@@ -115,7 +115,7 @@ class RoomPlan(ForeignSource):
         wall_m: Thickness of walls, which a scan sees from one side.
     """
 
-    marks: ClassVar = (("openings", None),)
+    marks = (("openings", None),)
 
     path: InputPath
     wall_m: Length = Field(default=0.1, ge=0.01, le=1)

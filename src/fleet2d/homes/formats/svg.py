@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -46,7 +46,7 @@ class Svg(ForeignSource):
         wall_m: Thickness of walls that are drawn as lines.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".svg",)
+    suffixes = (".svg",)
 
     path: InputPath
     scale: float | None = Field(default=None, gt=0)

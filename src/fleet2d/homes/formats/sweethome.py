@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -46,7 +46,7 @@ class SweetHome(ForeignSource):
         level: The floor, by name or id; left out: the lowest that is not below the ground.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".xml",)
+    suffixes = (".xml",)
 
     path: InputPath
     level: str | None = None

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
@@ -297,7 +297,7 @@ class Valetudo(PixelSource, ForeignSource):
             walls (`exact`).
     """
 
-    marks: ClassVar = (("__class", MAP_CLASS), *((key, None) for key in WRAPPERS))
+    marks = (("__class", MAP_CLASS), *((key, None) for key in WRAPPERS))
 
     path: InputPath
     no_go: NoGo = "keep_out"
