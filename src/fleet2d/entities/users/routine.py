@@ -17,7 +17,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S
-from fleet2d.routines.activity import Activity, catalogue
+from fleet2d.routines.activity import NOT_LIVED_IN, Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
 from fleet2d.routines.life import CACHED_DAYS, WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
@@ -229,7 +229,7 @@ class Seating:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
             name, rooms = matching_rooms(
-                activity.rooms, self._home.rooms, self._reachable, never_in=activity.never_in
+                activity.rooms, self._home.rooms, self._reachable, never_in=NOT_LIVED_IN
             )
         except PlacementError:  # then rest replaces the activity
             return ()
