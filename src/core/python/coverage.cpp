@@ -9,18 +9,13 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<PoseCache> = std::tuple(
-    &PoseCache::pose, &PoseCache::last, &PoseCache::settled, &PoseCache::cells, &PoseCache::shown, &PoseCache::used);
+inline constexpr std::size_t border::members_of<PoseCache> = 6;
 
 template <>
-inline constexpr auto border::members_of<CoverageRecord> =
-    std::tuple(&CoverageRecord::first, &CoverageRecord::last, &CoverageRecord::exposure, &CoverageRecord::counted,
-               &CoverageRecord::binned, &CoverageRecord::peak);
+inline constexpr std::size_t border::members_of<CoverageRecord> = 6;
 
 template <>
-inline constexpr auto border::members_of<CoverageSetup> =
-    std::tuple(&CoverageSetup::walls, &CoverageSetup::lenses, &CoverageSetup::patch_of_cell, &CoverageSetup::step_us,
-               &CoverageSetup::every, &CoverageSetup::bin_steps);
+inline constexpr std::size_t border::members_of<CoverageSetup> = 6;
 
 namespace {
 

@@ -7,8 +7,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Corners> =
-    std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
+inline constexpr std::size_t border::members_of<Corners> = 4;
 
 Routes::Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners)
     : owner_(nb::borrow(mesh)), mesh_(nb::cast<const OwnedMesh&>(mesh).mesh()) {

@@ -175,7 +175,7 @@ def set_up(
     """
     with rare_collections():
         from fleet2d.engine.simulation import Simulation
-        from fleet2d.scenario.model import load_scenario
+        from fleet2d.scenario.load import load_scenario
 
         gc.freeze()
 

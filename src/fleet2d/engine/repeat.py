@@ -25,10 +25,10 @@ from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import Run, open_run
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import path_in, refuse_links
 
-# What begins the note about the messages of a live run, which its repetition doesn't get.
+# The beginning of the note about the messages of a live run, which its repetition doesn't get.
 LIVE = "live: "
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
@@ -275,12 +275,12 @@ def _fields(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def _repeatable(notes: list[str]) -> list[str]:
-    """Return the notes that depend neither on the speed of a machine nor on what arrived live."""
+    """Return the notes that depend neither on the speed of a machine nor on live messages."""
     return [note for note in notes if not note.startswith((SLOW, LIVE, NO_CHECKPOINT))]
 
 
 def _files(old: Path, new: Path) -> list[str]:
-    """Return the files beside the tables whose bytes differ: the plan, and what was learned."""
+    """Return the files beside the tables whose bytes differ: the plan, and learned states."""
     names = {FLOORPLAN_NAME}
     for root in (old, new):
         names |= {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}

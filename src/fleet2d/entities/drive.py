@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, TURN, heading_of, turn_between
 
@@ -208,7 +208,6 @@ def _between(last: Moment, moment: Moment, metres: float) -> Moment:
     return Moment(seconds, metres, last.heading + round(turn * share))
 
 
-@register("drive", "differential")
 class Differential(Drive):
     """Turns on the spot towards each leg of its route, then drives straight, at constant rates."""
 
@@ -234,7 +233,6 @@ class Differential(Drive):
         return [(length / speed, length)]
 
 
-@register("drive", "holonomic")
 class Holonomic(Drive):
     """Drives in any direction at constant speed, without stopping to turn.
 
@@ -263,7 +261,6 @@ class Holonomic(Drive):
             yield Moment(seconds, metres, heading)
 
 
-@register("drive", "trapezoidal")
 class Trapezoidal(Differential):
     """Turns on the spot towards each leg; on it, accelerates, drives at constant speed, brakes.
 

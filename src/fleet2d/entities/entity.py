@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, PeerAddress, Speed, TurnRateDeg
 from fleet2d.entities.behavior import Actor, Behavior, LightHours
@@ -62,7 +62,6 @@ class EvidenceSource(Component):
         raise NotImplementedError
 
 
-@register("evidence_source", "live")
 class LiveDetections(EvidenceSource):
     """Perceive what arrives while the run goes on, from a real robot or another program.
 
@@ -106,7 +105,7 @@ class Entity(BodySettings):
             none: it stays still.
     """
 
-    behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = ()
+    behaviors: tuple[OneOf[Behavior], ...] = ()
 
 
 class User(Entity):
@@ -168,11 +167,11 @@ class Robot(Entity):
     radius: Length = Field(default=0.15, gt=0, le=2)
     speed: Speed = Field(default=0.6, ge=0.01, le=20)
     turn_rate_deg: TurnRateDeg = Field(default=90.0, ge=0.01, le=36000)
-    drive: Annotated[Drive, OneOf("drive")] = Differential()
+    drive: OneOf[Drive] = Differential()
     camera: Camera | None = Camera()
     cameras: dict[str, Camera] = Field(default={})
     perception: Perception | None = None
-    perceives: Annotated[EvidenceSource, OneOf("evidence_source")] | None = None
+    perceives: OneOf[EvidenceSource] | None = None
 
     usual_height = 0.4
     minds_costs = True

@@ -8,7 +8,6 @@ import numpy as np
 import shapely
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, counted, suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.behavior import Actor
@@ -30,7 +29,6 @@ MAX_OUTSIDE = 0.5
 ANONYMOUS = frozenset({"unknown", "person", "people", "human", "none", "nobody", "0", ""})
 
 
-@register("evidence_source", "replay")
 class ReplayedDetections(EvidenceSource, LogKeys):
     """Perceive what a real robot perceived: the detections in a table, or on a topic of a bag.
 

@@ -30,7 +30,6 @@ from pydantic_core import core_schema
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import CROSSINGS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
@@ -350,7 +349,6 @@ def native_schema() -> dict[str, Any]:
     return dialect | PlanFile.model_json_schema()
 
 
-@register("floorplan", "native")
 class Native(FloorPlanSource):
     """A plan in Fleet2D's own format.
 
@@ -517,7 +515,6 @@ def _part_document(polygon: Polygon) -> dict[str, Any]:
 HOMES = Path(__file__).with_name("homes")
 
 
-@register("floorplan", "bundled")
 class Bundled(FloorPlanSource):
     """A home that comes with Fleet2D.
 

@@ -5,14 +5,12 @@ from typing import Any
 from pydantic import Field
 
 from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, problem
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError, errors_as
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
-@register("intervention", "reset")
 class ResetAlgorithm(Intervention):
     """Let an algorithm forget what it has learned, or load what another run has learned.
 
@@ -46,7 +44,6 @@ class ResetAlgorithm(Intervention):
             world.reset(self.algorithm, self.learned)
 
 
-@register("intervention", "replace")
 class ReplaceOutput(Lasting):
     """Let behaviors and other algorithms read another output of an algorithm for a while.
 

@@ -12,7 +12,6 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import AWAY
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric, nested, pairs_of
@@ -24,7 +23,6 @@ RestPlace = tuple[float, float]
 MAX_PLACES = 4  # places per user in the closing table
 
 
-@register("metric", "distance")
 class Distance(Metric):
     """Metres that each body covers per day, as the sum of its moves from step to step."""
 
@@ -51,7 +49,6 @@ class Distance(Metric):
         return {name: metres / self.days for name, metres in self.metres.items() if self.days}
 
 
-@register("metric", "travel")
 class Travel(Metric):
     """Relocations and metres a day, of each robot.
 
@@ -108,7 +105,6 @@ class Travel(Metric):
         }
 
 
-@register("metric", "battery")
 class BatteryUse(Metric):
     """Lowest charge, dockings a day, and shares of time charging and empty, of each robot.
 
@@ -166,7 +162,6 @@ class BatteryUse(Metric):
         return numbers
 
 
-@register("metric", "room_share")
 class RoomShare(Metric):
     """Share of time that each user spends in each room, and away.
 
@@ -212,7 +207,6 @@ class RoomShare(Metric):
         }
 
 
-@register("metric", "stays")
 class Stays(Metric):
     """Where each user truly is: a row for each stay in a room, or away.
 
@@ -240,7 +234,6 @@ class Stays(Metric):
         }
 
 
-@register("metric", "co_presence")
 class CoPresence(Metric):
     """Share of a user's steps at home in which a robot is in the same room.
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
@@ -28,7 +27,6 @@ TOLD = frozenset(
 )  # fmt: skip
 
 
-@register("metric", "interactions")
 class Interactions(Metric):
     """What came of what robots wanted of people: value, answers, interruptions, annoyance.
 
@@ -161,7 +159,6 @@ class OpenRequest:
     value: float = 0.0
 
 
-@register("metric", "timing_regret")
 class TimingRegret(Metric):
     """How much more value asking at the best time of the same life would have had.
 

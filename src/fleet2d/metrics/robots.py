@@ -8,7 +8,6 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration, Speed, micros
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import LatticePoint
@@ -31,7 +30,6 @@ from fleet2d.sight.camera import DEFAULT_RANGE_M
 ENDS = (EventKind.FOUND, EventKind.NOT_AT_HOME, EventKind.GAVE_UP)
 
 
-@register("metric", "reach_time")
 class ReachTime(Metric):
     """Seconds that a robot would drive to a user who called it, at evenly spaced times.
 
@@ -137,7 +135,6 @@ class SearchRecord(NamedTuple):
     ideal: float
 
 
-@register("metric", "time_to_find")
 class TimeToFind(Metric):
     """Durations and outcomes of the searches of behavior `find` for a user, for each robot.
 
@@ -312,7 +309,6 @@ class TimeToFind(Metric):
 ZONES = {"intimate": 0.45, "personal": 1.2, "social": 3.6}
 
 
-@register("metric", "blocking")
 class Blocking(Metric):
     """How often, and for how long, a robot is in the way of a user who walks.
 
@@ -373,7 +369,6 @@ class Blocking(Metric):
         return nested(rates)
 
 
-@register("metric", "intrusion")
 class Intrusion(Metric):
     """Minutes a day that a robot is in each of Hall's zones of a user.
 

@@ -13,7 +13,6 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import BeliefReader
 from fleet2d.algorithms.presence.estimator import natural_log
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, UNKNOWN_TRUTH, Bool
@@ -250,7 +249,6 @@ class ScoredBins(NamedTuple):
         return ScoredBins._make(column[which] for column in self)
 
 
-@register("metric", "rtp_score")
 class RtpScore(Metric):
     """Scores of real-time presence and of a naive guess, minute by minute, by last-seen gap.
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, UNKNOWN_TRUTH
 from fleet2d.metrics.metric import Metric
@@ -18,7 +17,6 @@ NO_ONE = "nobody"  # name in the confusion of false positives
 SHARES = {"half": 0.5, "most": 0.9}
 
 
-@register("metric", "sightings")
 class Sightings(Metric):
     """Share of a user's steps at home at which at least one robot perceives the user.
 
@@ -54,7 +52,6 @@ class Sightings(Metric):
         return {user: seen / at_home for user, (seen, at_home) in self.steps.items() if at_home}
 
 
-@register("metric", "detections")
 class Detections(Metric):
     """Precision, recall and identity confusion of each robot, over all its cameras.
 
@@ -162,7 +159,6 @@ class Detections(Metric):
         return summary
 
 
-@register("metric", "coverage")
 class Coverage(Metric):
     """Share of the floor of all rooms that was in view of a robot, and times to half and 90 %.
 

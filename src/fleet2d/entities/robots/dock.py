@@ -2,7 +2,6 @@
 
 from datetime import datetime, timedelta
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
@@ -16,7 +15,6 @@ from fleet2d.runtime.events import EventKind
 REST = timedelta(hours=1)
 
 
-@register("behavior", "dock")
 class Dock(Behavior):
     """Go to the charger when the charge falls to a threshold, and stay until it is full enough.
 

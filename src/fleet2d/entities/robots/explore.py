@@ -5,7 +5,6 @@ from datetime import datetime, timedelta
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms
@@ -23,7 +22,6 @@ WORTH = 0.002
 RETRY_INTERVAL = timedelta(minutes=1)
 
 
-@register("behavior", "explore")
 class Explore(Behavior):
     """Complete the layer `explored` of the robot, frontier by frontier.
 

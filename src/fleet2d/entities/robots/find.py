@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share, TimeOfDay
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Command, Situation
@@ -41,6 +40,8 @@ from fleet2d.runtime.events import EventKind
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 SHARE_TO_SHOW = 0.9
+# Weight of a prior proportional to the areas of rooms, beside that of the source.
+DOUBT = 0.1
 # Counted for a route that is blocked at present, as by a shut door [s].
 BLOCKED_ROUTE_S = 86_400.0
 
@@ -138,7 +139,6 @@ class SearchState:
     blocked: set[int] = field(default_factory=set)
 
 
-@register("behavior", "find")
 class Find(BeliefBehavior):
     """Look for a person at given times or on command, until found, given up or believed out.
 
@@ -161,7 +161,6 @@ class Find(BeliefBehavior):
         deadline: Duration of a search after which it gives up.
         out_at: Probability of being out from which the person counts as not at home, once the robot
             has looked into every room that it can get to.
-        doubt: Weight of a prior proportional to the areas of rooms, beside that of the source.
         out: Probability that the person is out, as long as the source has no output.
         memory: Age at which an empty look counts half, because people move.
         views: The maximum number of places in a room from which it looks around.
@@ -181,7 +180,6 @@ class Find(BeliefBehavior):
     late: Duration = timedelta(minutes=30)
     deadline: PositiveDuration = timedelta(minutes=10)
     out_at: Share = 0.9
-    doubt: Share = 0.1
     out: Share = 0.5
     memory: Duration = timedelta(minutes=20)
     views: int = Field(default=2, ge=1, le=8)
@@ -337,7 +335,7 @@ class Find(BeliefBehavior):
         shares = belief.share[self.sites.rooms]
         total = sum_in_order(shares.tolist())
         shares = shares / total if total > 0 else np.zeros(len(sizes))
-        doubt = self.doubt if total > 0 else 1.0
+        doubt = DOUBT if total > 0 else 1.0
         mixed = (1 - doubt) * shares + doubt * sizes / int(sizes.sum())
         has_output = self.source is not None and now.outputs.get(self.source) is not None
         away = belief.away if has_output else self.out

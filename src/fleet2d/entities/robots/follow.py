@@ -5,7 +5,6 @@ from datetime import timedelta
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in, stop_at
@@ -24,7 +23,6 @@ MAX_INTERVAL = timedelta(seconds=32)
 OFF_DOOR_M = 0.8
 
 
-@register("behavior", "follow")
 class Follow(Behavior):
     """Follow a person at a distance for as long as the cameras have the person in view.
 
@@ -116,7 +114,6 @@ class Follow(Behavior):
         return plan.interrupt_on(EventKind.USER_LOST).stay(until=until).ask_by(until)
 
 
-@register("behavior", "come")
 class Come(Behavior):
     """Go where the robot is called to, and wait there for a while.
 

@@ -6,7 +6,6 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.giving_way import resumed
@@ -29,6 +28,8 @@ from fleet2d.runtime.events import EventKind
 Step = Literal["seek", "ask", "carry_out"]
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
+# It looks for a person who is at home with this probability, by `source`, at least.
+SOUGHT_FROM = 0.25
 # It looks into the likeliest rooms, until they have this part of the probability.
 ENOUGH = 0.9
 # No source is surer that a person is at home: without one, all of the probability is there.
@@ -127,7 +128,6 @@ class ServedRequest(NamedTuple):
     came_from: LatticePoint = (0, 0)
 
 
-@register("behavior", "interact")
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
@@ -158,9 +158,6 @@ class Interact(BeliefBehavior):
         patience: How long it waits for an answer.
         again: Time after an answer other than yes before it addresses the same person again.
         seek: Whether it looks for people; else it serves only those who come into view.
-        seek_at: Minimum probability, by `source`, that the person is at home for it to look.
-        only_urgent_at: With `timing`: part of the time to the deadline after which it no longer
-            waits for a better moment.
     """
 
     records = frozenset(
@@ -178,8 +175,6 @@ class Interact(BeliefBehavior):
     patience: PositiveDuration = timedelta(seconds=20)
     again: Duration = timedelta(minutes=10)
     seek: bool = True
-    seek_at: Share = 0.25
-    only_urgent_at: Share = Field(default=1.0)
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithms that it reads."""
@@ -290,7 +285,7 @@ class Interact(BeliefBehavior):
                 continue
             joint = self.belief(now, to).joint
             usual = min(MOST_SURE, sum_in_order(joint.tolist()))
-            if self.at_home.chance(to, now.time, usual) < self.seek_at:
+            if self.at_home.chance(to, now.time, usual) < SOUGHT_FROM:
                 self.not_sought[to] = now.time + SEARCH_PAUSE
             elif self._is_good_time(now, request):
                 return self._seek(now, request, joint)
@@ -301,7 +296,7 @@ class Interact(BeliefBehavior):
         pause = UNANSWERED_PAUSE if person in self.unanswered else SEARCH_PAUSE
         if not is_in_view:
             usual = min(MOST_SURE, sum_in_order(self.belief(now, person).joint.tolist()))
-            doubted = self.at_home.note_empty(person, now.time, usual, self.seek_at)
+            doubted = self.at_home.note_empty(person, now.time, usual, SOUGHT_FROM)
             pause = max(SEARCH_PAUSE, doubted)
         self.not_sought[person] = now.time + pause
 
@@ -334,8 +329,7 @@ class Interact(BeliefBehavior):
                 f"the output of {self.timing!r} has no chances of asking: name an algorithm of type"
                 " timing, or one whose output has a method `chance`, as TimingChances has"
             )
-        age = (now.time - request.since) / request.interaction.within
-        if output is not None and age < self.only_urgent_at:
+        if output is not None:
             chance = output.chance(to, request.name, now.time, self._room_of(now, to))
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
@@ -424,7 +418,6 @@ class Interact(BeliefBehavior):
         return plan.interrupt_on(EventKind.USER_SEEN)
 
 
-@register("behavior", "opportunistic")
 class Opportunistic(Behavior):
     """Approach a person who comes into view, and interact for a while.
 

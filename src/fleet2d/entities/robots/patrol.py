@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, InputPath, Length, OnDays, TimeOfDay, weekdays_of
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Behavior, Situation
@@ -34,10 +34,10 @@ from fleet2d.kernels import I64
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.events import EventKind
 
+SPACING_M = 0.1  # points of a retraced path that are nearer to the last are left out
 MAX_NAMED = 6  # how many rooms a note names
 
 
-@register("behavior", "patrol")
 class Patrol(Behavior):
     """Make rounds: go to each room or waypoint in turn, look around, stay a while, go on.
 
@@ -142,7 +142,6 @@ class ScheduledVisit(Settings):
     task: str = ""
 
 
-@register("behavior", "scheduled")
 class Scheduled(Behavior):
     """Visit rooms at fixed times of the day; between visits, later behaviors decide.
 
@@ -222,18 +221,16 @@ class Scheduled(Behavior):
             yield from (entry for entry in sorted(today) if entry[0] > since)
 
 
-@register("behavior", "retrace")
 class Retrace(Behavior):
     """Drive the path in the map of a Valetudo robot, in the home of that map, at the robot's speed.
 
     The map has no times; for a log with times use the behavior `replay`. Points nearer to each
-    other than `spacing` are thinned out. A point that the body can't get to is replaced by the
+    other than 0.1 m are thinned out. A point that the body can't get to is replaced by the
     nearest one that it can, if that is within `reach`. At the end of the path it starts again,
     after `cooldown`. Events: `retraces`, with the number of points, and `retraced`.
 
     Attributes:
         path: The map's JSON file.
-        spacing: Points of the path nearer than this are left out [m].
         reach: A point farther than this from free space is left out [m].
         avoid: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
     """
@@ -242,7 +239,6 @@ class Retrace(Behavior):
     resumes = True
 
     path: InputPath
-    spacing: Length = Field(default=0.1, ge=0)
     reach: Length = Field(default=1.0, ge=0)
     avoid: tuple[str, ...] = ()
 
@@ -271,7 +267,7 @@ class Retrace(Behavior):
         squared_moves = ((near - points) ** 2).sum(axis=1)
         reachable = near[squared_moves <= (self.reach * lattice.units_per_m) ** 2]
         avoided = avoided_rooms(actor, "retrace.avoid", self.avoid)
-        points_left = _thin_out(reachable, self.spacing * lattice.units_per_m)
+        points_left = _thin_out(reachable, SPACING_M * lattice.units_per_m)
         self.points = [p for p in points_left if not lies_in(actor, p, avoided)]
         if len(self.points) < 2:
             raise PlacementError(

@@ -15,7 +15,6 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import register
 from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath, PositiveDuration
@@ -225,7 +224,6 @@ def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
     )
 
 
-@register("behavior", "policy")
 class Policy(BeliefBehavior):
     """Let a learned policy choose the next room: to wait in, to look for a person in, or to visit.
 

@@ -2,7 +2,6 @@
 
 from datetime import timedelta
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
@@ -30,7 +29,6 @@ PASSING_TIME = timedelta(seconds=4)
 DIRECTIONS = 16
 
 
-@register("behavior", "reactions")
 class Reactions(Behavior):
     """React to robots: turn to them, step aside, come, leave; list it before other behaviors.
 

@@ -5,7 +5,6 @@ from datetime import timedelta
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import available_places, available_rooms
@@ -29,7 +28,6 @@ SHORTEST_US = 10 * SECOND_US
 POINTS_PER_M = 10
 
 
-@register("behavior", "room_sampling")
 class RoomSampling(Behavior):
     """Be in each room for a given share of the time, in visits of random length.
 
@@ -143,23 +141,23 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
     return [(room, float(np.cumsum(weights)[-1] / total)) for room, weights in by_room]
 
 
+# Probability that the next spot is in the same room.
+STAYS_IN_ROOM = 0.6
 # How many naps are planned at once.
 NAPS = 10
 
 
-@register("behavior", "pet")
 class Pet(Behavior):
     """Nap somewhere, roam through a few spots of the home, nap somewhere else.
 
     The durations of naps and stops are drawn at random. The next spot is in the same room
-    with probability `stays_in_room`, else in any room that it may enter.
+    with probability 0.6, else in any room that it may enter.
 
     Attributes:
         rooms: Rooms and kinds of rooms that it may enter; none: all.
         nap: How long it sleeps at a time.
         stop: How long it stops at a spot while it roams.
         spots: Smallest and largest number of stops between two naps.
-        stays_in_room: Probability that its next spot is in the same room.
     """
 
     usual_height = 0.3
@@ -172,7 +170,6 @@ class Pet(Behavior):
         mean=timedelta(seconds=40), std=timedelta(seconds=40)
     )
     spots: tuple[int, int] = (3, 12)
-    stays_in_room: float = Field(default=0.6, ge=0, le=1)
 
     def model_post_init(self, _: object, /) -> None:
         """Require a range of spots."""
@@ -206,6 +203,6 @@ class Pet(Behavior):
 
     def _walk(self, plan: Plan, draws: Draws) -> None:
         """Walk to the next spot."""
-        if draws.uniform() >= self.stays_in_room:
+        if draws.uniform() >= STAYS_IN_ROOM:
             self.room = draws.choice(self.allowed_rooms)
         draws.choice(self.places.in_room(self.room)).walk(plan)

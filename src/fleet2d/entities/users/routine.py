@@ -7,7 +7,6 @@ from functools import partial
 from itertools import islice
 from typing import NamedTuple
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
@@ -279,7 +278,6 @@ TURN_US = 900 * SECOND_US
 WAY_US = 60 * SECOND_US
 
 
-@register("behavior", "routine")
 class Routine(ResidentBehavior):
     """Live by a persona: a day's activities with their times, durations, order and probability.
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from fleet2d.bounds import LOG_BYTES, PIXELS, check_file
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
@@ -26,7 +25,6 @@ FREE_BELOW = 20
 OCCUPIED_ABOVE = 65
 
 
-@register("floorplan", "bag")
 class BagMap(OccupancySource):
     """The map in a bag of ROS 1 or ROS 2: the last OccupancyGrid, as a SLAM robot publishes it.
 

@@ -13,7 +13,6 @@ from shapely import LineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.files import in_file, reading
@@ -42,7 +41,6 @@ MIN_PART_M2 = 1.0
 WINDOW_LINES_M = 0.3
 
 
-@register("floorplan", "dxf")
 class Dxf(ForeignSource):
     """A drawing in DXF; needs the extra `cad`.
 

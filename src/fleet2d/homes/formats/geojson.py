@@ -20,7 +20,6 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS, POLYGONS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
@@ -300,7 +299,6 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
     return lambda xy: np.round(xy - corner, 6)
 
 
-@register("floorplan", "geojson")
 class GeoJson(ForeignSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
 

@@ -8,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter
 from shapely import Polygon
 from shapely.geometry import MultiPolygon
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import (
@@ -40,7 +39,6 @@ class _HouseFile(BaseModel):
 _HOUSE_FILE = TypeAdapter(_HouseFile)
 
 
-@register("floorplan", "houseexpo")
 class HouseExpo(FloorPlanSource):
     """A plan of the HouseExpo data set.
 

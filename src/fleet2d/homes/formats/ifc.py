@@ -10,7 +10,6 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.files import in_file, reading
@@ -40,7 +39,6 @@ RAISED_M = 0.5
 SILL_M = 1.3
 
 
-@register("floorplan", "ifc")
 class Ifc(ForeignSource):
     """A building model in IFC; needs the extra `ifc`.
 

@@ -10,7 +10,6 @@ import shapely
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter
 from shapely import LineString, Polygon
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.floorplan.files import Listed, in_file, parse_json, validate
 from fleet2d.floorplan.furniture import measured_height
@@ -108,7 +107,6 @@ class _Scan(BaseModel):
 _SCAN = TypeAdapter(_Scan)
 
 
-@register("floorplan", "roomplan")
 class RoomPlan(ForeignSource):
     """A scan by Apple's RoomPlan, exported as JSON.
 

@@ -16,7 +16,6 @@ from pydantic import Field
 from shapely import LineString, Polygon
 
 from fleet2d.bounds import CORNERS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, PositiveLength
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.files import in_file, reading
@@ -37,7 +36,6 @@ CURVE_STEPS = 16
 WALL_M = 0.1  # of walls that are drawn as lines
 
 
-@register("floorplan", "svg")
 class Svg(ForeignSource):
     """A drawing in SVG; needs the extra `svg`.
 

@@ -9,7 +9,6 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from shapely import LineString, Polygon, affinity
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import MAX_COORDINATE_M, in_file
@@ -39,7 +38,6 @@ FURNITURE_WORDS = {
 MIN_SIDE_CM = 1.0
 
 
-@register("floorplan", "sweethome")
 class SweetHome(ForeignSource):
     """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
 

@@ -20,7 +20,6 @@ from pydantic import Field, TypeAdapter
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import (
@@ -283,7 +282,6 @@ MAX_PARTS = 10_000
 TINY = 1e-6
 
 
-@register("floorplan", "valetudo")
 class Valetudo(PixelSource, ForeignSource):
     """A map of a robot vacuum that runs Valetudo.
 
