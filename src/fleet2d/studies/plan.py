@@ -158,7 +158,7 @@ def make_plan(
     """
     import polars as pl
 
-    rows: list[dict[str, Any]] = []
+    frames: list[pl.DataFrame] = []  # of combinations: as text, hashes take twice the memory
     problems: list[str] = []
     first_of = dict[tuple[str, str], int]()
     repeated = _repeated(design.seeds)  # two variants with the same scenario
@@ -179,14 +179,15 @@ def make_plan(
             repeated = same, first
         hashes = list(scenario_hashes(content, design.seeds))
         step, duration = (parse_duration(simulation[key]) for key in ("step", "duration"))
-        rows.append(
-            {
-                "scenario": hashes,
-                "identity": [identity(each, inputs) for each in hashes],
-                "template": template,
-                "home_key": home_key(content),
-                "simulated_s": (duration // step * step).total_seconds(),
-            }
+        frame = pl.DataFrame(
+            {"scenario": hashes, "identity": [identity(each, inputs) for each in hashes]}
+        )
+        frames.append(
+            frame.with_columns(
+                template=pl.lit(template),
+                home_key=pl.lit(home_key(content)),
+                simulated_s=pl.lit((duration // step * step).total_seconds()),
+            )
         )
         on_scenario(template, scenario)
     _raise_problems(problems)
@@ -196,9 +197,9 @@ def make_plan(
             f"{one} and {other} are the same scenario: an axis sets what another axis or a rule"
             " overrides, or has a value twice"
         )
-    variants = pl.DataFrame(rows).explode("scenario", "identity")
     numbers = pl.int_range(pl.len(), dtype=pl.Int32)
-    return StudyPlan(design, variants.with_columns(numbers.alias(VARIANT), numbers.alias("index")))
+    variants = pl.concat(frames).with_columns(numbers.alias(VARIANT), numbers.alias("index"))
+    return StudyPlan(design, variants)
 
 
 def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
