@@ -44,9 +44,9 @@ def read_as(kind: str, path: Path) -> FloorPlan:
 
 def formats() -> dict[str, tuple[str, dict[str, Any], Read]]:
     """Name, content and reader of the `SAMPLE` of each format's test, by the format."""
-    names = [path.stem for path in sorted(Path(__file__).parent.glob("formats/test_*.py"))]
-    modules = {name: import_module(f"tests.floorplan.formats.{name}") for name in names}
-    kinds = {name.removeprefix("test_"): module for name, module in modules.items()}
+    folder = Path(__file__).parent / "formats"
+    names = [name for name in components("floorplan") if (folder / f"test_{name}.py").exists()]
+    kinds = {name: import_module(f"tests.floorplan.formats.test_{name}") for name in names}
     samples = {k: m.SAMPLE for k, m in kinds.items() if hasattr(m, "SAMPLE")}
     samples["native as YAML"] = ("plan.yaml", samples["native"][1])
     return {k: (*sample, partial(read_as, k.split()[0])) for k, sample in samples.items()}
