@@ -81,6 +81,11 @@ def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
     assert failing.robots["astro"].speed < 0.3
 
 
+def test_a_search_needs_an_axis() -> None:
+    with pytest.raises(InputError, match="nothing to search over"):
+        read_space({})
+
+
 def test_a_test_that_holds_when_it_is_repeated_is_refused(folder: Path) -> None:
     (folder / "test_once.py").write_text(
         "from pathlib import Path\n"
