@@ -8,7 +8,7 @@ import pytest
 
 import fleet2d
 
-ROOT = Path(fleet2d.__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("name", fleet2d.__all__)

@@ -82,6 +82,28 @@ def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
     assert failing.robots["astro"].speed < 0.3
 
 
+def test_a_search_needs_an_axis() -> None:
+    with pytest.raises(InputError, match="nothing to search over"):
+        read_space({})
+
+
+def test_a_test_that_holds_when_it_is_repeated_is_refused(folder: Path) -> None:
+    (folder / "test_once.py").write_text(
+        "from pathlib import Path\n"
+        "from fleet2d.testing import trial\n"
+        "@trial('flat.yaml')\n"
+        "def test_once(trial):\n"
+        "    known = Path('known').exists()\n"
+        "    Path('known').touch()\n"
+        "    assert known\n"
+    )
+    done = falsify("test_once.py::test_once", "--over", OVER, "--budget", "1")
+
+    assert isinstance(done.exception, InputError)
+    assert "failed at try 1, but holds when that try is repeated" in str(done.exception)
+    assert not (folder / "falsified.yaml").exists()
+
+
 @pytest.mark.slow
 def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None:
     slow = "robots.astro.speed={low: 0.5, high: 0.6}"

@@ -154,10 +154,19 @@ def job_of(target: str, space: "SearchSpace") -> "TryJob":
 def describe_failure(
     failure: "FailingPoint", job: "TryJob", target: str, out: Path, shrink: int = SHRINK_TRIES
 ) -> list[str]:
-    """Write the failing scenario, and its run beside it; return the lines of a report."""
+    """Write the failing scenario, and its run beside it; return the lines of a report.
+
+    Raises:
+        InputError: Its run doesn't fail again.
+    """
     from fleet2d.testing.failures import describe_trial
 
     trial = job.run(failure.point, failure.seed)
+    if not trial.failures:
+        raise InputError(
+            f"{target} failed at try {failure.number}, but holds when that try is repeated: it"
+            " depends on more than the scenario and the seed, such as a file or the time of day"
+        )
     command = f"fleet2d test {out}"
     if job.test is not None:
         command = f"pytest {target} --fleet2d-scenario {out}"
