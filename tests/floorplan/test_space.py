@@ -18,7 +18,6 @@ from tests.strategies import homes, quick, seeds
 from tests.thorough import some
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import ROUNDING, PointDistances, Space, grow_polygons, grow_shape
@@ -47,7 +46,7 @@ HOMES = some(
 @cache
 def plan_of(path: Path) -> FloorPlan:
     """Return a plan of HouseExpo."""
-    return read_houseexpo(path)
+    return load_floorplan(path)
 
 
 @cache

@@ -422,7 +422,7 @@ CHILD = [
     Defence(
         "their coordinates are finite",
         "floorplan.formats.apart",
-        "if not all(np.isfinite(ring).all() for ring in rings):",
+        "if not all(np.isfinite(ring).all() for ring in corners):",
         "if False:",
         "floorplan/formats/test_apart.py::test_coordinate_beyond_all_floats_is_refused",
     ),
@@ -436,7 +436,7 @@ CHILD = [
     Defence(
         "they have a size",
         "floorplan.formats.apart",
-        'min(int.from_bytes(process.stdout.read(8), "big"), FILE_BYTES.limit)',
+        'min(int.from_bytes(process.stdout.read(8), "big"), READ_MB.limit << 20)',
         'int.from_bytes(process.stdout.read(8), "big")',
         "floorplan/formats/test_apart.py::test_wrong_answer_is_an_error_of_one_line",
     ),

@@ -20,7 +20,6 @@ from fleet2d.floorplan.formats.native import (
     FORMAT,
     bundled_names,
     native_document,
-    native_plan,
     read_bundled,
 )
 from fleet2d.floorplan.plan import FloorPlan
@@ -77,10 +76,7 @@ def load_floorplan(
             f"{suggest(plan, names, 'Bundled homes')}; synthetic ones:"
             " synthetic:0, synthetic:1, …"
         )
-    kind, content = _recognize(path)
-    if kind == "native":
-        return native_plan(content, path, usual, scale)
-    return _load_by(kind, path=path, cell=cell, scale=scale)
+    return _load_by(format_of_file(path), path=path, cell=cell, scale=scale)
 
 
 def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
@@ -146,20 +142,15 @@ def format_of_file(path: Path) -> str:
     Raises:
         FloorPlanError: It can't be read, or isn't a floor plan that Fleet2D knows.
     """
-    return _recognize(path)[0]
-
-
-def _recognize(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return the `type` that reads a file, and its content unless its ending tells the type."""
     if (kind := format_by_suffix(path)) is not None:
-        return kind, {}
+        return kind
     content = read_document(path)
     kind = _format_of(content)
     if kind is None and path.suffix.lower() in YAML and "image" in content:
         kind = "ros"
     if kind is None:
         raise _unknown_format(path, content)
-    return kind, content
+    return kind
 
 
 def advise_type(name: str) -> str:

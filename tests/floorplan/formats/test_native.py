@@ -9,7 +9,6 @@ from tests.homes import plan_files
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.formats.native import (
     Bundled,
     Native,
@@ -84,7 +83,7 @@ def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: fl
     for path in plan_files(shared_data):
         if path.name.startswith("f1ac") and cell < 0.1:
             continue  # the largest takes seconds
-        plan = read_houseexpo(path, cell)
+        plan = load_floorplan(path, cell)
 
         again = read_native(write(tmp_path, native_document(plan)), cell)
 

@@ -1,9 +1,9 @@
-"""A child process that reads files of other programs, within limits of time and memory.
+"""A child process that reads files of floor plans, within limits of time and memory.
 
-What parses such a file, much of it in libraries, may crash, hang or swell. Then the child dies, and
-its parent raises an error of one line. A process starts its child for the first such file, and
-keeps it. The child gets a function and the content of files by pickle, and answers in JSON, which
-the parent checks: what came of hostile bytes is hostile, too.
+What parses a file, much of it in libraries, and finds its rooms may crash, hang or swell. Then the
+child dies, and its parent raises an error of one line. A process starts its child for the first
+file, and keeps it. The child gets a function and the content of files by pickle, and answers in
+JSON, which the parent checks: what came of hostile bytes is hostile, too.
 """
 
 import atexit
@@ -15,6 +15,7 @@ import signal
 import sys
 import time
 import traceback
+from base64 import b64decode, b64encode
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
@@ -30,9 +31,10 @@ import shapely
 from pydantic import ConfigDict, TypeAdapter
 from shapely import MultiPolygon, Polygon
 
-from fleet2d.bounds import FILE_BYTES, JSON_VALUES, READ_MB, READ_SECONDS, Bound, one_line
+from fleet2d.bounds import JSON_VALUES, READ_MB, READ_SECONDS, Bound, one_line
 from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, os_errors_as
 from fleet2d.floorplan.formats.raster import UnclearPlaceError
+from fleet2d.kernels import Mesh
 
 try:
     import resource
@@ -42,11 +44,18 @@ except ImportError:  # on Windows
 T = TypeVar("T")
 
 # By the clock a file may take so many times its processor time, which others may use meanwhile.
-PATIENCE = 3
+PATIENCE = 10
 # What is raised by an answer that isn't valid.
 WRONG = (ValueError, TypeError, KeyError, RecursionError, shapely.errors.ShapelyError)
 _CODE = "from fleet2d.floorplan.formats.apart import serve; serve()"
 _VARIABLES = "FLEET2D_MAX_"
+_ENVIRONMENT = {
+    "OPENBLAS_NUM_THREADS": "1",  # each thread takes memory
+    # Freed arrays are used again. To return them to the system, and get them back page by page,
+    # takes as long as to read a picture.
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 30),
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}
 
 _lock = Lock()
 _child: Popen[bytes] | None = None
@@ -85,7 +94,7 @@ def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
     Args:
         path: The file, for messages.
         read: The function, or a method of a component. Its annotation says what it returns: plain
-            data, dataclasses and polygons.
+            data, dataclasses, arrays, meshes and polygons.
         arguments: Its arguments, among them the content of the file.
 
     Raises:
@@ -126,7 +135,7 @@ def _exchange(request: object, patience: float) -> bytes:
         assert process.stdout is not None
         pickle.dump(request, process.stdin)
         process.stdin.flush()
-        length = min(int.from_bytes(process.stdout.read(8), "big"), FILE_BYTES.limit)
+        length = min(int.from_bytes(process.stdout.read(8), "big"), READ_MB.limit << 20)
         answer = process.stdout.read(length)
         return answer if len(answer) == length else b""
     except BrokenPipeError:
@@ -150,7 +159,7 @@ def _running() -> Popen[bytes]:
                 stdin=PIPE,
                 stdout=PIPE,
                 stderr=DEVNULL,
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # each thread takes memory
+                env={**os.environ, **_ENVIRONMENT},
                 creationflags=0x08000000 if sys.platform == "win32" else 0,  # without a window
             )
     return _child
@@ -221,12 +230,16 @@ def _encode(value: object) -> bytes:
 
 
 def _plain(part: Any) -> Any:
-    """Return a polygon or a dataclass as plain data."""
+    """Return a part of an answer as plain data."""
     if isinstance(part, MultiPolygon):
-        return {"polygons": list(part.geoms)}
+        return {"#polygons": list(part.geoms)}
+    if isinstance(part, np.ndarray):
+        return {"#array": [part.dtype.str, part.shape, b64encode(part.tobytes()).decode()]}
+    if isinstance(part, Mesh):
+        return {"#mesh": [part.vertices, part.triangles, part.neighbors]}
     if isinstance(part, Polygon):
         rings = shapely.get_rings(part)
-        return {"rings": [shapely.get_coordinates(ring).tolist() for ring in rings]}
+        return {"#rings": [shapely.get_coordinates(ring).tolist() for ring in rings]}
     if is_dataclass(part):
         return {field.name: getattr(part, field.name) for field in fields(part)}
     raise TypeError(f"{type(part).__name__} is no part of an answer")
@@ -240,22 +253,27 @@ def _decode(answer: bytes, kind: Any) -> Any:
     """
     if answer.count(b",") > JSON_VALUES.limit:
         raise ValueError("too many values")
-    content = json.loads(answer, object_hook=_polygon, parse_constant=int)  # NaN is refused
+    content = json.loads(answer, object_hook=_part, parse_constant=int)  # NaN is refused
     if "failure" in content:
         return _checked(content["failure"], _Failure)
     return _checked(content["value"], kind)
 
 
-def _polygon(content: dict[str, Any]) -> Any:
-    """Return the polygon that a mapping stands for, else the mapping."""
-    if content.keys() == {"polygons"}:
-        return MultiPolygon(content["polygons"])
-    if content.keys() != {"rings"}:
-        return content
-    rings = [np.array(ring, np.float64).reshape(-1, 2) for ring in content["rings"]]
-    if not all(np.isfinite(ring).all() for ring in rings):
-        raise ValueError("a coordinate is infinite")
-    return Polygon(rings[0], rings[1:]) if rings else Polygon()
+def _part(content: dict[str, Any]) -> Any:
+    """Return the array, mesh or polygon that a mapping stands for, else the mapping."""
+    match content:
+        case {"#array": [dtype, shape, text]}:
+            return np.frombuffer(b64decode(text), dtype).reshape(shape)
+        case {"#mesh": arrays}:
+            return Mesh(*arrays)
+        case {"#polygons": polygons}:
+            return MultiPolygon(polygons)
+        case {"#rings": rings}:
+            corners = [np.array(ring, np.float64).reshape(-1, 2) for ring in rings]
+            if not all(np.isfinite(ring).all() for ring in corners):
+                raise ValueError("a coordinate is infinite")
+            return Polygon(corners[0], corners[1:]) if corners else Polygon()
+    return content
 
 
 def _checked(content: object, kind: Any) -> Any:

@@ -17,7 +17,7 @@ from fleet2d.floorplan.formats.apart import apart
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M
 from fleet2d.floorplan.formats.occupancy import OccupancySource
-from fleet2d.floorplan.formats.parts import PlanParts
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.storage.bags import headings_of, numbers_of, open_bag
 
 GRID = "nav_msgs/msg/OccupancyGrid"
@@ -62,7 +62,7 @@ class BagMap(OccupancySource):
             check_file(file, LOG_BYTES, FloorPlanError)
         return {}
 
-    def read(self, _: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, _: Mapping[Path, bytes]) -> FloorPlan:
         """Read the map.
 
         Raises:
@@ -71,7 +71,7 @@ class BagMap(OccupancySource):
         raw, note = _read(self.path, self.topic, self.scale or 1.0)
         notes: list[str] = []
         home = self.clean(raw, notes)
-        return self.parts(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
+        return self.build(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
 
 
 def _pixel(path: Path, topic: str | None, scale: float) -> float:

@@ -18,10 +18,9 @@ from fleet2d.floorplan.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyM
 from fleet2d.floorplan.formats.drawn_walls import LINE_M, find_gaps, told_apart, wall_candidates
 from fleet2d.floorplan.formats.files import in_file, read_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
-from fleet2d.floorplan.formats.parts import PlanParts
 from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, grey_picture
 from fleet2d.floorplan.lattice import MAX_CELL_M
-from fleet2d.floorplan.plan import largest_part
+from fleet2d.floorplan.plan import FloorPlan, largest_part
 from fleet2d.kernels import Bool, label_parts, squared_distance
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
@@ -82,7 +81,7 @@ class Image(PictureSource):
         """Side of a pixel [m]."""
         return self.resolution * (self.scale or 1.0)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the drawing.
 
         Light pixels that are connected to the edge of the picture are outside, and so are pixels
@@ -107,11 +106,12 @@ class Image(PictureSource):
         try:
             if grey_picture(content, self.path).edge_grey()[0] >= DARK_EDGE:
                 return False
-            return bool(self.model_copy(update={"negate": True})._read_home(content).plan())
+            self.model_copy(update={"negate": True})._read_home(content)
         except FloorPlanError:
             return False
+        return True
 
-    def _read_home(self, content: bytes) -> PlanParts:
+    def _read_home(self, content: bytes) -> FloorPlan:
         picture = grey_picture(content, self.path)
         if self.negate:
             picture = replace(picture, values=picture.white - picture.values)
@@ -142,7 +142,7 @@ class Image(PictureSource):
             notes += found
             raw = OccupancyMap(inside[::-1], walls[::-1], pixel)
             free = self.home(raw, picture, notes)
-            return self.parts(free, pixel, f"drawing, {self.path.name}", notes)
+            return self.build(free, pixel, f"drawing, {self.path.name}", notes)
 
     def _without_lines(
         self, picture: GreyPicture, light: Bool, enclosed: Bool
@@ -208,7 +208,7 @@ def _guess(path: Path, content: bytes) -> tuple[float, int] | None:
     for pixel in TRIED_M:
         try:
             image = Image.model_construct(path=path, resolution=pixel, cell=None)
-            plan = image.read({path: content}).plan()
+            plan = image.read({path: content})
         except FloorPlanError:
             continue
         widths = sorted(door.width_m for door in plan.doorways)

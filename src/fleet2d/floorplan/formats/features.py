@@ -14,9 +14,8 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.files import validate
 from fleet2d.floorplan.formats.native import ObjectUse
-from fleet2d.floorplan.formats.parts import PlanParts
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, distinct_names
-from fleet2d.floorplan.plan import LabelledRegion
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
     TOUCH_M,
     DoorLine,
@@ -103,7 +102,7 @@ class Feature:
 
 
 class Draft:
-    """Converts features to the parts of a home; all in metres."""
+    """Converts features to a floor plan; all in metres."""
 
     def __init__(
         self,
@@ -137,10 +136,10 @@ class Draft:
         self._cut_doors()
         self.panes = list(self._glaze())
 
-    def parts(self, name: str, cell: float, source: str) -> PlanParts:
-        """Return the parts of the home."""
+    def build(self, name: str, cell: float, source: str) -> FloorPlan:
+        """Return the floor plan."""
         areas = self._of("no_go")
-        return PlanParts(
+        return FloorPlan.build(
             name=name,
             free=self.free,
             regions=tuple(self._regions(cell)),

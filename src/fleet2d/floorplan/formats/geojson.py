@@ -25,6 +25,7 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats.features import GEOMETRIES, SURFACES, Draft, Feature, Move
+from fleet2d.floorplan.formats.file_source import FileSource
 from fleet2d.floorplan.formats.files import (
     MAX_COORDINATE_M,
     clean_coordinate,
@@ -33,7 +34,6 @@ from fleet2d.floorplan.formats.files import (
     shown_value,
 )
 from fleet2d.floorplan.formats.native import object_document
-from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.room import room_type
@@ -301,7 +301,7 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
 
 
 @register("floorplan", "geojson")
-class GeoJson(ForeignSource):
+class GeoJson(FileSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
 
     Attributes:
@@ -318,7 +318,7 @@ class GeoJson(ForeignSource):
     wall_m: Length = Field(default=0.1, ge=0, le=1)
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the plan.
 
         Free space is the areas of kind `free` or, if there are none, the rooms, without the walls.
@@ -335,7 +335,7 @@ class GeoJson(ForeignSource):
             units = "m" if self.scale and self.units == "auto" else self.units
             features, move = in_metres(raw, content, units, notes)
             name = content.get("name")
-            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).parts(
+            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).build(
                 name if isinstance(name, str) and name else self.path.stem,
                 self.cell,
                 f"GeoJSON, {self.path.name}",

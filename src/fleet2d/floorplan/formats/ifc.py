@@ -14,10 +14,11 @@ from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.features import Draft, Feature, choose_level
+from fleet2d.floorplan.formats.file_source import FileSource
 from fleet2d.floorplan.formats.files import in_file, reading
-from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.formats.sweethome import furniture_type
 from fleet2d.floorplan.furniture import measured_height
+from fleet2d.floorplan.plan import FloorPlan
 
 # What each class of IFC is in a plan; classes that a version of IFC lacks are left out.
 KINDS = {
@@ -41,7 +42,7 @@ SILL_M = 1.3
 
 
 @register("floorplan", "ifc")
-class Ifc(ForeignSource):
+class Ifc(FileSource):
     """A building model in IFC; needs the extra `ifc`.
 
     Attributes:
@@ -54,7 +55,7 @@ class Ifc(ForeignSource):
     path: InputPath
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read a storey of the model, as seen from above.
 
         Free space is the spaces (`IfcSpace`) without the walls or, without spaces, what the walls
@@ -75,7 +76,7 @@ class Ifc(ForeignSource):
             corners = shapely.get_num_coordinates([feature.shape for feature in features]).sum()
             CORNERS.check(int(corners), "it", FloorPlanError)
             draft = Draft(features, 0.1, notes, scale=self.scale)
-            return draft.parts(self.path.stem, self.cell, f"IFC, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"IFC, {self.path.name}")
 
 
 def _read(content: bytes, path: Path) -> Any:

@@ -13,9 +13,10 @@ from shapely import LineString, Polygon
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.floorplan.formats.features import Draft, Feature
+from fleet2d.floorplan.formats.file_source import FileSource
 from fleet2d.floorplan.formats.files import Listed, in_file, parse_json, validate
-from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
 from fleet2d.floorplan.furniture import measured_height
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
 
 # Names of furniture in the catalogue that RoomPlan has under others.
@@ -109,7 +110,7 @@ _SCAN = TypeAdapter(_Scan)
 
 
 @register("floorplan", "roomplan")
-class RoomPlan(ForeignSource):
+class RoomPlan(FileSource):
     """A scan by Apple's RoomPlan, exported as JSON.
 
     Attributes:
@@ -122,7 +123,7 @@ class RoomPlan(ForeignSource):
     path: InputPath
     wall_m: Length = Field(default=0.1, ge=0.01, le=1)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the scan; its longest wall is turned along x.
 
         Raises:
@@ -132,7 +133,7 @@ class RoomPlan(ForeignSource):
         with in_file(self.path):
             features = _features(validate(_SCAN, content))
             draft = Draft(features, self.wall_m, [], scale=self.scale)
-            return draft.parts(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
 
 
 def _features(scan: _Scan) -> list[Feature]:

@@ -21,8 +21,9 @@ from fleet2d.configuration.units import InputPath, PositiveLength
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.formats.dxf import WALLS, WINDOWS
 from fleet2d.floorplan.formats.features import Draft, Feature
+from fleet2d.floorplan.formats.file_source import FileSource
 from fleet2d.floorplan.formats.files import in_file, reading
-from fleet2d.floorplan.formats.parts import ForeignSource, PlanParts
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
 
 # Words in the names of groups and layers, in several languages.
@@ -38,7 +39,7 @@ WALL_M = 0.1  # of walls that are drawn as lines
 
 
 @register("floorplan", "svg")
-class Svg(ForeignSource):
+class Svg(FileSource):
     """A drawing in SVG; needs the extra `svg`.
 
     Attributes:
@@ -54,7 +55,7 @@ class Svg(ForeignSource):
     scale: float | None = Field(default=None, gt=0)
     wall_m: PositiveLength = WALL_M
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the drawing.
 
         Shapes count by the class, label or id of the group or layer that they are in, or by their
@@ -87,7 +88,7 @@ class Svg(ForeignSource):
             boxes = [f.shape.minimum_rotated_rectangle for f in windows]
             panes = [Feature("window", f.where, b, {}) for f, b in zip(windows, boxes, strict=True)]
             draft = Draft([*sound, *panes], self.wall_m, notes)
-            return draft.parts(self.path.stem, self.cell, f"SVG, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"SVG, {self.path.name}")
 
 
 def _read(content: bytes, path: Path) -> Any:
