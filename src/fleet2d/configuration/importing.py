@@ -60,6 +60,12 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
     if not (is_plugin or may_run_code()):
         check_may_run(name, files_to_run(folder, module_name))
+    is_file = bool(parent) or name.rpartition(":")[0].endswith(".py")
+    if is_file and source_of(folder, module_name) is None:
+        raise ScenarioError(
+            f"can't import {name!r}: there is no {module_name.replace('.', '/')}.py in {folder}"
+            f"{did_you_mean(module_name, _modules(folder, module_name))}"
+        )
     try:
         module = _import_module(folder, module_name)
     except BaseException as error:  # the user's module may raise anything
