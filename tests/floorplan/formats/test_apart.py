@@ -15,7 +15,7 @@ from threading import Timer
 import numpy as np
 import pytest
 import shapely
-from tests.floorplan.test_damaged_files import FORMATS, PGM
+from tests.floorplan.formats import test_geojson
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.formats import apart
@@ -33,7 +33,7 @@ def end_children() -> Iterator[None]:
 
 
 def good(folder: Path) -> Path:
-    name, content, _ = FORMATS["geojson"]
+    name, content = test_geojson.SAMPLE
     path = folder / name
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
@@ -237,8 +237,7 @@ def test_memory_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
     with pytest.raises(FloorPlanError, match="more memory to read than 40 MB"):
         load_floorplan(path, resolution=0.05)
-    path.write_bytes(PGM)
-    load_floorplan(path, resolution=0.05)
+    load_floorplan(good(tmp_path))
 
 
 def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path: Path) -> None:
