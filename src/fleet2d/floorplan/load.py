@@ -13,7 +13,7 @@ from typing import Any
 from fleet2d.configuration.components import components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import named_path
-from fleet2d.errors import FloorPlanError, InputError
+from fleet2d.errors import FloorPlanError, InputError, UnclearPlaceError
 from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
 from fleet2d.floorplan.formats.foreign import foreign_document, foreign_file
 from fleet2d.floorplan.formats.native import (
@@ -92,12 +92,12 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
     try:
         return load_floorplan(plan, **lengths)
     except FloorPlanError as error:
-        from fleet2d.floorplan.formats.raster import UnclearPlaceError
-
         if not isinstance(error.__cause__, UnclearPlaceError):
             raise
+        from fleet2d.floorplan.formats.raster import mark_place
+
         out = Path(f"{Path(plan).stem}-question.png")
-        error.__cause__.mark(Path(plan), out)
+        mark_place(error.__cause__, Path(plan), out)
         raise FloorPlanError(f"{error}; {out} marks it") from error
 
 

@@ -8,17 +8,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fleet2d.bounds import LOG_BYTES, PIXELS, check_file
+from fleet2d.bounds import PIXELS
 from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.apart import apart
 from fleet2d.floorplan.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.floorplan.formats.files import MAX_COORDINATE_M
 from fleet2d.floorplan.formats.occupancy import OccupancySource
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.storage.bags import headings_of, numbers_of, open_bag
+from fleet2d.storage.apart import apart
+from fleet2d.storage.bags import check_bag, headings_of, numbers_of, open_bag
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 # Chances of being occupied, in percent, as map_server divides them.
@@ -48,6 +48,7 @@ class BagMap(OccupancySource):
         """Return the map's resolution."""
         path = Path(settings["path"])
         topic = settings.get("topic")
+        check_bag(path, FloorPlanError)
         return apart(path, _pixel, path, topic, settings["scale"])
 
     def files(self) -> list[Path]:
@@ -58,8 +59,7 @@ class BagMap(OccupancySource):
 
     def contents(self) -> dict[Path, bytes]:
         """Return nothing: the child opens the bag, which is too large to be read as a whole."""
-        for file in self.files():
-            check_file(file, LOG_BYTES, FloorPlanError)
+        check_bag(self.path, FloorPlanError)
         return {}
 
     def read(self, _: Mapping[Path, bytes]) -> FloorPlan:

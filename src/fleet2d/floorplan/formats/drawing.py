@@ -12,16 +12,16 @@ from pydantic import Field, TypeAdapter
 from fleet2d.bounds import PICTURE_BYTES
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
-from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.apart import apart
+from fleet2d.errors import FloorPlanError, UnclearPlaceError
 from fleet2d.floorplan.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyMap
 from fleet2d.floorplan.formats.drawn_walls import LINE_M, find_gaps, told_apart, wall_candidates
 from fleet2d.floorplan.formats.files import in_file, read_file
 from fleet2d.floorplan.formats.occupancy import OBJECT_M2, PictureSource
-from fleet2d.floorplan.formats.raster import GreyPicture, UnclearPlaceError, grey_picture
+from fleet2d.floorplan.formats.raster import GreyPicture, grey_picture
 from fleet2d.floorplan.lattice import MAX_CELL_M
 from fleet2d.floorplan.plan import FloorPlan, largest_part
 from fleet2d.kernels import Bool, label_parts, squared_distance
+from fleet2d.storage.apart import apart
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
 GAPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2)

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from fleet2d.bounds import FILE_BYTES, Bound
-from fleet2d.floorplan.formats.apart import apart
 from fleet2d.floorplan.formats.files import read_file
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.storage.apart import apart
 
 
 class FileSource(FloorPlanSource):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.bounds import PIXELS
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, UnclearPlaceError
 from fleet2d.floorplan.formats.foreign import foreign_file
 from fleet2d.kernels import U8, Bool
 
@@ -84,28 +84,17 @@ class GreyPicture:
         return np.flatnonzero(is_filled[: counts.argmax() - FILLED_CONTRAST]).tolist()
 
 
-class UnclearPlaceError(FloorPlanError):
-    """A picture is no home because of one place in it.
+def mark_place(unclear: UnclearPlaceError, picture: Path, out: Path) -> None:
+    """Write a copy of a picture with a red circle round a place; needs Pillow."""
+    from PIL import Image, ImageDraw
 
-    Attributes:
-        place: The place (column, row) [pixels].
-        radius: Radius of what is unclear [pixels].
-    """
-
-    def __init__(self, message: str, place: tuple[int, int], radius: float) -> None:
-        super().__init__(message)
-        self.place, self.radius = place, radius
-
-    def mark(self, picture: Path, out: Path) -> None:
-        """Write a copy of a picture with a red circle round the place; needs Pillow."""
-        from PIL import Image, ImageDraw
-
-        with Image.open(picture) as image:
-            copy = image.convert("RGB")
-        (column, row), radius = self.place, max(self.radius, max(copy.size) / 30)
-        box = (column - radius, row - radius, column + radius, row + radius)
-        ImageDraw.Draw(copy).ellipse(box, outline="red", width=max(max(copy.size) // 200, 2))
-        copy.save(out)
+    with Image.open(picture) as image:
+        copy = image.convert("RGB")
+    column, row = unclear.place
+    radius = max(unclear.radius, max(copy.size) / 30)
+    box = (column - radius, row - radius, column + radius, row + radius)
+    ImageDraw.Draw(copy).ellipse(box, outline="red", width=max(max(copy.size) // 200, 2))
+    copy.save(out)
 
 
 def grey_picture(content: bytes, path: Path) -> GreyPicture:

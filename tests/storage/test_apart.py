@@ -18,10 +18,10 @@ import shapely
 from tests.floorplan.formats import test_geojson
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats import apart
 from fleet2d.floorplan.formats.geojson import GeoJson
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.storage import apart
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
 
@@ -143,7 +143,7 @@ def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_child_ends_with_its_parent(tmp_path: Path) -> None:
     program = (
-        "import sys, fleet2d; from fleet2d.floorplan.formats import apart;"
+        "import sys, fleet2d; from fleet2d.storage import apart;"
         "fleet2d.load_floorplan(sys.argv[1]); print(apart._child.pid, flush=True);"
         "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     )
@@ -206,7 +206,7 @@ def test_processor_time_ends_before_the_clock_does(
     monkeypatch.setattr(
         apart,
         "_death",
-        lambda path, late, status: (ends.append(status), death(path, late, status))[1],
+        lambda *death_of: (ends.append(death_of[-1]), death(*death_of))[1],
     )
     monkeypatch.setattr(apart, "PATIENCE", 20)
     monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
@@ -272,7 +272,7 @@ def answering(content: bytes, length: int | None = None) -> str:
     """Return the program of a child that has one answer."""
     head = (len(content) if length is None else length).to_bytes(8, "big")
     return (
-        "import sys, pickle; pickle.load(sys.stdin.buffer);"
+        "import sys, pickle; pickle.load(sys.stdin.buffer); pickle.load(sys.stdin.buffer);"
         f"sys.stdout.buffer.write({head!r}); sys.stdout.buffer.write({_short(content)});"
         "sys.stdout.flush(); sys.stdin.read()"
     )

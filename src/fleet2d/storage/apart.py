@@ -1,4 +1,4 @@
-"""A child process that reads files of floor plans, within limits of time and memory.
+"""A child process that reads files of floor plans and bags, within limits of time and memory.
 
 What parses a file, much of it in libraries, and finds its rooms may crash, hang or swell. Then the
 child dies, and its parent raises an error of one line. A process starts its child for the first
@@ -31,9 +31,14 @@ import shapely
 from pydantic import ConfigDict, TypeAdapter
 from shapely import MultiPolygon, Polygon
 
-from fleet2d.bounds import JSON_VALUES, READ_MB, READ_SECONDS, Bound, one_line
-from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, os_errors_as
-from fleet2d.floorplan.formats.raster import UnclearPlaceError
+from fleet2d.bounds import JSON_VALUES, LOG_BYTES, READ_MB, READ_SECONDS, Bound, one_line
+from fleet2d.errors import (
+    Fleet2DError,
+    FloorPlanError,
+    InputError,
+    UnclearPlaceError,
+    os_errors_as,
+)
 from fleet2d.kernels import Mesh
 
 try:
@@ -47,10 +52,11 @@ T = TypeVar("T")
 PATIENCE = 10
 # What is raised by an answer that isn't valid.
 WRONG = (ValueError, TypeError, KeyError, RecursionError, shapely.errors.ShapelyError)
-_CODE = "from fleet2d.floorplan.formats.apart import serve; serve()"
+_CODE = "from fleet2d.storage.apart import serve; serve()"
 _VARIABLES = "FLEET2D_MAX_"
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # each thread takes memory
+    "ARROW_DEFAULT_MEMORY_POOL": "system",  # others reserve a gigabyte
     # Freed arrays are used again. To return them to the system, and get them back page by page,
     # takes as long as to read a picture.
     "MALLOC_MMAP_THRESHOLD_": str(1 << 30),
@@ -76,19 +82,25 @@ class _Failure:
     text: str = ""
     place: tuple[int, int, float] | None = None
 
-    def error(self, path: Path) -> InputError:
+    def error(self, path: Path, failure: type[InputError]) -> InputError:
         """Return the error that the parent raises."""
         if self.kind == "memory":
-            return _beyond(path, "more memory", READ_MB)
+            return failure(_beyond(path, "more memory", READ_MB))
         if self.kind == "other":
-            return FloorPlanError(
+            return failure(
                 f"{path} can't be read: {self.text}: if the file isn't damaged, simplify it or"
                 " export it again"
             )
-        return (FloorPlanError if self.kind == "file" else InputError)(self.text)
+        return (failure if self.kind == "file" else InputError)(self.text)
 
 
-def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
+def apart(
+    path: Path,
+    read: Callable[..., T],
+    *arguments: Any,
+    failure: type[InputError] = FloorPlanError,
+    seconds: Bound = READ_SECONDS,
+) -> T:
     """Return what a function of Fleet2D returns for a file, called in the child.
 
     Args:
@@ -96,24 +108,27 @@ def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
         read: The function, or a method of a component. Its annotation says what it returns: plain
             data, dataclasses, arrays, meshes and polygons.
         arguments: Its arguments, among them the content of the file.
+        failure: The type of the error about the file.
+        seconds: The processor time that it may take.
 
     Raises:
-        FloorPlanError: The function raises it or fails, it exceeds a limit, or the child dies.
-        InputError: The function raises it.
+        InputError: The function raises it or fails, it exceeds a limit, or the child dies; of the
+            type `failure`, unless the function raises another one.
     """
-    patience = PATIENCE * READ_SECONDS.limit
+    patience = PATIENCE * seconds.limit
     limits = {key: text for key, text in os.environ.items() if key.startswith(_VARIABLES)}
     with _lock:
         start = time.monotonic()
-        answer = _exchange((limits, read, arguments), patience)
+        rest = limits, arguments, failure, seconds.limit
+        answer = _exchange(read, rest, patience)
         if not answer:
             is_late = time.monotonic() - start >= patience
-            raise _death(path, is_late, _stop(grace=1.0))
+            raise failure(_death(path, seconds, is_late, _stop(grace=1.0)))
         try:
             result: T | _Failure = _decode(answer, get_type_hints(read)["return"])
         except WRONG:
             _stop()
-            raise FloorPlanError(
+            raise failure(
                 f"{path} can't be read: its reader gave no valid answer: export the file again"
             ) from None
         if isinstance(result, _Failure) and result.kind in ("memory", "other"):
@@ -122,18 +137,19 @@ def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
         return result
     place = result.place
     unclear = place and UnclearPlaceError(result.text, place[:2], place[2])
-    raise result.error(path) from unclear
+    raise result.error(path, failure) from unclear
 
 
-def _exchange(request: object, patience: float) -> bytes:
-    """Return the answer to a request; empty if the child died or took too long."""
+def _exchange(read: object, rest: object, patience: float) -> bytes:
+    """Return the answer to a request, in two parts; empty if the child died or took too long."""
     process = _running()
     timer = Timer(patience, process.kill)
     timer.start()
     try:
         assert process.stdin is not None
         assert process.stdout is not None
-        pickle.dump(request, process.stdin)
+        pickle.dump(read, process.stdin)
+        pickle.dump(rest, process.stdin)
         process.stdin.flush()
         length = min(int.from_bytes(process.stdout.read(8), "big"), READ_MB.limit << 20)
         answer = process.stdout.read(length)
@@ -204,19 +220,19 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forget)
 
 
-def _death(path: Path, is_late: bool, status: int) -> FloorPlanError:
-    """Return the error about a file at which the child died."""
+def _death(path: Path, seconds: Bound, is_late: bool, status: int) -> str:
+    """Return the message about a file at which the child died."""
     name = signal.Signals(-status).name if status < 0 else f"exit code {status}"
     if is_late or name == "SIGXCPU":
-        return _beyond(path, "longer", READ_SECONDS)
+        return _beyond(path, "longer", seconds)
     cause = f"died ({name}): if the file isn't damaged, simplify it or export it again"
     if name == "SIGKILL":
         cause = "was killed, perhaps because memory ran out: try again"
-    return FloorPlanError(f"{path} can't be read: its reader {cause}")
+    return f"{path} can't be read: its reader {cause}"
 
 
-def _beyond(path: Path, what: str, bound: Bound) -> FloorPlanError:
-    return FloorPlanError(
+def _beyond(path: Path, what: str, bound: Bound) -> str:
+    return (
         f"{path} takes {what} to read than {bound.limit} {bound.noun}: simplify it, or set"
         f" {bound.variable}={2 * bound.limit} in the environment"
     )
@@ -300,25 +316,28 @@ def serve() -> None:
     base = _size()
     while True:
         try:
-            limits, read, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301 - of the parent
+            before = _size()
+            read = pickle.load(sys.stdin.buffer)  # noqa: S301 - of the parent
+            base += _size() - before  # the module with its libraries
+            limits, arguments, failure, seconds = pickle.load(sys.stdin.buffer)  # noqa: S301
         except EOFError:
             return
         for name in [name for name in os.environ if name.startswith(_VARIABLES)]:
             del os.environ[name]
         os.environ.update(limits)
-        _limit(base)
-        answer = _answer(read, arguments)
+        _limit(base, seconds)
+        answer = _answer(read, arguments, failure)
         answers.write(len(answer).to_bytes(8, "big") + answer)
         answers.flush()
 
 
-def _answer(read: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+def _answer(read: Callable[..., Any], arguments: tuple[Any, ...], kind: type[InputError]) -> bytes:
     try:
         return _encode({"value": read(*arguments)})
     except Fleet2DError as error:
         cause = error.__cause__
         at = (*cause.place, cause.radius) if isinstance(cause, UnclearPlaceError) else None
-        failure = _Failure("file" if isinstance(error, FloorPlanError) else "input", str(error), at)
+        failure = _Failure("file" if isinstance(error, kind) else "input", str(error), at)
     except RecursionError:
         failure = _Failure("other", "its parts are nested too deeply")
     except MemoryError:
@@ -340,17 +359,19 @@ def _size() -> int:
     return 0
 
 
-def _limit(base: int) -> None:
+def _limit(base: int, seconds: int) -> None:
     """Limit the processor time and memory that this process takes from now on.
 
     Args:
         base: Size of the process when it began [bytes].
+        seconds: The processor time.
     """
     if resource is None:
         return
     limits = {
         resource.RLIMIT_CORE: 0,
-        resource.RLIMIT_CPU: math.ceil(time.process_time() + READ_SECONDS.limit),
+        resource.RLIMIT_FSIZE: LOG_BYTES.limit,  # of files that a bag unpacks to
+        resource.RLIMIT_CPU: math.ceil(time.process_time() + seconds),
     }
     if base:
         limits[resource.RLIMIT_AS] = base + (READ_MB.limit << 20)
