@@ -21,7 +21,7 @@ from fleet2d.errors import InputError
 from fleet2d.expectations.parse import parse_expectation
 from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.layers import LayerSettings
-from fleet2d.floorplan.synthetic.source import Synthetic
+from fleet2d.homes.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels import SUB, TURN
 from fleet2d.routines.persona import Manners

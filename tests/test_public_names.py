@@ -36,7 +36,7 @@ def test_documented_modules_are_named_as_public() -> None:
 
     assert documented - {"fleet2d"}
     for module in documented:
-        if module.startswith("fleet2d.gym"):
+        if module.startswith("fleet2d.learning.gym"):
             pytest.importorskip("gymnasium", reason="needs the extra gym")
         import_module(module)
         assert f"`{module}`" in page, f"{module} is documented, and docs/api.md doesn't list it"

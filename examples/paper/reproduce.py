@@ -38,7 +38,6 @@ from fleet2d.errors import ComponentError, Fleet2DError, InputError, os_errors_a
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.metrics.rtp_score import ALL, GAPS
 from fleet2d.options import Workers
-from fleet2d.pictures.floorplan import drawing_style, write_picture
 from fleet2d.runtime.clock import HOUR_S
 from fleet2d.studies.answers import group_means
 from fleet2d.studies.api import make_executor, study
@@ -46,7 +45,8 @@ from fleet2d.studies.executors import cores
 from fleet2d.studies.figures import COLORS, DARK, draw_interaction
 from fleet2d.studies.progress import progress_bar
 from fleet2d.studies.reader import Study
-from fleet2d.viewer.film import draw_frames, stage_of
+from fleet2d.viewing.film import draw_frames, stage_of
+from fleet2d.viewing.pictures.floorplan import drawing_style, write_picture
 
 USER = "ana"  # in all studies
 PAPER_COLUMN = "the paper's"  # heading of the column of the paper's own figures

@@ -1,6 +1,8 @@
 // The chains of all people of a run, one day at a time: what they share of its evidence is passed once.
 #pragma once
 
+#include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "chains.hpp"
@@ -28,13 +30,19 @@ struct DayEvidence {
     View<const i64> minute;   // (bins,) since midnight
     View<const i64> view;     // (bins,) the row of `views`
     View<const u8, 2> views;  // (views, patches), as in Stretches
-    View<const i64> begin;    // (people + 1,) where each person's sightings begin
-    View<const i64> bin;      // (sightings,) by person, ascending: as in PatchCounts
+    View<const i64> user;     // (sightings,) ascending; other users than the people are left out
+    View<const i64> bin;      // (sightings,) ascending for each user: as in PatchCounts
     View<const i64> patch;    // (sightings,)
     View<const i64> steps;    // (sightings,)
 
+    // Begin and end of a person's sightings.
+    std::pair<i64, i64> sightings_of(i64 person) const {
+        const auto [first, last] = std::equal_range(user.begin(), user.end(), person);
+        return {first - user.begin(), last - user.begin()};
+    }
+
     // The stretches of each person, of `longest` bins at most.
-    std::vector<OwnedStretches> stretches(i64 longest) const;
+    std::vector<OwnedStretches> stretches(i64 people, i64 longest) const;
 };
 
 // Moments of people, as in Moments.

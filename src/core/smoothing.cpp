@@ -370,7 +370,7 @@ Smoothed smooth(const StayModel& model, const Stretches& stretches, View<const f
 
 PeopleSmoothed smooth_people(const PeopleModel& model, const DayEvidence& day, i64 longest, View<const f64, 3> prior,
                              View<const f64, 3> future, const PeopleMoments& moments) {
-    const std::vector<OwnedStretches> stretches = day.stretches(longest);
+    const std::vector<OwnedStretches> stretches = day.stretches(model.size(), longest);
     PeopleSmoothed result{PeoplePlaces::of(stretches, model.restless.shape[1]), Array<f64, 3>::empty(prior.shape),
                           Array<f64, 3>::empty(prior.shape)};
     if (model.size() == 0) return result;

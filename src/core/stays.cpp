@@ -135,10 +135,11 @@ OwnedStretches merge_bins(View<const i64> minute, View<const i64> view, const Pa
     return result;
 }
 
-std::vector<OwnedStretches> DayEvidence::stretches(i64 longest) const {
+std::vector<OwnedStretches> DayEvidence::stretches(i64 people, i64 longest) const {
     std::vector<OwnedStretches> result;
-    for (i64 person = 0; person + 1 < begin.size(); ++person) {
-        const auto own = [&](View<const i64> all) { return all.slice(begin[person], begin[person + 1]); };
+    for (i64 person = 0; person < people; ++person) {
+        const auto [begin, end] = sightings_of(person);
+        const auto own = [begin = begin, end = end](View<const i64> all) { return all.slice(begin, end); };
         result.push_back(merge_bins(minute, view, {own(bin), own(patch), own(steps)}, longest));
     }
     return result;
@@ -165,7 +166,7 @@ Array<f64, 3> all_hidden(View<const f64, 2> places) {
 }
 
 PeoplePlaces follow_people(const PeopleModel& model, const DayEvidence& day, i64 longest, View<f64, 3> now) {
-    const std::vector<OwnedStretches> stretches = day.stretches(longest);
+    const std::vector<OwnedStretches> stretches = day.stretches(model.size(), longest);
     PeoplePlaces result = PeoplePlaces::of(stretches, model.restless.shape[1]);
     if (model.size() == 0) return result;
     const SharedViews shared(model.of(0), day.views);

@@ -5,6 +5,8 @@ The public names are those of this package, which `__init__.pyi` lists with thei
 """
 
 import re
+import sys
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -32,3 +34,18 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     """List the public names."""
     return __all__
+
+
+def _join_notebook() -> None:
+    """Load the extensions of IPython that limbs register, if this is a session of IPython."""
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    if shell is not None:
+        from importlib.metadata import entry_points  # slow to import, and only needed here
+
+        for entry in entry_points(group="fleet2d.notebook"):
+            with suppress(ModuleNotFoundError):  # a limb that was taken away
+                shell.extension_manager.load_extension(entry.value)
+
+
+_join_notebook()

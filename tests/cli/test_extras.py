@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 import yaml
-from tests.datasets.small import SOURCE, make
 from tests.hostile.test_archives import BOMBS
+from tests.learning.datasets.small import SOURCE, make
 from tests.scenes import TESTS, process
 from tests.thorough import some
 

@@ -5,11 +5,13 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
 from pydantic import Field, PydanticUserError, TypeAdapter, ValidationError
+from tests.own_errors import Missed
 
 from fleet2d.configuration import components as module
 from fleet2d.configuration.components import (
@@ -19,13 +21,13 @@ from fleet2d.configuration.components import (
     ShortForm,
     base_of,
     components,
-    hook,
     lookup,
     register,
     split_short_form,
 )
+from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.units import Duration, Length, Text
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import ScenarioError
 
 
 class Gadget(Component):
@@ -368,15 +370,24 @@ def test_short_form_beside_behaviors_is_refused() -> None:
     }
 
 
-def test_hook_that_nobody_registers_is_an_error_with_its_name() -> None:
-    with pytest.raises(InputError, match=r"'paint' as fleet2d\.run"):
-        hook("run", "paint")
+def test_file_beside_the_scenario_takes_no_plugin_s_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside = tmp_path / "tests" / "own_errors.py"
+    beside.parent.mkdir()
+    beside.write_text("raise SystemExit('code beside the scenario runs')", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+    assert Missed is import_class("tests.own_errors:Missed", is_plugin=True)
 
 
-def test_methods_of_runs_and_plans_find_their_hooks() -> None:
-    names = {"run": ("draw", "html", "judge", "view"), "plan": ("draw", "png")}
+def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = EntryPoint("fox", "no_such_package.foxes:Fox", "fleet2d.gadget")
+    monkeypatch.setattr(module, "_plugins", lambda kind: EntryPoints([entry]))
 
-    assert all(callable(hook(kind, name)) for kind in names for name in names[kind])
+    assert ["fan", "lamp"] == list(components("gadget"))
+    with pytest.raises(ScenarioError, match="there is no gadget 'fox'"):
+        lookup("gadget", "fox")
 
 
 def test_type_in_a_module_of_another_name_loads_that_module_alone() -> None:

@@ -181,7 +181,7 @@ def test_a_stored_run_is_shown_without_code_unless_a_body_needs_it(
 def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d: Cli, tmp_path: Path) -> None:
     stored(tmp_path)
     run = package.open_run("run")
-    for use in (lambda: run.path("ana"), lambda: run.judge("always(room(ana) != bath)")):
+    for use in (lambda: run.path("ana"), lambda: package.judge("always(room(ana) != bath)", run)):
         with pytest.raises(UntrustedCodeError, match="which would run"):
             use()
     assert not Path("ran").exists()

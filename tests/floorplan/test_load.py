@@ -11,11 +11,11 @@ import pytest
 from fleet2d.configuration import components
 from fleet2d.configuration.units import Text
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.valetudo import Valetudo
 from fleet2d.floorplan.load import advise_type, format_of_file, is_floorplan, load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.floorplan.synthetic.source import Synthetic
+from fleet2d.homes.formats.valetudo import Valetudo
+from fleet2d.homes.synthetic.source import Synthetic
 
 # How many rooms the file has (None: it names none), and its free space without specks and scraps [m2].
 MAPS = {

@@ -6,8 +6,8 @@ import pytest
 from pydantic import ValidationError
 
 from fleet2d.errors import FloorPlanError, ScenarioError
-from fleet2d.floorplan.formats.native import Bundled
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.native import Bundled
 from fleet2d.floorplan.source import Furnishing
 from fleet2d.scenario.model import load_scenario
 

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from tests.homes import plan_files, walls_of
+from tests.meshed_homes import plan_files, walls_of
 from tests.reference.line_of_sight import visible
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds

@@ -14,7 +14,7 @@ import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tests.homes import home_of
+from tests.meshed_homes import home_of
 
 import fleet2d
 from fleet2d import _core, kernels
@@ -26,11 +26,11 @@ from fleet2d.kernels import (
     Corners,
     CoverageRecord,
     CoverageSetup,
+    DayEvidence,
     DetectionRule,
     ErrorTables,
     Lenses,
     Moments,
-    PeopleEvidence,
     PlaceNetwork,
     Reach,
     RoomMemory,
@@ -174,7 +174,6 @@ def test_the_core_exports_only_what_others_import_and_the_parts_that_are_tested(
 
 # Structs of the core with other names than their named tuples.
 NAMED_TUPLES = {
-    "DayEvidence": "PeopleEvidence",
     "PeopleModel": "StayModel",
     "PeopleMoments": "Moments",
     "PosesToFill": "Poses",
@@ -389,12 +388,12 @@ def people() -> StayModel:
     return StayModel(*(np.repeat(part[None], 5, axis=0) for part in arrays), first, detection)
 
 
-def evidence() -> PeopleEvidence:
+def evidence() -> DayEvidence:
     views = np.zeros((2, 4), np.uint8)
     views[1, 2] = 60
-    begin, view = np.array([0, 1, 1, 3, 3, 4]), np.array([0, 0, 1, 1, 1])
+    user, view = np.array([0, 2, 2, 4]), np.array([0, 0, 1, 1, 1])
     columns = np.array([1, 0, 4, 2]), np.array([2, 1, 2, 0]), np.array([1, 2, 2, 3])
-    return PeopleEvidence(np.arange(5), view, views, begin, *columns)
+    return DayEvidence(np.arange(5), view, views, user, *columns)
 
 
 def stretches() -> Stretches:

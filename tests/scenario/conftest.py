@@ -1,6 +1,7 @@
 """Stand-in components: the scenario layer is tested without what it will configure."""
 
 from datetime import timedelta
+from importlib.metadata import EntryPoints
 from typing import Annotated, ClassVar
 
 import pytest
@@ -80,6 +81,7 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(components, "_REGISTRY", {})
     monkeypatch.setattr(components, "_ALIASES", {})
     monkeypatch.setattr(components, "_COMPLETE", set(components.PACKAGES))
+    monkeypatch.setattr(components, "_plugins", lambda kind: EntryPoints())
     register("sight", "line_of_sight")(LineOfSight)  # defaults that every scenario has
     register("drive", "differential")(Differential)
     register("floorplan", "houseexpo", aliases=("he",))(File)

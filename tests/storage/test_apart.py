@@ -15,12 +15,12 @@ from threading import Timer
 import numpy as np
 import pytest
 import shapely
-from tests.floorplan.formats import test_geojson
+from tests.homes.formats import test_geojson
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.geojson import GeoJson
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.homes.formats.geojson import GeoJson
 from fleet2d.storage import apart
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'

@@ -4,7 +4,6 @@ Rows of observations are counted by user, bin and patch; with the share of each 
 counts are what algorithms learn presence from.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
@@ -189,19 +188,6 @@ class SightingCounts(NamedTuple):
             [[[1], [1]]]
         """
         return cls(*list_sightings(step, user, place, bin_steps, *shape), shape)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return the counts of consecutive bins as one."""
-        first = np.cumsum([0, *(part.shape[0] for part in parts)]).tolist()
-        user, place, steps = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("user", "place", "steps")
-        )
-        bins = np.concatenate([part.bin + begin for part, begin in zip(parts, first, strict=False)])
-        order = np.argsort(user, kind="stable")
-        shape = (first[-1], *parts[0].shape[1:])
-        return cls(user[order], bins[order], place[order], steps[order], shape)
 
     def between(self, begin: int, end: int) -> Self:
         """Return the counts of the bins `begin` to `end` - 1."""

@@ -14,12 +14,12 @@ from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
-from fleet2d.interactions.interaction import Outcome
+from fleet2d.interactions.interaction import OUTCOMES, Outcome
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import logistic
+from fleet2d.runtime.events import EventKind
 
 HOURS = 24
-OUTCOMES = frozenset(str(outcome) for outcome in Outcome)
 
 
 class Asked(NamedTuple):
@@ -151,7 +151,7 @@ class TimingAlgorithm(Algorithm):
         learned = 0
         self.worth |= {w.text.rpartition(" ")[0]: w.interaction.worth for w in history.wanted}
         for event in history.events:
-            if event.event == "asks":
+            if event.event == EventKind.ASKS:
                 self._close(event.entity, "")
                 name, _, user = event.detail.rpartition(" ")
                 at = history.poses(event.entity).at(event.step - history.first)
@@ -160,7 +160,7 @@ class TimingAlgorithm(Algorithm):
                 index = -1 if room is None else room.index
                 self.open[event.entity] = Asked(user, name, hour, index)
                 self._policy(user, name, len(state.home.rooms))
-            elif event.event in OUTCOMES or event.event == "withdraws":
+            elif event.event in OUTCOMES or event.event == EventKind.WITHDRAWS:
                 outcome = event.event if event.event in OUTCOMES else ""
                 learned += self._close(event.entity, outcome)
         if not learned and len(self.policies) == before:

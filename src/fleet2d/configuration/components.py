@@ -51,7 +51,6 @@ from fleet2d.configuration.problems import (
 )
 from fleet2d.errors import (
     Fleet2DError,
-    InputError,
     ScenarioError,
     errors_as,
     may_be_ctrl_c,
@@ -59,7 +58,7 @@ from fleet2d.errors import (
 )
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import EntryPoint, EntryPoints
 
 
 T = TypeVar("T")
@@ -462,9 +461,10 @@ def lookup(kind: str, name: str) -> type[Component]:
     if (cls := _registered(kind, name)) is not None:
         return cls
     for entry in _plugins(kind).select(name=name):
-        cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
-        cls.type_name = name
-        return cls
+        if _is_there(entry):
+            cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
+            cls.type_name = name
+            return cls
     known = sorted(components(kind))
     near = did_you_mean(name, [*known, *_ALIASES.get(kind, ())])
     raise ScenarioError(
@@ -476,23 +476,8 @@ def lookup(kind: str, name: str) -> type[Component]:
 def components(kind: str) -> dict[str, type[Component]]:
     """Return every component of a kind, registered or from an entry point, by name, sorted."""
     _import_builtins(kind)
-    plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind)}
+    plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind) if _is_there(e)}
     return dict(sorted((plugins | _REGISTRY.get(kind, {})).items()))
-
-
-def hook(kind: str, name: str) -> Any:
-    """Return what an installed package, or Fleet2D's own, registers as an entry point.
-
-    So a module can call what builds upon it, if that is installed.
-
-    Raises:
-        InputError: Nothing is registered under that name.
-    """
-    for entry in _plugins(kind).select(name=name):
-        return entry.load()
-    raise InputError(
-        f"no installed package registers {name!r} as fleet2d.{kind}: reinstall fleet2d"
-    )
 
 
 @cache
@@ -501,6 +486,14 @@ def _plugins(kind: str) -> "EntryPoints":
     from importlib.metadata import entry_points  # slow to import, and seldom used
 
     return entry_points(group=f"fleet2d.{kind}")
+
+
+def _is_there(entry: "EntryPoint") -> bool:
+    """Return whether the module of an entry point exists; that of a limb may be taken away."""
+    try:
+        return importlib.util.find_spec(entry.module) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def aliases(kind: str, name: str) -> tuple[str, ...]:

@@ -67,7 +67,10 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
             f"{did_you_mean(module_name, _modules(folder, module_name))}"
         )
     try:
-        module = _import_module(folder, module_name)
+        if is_plugin:  # what lies beside the scenario under that name isn't meant
+            module = importlib.import_module(module_name)
+        else:
+            module = _import_module(folder, module_name)
     except BaseException as error:  # the user's module may raise anything
         if may_be_ctrl_c(error):
             raise

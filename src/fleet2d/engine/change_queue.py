@@ -295,9 +295,11 @@ class ChangeQueue:
             return switch(self.home, lit, step, is_on=change.turn == "on")
         door = self.names.index(target)
         if verb in ("lock", "unlock"):
-            self.home.set_lock(door, locked=verb == "lock")
+            locks = verb == "lock"
+            self.home.set_lock(door, locked=locks)
             self._stop(step, self._door_shape(door))
-            return [Event(step, target, EventKind(f"{verb}ed"), due.by)]
+            kind = EventKind.LOCKED if locks else EventKind.UNLOCKED
+            return [Event(step, target, kind, due.by)]
         is_open = verb == "open"
         if is_open != (door in self.home.shut):
             return []

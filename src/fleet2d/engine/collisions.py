@@ -22,6 +22,7 @@ from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after_step, plan_around
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import I64, U8, Bool, Poses, line_of_sight, locate
+from fleet2d.runtime.events import EventKind
 
 # Time for which a body ignores another one that it goes round or squeezes past.
 PASSING_TIME = timedelta(seconds=10)
@@ -116,8 +117,9 @@ class BlockedWays(Watcher):
         is_later = other < row and self._avoids(other, row, step)
         patience_us = self._patience_us * (2 if is_later else 1)
         if (step - since) * step_us < patience_us:
-            first = since == step
-            notes = [Note(step * step_us, "gives_way", self._actors[other].name)] if first else []
+            notes = []
+            if since == step:
+                notes = [Note(step * step_us, EventKind.GIVES_WAY, self._actors[other].name)]
             plan: Plan | None = plan_after_step(now, actor.plan, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:

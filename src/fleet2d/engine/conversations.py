@@ -187,7 +187,7 @@ class Conversations(Watcher):
                 interaction = change.request.interaction
                 text = f"{change.request.name} {interaction.to}"
                 events.append(Event(at, robot.name, change.event, text))
-                if change.event == "due":
+                if change.event == EventKind.DUE:
                     self.wanted.append(Wanted(at, robot.name, text, interaction))
                 self._tell(row, change.event, text)
             asked = [q for q in notes_of(robot, EventKind.ASKS) if q.step == step]

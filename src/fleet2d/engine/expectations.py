@@ -9,12 +9,11 @@ import numpy as np
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
-from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.artifacts.table import STEP, TIME, Column
 from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.intervention_queue import InterventionQueue, possible_details, possible_events
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.trajectories import STEP, TIME
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals
@@ -219,27 +218,18 @@ class RunExpectations:
     def _store_violations(self, store: RunStore, verdicts: Mapping[str, Verdict]) -> None:
         """Store a row for each violation, in order of its first step."""
         names = tuple(sorted(verdicts))  # the keys of a manifest are sorted, too
-        columns = (
-            STEP,
-            TIME,
-            Column("expectation", "category", categories=names),
-            Column("last_step", "int64", description="last step of the violation"),
-            Column("worst_step", "int64", description="the first at which it is worst"),
-            Column("robustness", "float64", nullable=True, description="missing: infinite"),
-        )
-        store.add_table(TableSpec(TABLE, columns, "the violations of expectations"))
         rows = sorted((v, names.index(n)) for n, each in verdicts.items() for v in each.violations)
-        if not rows:
-            return
-        first, last, robustness, worst = zip(*(row[0] for row in rows), strict=True)
-        step = np.array(first, np.int64)
-        value = np.array(robustness)
-        store.append(
-            TABLE,
-            step=step,
-            time=self.clock.times(step),
-            expectation=np.array([code for _, code in rows], np.int32),
-            last_step=np.array(last, np.int64),
-            worst_step=np.array(worst, np.int64),
-            robustness=np.where(np.isfinite(value), value, np.nan),
-        )
+        step = np.array([violation.first for violation, _ in rows], np.int64)
+        robustness = np.array([violation.robustness for violation, _ in rows])
+        last = Column("last_step", "int64", description="last step of the violation")
+        worst = Column("worst_step", "int64", description="the first at which it is worst")
+        value = Column("robustness", "float64", nullable=True, description="missing: infinite")
+        columns = {
+            STEP: step,
+            TIME: self.clock.times(step),
+            Column("expectation", "category", categories=names): [code for _, code in rows],
+            last: [violation.last for violation, _ in rows],
+            worst: [violation.worst for violation, _ in rows],
+            value: np.where(np.isfinite(robustness), robustness, np.nan),
+        }
+        store.add_rows(TABLE, columns, "the violations of expectations")

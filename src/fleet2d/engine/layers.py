@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.history import Log
+from fleet2d.artifacts.table import DTYPES, KINDS, TIME, Column
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, Watcher
@@ -33,7 +34,7 @@ from fleet2d.kernels import (
     settle_coverage,
 )
 from fleet2d.metrics.metric import Metric
-from fleet2d.runs.run import layer_rows, layer_table
+from fleet2d.runs.run import ALL_CELLS, LAYER_PREFIX
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import TableContext, stack_lenses
@@ -334,11 +335,23 @@ class LayerBook:
         return whole_steps(layer.every, self._clock.step_us, key)
 
     def _put(self, layer: Layer, step: int) -> None:
-        spec = layer_table(layer)
-        self._store.add_table(spec)
-        columns = layer_rows(layer)
-        steps = np.full(len(columns["row"]), step, np.int64)
-        self._store.append(spec.name, step=steps, time=self._clock.times(steps), **columns)
+        """Store a layer after a step: its fill value, and the cells with another one."""
+        values = layer.values
+        fill = np.array(layer.fill)
+        differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
+        row, column = np.nonzero(differs)
+        kind = KINDS[layer.dtype.kind]
+        dtype = DTYPES[kind]
+        value = np.concatenate([[fill.astype(dtype)], values[differs].astype(dtype)])
+        named = Column("row", "int32", description="of the cell; -1: all cells not named")
+        columns = {
+            Column("step", "step", description="the layer as it was after this step"): step,
+            TIME: np.datetime64(self._clock.time(step)),
+            named: np.concatenate([[ALL_CELLS], row]),
+            Column("column", "int32"): np.concatenate([[ALL_CELLS], column]),
+            Column("value", kind, layer.unit, kind == "float64", (), layer.description): value,
+        }
+        self._store.add_rows(f"{LAYER_PREFIX}{layer.name}", columns, layer.description)
         self._stored_at[layer.name] = step
 
 

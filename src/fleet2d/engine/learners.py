@@ -22,15 +22,13 @@ from fleet2d.algorithms.algorithm import (
     to_columns,
 )
 from fleet2d.algorithms.history import History, Log
-from fleet2d.artifacts.table import Column, Kind, TableSpec
+from fleet2d.artifacts.table import KINDS, Column, Kind
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame, errors_as
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import HOME, Event
-
-KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
 
 
 @dataclass
@@ -268,12 +266,13 @@ class Learners:
             return  # without values even the kinds of the columns are unknown
         if not learner.kinds:
             learner.kinds = kinds
-            specs = [Column(name, kind) for name, kind in kinds.items()]
-            first = (Column("step", "step"), Column("time", "time"))
-            self.store.add_table(TableSpec(learner.table, (*first, *specs)))
         _check_kinds(learner, kinds)
-        steps = np.full(len(next(iter(columns.values()))), step, np.int64)
-        self.store.append(learner.table, step=steps, time=self.clock.times(steps), **columns)
+        rows = {
+            Column("step", "step"): step,
+            Column("time", "time"): np.datetime64(self.clock.time(step)),
+            **{Column(name, kind): columns[name] for name, kind in learner.kinds.items()},
+        }
+        self.store.add_rows(learner.table, rows)
 
 
 def _copy(output: Any) -> Any:

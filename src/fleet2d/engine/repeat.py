@@ -106,13 +106,27 @@ def _reproduce(old: Run, root: Path) -> Reproduction:
     return Reproduction(old.digest, new.digest, sorted(differing), causes)
 
 
-def judge_again(run: Run, expectation: Expectation | str, name: str = "") -> Verdict:
-    """Judge a finished run by an expectation; the run is repeated for this from its manifest.
+def judge(expectation: Expectation | str, run: Run | Simulation, name: str = "") -> Verdict:
+    """Return the verdict on an expectation in a run.
+
+    Args:
+        expectation: The expectation.
+        run: A finished run, which is repeated exactly from its manifest; or a simulation: then the
+            expectation counts from the first call on, and the verdict is about the time until now.
+        name: Name of the expectation, for messages.
 
     Raises:
         InputError: See `Simulation.expect`; or the run isn't complete, or its code isn't trusted.
         ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
+
+    Example:
+        >>> import fleet2d
+        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
+        >>> judge("always(distance(ana, astro) > 0.1)", run).holds
+        True
     """
+    if isinstance(run, Simulation):
+        return run.judge(expectation, name)
     if run.status != "complete":
         raise RunDirectoryError(
             f"the run is {run.status}: only a complete run can be judged; the verdicts on its own"

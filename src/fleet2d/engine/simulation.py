@@ -51,8 +51,8 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import ArtifactError, InputError, ScenarioError, errors_as
 from fleet2d.floorplan.checkup import errors_in
-from fleet2d.floorplan.formats.native import native_document
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.native import native_document
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
 from fleet2d.kernels import About, in_radians
 from fleet2d.runs.run import Run, open_store

@@ -33,6 +33,7 @@ from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
 from fleet2d.floorplan.placed_objects import Posture
+from fleet2d.runtime.events import EventKind
 
 Ask = Callable[[Behavior, Situation], Plan | None]
 
@@ -284,7 +285,7 @@ class LeaveRoom:
         if self._has_tried or room is None or room.index not in banned:
             return None
         self._has_tried = True
-        plan = now.plan().note("withdraws", self.about)
+        plan = now.plan().note(EventKind.WITHDRAWS, self.about)
         allowed = actor.space_without(banned).rooms_of(0)
         others = [r for r in actor.reachable_rooms() if r.index in allowed - banned]
         if others:
@@ -326,7 +327,7 @@ class DoActivity(Trip):
             plan.come_home().go_to(self.place, "send")
         elif performer is not None:
             performer.perform(plan, self.activity)
-        plan.note("activity", self.activity)
+        plan.note(EventKind.ACTIVITY, self.activity)
 
     def _performer(self, now: Situation) -> Behavior | None:
         capable = (b for b in now.actor.behaviors if self.activity in b.activities())
@@ -601,7 +602,7 @@ class DecidingActor(Actor):
             plan = now.plan()
             reason = str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait
-                plan.note("way_blocked", reason)
+                plan.note(EventKind.WAY_BLOCKED, reason)
             plan.stay(DOOR_WAIT)
             self._blocked = reason, self.clock.step_at_or_after(plan.time_us)
             return plan

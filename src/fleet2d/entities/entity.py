@@ -19,6 +19,7 @@ from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.kernels import I64
 from fleet2d.kernels import SightingColumn as Column
+from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Camera
 from fleet2d.sight.perception import Perception
 
@@ -123,7 +124,7 @@ class User(Entity):
     camera: Camera | None = None
     answers: AnswersField | None = None
     lights: LightHours = ()
-    sight_events: ClassVar[tuple[str, str]] = ("robot_lost", "robot_seen")
+    sight_events: ClassVar[tuple[str, str]] = (EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN)
     uses_furniture: ClassVar[bool] = True
     uses_portals: ClassVar[bool] = True
 
@@ -180,7 +181,7 @@ class Robot(Entity):
     gives_way: GivesWay | None = None
     localization: Localization | None = None
     keep_out: tuple[str, ...] = ()
-    sight_events: ClassVar[tuple[str, str]] = ("user_lost", "user_seen")
+    sight_events: ClassVar[tuple[str, str]] = (EventKind.USER_LOST, EventKind.USER_SEEN)
     request_events: ClassVar[frozenset[str]] = REQUEST_EVENTS
 
     @model_validator(mode="before")

@@ -17,6 +17,7 @@ from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import BELL_STD, F64, I64, TURN, BatteryState, Breakpoints, Window
 from fleet2d.runtime.determinism import stream_key
+from fleet2d.runtime.events import EventKind
 
 # The table of events gets a row `battery` when the charge has changed by this much.
 RECORDED_CHANGE = 0.05
@@ -118,7 +119,7 @@ class Charge:
         if change >= RECORDED_CHANGE or (self.level <= 0) != (self._recorded <= 0):
             self._recorded = self.level
             begin_us = plan.began[0] * plan.step_us
-            plan.notes.insert(0, Note(begin_us, "battery", self.percent))
+            plan.notes.insert(0, Note(begin_us, EventKind.BATTERY, self.percent))
 
     @property
     def _state(self) -> BatteryState:

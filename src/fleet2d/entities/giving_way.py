@@ -21,6 +21,7 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
 from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
+from fleet2d.runtime.events import EventKind
 
 Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
 
@@ -215,7 +216,7 @@ class WaitForPeople:
         look = self._look_after(now.step)
         patience = micros(gives_way.patience)
         if now.step == self.since:
-            plan.note("gives_way", person)
+            plan.note(EventKind.GIVES_WAY, person)
         if self._waited(now.step) >= patience:  # it has already looked for a way round
             patience = max(patience, micros(gives_way.gives_up))
         # At its first look it may still turn towards its next leg.
@@ -254,7 +255,7 @@ class WaitForPeople:
 
     def give_up(self, now: Situation, person: str) -> Plan:
         """Stand for a step, after which the behaviors are asked again."""
-        return self._stand_for_a_step(now).note("gives_up", person)
+        return self._stand_for_a_step(now).note(EventKind.GIVES_UP, person)
 
     def _stand_for_a_step(self, now: Situation) -> Plan:
         """Return a plan that begins with a step of standing, so that people in the way are seen."""

@@ -19,7 +19,7 @@ from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
 from fleet2d.kernels import I8, I64, SUB, TURN, Breakpoints, Legs, WalkRule
-from fleet2d.runtime.events import KINDS
+from fleet2d.runtime.events import KINDS, EventKind
 
 
 class Note(NamedTuple):
@@ -190,7 +190,7 @@ class Plan:
             self._step_to(at.x, at.y)
             self.turn_to(at.heading)
         self.take(at.posture)
-        return self.note("uses", at.thing.name)
+        return self.note(EventKind.USES, at.thing.name)
 
     def take(self, posture: Posture) -> Self:
         """Stand, sit or lie from the present end of the plan until the next walk."""
@@ -309,7 +309,7 @@ class Plan:
         if not self.away:
             self.go_to_point(*self.body.way_out)
             self.away = 1
-            self.note("left_home")
+            self.note(EventKind.LEFT_HOME)
             self._mark()
         return self
 
@@ -317,7 +317,7 @@ class Plan:
         """Be at home again, at the point where the body left; no effect if it is at home."""
         if self.away:
             self.away = 0
-            self.note("came_home")
+            self.note(EventKind.CAME_HOME)
             self._mark()
         return self
 
@@ -352,7 +352,7 @@ class Plan:
 
     def call(self, user: str = "") -> Self:
         """Call a person by name, or everybody who is near: people who react to robots may come."""
-        return self.note("calls", user)
+        return self.note(EventKind.CALLS, user)
 
     def interrupt_on(self, *events: "str | type[Component]") -> Self:
         """Ask the behavior again as soon as one of these events happens.

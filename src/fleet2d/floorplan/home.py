@@ -88,14 +88,6 @@ class Home:
         """The parts of it that never change during a run, by name."""
         return {"plan": self.plan, "walls": self.plan.sight_mesh, "shapes": self._shapes}
 
-    def draw(self, ax: Any = None) -> Any:
-        """Draw the floor plan; see `FloorPlan.draw`."""
-        return self.plan.draw(ax)
-
-    def _repr_png_(self) -> bytes | None:
-        """Show the floor plan in a notebook, where matplotlib is installed."""
-        return self.plan._repr_png_()
-
     def cached(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return the value of a key, which all runs in this home share.
 

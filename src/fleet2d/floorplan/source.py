@@ -46,7 +46,7 @@ from fleet2d.floorplan.rooms.room import (
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import BODY_RADIUS, standing_cells, with_approaches
 from fleet2d.inputs import sha256_of_file
-from fleet2d.kernels import I64, TURN, fill_from_neighbors
+from fleet2d.kernels import F64, I64, TURN, fill_from_neighbors
 
 
 class RoomCorrection(Settings):
@@ -340,6 +340,21 @@ class FloorPlanSource(Component):
         examples=[[{"area": [[1, 0.5], [2.5, 0.5], [2.5, 2]], "speed": "40 %", "stop": "2 s"}]],
     )
 
+    @classmethod
+    def of_file(cls, **settings: Any) -> "FloorPlanSource":
+        """Return the source with settings beside a file; those that are None have their defaults.
+
+        Raises:
+            FloorPlanError: It needs another setting.
+        """
+        given = {key: value for key, value in settings.items() if value is not None}
+        return cls.model_construct(**given)
+
+    @classmethod
+    def document(cls, plan: FloorPlan) -> dict[str, Any]:
+        """Return the content of a JSON file that has a plan, if such files are written."""
+        raise NotImplementedError
+
     @abstractmethod
     def load(self) -> FloorPlan:
         """Read the floor plan.
@@ -347,6 +362,14 @@ class FloorPlanSource(Component):
         Raises:
             FloorPlanError: The file can't be read, or is not a home.
         """
+
+    def driven_ways(self) -> list[F64]:
+        """Return the ways that a robot drove when it made the map, each float64 (n, 2) [m].
+
+        Raises:
+            FloorPlanError: The file can't be read.
+        """
+        return []
 
     def plan(self) -> FloorPlan:
         """Return the floor plan with the rooms and furniture that the scenario adds.

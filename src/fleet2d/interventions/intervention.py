@@ -483,7 +483,11 @@ On = Annotated[
                     "additionalProperties": False,
                 },
             ],
-            "examples": ["docks", ["user_seen", "astro"], ["activity", "ana", "dinner"]],
+            "examples": [
+                EventKind.DOCKS,
+                [EventKind.USER_SEEN, "astro"],
+                [EventKind.ACTIVITY, "ana", "dinner"],
+            ],
         }
     ),
 ]

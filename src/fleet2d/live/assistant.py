@@ -283,7 +283,7 @@ class Workspace:
         Raises:
             InputError: There is no such run.
         """
-        from fleet2d.pictures.run import draw_run
+        from fleet2d.viewing.pictures.run import draw_run
 
         with tempfile.TemporaryDirectory() as folder:
             target = Path(folder) / "run.png"

@@ -17,6 +17,7 @@ from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric, nested, pairs_of
 from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.events import EventKind
 
 RestPlace = tuple[float, float]
 
@@ -136,15 +137,15 @@ class BatteryUse(Metric):
         """Read the events."""
         for event in history.events:
             name = event.entity
-            if event.event in ("battery", "docks", "charged"):
+            if event.event in (EventKind.BATTERY, EventKind.DOCKS, EventKind.CHARGED):
                 level = float(event.detail.removesuffix(" %")) / 100
                 self.lowest[name] = min(self.lowest.get(name, 1.0), level)
-                if event.event == "battery" and level == 0:
+                if event.event == EventKind.BATTERY and level == 0:
                     self.empty_at.setdefault(name, event.step)
-            if event.event == "docks":
+            if event.event == EventKind.DOCKS:
                 self.dockings[name] = self.dockings.get(name, 0) + 1
                 self.docked_at[name] = event.step
-            elif event.event == "charged" and name in self.docked_at:
+            elif event.event == EventKind.CHARGED and name in self.docked_at:
                 steps = event.step - self.docked_at.pop(name)
                 self.charging[name] = self.charging.get(name, 0) + steps
         self.steps, self.step_s = history.end, history.step_s

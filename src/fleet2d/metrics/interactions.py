@@ -21,7 +21,12 @@ from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
 # What happens between a person and a robot without a request.
-TOLD = frozenset({"called", "question", "replies", "sent_away", "banned", "switched_off"})
+TOLD = frozenset(
+    {
+        EventKind.CALLED, EventKind.QUESTION, EventKind.REPLIES, EventKind.SENT_AWAY,
+        EventKind.BANNED, EventKind.SWITCHED_OFF,
+    }
+)  # fmt: skip
 
 
 @register("metric", "interactions")
@@ -44,8 +49,15 @@ class Interactions(Metric):
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset({"interrupted", "wait_s", "trust", "asked"})
+    units: ClassVar[Mapping[str, str]] = {
+        "wanted": "requests",
+        "kept": "share of requests",
+        **dict.fromkeys(("answered", "accepted"), "share of times asked"),
+        **dict.fromkeys(("value", "missed"), "worth"),
+        **dict.fromkeys(("annoyance", "mean_annoyance", "trust"), "of 1"),
+        "woke": "times",
+    }
     least: ClassVar[Mapping[str, float]] = {"": 0}
-    largest: ClassVar[Mapping[str, float]] = dict.fromkeys(("answered", "accepted", "kept"), 1)
     better: ClassVar[BetterValues] = {
         **dict.fromkeys(("answered", "accepted", "kept", "value", "trust"), "higher"),
         **dict.fromkeys(("missed", "wait_s", "woke", "annoyance", "mean_annoyance"), "lower"),

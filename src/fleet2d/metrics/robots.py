@@ -27,10 +27,10 @@ from fleet2d.metrics.metric import (
 )
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.runtime.events import Event
+from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.camera import DEFAULT_RANGE_M
 
-ENDS = ("found", "not_at_home", "gave_up")
+ENDS = (EventKind.FOUND, EventKind.NOT_AT_HOME, EventKind.GAVE_UP)
 
 
 @register("metric", "reach_time")
@@ -206,7 +206,7 @@ class TimeToFind(Metric):
                 if event.entity != robot:
                     continue
                 metres = float(driven[event.step - history.first])
-                if event.event == "find_begins" and event.detail in state.users:
+                if event.event == EventKind.FIND_BEGINS and event.detail in state.users:
                     self.open[robot] = self._begin(history, state, event, metres)
                 elif event.event in ENDS and robot in self.open:
                     ended.append(self._end(history, event, metres))
@@ -240,7 +240,7 @@ class TimeToFind(Metric):
         i = event.step - history.first
         user = history.poses(search.user)
         gap = np.array(history.poses(event.entity).at(i)) - user.at(i)
-        if end == "found" and (user.away[i] or float((gap * gap).sum()) > self.sight**2):
+        if end == EventKind.FOUND and (user.away[i] or float((gap * gap).sum()) > self.sight**2):
             end = "false"
         seconds = (event.step - search.began) * history.step_s
         return search._replace(metres=metres - search.metres, seconds=seconds, end=end)
@@ -282,12 +282,14 @@ class TimeToFind(Metric):
         numbers: dict[str, Any] = {"searches": len(searches)}
         mistakes = {
             "false": sum(s.end == "false" for s in searches),
-            "false_out": sum(s.end == "not_at_home" for s in at_home),
+            "false_out": sum(s.end == EventKind.NOT_AT_HOME for s in at_home),
         }
         numbers |= {name: count for name, count in mistakes.items() if count}
         if at_home:
-            finds = [s for s in at_home if s.end == "found"]
-            curve = kaplan_meier([s.seconds for s in at_home], [s.end == "found" for s in at_home])
+            finds = [s for s in at_home if s.end == EventKind.FOUND]
+            curve = kaplan_meier(
+                [s.seconds for s in at_home], [s.end == EventKind.FOUND for s in at_home]
+            )
             in_time = [s for s in finds if s.seconds <= until]
             numbers["success"] = len(in_time) / len(at_home)
             numbers["mean"] = restricted_mean([c for c in curve if c[0] <= until], until)
@@ -300,7 +302,7 @@ class TimeToFind(Metric):
                 most = sum_in_order(max(s.ideal, s.metres) for s in finds)
                 numbers["ratio"] = most / sum_in_order(s.ideal for s in finds)
         if away:
-            correct = [s for s in away if s.end == "not_at_home"]
+            correct = [s for s in away if s.end == EventKind.NOT_AT_HOME]
             numbers["out_told"] = len(correct) / len(away)
             if correct:
                 numbers["out_mean"] = sum_in_order(s.seconds for s in correct) / len(correct)
@@ -358,7 +360,7 @@ class Blocking(Metric):
             self.last[key] = pair.user_poses.at(-1), bool(is_near[-1]), bool(is_blocked[-1])
         steps_aside = {f"steps aside for {robot}": robot for robot in state.robots}
         for event in history.events:
-            if event.event == "reacts" and event.detail in steps_aside:
+            if event.event == EventKind.REACTS and event.detail in steps_aside:
                 met = self.counts.get((steps_aside[event.detail], event.entity))
                 if met is not None:  # else a robot stepped aside, by a behavior of its own
                     met["asides"] = met.get("asides", 0) + 1

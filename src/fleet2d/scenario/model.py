@@ -68,19 +68,15 @@ def _read_expectation(value: Any) -> Any:
     return read_expectation(value)
 
 
-def _describe_expectation(schema: dict[str, Any]) -> None:
-    from fleet2d.expectations.parse import JSON_SCHEMA
-
-    schema.update(JSON_SCHEMA)
-
-
 ExpectationField = Annotated[
     Any,
     BeforeValidator(_read_expectation),
     PlainSerializer(str, return_type=str, when_used="json"),
-    Field(json_schema_extra=_describe_expectation),
+    Field(
+        json_schema_extra={"type": "string", "examples": ["always(distance(ana, astro) > 0.5 m)"]}
+    ),
 ]
-"""Text or a mapping in a file, an `Expectation` in Python."""
+"""Text in a file, an `Expectation` in Python."""
 
 
 def _parse_local_time(value: Any) -> Any:

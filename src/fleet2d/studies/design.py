@@ -27,9 +27,7 @@ from fleet2d.studies.specification import SEED, Specification
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results: those above the
 # engine in the order of imports.
-_LEAVES = (
-    "__main__", "cli", "datasets", "fit", "gym", "live", "pictures", "studies", "testing", "viewer",
-)  # fmt: skip
+_LEAVES = ("__main__", "cli", "learning", "live", "studies", "testing", "viewing")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
 

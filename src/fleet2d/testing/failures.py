@@ -333,7 +333,7 @@ def _store(
     yield f"  run: {out}"
     try:
         from fleet2d.runs.run import open_run
-        from fleet2d.viewer.figures import draw_failure
+        from fleet2d.viewing.figures import draw_failure
 
         picture = out.with_suffix(".png")
         run = open_run(out)

@@ -13,11 +13,11 @@ from fleet2d.algorithms.presence.belief import BeliefSeries, Presence, with_anyo
 from fleet2d.algorithms.presence.estimator import normalized
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
-from fleet2d.algorithms.presence.people import DayEvidence, StateLayout
+from fleet2d.algorithms.presence.people import StateLayout, between, stretches_of
 from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import F64, I64, Bool, StayModel, advance, follow
+from fleet2d.kernels import F64, I64, Bool, DayEvidence, StayModel, advance, follow
 from fleet2d.runtime.clock import DAY_MINUTES
 
 WEEKEND = 5  # its first day, Monday being 0
@@ -255,7 +255,7 @@ class Filter(Model):
 
     def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
         """Return P(room | evidence up to each bin): float64 (bins, rooms + 1)."""
-        stretches = day.stretches(user, 1)
+        stretches = stretches_of(day, user, 1)
         if not self.negative:
             stretches = stretches._replace(views=np.zeros_like(stretches.views))
         follower = self.followers[user]
@@ -316,11 +316,12 @@ class RoutineModel(SemiMarkov):
     def _follow(self, user: int, day: DayEvidence, model: StayModel) -> F64:
         hours = day.minute // 60
         begins = [0, *(np.flatnonzero(np.diff(hours)) + 1).tolist()]
-        models = self.habits(user).at(model, (day.number - 1) % 7, hours[begins].tolist())
+        weekday = (self.learner.counts.today - 1) % 7
+        models = self.habits(user).at(model, weekday, hours[begins].tolist())
         parts = pairwise([*begins, len(hours)])
         follow = super()._follow
         each = zip(parts, models, strict=True)
-        return np.concatenate([follow(user, day.between(*part), at) for part, at in each])
+        return np.concatenate([follow(user, between(day, *part), at) for part, at in each])
 
     def habits(self, user: int) -> Habits:
         """Return how a user's transitions depend on the hour, as learned so far."""

@@ -283,10 +283,10 @@ class OnnxModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network of your own in an ONNX file.
 
     Inputs are `features`, float32 (bins, places, 25), and `places`, float32 (places, 12), as
-    `fleet2d.datasets.windows` has them; the output is float32 (bins, places), probabilities or
-    scores of which the softmax is taken, away last. Homes differ in the number of places. It needs
-    the package onnxruntime (`pip install "fleet2d[onnx]"`), whose results may differ in the last
-    digits between machines: so may the run.
+    `fleet2d.learning.datasets.windows` has them; the output is float32 (bins, places),
+    probabilities or scores of which the softmax is taken, away last. Homes differ in the number of
+    places. It needs the package onnxruntime (`pip install "fleet2d[onnx]"`), whose results may
+    differ in the last digits between machines: so may the run.
 
     Attributes:
         file: The ONNX file.

@@ -21,13 +21,15 @@ from fleet2d.algorithms.presence.belief import (
     belief_labels,
     check_distributions,
 )
-from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator, PresenceAlgorithm
+from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator
+from fleet2d.algorithms.presence.long_term import PresenceAlgorithm
 from fleet2d.configuration.components import Component, OneOf, register
 from fleet2d.configuration.units import PositiveDuration, whole_steps
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import exp2
+from fleet2d.runtime.events import EventKind
 
 NEVER = -1
 
@@ -348,9 +350,9 @@ class ToldPresence(Algorithm):
             raise self._not_presence(self.reads[0])
         for event in history.events:
             name, _, where = event.detail.partition(" ")
-            if event.event == "told" and name in state.users:
+            if event.event == EventKind.TOLD and name in state.users:
                 self.told.setdefault(name, []).append(Told(event.step, where))
-            elif event.event == "user_seen" and event.detail in state.users:
+            elif event.event == EventKind.USER_SEEN and event.detail in state.users:
                 self.told.setdefault(event.detail, []).append(Told(event.step, ""))
         track = belief.track
         step_s = history.step_s

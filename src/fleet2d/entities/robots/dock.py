@@ -10,6 +10,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
+from fleet2d.runtime.events import EventKind
 
 # How long it rests at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)
@@ -32,7 +33,7 @@ class Dock(Behavior):
             as there is another way.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"charged", "docks"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.CHARGED, EventKind.DOCKS})
     answers: ClassVar[frozenset[str]] = frozenset({"dock"})
 
     threshold: Share = 0.2
@@ -88,12 +89,12 @@ class Dock(Behavior):
         is_low = charge.level <= self.threshold
         if has_command or is_low or (self.charging and charge.level < self.until):
             if not self.charging or (plan.x, plan.y) != charger:
-                self._go(plan, now.actor, charger).note("docks", charge.percent)
+                self._go(plan, now.actor, charger).note(EventKind.DOCKS, charge.percent)
             self.charging = True
             return plan.stay(timedelta(microseconds=charge.time_to_charge(self.until)))
         if self.charging:
             self.charging = False
-            plan.note("charged", charge.percent)
+            plan.note(EventKind.CHARGED, charge.percent)
             if not self.rest:
                 # The row needs a plan; the shortest one, so that later behaviors are asked next.
                 return plan.stay(timedelta(microseconds=1))

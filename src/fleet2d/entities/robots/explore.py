@@ -13,6 +13,7 @@ from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import centres, check_has_camera, spread, visible_from
 from fleet2d.kernels import TURN, Bool, squared_distance
+from fleet2d.runtime.events import EventKind
 
 # Maximum number of cells of the home that are tried as viewpoints, and as targets to be seen.
 MAX_VIEWPOINT_CELLS = 800
@@ -42,7 +43,7 @@ class Explore(Behavior):
             round in none of them, and their floor needn't be seen.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"explored", "explores"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})
     needs: ClassVar[frozenset[str]] = frozenset({"explored"})
 
     enough: Share = 0.98
@@ -93,8 +94,10 @@ class Explore(Behavior):
             return None
         if self.stand is None:
             self.is_done = True
-            return plan.note("explored", f"{100 * share:.1f} %").stay(timedelta(microseconds=1))
-        plan.note("explores", f"{100 * share:.1f} %")
+            return plan.note(EventKind.EXPLORED, f"{100 * share:.1f} %").stay(
+                timedelta(microseconds=1)
+            )
+        plan.note(EventKind.EXPLORES, f"{100 * share:.1f} %")
         row, column = self.stands[self.stand].tolist()
         plan.go_to_point(*now.home.plan.lattice.cell_centre(row, column))
         self.plan = plan.turn_by(1.0)

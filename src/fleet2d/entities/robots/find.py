@@ -37,6 +37,7 @@ from fleet2d.errors import PlacementError
 from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import EventKind
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 SHARE_TO_SHOW = 0.9
@@ -170,7 +171,7 @@ class Find(BeliefBehavior):
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
-        {"find_begins", "found", "gave_up", "not_at_home"}
+        {EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME}
     )
     answers: ClassVar[frozenset[str]] = frozenset({"find"})
 
@@ -243,7 +244,7 @@ class Find(BeliefBehavior):
             user = self.user
         if user is not None:
             search = self.search = SearchState(now.time, user)
-            plan.note("find_begins", user)
+            plan.note(EventKind.FIND_BEGINS, user)
         elif search is None:
             return None
         else:
@@ -267,7 +268,7 @@ class Find(BeliefBehavior):
         if not now.events or last.root is not self.plan or last.is_over(now.step):
             return None
         plan = resumed(now.plan(), last, now.step)
-        return None if plan is None else plan.interrupt_on("user_seen")
+        return None if plan is None else plan.interrupt_on(EventKind.USER_SEEN)
 
     def _is_due(self, now: Situation) -> bool:
         """Return whether a search is due and not too late; afterwards the next one is due."""
@@ -289,7 +290,7 @@ class Find(BeliefBehavior):
 
     def _approach(self, now: Situation, plan: Plan, x: float, y: float) -> Plan:
         """End the search: approach the person, at (x, y) [m], and stay."""
-        self._end(plan, "found")
+        self._end(plan, EventKind.FOUND)
         if is_in_rooms(now, x, y, self.avoided):
             return plan.face(*now.home.plan.lattice.point_at((x, y))).stay(self.stay)
         approach(now, plan, x, y, self.distance)
@@ -303,7 +304,7 @@ class Find(BeliefBehavior):
         """Go to the next site and look round there, or end the search."""
         ends = search.since + self.deadline
         if now.time >= ends:
-            return self._end(plan, "gave_up")
+            return self._end(plan, EventKind.GAVE_UP)
         prior, away = self._prior(now, search.user)
         age = np.full(len(self.sites), np.inf)
         memory = self.memory.total_seconds()
@@ -313,7 +314,7 @@ class Find(BeliefBehavior):
         is_out = away >= self.out_at * (away + sum_in_order(remaining.tolist()))
         unseen = np.flatnonzero(np.isinf(age)).tolist()
         if is_out and not any(self.sites.can_go(plan, site) for site in unseen):
-            return self._end(plan, "not_at_home")
+            return self._end(plan, EventKind.NOT_AT_HOME)
         route = search.route
         if self.policy == "receding" or not route:
             problem = self.sites.problem(now, after_empty_looks(prior, age, memory))
@@ -323,7 +324,7 @@ class Find(BeliefBehavior):
         search.route = route
         search.goal = route[0] if route else None
         if route:
-            self.sites.look_round(plan, route[0]).interrupt_on("user_seen")
+            self.sites.look_round(plan, route[0]).interrupt_on(EventKind.USER_SEEN)
         else:  # shut doors block all sites
             plan.stay(DOOR_WAIT)
         self.plan = plan.ask_by(ends)

@@ -12,6 +12,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in, stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, centres, check_has_camera, is_in_rooms
+from fleet2d.runtime.events import EventKind
 
 # Distance from where a person was lost at which it looks for the person [m].
 SEARCH_DISTANCE_M = 0.3
@@ -41,8 +42,8 @@ class Follow(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"follows", "lost"})
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.FOLLOWS, EventKind.LOST})
+    listens: ClassVar[frozenset[str]] = frozenset({EventKind.USER_SEEN})
 
     user: str = Field(default="", min_length=0)
     distance: Length = Field(default=1.5, ge=0.3, le=10)
@@ -81,7 +82,7 @@ class Follow(Behavior):
             if self.person is None:
                 return None
             self.since = now.time
-            return self._follow(now, now.plan().note("follows", self.person))
+            return self._follow(now, now.plan().note(EventKind.FOLLOWS, self.person))
         if self.longest and now.time - self.since >= self.longest:
             self.person = None
             return None
@@ -92,7 +93,7 @@ class Follow(Behavior):
             self.is_searching = False
             return None
         self.is_searching = True
-        plan = now.plan().note("lost", self.person).interrupt_on("user_seen")
+        plan = now.plan().note(EventKind.LOST, self.person).interrupt_on(EventKind.USER_SEEN)
         if not is_in_rooms(now, *self.last, self.avoided):
             approach(now, plan, *self.last, SEARCH_DISTANCE_M)
         return plan.turn_by(1.0)
@@ -111,7 +112,7 @@ class Follow(Behavior):
         if self.longest:
             until = min(until, self.since + self.longest)
         # It looks again before the end of a long way, as the person may walk on.
-        return plan.interrupt_on("user_lost").stay(until=until).ask_by(until)
+        return plan.interrupt_on(EventKind.USER_LOST).stay(until=until).ask_by(until)
 
 
 @register("behavior", "come")
@@ -128,7 +129,7 @@ class Come(Behavior):
             of them, it waits outside, near the door.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"visits"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.VISITS})
     answers: ClassVar[frozenset[str]] = frozenset({"come"})
     resumes: ClassVar[bool] = True
 
@@ -154,7 +155,7 @@ class Come(Behavior):
         if command is None:
             return None
         goal = self._outside(now.actor, stop_at(now.actor, command.place))
-        plan = now.plan().go_to_point(*goal).note("visits", command.text.partition(" ")[2])
+        plan = now.plan().go_to_point(*goal).note(EventKind.VISITS, command.text.partition(" ")[2])
         self.command = None
         return plan.stay(self.stay)
 

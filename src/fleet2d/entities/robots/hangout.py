@@ -19,6 +19,7 @@ from fleet2d.errors import PlacementError
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB, points_in_sight
+from fleet2d.runtime.events import EventKind
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2
@@ -241,7 +242,7 @@ class Hangout(BeliefBehavior):
         off_doors: How far from doorways it stands at least [m].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"explores", "relocates"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.EXPLORES, EventKind.RELOCATES})
 
     period: PositiveDuration = timedelta(minutes=30)
     near: Nearness = "path"
@@ -321,14 +322,14 @@ class Hangout(BeliefBehavior):
         if self.place is None or now.time - self.better_since >= self.confirm:
             self.place = best
             self.better_since = None
-            plan.note("relocates", now.home.plan.rooms[int(self.places.room[best])].name)
+            plan.note(EventKind.RELOCATES, now.home.plan.rooms[int(self.places.room[best])].name)
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
         if room in now.actor.kept_out:
             return
         target = now.home.rooms[room]
-        plan.note("explores", target.name)
+        plan.note(EventKind.EXPLORES, target.name)
         for point in viewpoints_of(now.actor, target, SHARE_TO_SHOW, MAX_VIEWS).points:
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)

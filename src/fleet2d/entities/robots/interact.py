@@ -20,12 +20,12 @@ from fleet2d.entities.robots.approach import (
     is_in_rooms,
 )
 from fleet2d.errors import ComponentError
-from fleet2d.interactions.interaction import Outcome, Request
+from fleet2d.interactions.interaction import OUTCOMES, Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import exp2, sum_in_order
+from fleet2d.runtime.events import EventKind
 
 Step = Literal["seek", "ask", "carry_out"]
-ANSWERS = frozenset(str(outcome) for outcome in Outcome)
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
 # It looks into the likeliest rooms, until they have this part of the probability.
@@ -163,9 +163,14 @@ class Interact(BeliefBehavior):
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
-        {"asks", "collects", "delivered", "withdraws", "opportunity", "replies"}
+        {
+            EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED, EventKind.WITHDRAWS,
+            EventKind.OPPORTUNITY, EventKind.REPLIES,
+        }
+    )  # fmt: skip
+    listens: ClassVar[frozenset[str]] = frozenset(
+        {EventKind.USER_SEEN, EventKind.DUE, EventKind.QUESTION}
     )
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen", "due", "question"})
 
     serves_requests: ClassVar[bool] = True
 
@@ -196,7 +201,7 @@ class Interact(BeliefBehavior):
     def awaits(self, now: Situation) -> frozenset[str]:
         """Leave out `user_seen` unless it waits for somebody to come into view."""
         waits = any(self._waits_for(now, request) for request in self._ready(now))
-        return self.listens if waits else self.listens - {"user_seen"}
+        return self.listens if waits else self.listens - {EventKind.USER_SEEN}
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when a request may be served that has to wait now."""
@@ -246,11 +251,11 @@ class Interact(BeliefBehavior):
 
     def _reply(self, now: Situation) -> Plan | None:
         """Answer the question of a person, if there is one."""
-        event = next((event for event in now.events if event.event == "question"), None)
+        event = next((event for event in now.events if event.event == EventKind.QUESTION), None)
         if event is None:
             return None
         plan = now.plan().face(*now.home.plan.lattice.point_at((event.x, event.y)))
-        return plan.note("replies", event.user).stay(REPLY_TAKES)
+        return plan.note(EventKind.REPLIES, event.user).stay(REPLY_TAKES)
 
     def _address(
         self, now: Situation, ready: list[Request], served: ServedRequest | None
@@ -363,7 +368,7 @@ class Interact(BeliefBehavior):
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
         plan.face(*now.home.plan.lattice.point_at(place))
-        plan.note("asks", request.text).stay(self.patience).interrupt_on(*ANSWERS)
+        plan.note(EventKind.ASKS, request.text).stay(self.patience).interrupt_on(*OUTCOMES)
         self.plan = plan.root
         return plan
 
@@ -371,10 +376,10 @@ class Interact(BeliefBehavior):
         """Carry out what was accepted, or withdraw after another answer."""
         request = served.request
         to = served.text.rpartition(" ")[2]
-        answers = [e.event for e in now.events if e.event in ANSWERS and e.user == served.text]
+        answers = [e.event for e in now.events if e.event in OUTCOMES and e.user == served.text]
         if Outcome.ACCEPTED in answers:
             self.served = served._replace(step="carry_out")
-            done = "delivered" if to == request.interaction.to else "collects"
+            done = EventKind.DELIVERED if to == request.interaction.to else EventKind.COLLECTS
             self.plan = now.plan().stay(request.interaction.takes).note(done, served.text)
             return self.plan.stay(timedelta(seconds=1))
         if not answers:
@@ -384,7 +389,7 @@ class Interact(BeliefBehavior):
             self.unanswered[to] = served.place
             self.not_sought[to] = now.time + UNANSWERED_PAUSE
         self.left_alone[to] = now.time + self.again
-        plan = now.plan().note("withdraws", served.text)
+        plan = now.plan().note(EventKind.WITHDRAWS, served.text)
         return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
 
     def _seek(self, now: Situation, request: Request, joint: F64) -> Plan:
@@ -399,7 +404,7 @@ class Interact(BeliefBehavior):
                 break
             looked += float(joint[room.index])
             self.plan.go_to_point(*now.actor.middle(room)).turn_by(1)
-        return self.plan.interrupt_on("user_seen")
+        return self.plan.interrupt_on(EventKind.USER_SEEN)
 
     def _look_on(
         self, now: Situation, ready: list[Request], served: ServedRequest | None
@@ -416,7 +421,7 @@ class Interact(BeliefBehavior):
             self._end_round(now, served.request.to, is_in_view=is_in_view)
             return None
         self.served = served
-        return plan.interrupt_on("user_seen")
+        return plan.interrupt_on(EventKind.USER_SEEN)
 
 
 @register("behavior", "opportunistic")
@@ -439,9 +444,12 @@ class Opportunistic(Behavior):
     """
 
     records: ClassVar[frozenset[str]] = frozenset(
-        {"approaches", "asks", "collects", "delivered", "interaction_over", "interacts"}
-    )
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
+        {
+            EventKind.APPROACHES, EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED,
+            EventKind.INTERACTION_OVER, EventKind.INTERACTS,
+        }
+    )  # fmt: skip
+    listens: ClassVar[frozenset[str]] = frozenset({EventKind.USER_SEEN})
 
     users: tuple[str, ...] = ()
     distance: Length = Field(default=1.2, ge=0.3, le=10)
@@ -465,13 +473,13 @@ class Opportunistic(Behavior):
         """Approach somebody in view, or leave the decision to later behaviors."""
         asked = self.asked
         self.asked = None
-        texts = [event.user for event in now.events if event.event == "accepted"]
+        texts = [event.user for event in now.events if event.event == EventKind.ACCEPTED]
         if asked is not None and asked[1] in texts:
             request, text = asked
             person = text.rpartition(" ")[2]
-            done = "delivered" if person == request.interaction.to else "collects"
+            done = EventKind.DELIVERED if person == request.interaction.to else EventKind.COLLECTS
             plan = now.plan().stay(request.interaction.takes).note(done, text)
-            return plan.note("interaction_over", person)
+            return plan.note(EventKind.INTERACTION_OVER, person)
         avoided = self.avoided | now.actor.banned(now.step)
         for name, (x, y) in sorted(now.in_view.items()):
             is_meant = not self.users or name in self.users
@@ -484,12 +492,12 @@ class Opportunistic(Behavior):
         return None
 
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
-        plan = now.plan().note("approaches", name)
+        plan = now.plan().note(EventKind.APPROACHES, name)
         approach(now, plan, x, y, self.distance)
         plan.face(*now.home.plan.lattice.point_at((x, y)))
-        plan.note("interacts", name)
+        plan.note(EventKind.INTERACTS, name)
         ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
         self.asked = (ready[0], ready[0].text) if ready else None
         if self.asked is not None:
-            plan.note("asks", self.asked[1]).interrupt_on("accepted")
-        return plan.stay(self.interaction).note("interaction_over", name)
+            plan.note(EventKind.ASKS, self.asked[1]).interrupt_on(EventKind.ACCEPTED)
+        return plan.stay(self.interaction).note(EventKind.INTERACTION_OVER, name)

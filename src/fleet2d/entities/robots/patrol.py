@@ -27,9 +27,11 @@ from fleet2d.entities.place import (
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import stops_with_view, unwatched
 from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.load import source_of
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64
 from fleet2d.runtime.clock import DAY, midnight_of
+from fleet2d.runtime.events import EventKind
 
 MAX_NAMED = 6  # how many rooms a note names
 
@@ -155,7 +157,7 @@ class Scheduled(Behavior):
             are left out, with a note.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"visits", "way_blocked"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
 
     visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
     late: Duration = timedelta(minutes=30)
@@ -190,13 +192,13 @@ class Scheduled(Behavior):
         blocked = [number for due, number in self.pending if (due, number) in fresh]
         if blocked:
             name = self._room_name(now.actor, blocked[0])
-            return now.plan().note("way_blocked", name).stay(DOOR_WAIT)
+            return now.plan().note(EventKind.WAY_BLOCKED, name).stay(DOOR_WAIT)
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:
         visit, (x, y) = self.visits[number], self.stops[number]
         name = visit.task or self._room_name(now.actor, number)
-        plan = now.plan().go_to_point(x, y).note("visits", name)
+        plan = now.plan().go_to_point(x, y).note(EventKind.VISITS, name)
         if visit.look_around:
             plan.turn_by(1.0)
         return plan.stay(visit.dwell)
@@ -235,7 +237,7 @@ class Retrace(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"retraced", "retraces"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.RETRACED, EventKind.RETRACES})
     resumes: ClassVar[bool] = True
 
     path: InputPath
@@ -253,11 +255,8 @@ class Retrace(Behavior):
         Raises:
             PlacementError: The map has no path, or none that the robot can drive here.
         """
-        # Imported here, as other rounds need no maps.
-        from fleet2d.floorplan.formats.valetudo import read_valetudo_paths
-
         try:
-            pieces = read_valetudo_paths(self.path)
+            pieces = source_of("valetudo", path=self.path).driven_ways()
         except FloorPlanError as error:
             raise PlacementError(
                 f"{actor.path}: {error}; it retraces the map of a Valetudo robot, and a log of"
@@ -282,11 +281,11 @@ class Retrace(Behavior):
 
     def decide(self, now: Situation) -> Plan:
         """Drive the whole path."""
-        plan = now.plan().note("retraces", f"{len(self.points)} points")
+        plan = now.plan().note(EventKind.RETRACES, f"{len(self.points)} points")
         for x, y in self.points:
             if not now.actor.may_block_routes or plan.reaches(x, y):
                 plan.go_to_point(x, y)
-        return plan.note("retraced")
+        return plan.note(EventKind.RETRACED)
 
 
 def _thin_out(points: I64, spacing: float) -> list[tuple[int, int]]:

@@ -11,6 +11,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
+from fleet2d.runtime.events import EventKind
 
 # The events, the most important first, and the manner that is the probability of a reaction.
 PROBABILITIES = {
@@ -40,7 +41,7 @@ class Reactions(Behavior):
         manners: The manners; left out: those of the persona.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"reacts"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.REACTS})
 
     manners: Manners | None = None
 
@@ -87,14 +88,14 @@ class Reactions(Behavior):
         elif event.event == "robot_coming":
             self._step_aside(now, plan, event, draws)
         else:
-            plan.note("reacts", f"turns to {event.user}")
+            plan.note(EventKind.REACTS, f"turns to {event.user}")
             self._look_at(now, plan, event, self.durations["looks"], draws)
         self.rank = RANKS.index(event.event)
         self.until = now.actor.clock.step_at_or_after(plan.time_us)
         return plan
 
     def _come(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
-        plan.note("reacts", f"comes to {event.user}")
+        plan.note(EventKind.REACTS, f"comes to {event.user}")
         self._maybe_stop(now, draws)
         at_x, at_y = _robot(now, event)
         distance_m = max(MEET_M, self.used_manners.too_close + CLEAR_M)
@@ -104,7 +105,7 @@ class Reactions(Behavior):
         self._look_at(now, plan, event, self.durations["comes_for"], draws)
 
     def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
-        plan.note("reacts", f"leaves {event.user}")
+        plan.note(EventKind.REACTS, f"leaves {event.user}")
         self._maybe_stop(now, draws)
         rooms = [room for room in now.actor.reachable_rooms() if room != now.room]
         if rooms:
@@ -113,7 +114,7 @@ class Reactions(Behavior):
 
     def _step_aside(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         """Step out of the robot's way, to a random free point beside it."""
-        plan.note("reacts", f"steps aside for {event.user}")
+        plan.note(EventKind.REACTS, f"steps aside for {event.user}")
         at_x, at_y = _robot(now, event)
         dx, dy = plan.x - at_x, plan.y - at_y
         # Across the robot's way; along it, the robot would come closer again.

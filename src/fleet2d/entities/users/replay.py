@@ -33,6 +33,7 @@ from fleet2d.logs.log import (
 )
 from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import EventKind
 
 # Coordinates are clipped to this, far outside of any home [m].
 COORDINATE_LIMIT_M = 1e6
@@ -170,7 +171,7 @@ class FixFollower:
         x, y = self.fixes.xy[i].tolist()
         at_us = int(self.fixes.time_us[i])
         heading = int(self.heading[i])
-        plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
+        plan.jump(at_us, x=x, y=y, heading=heading, away=0).note(EventKind.KNOWN)
 
     def _route(self, j: int) -> I64:
         """Return the route to a fix from the one before, straight if that is free; int64 (n, 2)."""
@@ -281,7 +282,7 @@ class RoomFollower:
         x, y = self._spot(visit, plan)
         plan.jump(at_us, x=x, y=y, away=int(visit.place == AWAY))
         if known:
-            plan.note("known", visit.place)
+            plan.note(EventKind.KNOWN, visit.place)
 
     def _walk(self, plan: Plan, before: LoggedVisit, visit: LoggedVisit) -> None:
         """Walk from one visit to the next, so as to arrive in time."""
@@ -289,7 +290,7 @@ class RoomFollower:
         may_leave = max(plan.time_us, before.keep * self.step_us)
         if before.place == AWAY:
             back_us = max(plan.time_us, min((before.last + 1) * self.step_us, arrive_us - 1))
-            plan.jump(back_us, away=0).note("came_home")
+            plan.jump(back_us, away=0).note(EventKind.CAME_HOME)
             may_leave = max(plan.time_us, may_leave)
         spot = self._spot(visit, plan)
         rows = self._way(plan, spot)
@@ -300,7 +301,7 @@ class RoomFollower:
             rows = self._way(plan, self._near(plan, spot))
         self._set_out(plan, rows, may_leave, arrive_us, before)
         if visit.place == AWAY:
-            plan.jump(arrive_us, away=1).note("left_home")
+            plan.jump(arrive_us, away=1).note(EventKind.LEFT_HOME)
 
     def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
         """Return the place in the room of a spot that is nearest to the body."""
@@ -350,7 +351,7 @@ class RoomFollower:
         for step, activity in visit.activities:
             at_us = max(step, 0) * self.step_us
             if activity and at_us >= plan.began[0] * self.step_us:
-                plan.notes.append(Note(at_us, "activity", activity))
+                plan.notes.append(Note(at_us, EventKind.ACTIVITY, activity))
 
 
 GAP_OF_ROOMS = timedelta(minutes=10)
@@ -359,7 +360,7 @@ GAP_OF_FIXES = timedelta(minutes=1)
 
 def _vanish(plan: Plan, at_us: int) -> None:
     """Make the body's position unknown: it is away, without having walked out."""
-    plan.jump(at_us, away=1).note("unknown")
+    plan.jump(at_us, away=1).note(EventKind.UNKNOWN)
 
 
 def report_rooms(
@@ -467,7 +468,9 @@ class Replay(Behavior, LogKeys):
         fastest: Walks faster than this are reported as implausible [m/s].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
+    records: ClassVar[frozenset[str]] = frozenset(
+        {EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN}
+    )
 
     path: InputFileOrFolder
     format: Layout = "auto"
@@ -508,7 +511,7 @@ class Replay(Behavior, LogKeys):
         plan = now.plan()
         if now.step == 0:
             for note in self.notes:
-                plan.note("replay", note)
+                plan.note(EventKind.REPLAY, note)
         if isinstance(self.follower, FixFollower):
             return self.follower.follow(plan)
         current = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)

@@ -24,6 +24,7 @@ from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws
+from fleet2d.runtime.events import EventKind
 
 T = TypeVar("T")
 
@@ -206,11 +207,10 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
 
 
 SECOND_US = 1_000_000
-# How the core numbers ways of choosing rooms, small moves, and what happens.
-POLICIES, MOVE_KINDS, EVENTS = (
-    tuple(member.name.lower() for member in numbers)
-    for numbers in (kernels.RoomPolicy, kernels.MoveKind, kernels.Happening)
-)
+# How the core numbers ways of choosing rooms, small moves, and events.
+POLICIES = tuple(policy.name.lower() for policy in kernels.RoomPolicy)
+MOVE_KINDS = tuple(kind.name.lower() for kind in kernels.MoveKind)
+EVENTS = tuple(EventKind[event.name] for event in kernels.Happening)
 
 
 @lru_cache(512)  # most are the same for all people

@@ -12,6 +12,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
 from fleet2d.runtime.clock import DAY, midnight_of, midnights
+from fleet2d.runtime.events import EventKind
 
 AWAY: tuple[()] = ()
 
@@ -164,7 +165,7 @@ def _add(plan: Plan, entry: AgendaEntry) -> None:
     else:
         plan.leave_home()
     if entry.activity:
-        plan.note("activity", entry.activity)
+        plan.note(EventKind.ACTIVITY, entry.activity)
 
 
 def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[AgendaEntry]:

@@ -12,6 +12,7 @@ from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.runtime.events import EventKind
 from fleet2d.runtime.program import ExternalProgram
 
 MAX_ITEMS = 1000
@@ -42,11 +43,16 @@ class Unknown(Behavior):
     what would need their place. Event: `unknown`.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"unknown"})
+    records: ClassVar[frozenset[str]] = frozenset({EventKind.UNKNOWN})
 
     def decide(self, now: Situation) -> Plan:
         """Be away, without having walked out."""
-        return now.plan().jump(now.step * now.actor.clock.step_us, away=1).note("unknown").stay()
+        return (
+            now.plan()
+            .jump(now.step * now.actor.clock.step_us, away=1)
+            .note(EventKind.UNKNOWN)
+            .stay()
+        )
 
 
 @register("behavior", "live")
