@@ -30,7 +30,7 @@ from fleet2d.configuration.units import format_duration, micros, parse_duration
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
-from fleet2d.homes.formats.houseexpo import read_houseexpo
+from fleet2d.floorplan.load import load_floorplan
 from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import Camera
@@ -274,7 +274,7 @@ def _move_starts(
     data: dict[str, Any], scenario: Scenario, plan: Path, bodies: Mapping[str, ConfigReader]
 ) -> None:
     """Move every start at which its body doesn't fit to the nearest point at which it does."""
-    home = Home(read_houseexpo(plan, data["floorplan"]["cell"]))
+    home = Home(load_floorplan(plan, data["floorplan"]["cell"]))
     lattice = home.plan.lattice
     for name, entity in [*scenario.users.items(), *scenario.robots.items()]:
         start = data["users" if name in data["users"] else "robots"][name].get("start")

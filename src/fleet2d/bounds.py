@@ -85,10 +85,6 @@ PICTURE_BYTES = Bound("PICTURE_BYTES", 256 << 20, "bytes")
 """Size of a picture of a floor plan."""
 LOG_BYTES = Bound("LOG_BYTES", 1 << 30, "bytes")
 """Size of a log."""
-CHUNK_BYTES = Bound("CHUNK_BYTES", 256 << 20, "bytes when unpacked")
-"""Size of a message in a bag, or of a chunk of messages, unpacked."""
-METADATA_BYTES = Bound("METADATA_BYTES", 1 << 20, "bytes")
-"""Size of the description of a bag, which is read slowly."""
 DEPTH = Bound("DEPTH", 64, "lists in lists")
 """Depth of YAML."""
 YAML_VALUES = Bound("VALUES", 200_000, "values")
@@ -118,8 +114,9 @@ CORNERS = Bound("CORNERS", 25_000, "corners")
 """Corners of the free space and the furniture of a floor plan, or of all polygons of a drawing."""
 ROOM_CORNERS = Bound("ROOM_CORNERS", 100_000, "corners of rooms")
 """Corners of the rooms of a floor plan, which in a map are the corners of pixels on both sides."""
-CROSSINGS = Bound("CROSSINGS", 100_000, "places where it crosses itself")
-"""Crossings of the outline of one room, wall or home with itself, which are repaired."""
+CROSSINGS = Bound("CROSSINGS", 10_000, "places where it crosses itself")
+"""Crossings of the outline of one room, wall or home with itself, which are repaired; and parts of
+the free space that meet."""
 LOG_ROWS = Bound("LOG_ROWS", 5_000_000, "rows")
 """Rows of a log of rooms, activities or detections."""
 FIXES = Bound("FIXES", 20_000_000, "fixes")
@@ -133,9 +130,11 @@ WEIGHTS_BYTES = Bound("WEIGHTS_BYTES", 1 << 20, "bytes when unpacked")
 TABLE_BYTES = Bound("TABLE_BYTES", 2 << 30, "bytes when unpacked")
 """Size of a table, unpacked, that is read at once."""
 READ_SECONDS = Bound("READ_SECONDS", 6, "seconds")
-"""Processor time to read a file of another program."""
+"""Processor time to read a floor plan in the child process."""
+BAG_SECONDS = Bound("BAG_SECONDS", 60, "seconds")
+"""Processor time to read a log in a bag in the child process."""
 READ_MB = Bound("READ_MB", 800, "MB")
-"""Memory to read a file of another program."""
+"""Memory to read a floor plan or a bag in the child process."""
 VARIANTS = Bound("VARIANTS", 1_000_000, "values")
 """Values of one axis of a study, and replicates."""
 

@@ -68,6 +68,21 @@ class FloorPlanError(InputError):
     """A floor plan can't be read, or isn't a home."""
 
 
+class UnclearPlaceError(FloorPlanError):
+    """A picture is no home because of one place in it.
+
+    Attributes:
+        place: The place (column, row) [pixels].
+        radius: Radius of what is unclear [pixels].
+    """
+
+    def __init__(self, message: str, place: tuple[int, int], radius: float) -> None:
+        """Take the message and the place."""
+        super().__init__(message)
+        self.place = place
+        self.radius = radius
+
+
 class PlacementError(InputError):
     """An entity can't stand at a place, or can't get there."""
 

@@ -78,3 +78,17 @@ def test_a_table_of_another_home_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         fleet2d.Simulation(scenario(write(tmp_path, text), **settings))
+
+
+@pytest.mark.parametrize("day", ["2026-01-04", "2026-01-06"])
+def test_a_table_of_another_time_is_refused_with_both_ranges(tmp_path: Path, day: str) -> None:
+    path = write(tmp_path, ROWS.replace("2026-01-05", day))
+    ranges = rf"from {day} 01:30:00 to {day} 03:00:00, and the run is from 2026-01-05 00:00:00 to"
+    with pytest.raises(InputError, match=f"{ranges} 2026-01-05 04:00:00"):
+        fleet2d.Simulation(scenario(path, user="ana"))
+
+
+def test_a_table_that_ends_during_the_run_is_put_out(tmp_path: Path) -> None:
+    path = write(tmp_path, ROWS.replace("2026-01-05 01", "2026-01-04 01"))
+
+    assert shares(fleet2d.run(scenario(path, user="ana")), "kitchen_0")[0] == 0.75

@@ -19,7 +19,6 @@ from fleet2d.floorplan.native import (
 )
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.homes.formats.houseexpo import read_houseexpo
 
 OUTLINE = [[0, 0], [5, 0], [5, 3], [0, 3]]
 PLAN = {"format": "fleet2d-floorplan", "version": 1, "name": "flat", "free": [{"outline": OUTLINE}]}
@@ -84,7 +83,7 @@ def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: fl
     for path in plan_files(shared_data):
         if path.name.startswith("f1ac") and cell < 0.1:
             continue  # the largest takes seconds
-        plan = read_houseexpo(path, cell)
+        plan = load_floorplan(path, cell)
 
         again = read_native(write(tmp_path, native_document(plan)), cell)
 

@@ -21,7 +21,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import ROUNDING, PointDistances, Space, grow_polygons, grow_shape
-from fleet2d.homes.formats.houseexpo import read_houseexpo
 from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280
@@ -47,7 +46,7 @@ HOMES = some(
 @cache
 def plan_of(path: Path) -> FloorPlan:
     """Return a plan of HouseExpo."""
-    return read_houseexpo(path)
+    return load_floorplan(path)
 
 
 @cache

@@ -17,7 +17,7 @@ import resource, sys, time
 from pathlib import Path
 import fleet2d
 from fleet2d.errors import FloorPlanError
-from fleet2d.homes.formats import apart
+from fleet2d.storage import apart
 
 resolution = 0.05 if sys.argv[1].endswith(".pgm") else None
 start = time.process_time()
@@ -62,12 +62,19 @@ def half_a_row(folder: Path) -> Path:
     return pgm(folder / "home.pgm", np.full((1, 1 << 24), 255, np.uint8))
 
 
-def largest_hall(folder: Path) -> Path:
+def largest_picture(folder: Path) -> Path:
     return pgm(folder / "home.pgm", framed(4096))
 
 
+def largest_hall(folder: Path) -> Path:
+    """Write a hall of 10 million pixels in the largest picture."""
+    shades = np.full((4096, 4096), 205, np.uint8)
+    shades[:3150, :3150] = framed(3150)
+    return pgm(folder / "home.pgm", shades)
+
+
 def combs(folder: Path) -> Path:
-    shades = framed(4096)
+    shades = framed(3150)
     shades[10:-10, ::12] = 0
     return pgm(folder / "home.pgm", shades)
 
@@ -119,12 +126,14 @@ def most_values(folder: Path) -> Path:
     return geojson(folder, corners.tolist())
 
 
-def largest_square(folder: Path) -> Path:
-    outline = [[0, 0], [223, 0], [223, 223], [0, 223]]
+def native(folder: Path, *parts: list[list[float]]) -> Path:
     path = folder / "home.json"
-    plan = {"format": "fleet2d-floorplan", "version": 1, "free": [{"outline": outline}]}
-    path.write_text(json.dumps(plan), encoding="utf-8")
+    path.write_text(json.dumps({"format": "fleet2d-floorplan", "version": 1, "free": parts}))
     return path
+
+
+def largest_square(folder: Path) -> Path:
+    return native(folder, [[0, 0], [157, 0], [157, 157], [0, 157]])
 
 
 def written(folder: Path, name: str, package: str, *parts: str) -> Path:
@@ -195,11 +204,22 @@ def crossing_walls(folder: Path) -> Path:
 def crossing_parts(folder: Path) -> Path:
     """Write free space of thin parts, each of which crosses a quarter of the others."""
     ends = np.random.default_rng(0).random((2_500, 2, 2)).round(4) * 60
-    parts = [[a, b, [b[0] + 0.02, b[1] + 0.02]] for a, b in ends.tolist()]
-    path = folder / "home.json"
-    plan = {"format": "fleet2d-floorplan", "version": 1, "free": parts}
-    path.write_text(json.dumps(plan), encoding="utf-8")
-    return path
+    return native(folder, *([a, b, [b[0] + 0.02, b[1] + 0.02]] for a, b in ends.tolist()))
+
+
+def too_large_a_square(folder: Path) -> Path:
+    return native(folder, [[0, 0], [223, 0], [223, 223], [0, 223]])
+
+
+def most_teeth(folder: Path) -> Path:
+    return native(folder, comb_of(12_490))
+
+
+def parts_and_teeth(folder: Path) -> Path:
+    """Write a file that is small, with as many crossing parts and teeth as are read."""
+    corners = [[x, y + 60] for x, y in comb_of(1_500)]
+    ends = np.random.default_rng(0).random((140, 2, 2)).round(2) * 60
+    return native(folder, corners, *([a, b, [b[0] + 0.2, b[1] + 0.2]] for a, b in ends.tolist()))
 
 
 def too_many_boxes(folder: Path) -> Path:
@@ -225,10 +245,14 @@ ATTACKS = [
     (one_row, "FLEET2D_MAX_PIXELS"),
     (half_a_row, "at most 32768 a side"),
     (teeth_at_the_bound, "read: "),
-    (largest_hall, "read: 41902 m2"),
+    (largest_hall, "read: 24775 m2"),
+    (largest_picture, "(17 million cells|READ_SECONDS)"),
     (combs, "read: "),
     (noise, ""),
-    (largest_square, "read: 49729 m2"),
+    (largest_square, "read: 24649 m2"),
+    (too_large_a_square, "20 million cells"),
+    (most_teeth, "(read: |READ_SECONDS)"),
+    (parts_and_teeth, "read: "),
     (most_values, "FLEET2D_MAX_CORNERS"),
     (pillars, "FLEET2D_MAX_CORNERS"),
 ]

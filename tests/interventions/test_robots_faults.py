@@ -222,3 +222,20 @@ def test_rooms_to_keep_out_of_are_checked() -> None:
     script = [{"at": "10 min", "keep_out": "astro", "of": "kitchn"}]
     with pytest.raises(PlacementError, match="no room 'kitchn': did you mean 'kitchen'"):
         fleet2d.run(scenario("1 h", robots={"astro": {}}, script=script))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_robot_that_meanders_keeps_out_while_it_is_told_to(seed: int) -> None:
+    content = scenario(
+        "3 h",
+        robots={"astro": {"behaviors": [{"type": "meander"}]}},
+        artifacts={"trajectories": "1 s"},
+        script=[{"at": "1 h", "keep_out": "astro", "of": "kitchen", "duration": "1 h"}],
+    )
+    run = fleet2d.run(content, seed=seed)
+    rooms = table(run, "trajectories", entity="astro")["room"]
+
+    assert "kitchen_0" in set(rooms[:3600]) | set(rooms[7200:])
+    left = 3600 + int(np.argmax(rooms[3600:] != "kitchen_0"))
+    assert left < 3700
+    assert "kitchen_0" not in set(rooms[left:7200])

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import time
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -247,6 +248,42 @@ def test_a_call_simulates_for_a_limited_time(
         place.advance(name, "4000 d")
     monkeypatch.setattr(assistant, "MAX_S", 60)
     assert place.advance(name, "1 min")["state"]["ana"]
+
+
+def busy(*_: object, **__: object) -> None:
+    """Compute for longer than a call may take."""
+    end = time.monotonic() + 30
+    while time.monotonic() < end:
+        sum(range(1000))
+
+
+@pytest.mark.parametrize("slow", ["load_scenario", "open_run"])
+def test_all_that_a_call_does_has_a_limited_time(
+    place: Workspace, monkeypatch: pytest.MonkeyPatch, slow: str
+) -> None:
+    monkeypatch.setattr(assistant, "MAX_CALL_S", 0.3)
+    monkeypatch.setattr(assistant, slow, busy)
+    use = place.check if slow == "load_scenario" else place.picture
+
+    begin = time.monotonic()
+    with pytest.raises(InputError, match=r"one call takes 0\.3 s at most"):
+        use("home.yaml")
+    assert time.monotonic() < begin + 15
+    assert HOME == place.read("home.yaml")
+
+
+def test_a_simulation_whose_metrics_take_too_long_is_gone(
+    place: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = place.begin("home.yaml")
+    monkeypatch.setattr(assistant, "MAX_CALL_S", 0.3)
+    for step in ("advance", "finish"):
+        monkeypatch.setattr(assistant.Simulation, step, busy)
+
+    with pytest.raises(InputError, match="one call takes"):
+        place.advance(name, "1 min")
+    with pytest.raises(InputError, match=f"no simulation '{name}'"):
+        place.finish(name)
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from fleet2d.configuration.units import InputPath, PositiveDuration
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.floorplan.home import Home, HomeChanges
 from fleet2d.kernels import F64
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.storage.archives import read_arrays
 
@@ -397,6 +398,16 @@ class Algorithm(Component):
         check_shapes(run_state(self), learned, type(self).__name__)
         for name, value in learned.items():
             setattr(self, name, value)
+
+    def check_times(self, clock: Clock) -> None:
+        """Refuse input whose times are all outside of the run; called before the run begins.
+
+        Args:
+            clock: The steps of the run.
+
+        Raises:
+            InputError: They are.
+        """
 
     def check_learned(self, users: Sequence[str], start: datetime) -> None:
         """Refuse a state learned with other users; called after `recall`, before the run begins.

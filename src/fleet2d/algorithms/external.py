@@ -20,6 +20,7 @@ from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.logs.log import AWAY, LogError, LogKeys
 from fleet2d.logs.tables import LogTable
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.program import ExternalProgram
 
 # The end of an Arrow IPC stream: no further message.
@@ -221,9 +222,28 @@ class ReplayedOutput(Algorithm, LogKeys):
         self._shares = np.zeros((len(self._times), len(rooms)))
         np.add.at(self._shares, (np.cumsum(is_new) - 1, room[local.row]), share[local.row])
 
+    def check_times(self, clock: Clock) -> None:
+        """Refuse a table of another time.
+
+        Raises:
+            LogError: It ends before the run begins, or begins after the run's end.
+        """
+        midnight = self._midnight(clock.start)
+        first, last = (midnight + timedelta(microseconds=int(t)) for t in self._times[[0, -1]])
+        end = clock.time(clock.steps)
+        if last < clock.start or first >= end:
+            raise LogError(
+                f"{self.path}: its shares are from {first} to {last}, and the run is from"
+                f" {clock.start} to {end}: set simulation.start, or give a table of that time"
+            )
+
+    def _midnight(self, start: datetime) -> datetime:
+        """Return the moment from which its times count, by the start of the run."""
+        return datetime.combine(self._day or start.date(), datetime.min.time())
+
     def update(self, history: History, state: Present) -> Any:
         """Return the newest shares; None before the first."""
-        midnight = datetime.combine(self._day or state.start.date(), datetime.min.time())
+        midnight = self._midnight(state.start)
         row = int(np.searchsorted(self._times, micros(state.time - midnight), side="right")) - 1
         return None if row < 0 else RoomDistribution(self._shares[row])
 

@@ -60,6 +60,12 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
     if not is_plugin:
         check_may_import(name, folder, module_name)
+    is_file = bool(parent) or name.rpartition(":")[0].endswith(".py")
+    if is_file and source_of(folder, module_name) is None:
+        raise ScenarioError(
+            f"can't import {name!r}: there is no {module_name.replace('.', '/')}.py in {folder}"
+            f"{did_you_mean(module_name, _modules(folder, module_name))}"
+        )
     try:
         if is_plugin:  # what lies beside the scenario under that name isn't meant
             module = importlib.import_module(module_name)

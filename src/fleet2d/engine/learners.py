@@ -158,6 +158,8 @@ class Learners:
         component = origin.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
+            if isinstance(component, Algorithm):
+                component.check_times(self.clock)
             if isinstance(component, Algorithm) and learned is not None:
                 component.recall(load_learned(learned))
                 component.check_learned(self.users, self.clock.start)

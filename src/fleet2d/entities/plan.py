@@ -341,7 +341,7 @@ class Plan:
         home = self.body.home
         body = self.body
         # A random walk doesn't open doors: a shut one is a wall.
-        space = home.space(body.entity.radius, without=body.forbidden)
+        space = home.space(body.entity.radius, without=body.kept_out)
         self._motion = RandomWalk(home.barriers, space.mesh, rule)
         self.endless = True
         return self

@@ -82,7 +82,13 @@ def read_document(path: Path) -> dict[str, Any]:
     Raises:
         FloorPlanError: There is no such file, or it holds neither.
     """
-    return read_yaml(path) if path.suffix.lower() in YAML else read_json(path)
+    return parse_document(read_file(path), path)
+
+
+def parse_document(content: bytes, path: Path) -> dict[str, Any]:
+    """Return the mapping in the content of a file, as `read_document` does."""
+    is_yaml = path.suffix.lower() in YAML
+    return parse_yaml(content, path) if is_yaml else parse_json(content, path)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -23,8 +23,8 @@ MAX_CELL_M = 1.0
 # Products of three coordinates must stay inside int64: the sight kernels rely on this bound.
 COORDINATE_LIMIT = 2**20
 
-# Most cells of a plan: finding its rooms takes 30 bytes a cell, 600 MB in all.
-MAX_CELLS = 20_000_000
+# Most cells of a plan, whose rooms are found in a few seconds, with 30 bytes a cell.
+MAX_CELLS = 10_000_000
 
 
 # Units that a file may have instead of metres, and the length of each [m].
@@ -113,7 +113,7 @@ class Lattice:
             most = MAX_CELLS / 1e6
             raise FloorPlanError(
                 f"the floor plan is {width:.0f} m x {height:.0f} m: {millions:.0f} million cells of"
-                f" {self.cell:g} m, and at most {most:.0f} million fit into 1 GB of memory:"
+                f" {self.cell:g} m, and at most {most:.0f} million are read:"
                 f" set floorplan.cell to {fits:g} or more, and check that the file is in metres"
                 f"{unit_hint(self.size)}"
             )

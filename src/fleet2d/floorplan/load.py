@@ -13,18 +13,17 @@ from typing import Any
 from fleet2d.configuration.components import components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import named_path
-from fleet2d.errors import FloorPlanError, InputError
+from fleet2d.errors import FloorPlanError, InputError, UnclearPlaceError
 from fleet2d.floorplan.files import YAML, read_document, read_yaml
 from fleet2d.floorplan.foreign import foreign_document, foreign_file
 from fleet2d.floorplan.native import (
     FORMAT,
     bundled_names,
     native_document,
-    native_plan,
     read_bundled,
 )
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource, UnclearPlaceError
+from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.inputs import open_input
 
 DEFAULT_CELL_M = 0.05
@@ -77,10 +76,7 @@ def load_floorplan(
             f"{suggest(plan, names, 'Bundled homes')}; synthetic ones:"
             " synthetic:0, synthetic:1, …"
         )
-    kind, content = _recognize(path)
-    if kind == "native":
-        return native_plan(content, path, usual, scale)
-    return source_of(kind, path=path, cell=cell, scale=scale).load()
+    return source_of(format_of_file(path), path=path, cell=cell, scale=scale).load()
 
 
 def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
@@ -99,8 +95,21 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
         if not isinstance(error.__cause__, UnclearPlaceError):
             raise
         out = Path(f"{Path(plan).stem}-question.png")
-        error.__cause__.mark(Path(plan), out)
+        _mark(error.__cause__, Path(plan), out)
         raise FloorPlanError(f"{error}; {out} marks it") from error
+
+
+def _mark(unclear: UnclearPlaceError, drawing: Path, out: Path) -> None:
+    """Write a copy of a drawing with a red circle round a place; needs Pillow."""
+    from PIL import Image, ImageDraw
+
+    with Image.open(drawing) as image:
+        copy = image.convert("RGB")
+    column, row = unclear.place
+    radius = max(unclear.radius, max(copy.size) / 30)
+    box = (column - radius, row - radius, column + radius, row + radius)
+    ImageDraw.Draw(copy).ellipse(box, outline="red", width=max(max(copy.size) // 200, 2))
+    copy.save(out)
 
 
 def source_of(kind: str, **settings: Any) -> FloorPlanSource:
@@ -157,20 +166,15 @@ def format_of_file(path: Path) -> str:
     Raises:
         FloorPlanError: It can't be read, or isn't a floor plan that Fleet2D knows.
     """
-    return _recognize(path)[0]
-
-
-def _recognize(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return the `type` that reads a file, and its content unless its ending tells the type."""
     if (kind := format_by_suffix(path)) is not None:
-        return kind, {}
+        return kind
     content = read_document(path)
     kind = _format_of(content)
     if kind is None and path.suffix.lower() in YAML and "image" in content:
         kind = "ros"
     if kind is None:
         raise _unknown_format(path, content)
-    return kind, content
+    return kind
 
 
 def advise_type(name: str) -> str:

@@ -10,7 +10,7 @@ A plan that is written by `native_document` and read again at the same cell size
 `PlanFile` has all keys. The bundled homes are files in this format.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +33,7 @@ from fleet2d.bounds import CROSSINGS
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.file_source import SMALL_BYTES, FileSource
 from fleet2d.floorplan.files import (
     RING_SCHEMA,
     Coordinate,
@@ -42,7 +43,7 @@ from fleet2d.floorplan.files import (
     Ring,
     Text,
     in_file,
-    read_document,
+    parse_document,
     read_json,
     shown_value,
     validate,
@@ -349,7 +350,7 @@ def native_schema() -> dict[str, Any]:
     return dialect | PlanFile.model_json_schema()
 
 
-class Native(FloorPlanSource):
+class Native(FileSource):
     """A plan in Fleet2D's own format.
 
     Attributes:
@@ -357,12 +358,30 @@ class Native(FloorPlanSource):
     """
 
     marks = (("format", FORMAT),)
+    small_bytes = SMALL_BYTES
 
     path: InputPath
 
-    def load(self) -> FloorPlan:
-        """Read the plan."""
-        return read_native(self.path, self.cell, self.scale)
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
+        """Read the plan.
+
+        Raises:
+            FloorPlanError: It can't be read, isn't in this format, or has no free space.
+        """
+        content = parse_document(files[self.path], self.path)
+        with in_file(self.path):
+            if content.get("format") != FORMAT:
+                hint = (
+                    " (it looks like HouseExpo: use type houseexpo)" if "verts" in content else ""
+                )
+                raise FloorPlanError(f'no Fleet2D floor plan: "format" is not "{FORMAT}"{hint}')
+            if content.get("version") != VERSION:
+                version = shown_value(content.get("version"))
+                raise FloorPlanError(
+                    f"version {version} of the format is not known: this Fleet2D reads {VERSION}"
+                )
+            file = validate(PLAN_FILE, {**content, "version": VERSION})
+            return plan_of(file, self.path, self.cell, self.scale)
 
 
 def read_native(path: Path, cell: float = 0.05, scale: float | None = None) -> FloorPlan:
@@ -376,27 +395,7 @@ def read_native(path: Path, cell: float = 0.05, scale: float | None = None) -> F
     Raises:
         FloorPlanError: It can't be read, isn't in this format, or has no free space.
     """
-    return native_plan(read_document(path), path, cell, scale)
-
-
-def native_plan(
-    content: dict[str, Any], path: Path, cell: float = 0.05, scale: float | None = None
-) -> FloorPlan:
-    """Return the floor plan of a file's content.
-
-    Raises:
-        FloorPlanError: It isn't in this format, or has no free space.
-    """
-    with in_file(path):
-        if content.get("format") != FORMAT:
-            hint = " (it looks like HouseExpo: use type houseexpo)" if "verts" in content else ""
-            raise FloorPlanError(f'no Fleet2D floor plan: "format" is not "{FORMAT}"{hint}')
-        if content.get("version") != VERSION:
-            version = shown_value(content.get("version"))
-            raise FloorPlanError(
-                f"version {version} of the format is not known: this Fleet2D reads {VERSION}"
-            )
-        return plan_of(validate(PLAN_FILE, {**content, "version": VERSION}), path, cell, scale)
+    return Native.model_construct(path=path, cell=cell, scale=scale).load()
 
 
 def plan_of(file: PlanFile, path: Path, cell: float, scale: float | None = None) -> FloorPlan:

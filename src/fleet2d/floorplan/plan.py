@@ -201,7 +201,7 @@ class FloorPlan:
     name: str
     source: str
     lattice: Lattice
-    polygons: Sequence[Polygon]
+    polygons: tuple[Polygon, ...]
     mesh: Mesh
     free: Bool
     room_of_cell: I16

@@ -286,14 +286,6 @@ def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
         )
 
 
-class UnclearPlaceError(FloorPlanError):
-    """A drawing is unclear at a place, which can be marked in a copy of it."""
-
-    @abstractmethod
-    def mark(self, drawing: Path, out: Path) -> None:
-        """Write a copy of the drawing with the place marked."""
-
-
 # Homes that a process caches, read and furnished.
 CACHED_PLANS = 8
 

@@ -4,6 +4,7 @@ The tools write and check scenarios and personas, run them, ask their tables, dr
 intervene. Code of a scenario's own never runs, and no path leads out of the folder.
 """
 
+import ctypes
 import functools
 import itertools
 import tempfile
@@ -34,22 +35,56 @@ MAX_BODY_STEPS = 1_000_000_000
 """Steps of a run times its bodies: a few minutes."""
 MAX_S = 60.0
 """Time that one call simulates [s]."""
+MAX_CALL_S = 120.0
+"""Time that one call takes, with setting up and metrics [s]."""
 MAX_RUNNING = 8
 """The number of simulations that wait for interventions at the same time."""
+
+
+class _CallTooLong(KeyboardInterrupt):
+    """A call takes too long: what it does is interrupted as by Ctrl-C."""
 
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def confined(method: Method) -> Method:
-    """Run a method of a workspace within its folder, without a scenario's code, one at a time."""
+    """Run a method of a workspace within its folder, without a scenario's code, one at a time.
+
+    It is interrupted if it takes too long; a simulation that it names is gone then.
+    """
 
     @functools.wraps(method)
     def run(place: "Workspace", *args: Any, **settings: Any) -> Any:
         with place.lock, within(place.folder), running_code(allowed=False):
-            return method(place, *args, **settings)
+            try:
+                with interrupted_after(MAX_CALL_S):
+                    return method(place, *args, **settings)
+            except _CallTooLong:
+                for name in (*args, *settings.values()):
+                    if isinstance(name, str):
+                        place.running.pop(name, None)
+                raise InputError(
+                    f"one call takes {MAX_CALL_S:g} s at most: ask for a smaller home, fewer bodies"
+                    " or less time"
+                ) from None
 
     return cast("Method", run)
+
+
+@contextmanager
+def interrupted_after(seconds: float) -> Iterator[None]:
+    """Raise `_CallTooLong` in this thread if the block takes longer."""
+    thread = ctypes.c_ulong(threading.get_ident())
+    interrupt = ctypes.pythonapi.PyThreadState_SetAsyncExc
+    timer = threading.Timer(seconds, interrupt, [thread, ctypes.py_object(_CallTooLong)])
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+        interrupt(thread, None)  # one that is on its way would be raised after the block
 
 
 class Workspace:
@@ -75,7 +110,7 @@ class Workspace:
             raise InputError(f"{folder} is not a folder: create it, or name another")
         self.folder = folder.resolve()
         self.lock = threading.Lock()
-        self._running: dict[str, Simulation] = {}
+        self.running: dict[str, Simulation] = {}
         self._numbers = itertools.count(1)
 
     def path(self, name: str) -> Path:
@@ -264,10 +299,10 @@ class Workspace:
         Raises:
             InputError: The scenario is wrong, or too many simulations wait.
         """
-        if len(self._running) >= MAX_RUNNING:
+        if len(self.running) >= MAX_RUNNING:
             raise InputError(f"{MAX_RUNNING} simulations wait already: finish one of them")
         name = f"simulation_{next(self._numbers)}"
-        self._running[name] = self._simulation(scenario, overrides or [], None)
+        self.running[name] = self._simulation(scenario, overrides or [], None)
         return name
 
     @confined
@@ -313,13 +348,13 @@ class Workspace:
             InputError: There is no such simulation.
         """
         run = self._get(simulation)
-        del self._running[simulation]
+        del self.running[simulation]
         finished = run.finish()
         return {"status": finished.status, "metrics": finished.metrics}
 
     def _get(self, name: str) -> Simulation:
-        check_known(name, "simulation", self._running, InputError)
-        return self._running[name]
+        check_known(name, "simulation", self.running, InputError)
+        return self.running[name]
 
 
 @contextmanager
@@ -333,6 +368,8 @@ def limited(simulation: Simulation, advice: str) -> Iterator[None]:
     timer.start()
     try:
         yield
+    except _CallTooLong:
+        raise
     except KeyboardInterrupt:
         raise InputError(
             f"one call simulates for {MAX_S:g} s at most, which ended at"

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.bounds import FIXES
+from fleet2d.bounds import BAG_SECONDS, FIXES
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes, localize
 from fleet2d.logs.times import Stamps
-from fleet2d.storage.bags import headings_of, numbers_of, open_bag, stamp_ns, times_of
+from fleet2d.storage.apart import apart
+from fleet2d.storage.bags import check_bag, headings_of, numbers_of, open_bag, stamp_ns, times_of
 
 # From a message to its place and its quaternion.
 _POSES: dict[str, Callable[[Any], tuple[Any, Any]]] = {
@@ -60,9 +61,17 @@ def read_bag(
             to `frame`.
         InputError: rosbags isn't installed.
     """
+    check_bag(path, LogError)
+    arguments = path, id, frame
+    fixes = apart(path, _fixes, *arguments, failure=LogError, seconds=BAG_SECONDS)
+    return localize(path, "bag", fixes, time_zone=time_zone, sort=sort)
+
+
+def _fixes(path: Path, name: str | None, frame: str) -> RawFixes:
+    """Return the poses of a topic or frame, as they are in another frame; in the child."""
     with open_bag(path, LogError) as reader:
         tree = FrameTree(reader, path)
-        source, poses, notes = _poses(reader, tree, id, frame)
+        source, poses, notes = _poses(reader, tree, name, frame)
         motions, is_known = poses.seen_from(frame, tree, source, notes)
     (x, y, _), heading = motions.place.T, headings_of(motions.turn)
     if without := int(np.isnan(heading).sum()):
@@ -72,8 +81,7 @@ def read_bag(
     if not is_known.any():
         raise LogError(f"{path}: {source}: no pose is left: {'; '.join(notes)}")
     stamps = Stamps.of_messages(poses.time[is_known])
-    fixes = RawFixes(stamps, x[is_known], y[is_known], heading[is_known], notes)
-    return localize(path, "bag", fixes, time_zone=time_zone, sort=sort)
+    return RawFixes(stamps, x[is_known], y[is_known], heading[is_known], notes)
 
 
 def _poses(

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fleet2d.bounds import FIXES, one_line
+from fleet2d.bounds import BAG_SECONDS, FIXES, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.kernels import I64
 from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, frame_name
@@ -19,7 +19,8 @@ from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes
 from fleet2d.logs.tables import NAMES, LogTable
 from fleet2d.logs.times import Stamps
-from fleet2d.storage.bags import headings_of, is_bag, open_bag, stamp_ns, times_of
+from fleet2d.storage.apart import apart
+from fleet2d.storage.bags import check_bag, headings_of, is_bag, open_bag, stamp_ns, times_of
 
 COLUMNS = {
     "time": NAMES["time"],
@@ -101,7 +102,10 @@ def read_detections(
     if not path.exists():
         raise LogError(f"no such file: {path}")
     if is_bag(path):
-        fixes, label, labels = _from_bag(path, topic, columns or {}, frame or MAP)
+        check_bag(path, LogError)
+        arguments = path, topic, dict(columns or {}), frame or MAP
+        bag = apart(path, _from_bag, *arguments, failure=LogError, seconds=BAG_SECONDS)
+        fixes, label, labels = bag
     else:
         if topic is not None or frame is not None:
             raise LogError(f"{path} is a table: 'topic' is for bags, and so is the name of a frame")

@@ -92,9 +92,9 @@ def read_table(path: Path) -> tuple[pa.Table, I64]:
             return _read_csv(path)
         FIXES.check(table.num_rows, path, LogError)
         _ = table.column_names
-    except UnicodeDecodeError:
-        raise LogError(f"{path} is not text in UTF-8: save it as CSV in UTF-8") from None
-    except (pa.ArrowException, OSError) as error:
+    except (UnicodeDecodeError, pa.ArrowException, OSError) as error:
+        if isinstance(error, UnicodeDecodeError) or "invalid UTF8" in str(error):
+            raise LogError(f"{path} is not text in UTF-8: save it as CSV in UTF-8") from None
         raise LogError(f"{path} can't be read: {one_line(error, 200)}") from error
     return table, np.arange(1, table.num_rows + 1)
 

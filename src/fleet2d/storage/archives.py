@@ -2,7 +2,6 @@
 
 import io
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
@@ -12,36 +11,12 @@ from numpy.typing import NDArray
 
 from fleet2d.bounds import Bound, read_bytes
 
-_BLOCK_BYTES = 1 << 20
 # The list of members of a ZIP archive: some ten thousand take so much [bytes].
 _LIST_BYTES = 1 << 20
 # The end of a ZIP archive has a mark, the size of that list, and a comment.
 _END_MARK = b"PK\5\6"
 _LIST_SIZE_AT = 12
 _END_BYTES = 22
-
-
-def unpacked(packed: object, compression: str) -> Iterator[bytes]:
-    """Yield what packed content unpacks to, block by block, so that a caller can stop.
-
-    Args:
-        packed: Bytes, or the path of a file.
-        compression: bz2, gzip, lz4 (with frames) or zstd.
-
-    Raises:
-        OSError: It is damaged, or the file can't be read.
-
-    Example:
-        >>> import gzip
-        >>> b"".join(unpacked(gzip.compress(b"home"), "gzip"))
-        b'home'
-    """
-    import pyarrow as pa
-
-    source = packed if isinstance(packed, Path) else pa.BufferReader(packed)
-    with pa.input_stream(source, compression=compression) as stream:
-        while block := stream.read(_BLOCK_BYTES):
-            yield block
 
 
 def read_arrays(path: Path, bound: Bound) -> dict[str, NDArray[Any]]:

@@ -11,10 +11,15 @@ from tests.meshed_homes import plan_files
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.homes.formats.houseexpo import HouseExpo, read_houseexpo
+from fleet2d.homes.formats.houseexpo import HouseExpo
 from fleet2d.kernels import label_parts
 
 SQUARE = [[0, 0], [4, 0], [4, 3], [0, 3]]
+
+
+def read_houseexpo(path: Path, cell: float = 0.05) -> FloorPlan:
+    return HouseExpo.model_construct(path=path, cell=cell).load()
+
 
 # A file with all that the format has; `test_damaged_files.py` damages it.
 SAMPLE: tuple[str, dict[str, Any]] = (

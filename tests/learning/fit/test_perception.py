@@ -182,6 +182,17 @@ def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> 
     assert [30, 180] == pytest.approx(radians.bearing[:2].tolist())
 
 
+def test_tables_are_read_as_other_logs_are(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"{k % 3},5;{'yes' if k % 2 else 'no'}" for k in range(ROWS)]
+    path.write_text("\n".join(["Distance;detected", *rows]))
+
+    log = read_detections(path)
+
+    assert [0.5, 1.5, 2.5] == log.distance[:3].tolist()
+    assert [False, True] == log.detected[:2].tolist()
+
+
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
@@ -189,26 +200,28 @@ def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> 
         ({"distance": GOOD["distance"]}, ["no column 'detected'"]),
         (
             GOOD | {"distance": ["near"] + [1] * (ROWS - 1)},
-            ["log.csv:2", "distance", "'near'", "number"],
+            ["log.csv, line 2", "distance", "'near'", "number"],
         ),
         (
             GOOD | {"distance": [1] * (ROWS - 1) + [-1]},
-            ["log.csv:61", "distance", "'-1'", "0 to 100 m"],
+            ["log.csv, line 61", "distance", "'-1'", "0 to 100 m"],
         ),
-        (GOOD | {"distance": ["nan"] + [1] * (ROWS - 1)}, ["log.csv:2", "'nan'"]),
-        (GOOD | {"detected": [2] * ROWS}, ["log.csv:2", "detected", "'2'", "0 or 1"]),
+        (GOOD | {"distance": ["nan"] + [1] * (ROWS - 1)}, ["log.csv, line 2", "'nan'"]),
+        (GOOD | {"detected": [2] * ROWS}, ["log.csv, line 2", "detected", "'2'", "0 or 1"]),
         (GOOD | {"detected": [1] * ROWS}, ["all of 60 rows are detected", "nothing to fit"]),
         (GOOD | {"detected": [0] * ROWS}, ["none of 60 rows"]),
         (GOOD | {"bearing": [0] * ROWS}, ["'bearing'", "bearing_deg or bearing_rad"]),
         ({k: v[:3] for k, v in GOOD.items()}, ["3 rows", "50"]),
-        (GOOD | {"distance": [1200] * ROWS}, ["log.csv:2", "'1200'", "0 to 100 m"]),
-        (GOOD | {"bearing_deg": [3350] * ROWS}, ["log.csv:2", "bearing_deg", "-360 to 360"]),
-        (GOOD | {"bearing_rad": [30] * ROWS}, ["log.csv:2", "bearing_rad", "-6.283 to 6.283"]),
-        ({"distance;detected": ["1;0"] * ROWS}, ["no column 'distance'", "commas between"]),
-        (GOOD | {"detected ": GOOD["detected"]}, ["'detected' twice"]),
+        (GOOD | {"distance": [1200] * ROWS}, ["log.csv, line 2", "'1200'", "0 to 100 m"]),
+        (GOOD | {"bearing_deg": [3350] * ROWS}, ["log.csv, line 2", "bearing_deg", "-360 to 360"]),
+        (
+            GOOD | {"bearing_rad": [30] * ROWS},
+            ["log.csv, line 2", "bearing_rad", "-6.283 to 6.283"],
+        ),
+        (GOOD | {"detected ": GOOD["detected"]}, ["several columns of detected"]),
         (
             GOOD | {"identity": ["ana"] * ROWS, "true_identity": [""] * ROWS},
-            ["log.csv:2", "true_identity is empty"],
+            ["log.csv, line 2", "true_identity is empty"],
         ),
     ],
 )
@@ -237,7 +250,7 @@ def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
 
 
 def test_a_file_that_is_no_text_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_bytes(b"\xff\xfed\x00")
+    (tmp_path / "log.csv").write_bytes(b"distance,detected\n\xe9,1\n")
     with pytest.raises(InputError, match="not text in UTF-8"):
         read_detections(tmp_path / "log.csv")
 

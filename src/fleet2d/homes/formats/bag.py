@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.bounds import LOG_BYTES, PIXELS, check_file
+from fleet2d.bounds import PIXELS
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import MAX_COORDINATE_M
-from fleet2d.homes.formats.apart import apart
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.homes.formats.occupancy import OccupancySource
-from fleet2d.homes.formats.parts import PlanParts
-from fleet2d.storage.bags import headings_of, numbers_of, open_bag
+from fleet2d.storage.apart import apart
+from fleet2d.storage.bags import check_bag, headings_of, numbers_of, open_bag
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 # Chances of being occupied, in percent, as map_server divides them.
@@ -46,6 +46,7 @@ class BagMap(OccupancySource):
         """Return the map's resolution."""
         path = Path(settings["path"])
         topic = settings.get("topic")
+        check_bag(path, FloorPlanError)
         return apart(path, _pixel, path, topic, settings["scale"])
 
     def files(self) -> list[Path]:
@@ -56,11 +57,10 @@ class BagMap(OccupancySource):
 
     def contents(self) -> dict[Path, bytes]:
         """Return nothing: the child opens the bag, which is too large to be read as a whole."""
-        for file in self.files():
-            check_file(file, LOG_BYTES, FloorPlanError)
+        check_bag(self.path, FloorPlanError)
         return {}
 
-    def read(self, _: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, _: Mapping[Path, bytes]) -> FloorPlan:
         """Read the map.
 
         Raises:
@@ -69,7 +69,7 @@ class BagMap(OccupancySource):
         raw, note = _read(self.path, self.topic, self.scale or 1.0)
         notes: list[str] = []
         home = self.clean(raw, notes)
-        return self.parts(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
+        return self.build(home, raw.pixel, f"map of a bag, {self.path.name}", [*notes, note])
 
 
 def _pixel(path: Path, topic: str | None, scale: float) -> float:

@@ -11,18 +11,17 @@ from pydantic import Field, TypeAdapter
 
 from fleet2d.bounds import PICTURE_BYTES
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, UnclearPlaceError
 from fleet2d.floorplan.files import in_file, read_file
 from fleet2d.floorplan.lattice import MAX_CELL_M
-from fleet2d.floorplan.plan import largest_part
+from fleet2d.floorplan.plan import FloorPlan, largest_part
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.homes.formats.apart import apart
 from fleet2d.homes.formats.cleaning import ROOM_M2, USUAL_DOOR_M, OccupancyMap
 from fleet2d.homes.formats.drawn_walls import LINE_M, find_gaps, told_apart, wall_candidates
 from fleet2d.homes.formats.occupancy import OBJECT_M2, PictureSource
-from fleet2d.homes.formats.parts import PlanParts
-from fleet2d.homes.formats.raster import GreyPicture, UnclearPixelError, grey_picture
+from fleet2d.homes.formats.raster import GreyPicture, grey_picture
 from fleet2d.kernels import Bool, label_parts, squared_distance
+from fleet2d.storage.apart import apart
 
 # Widths of gaps in outer walls that are tried in turn [m], from pixels to a door.
 GAPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2)
@@ -101,7 +100,7 @@ class Image(PictureSource):
         """Side of a pixel [m]."""
         return self.resolution * (self.scale or 1.0)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the drawing.
 
         Light pixels that are connected to the edge of the picture are outside, and so are pixels
@@ -126,11 +125,12 @@ class Image(PictureSource):
         try:
             if grey_picture(content, self.path).edge_grey()[0] >= DARK_EDGE:
                 return False
-            return bool(self.model_copy(update={"negate": True})._read_home(content).plan())
+            self.model_copy(update={"negate": True})._read_home(content)
         except FloorPlanError:
             return False
+        return True
 
-    def _read_home(self, content: bytes) -> PlanParts:
+    def _read_home(self, content: bytes) -> FloorPlan:
         picture = grey_picture(content, self.path)
         if self.negate:
             picture = replace(picture, values=picture.white - picture.values)
@@ -161,7 +161,7 @@ class Image(PictureSource):
             notes += found
             raw = OccupancyMap(inside[::-1], walls[::-1], pixel)
             free = self.home(raw, picture, notes)
-            return self.parts(free, pixel, f"drawing, {self.path.name}", notes)
+            return self.build(free, pixel, f"drawing, {self.path.name}", notes)
 
     def _without_lines(
         self, picture: GreyPicture, light: Bool, enclosed: Bool
@@ -227,7 +227,7 @@ def _guess(path: Path, content: bytes) -> tuple[float, int] | None:
     for pixel in TRIED_M:
         try:
             image = Image.model_construct(path=path, resolution=pixel, cell=None)
-            plan = image.read({path: content}).plan()
+            plan = image.read({path: content})
         except FloorPlanError:
             continue
         widths = sorted(door.width_m for door in plan.doorways)
@@ -290,7 +290,7 @@ def _inside(light: Bool, close_gaps: float, pixel: float, notes: list[str]) -> B
     for width, closed in wider:
         if _largest(closed) >= max(MOST * at_most, OBJECT_M2 / pixel**2):
             row, column = _first_gap(light, inside, closed)
-            raise UnclearPixelError(
+            raise UnclearPlaceError(
                 f"no space is enclosed by walls: one gap is at pixel ({column}, {row}), at most"
                 f" {width:g} m wide. Draw the outer walls without gaps, or set"
                 f" floorplan.close_gaps={width:g}",

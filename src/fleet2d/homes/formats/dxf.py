@@ -15,10 +15,11 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.bounds import CORNERS
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import in_file, reading
 from fleet2d.floorplan.lattice import SIDE_M
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.features import Draft, Feature, enclosed_space
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.kernels import F64
 
 # Metres to a unit, by the header variable $INSUNITS, and what is tried if it says nothing.
@@ -41,7 +42,7 @@ MIN_PART_M2 = 1.0
 WINDOW_LINES_M = 0.3
 
 
-class Dxf(ForeignSource):
+class Dxf(FileSource):
     """A drawing in DXF; needs the extra `cad`.
 
     Attributes:
@@ -57,7 +58,7 @@ class Dxf(ForeignSource):
     scale: float | None = Field(default=None, gt=0)
     walls: str | None = None
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the drawing.
 
         Lines on the layers of walls bound the home, and the space between the two lines of a wall
@@ -86,7 +87,7 @@ class Dxf(ForeignSource):
             free = _inside(metres, notes)
             panes = _panes([(line - low) * scale for line in _lines(drawing, windows)])
             draft = Draft([Feature("free", "walls", free, {}), *panes], 0.0, notes)
-            return draft.parts(self.path.stem, self.cell, f"DXF, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"DXF, {self.path.name}")
 
     def _layers(self, drawing: Any, notes: list[str]) -> set[str]:
         """Return the names of the layers with walls."""

@@ -15,7 +15,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import validate
 from fleet2d.floorplan.native import ObjectUse
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, distinct_names
-from fleet2d.floorplan.plan import LabelledRegion
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
     TOUCH_M,
     DoorLine,
@@ -25,7 +25,6 @@ from fleet2d.floorplan.rooms.doorways import (
     shared_borders,
 )
 from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_type
-from fleet2d.homes.formats.parts import PlanParts
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -103,7 +102,7 @@ class Feature:
 
 
 class Draft:
-    """Converts features to the parts of a home; all in metres."""
+    """Converts features to a floor plan; all in metres."""
 
     def __init__(
         self,
@@ -137,10 +136,10 @@ class Draft:
         self._cut_doors()
         self.panes = list(self._glaze())
 
-    def parts(self, name: str, cell: float, source: str) -> PlanParts:
-        """Return the parts of the home."""
+    def build(self, name: str, cell: float, source: str) -> FloorPlan:
+        """Return the floor plan."""
         areas = self._of("no_go")
-        return PlanParts(
+        return FloorPlan.build(
             name=name,
             free=self.free,
             regions=tuple(self._regions(cell)),

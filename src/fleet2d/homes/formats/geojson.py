@@ -23,6 +23,7 @@ from fleet2d.bounds import CORNERS, POLYGONS
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import (
     MAX_COORDINATE_M,
     clean_coordinate,
@@ -35,7 +36,6 @@ from fleet2d.floorplan.native import object_document
 from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.homes.formats.features import GEOMETRIES, SURFACES, Draft, Feature, Move
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.kernels import F64
 
 COLLECTION = "FeatureCollection"
@@ -299,7 +299,7 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
     return lambda xy: np.round(xy - corner, 6)
 
 
-class GeoJson(ForeignSource):
+class GeoJson(FileSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
 
     Attributes:
@@ -321,7 +321,7 @@ class GeoJson(ForeignSource):
         """Return a plan as a FeatureCollection; see `geojson_document`."""
         return geojson_document(plan)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the plan.
 
         Free space is the areas of kind `free` or, if there are none, the rooms, without the walls.
@@ -338,7 +338,7 @@ class GeoJson(ForeignSource):
             units = "m" if self.scale and self.units == "auto" else self.units
             features, move = in_metres(raw, content, units, notes)
             name = content.get("name")
-            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).parts(
+            return Draft(features, self.wall_m, notes, move=move, scale=self.scale).build(
                 name if isinstance(name, str) and name else self.path.stem,
                 self.cell,
                 f"GeoJSON, {self.path.name}",

@@ -1,5 +1,6 @@
 """Floor plans of the HouseExpo data set: one outline and boxes with a room category each."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ from shapely.geometry import MultiPolygon
 
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.file_source import SMALL_BYTES, FileSource
 from fleet2d.floorplan.files import (
     BoxSides,
     Listed,
@@ -17,12 +19,11 @@ from fleet2d.floorplan.files import (
     Ring,
     in_file,
     list_of,
-    read_json,
+    parse_json,
     validate,
 )
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.source import FloorPlanSource
 
 
 class _HouseFile(BaseModel):
@@ -39,7 +40,7 @@ class _HouseFile(BaseModel):
 _HOUSE_FILE = TypeAdapter(_HouseFile)
 
 
-class HouseExpo(FloorPlanSource):
+class HouseExpo(FileSource):
     """A plan of the HouseExpo data set.
 
     Attributes:
@@ -47,49 +48,44 @@ class HouseExpo(FloorPlanSource):
     """
 
     marks = (("verts", None),)
+    small_bytes = SMALL_BYTES
 
     path: InputPath
 
-    def load(self) -> FloorPlan:
-        """Read the plan."""
-        return read_houseexpo(self.path, self.cell, self.scale)
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
+        """Read the plan.
 
+        Its `verts` are one outline that traces the inner walls, too. Its `room_category` boxes
+        overlap each other and the walls, repeat under two names, and may be missing;
+        `label_rooms` divides the rooms by them.
 
-def read_houseexpo(path: Path, cell: float = 0.05, scale: float | None = None) -> FloorPlan:
-    """Read a HouseExpo file.
-
-    Its `verts` are one outline that traces the inner walls, too. Its `room_category` boxes overlap
-    each other and the walls, repeat under two names, and may be missing; `label_rooms` divides the
-    rooms by them.
-
-    Args:
-        path: The JSON file.
-        cell: Side of a grid cell [m].
-        scale: Metres to a unit of the file; None for 1.
-
-    Raises:
-        FloorPlanError: It can't be read, isn't HouseExpo, or has no free space.
-    """
-    content = read_json(path)
-    if "verts" not in content:
-        hint = " (it is in Fleet2D's own format: use type native)" if "format" in content else ""
-        raise FloorPlanError(f"{path} is not a HouseExpo plan: it has no key `verts`{hint}")
-    name = content.get("id")
-    with in_file(path):
-        house = validate(_HOUSE_FILE, content)
-        free, notes = _free_space(house.verts)
-        regions, box_notes = _regions(house.room_category or {})
-        return FloorPlan.build(
-            name if isinstance(name, str) and name else path.stem,
-            free,
-            regions,
-            cell,
-            source=f"HouseExpo, {path.name}",
-            doorways=None,
-            regions_are="boxes" if regions else "none",
-            notes=[*notes, *box_notes],
-            scale=scale,
-        )
+        Raises:
+            FloorPlanError: It can't be read, isn't HouseExpo, or has no free space.
+        """
+        content = parse_json(files[self.path], self.path)
+        if "verts" not in content:
+            hint = (
+                " (it is in Fleet2D's own format: use type native)" if "format" in content else ""
+            )
+            raise FloorPlanError(
+                f"{self.path} is not a HouseExpo plan: it has no key `verts`{hint}"
+            )
+        name = content.get("id")
+        with in_file(self.path):
+            house = validate(_HOUSE_FILE, content)
+            free, notes = _free_space(house.verts)
+            regions, box_notes = _regions(house.room_category or {})
+            return FloorPlan.build(
+                name if isinstance(name, str) and name else self.path.stem,
+                free,
+                regions,
+                self.cell,
+                source=f"HouseExpo, {self.path.name}",
+                doorways=None,
+                regions_are="boxes" if regions else "none",
+                notes=[*notes, *box_notes],
+                scale=self.scale,
+            )
 
 
 def _free_space(corners: list[Point]) -> tuple[Polygon | MultiPolygon, list[str]]:

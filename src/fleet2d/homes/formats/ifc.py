@@ -12,10 +12,11 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.bounds import CORNERS
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import in_file, reading
 from fleet2d.floorplan.furniture import measured_height
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.features import Draft, Feature, choose_level
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.homes.formats.sweethome import furniture_type
 
 # What each class of IFC is in a plan; classes that a version of IFC lacks are left out.
@@ -39,7 +40,7 @@ RAISED_M = 0.5
 SILL_M = 1.3
 
 
-class Ifc(ForeignSource):
+class Ifc(FileSource):
     """A building model in IFC; needs the extra `ifc`.
 
     Attributes:
@@ -52,7 +53,7 @@ class Ifc(ForeignSource):
     path: InputPath
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read a storey of the model, as seen from above.
 
         Free space is the spaces (`IfcSpace`) without the walls or, without spaces, what the walls
@@ -73,7 +74,7 @@ class Ifc(ForeignSource):
             corners = shapely.get_num_coordinates([feature.shape for feature in features]).sum()
             CORNERS.check(int(corners), "it", FloorPlanError)
             draft = Draft(features, 0.1, notes, scale=self.scale)
-            return draft.parts(self.path.stem, self.cell, f"IFC, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"IFC, {self.path.name}")
 
 
 def _read(content: bytes, path: Path) -> Any:

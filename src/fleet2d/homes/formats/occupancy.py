@@ -11,7 +11,9 @@ from shapely import Polygon
 from fleet2d.bounds import CORNERS, PICTURE_BYTES
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.lattice import MIN_CELL_M
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.homes.formats.cleaning import (
     OccupancyMap,
@@ -20,7 +22,6 @@ from fleet2d.homes.formats.cleaning import (
     note_left_out,
     remove_specks,
 )
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.homes.formats.raster import GreyPicture
 from fleet2d.kernels import Bool, trace_rings
 
@@ -44,7 +45,7 @@ OBJECT_M2 = 8.0
 OBJECT_SHARE = 0.15
 
 
-class OccupancySource(PixelSource, ForeignSource):
+class OccupancySource(PixelSource, FileSource):
     """A source of a floor plan made of free, occupied and unknown pixels; see `free_space`.
 
     Attributes:
@@ -77,8 +78,8 @@ class OccupancySource(PixelSource, ForeignSource):
         notes += changes
         return free
 
-    def parts(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> PlanParts:
-        """Return the parts of a home in which walls determine the rooms and doorways.
+    def build(self, free: Polygon, pixel: float, source: str, notes: list[str]) -> FloorPlan:
+        """Return the floor plan of a home in which walls determine the rooms and doorways.
 
         Args:
             free: The free space [m].
@@ -96,11 +97,12 @@ class OccupancySource(PixelSource, ForeignSource):
             )
         if tolerance > 0:
             free = _simplify(free, tolerance, notes)
-        return PlanParts(
+        return FloorPlan.build(
             name=self.path.stem,
             free=free,
             cell=max(pixel, MIN_CELL_M) if self.cell is None else self.cell,
             source=source,
+            doorways=None,
             regions_are="none",
             notes=tuple(notes),
         )

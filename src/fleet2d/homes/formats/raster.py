@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from fleet2d.bounds import PIXELS
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.foreign import foreign_file
-from fleet2d.floorplan.source import UnclearPlaceError
 from fleet2d.kernels import U8, Bool
 
 MAX_SIDE = 2**15
@@ -83,30 +82,6 @@ class GreyPicture:
         beside = np.maximum(np.roll(counts, 2), np.roll(counts, -2))
         is_filled = (counts >= FILLED_SHARE * counts.sum()) & (counts > FILLED_PEAK * beside)
         return np.flatnonzero(is_filled[: counts.argmax() - FILLED_CONTRAST]).tolist()
-
-
-class UnclearPixelError(UnclearPlaceError):
-    """A picture is no home because of one place in it.
-
-    Attributes:
-        place: The place (column, row) [pixels].
-        radius: Radius of what is unclear [pixels].
-    """
-
-    def __init__(self, message: str, place: tuple[int, int], radius: float) -> None:
-        super().__init__(message)
-        self.place, self.radius = place, radius
-
-    def mark(self, picture: Path, out: Path) -> None:
-        """Write a copy of a picture with a red circle round the place; needs Pillow."""
-        from PIL import Image, ImageDraw
-
-        with Image.open(picture) as image:
-            copy = image.convert("RGB")
-        (column, row), radius = self.place, max(self.radius, max(copy.size) / 30)
-        box = (column - radius, row - radius, column + radius, row + radius)
-        ImageDraw.Draw(copy).ellipse(box, outline="red", width=max(max(copy.size) // 200, 2))
-        copy.save(out)
 
 
 def grey_picture(content: bytes, path: Path) -> GreyPicture:

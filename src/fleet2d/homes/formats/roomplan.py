@@ -11,10 +11,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter
 from shapely import LineString, Polygon
 
 from fleet2d.configuration.units import InputPath, Length
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import Listed, in_file, parse_json, validate
 from fleet2d.floorplan.furniture import measured_height
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.features import Draft, Feature
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.kernels import F64
 
 # Names of furniture in the catalogue that RoomPlan has under others.
@@ -107,7 +108,7 @@ class _Scan(BaseModel):
 _SCAN = TypeAdapter(_Scan)
 
 
-class RoomPlan(ForeignSource):
+class RoomPlan(FileSource):
     """A scan by Apple's RoomPlan, exported as JSON.
 
     Attributes:
@@ -120,7 +121,7 @@ class RoomPlan(ForeignSource):
     path: InputPath
     wall_m: Length = Field(default=0.1, ge=0.01, le=1)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the scan; its longest wall is turned along x.
 
         Raises:
@@ -130,7 +131,7 @@ class RoomPlan(ForeignSource):
         with in_file(self.path):
             features = _features(validate(_SCAN, content))
             draft = Draft(features, self.wall_m, [], scale=self.scale)
-            return draft.parts(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"RoomPlan scan, {self.path.name}")
 
 
 def _features(scan: _Scan) -> list[Feature]:

@@ -18,9 +18,9 @@ from fleet2d.floorplan.files import (
     shown_value,
 )
 from fleet2d.floorplan.lattice import MAX_CELL_M
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.cleaning import OccupancyMap, turn_by
 from fleet2d.homes.formats.occupancy import PictureSource
-from fleet2d.homes.formats.parts import PlanParts
 from fleet2d.homes.formats.raster import GreyPicture, grey_picture
 from fleet2d.inputs import input_path
 from fleet2d.kernels import Bool
@@ -56,7 +56,7 @@ class Ros(PictureSource):
             settings = _settings(content, self.scale or 1.0)
             return [self.path, _image_file(settings.image, self.path)]
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the map.
 
         Raises:
@@ -69,7 +69,7 @@ class Ros(PictureSource):
             notes = _note_image(settings.image, file, self.path)
             picture = grey_picture(image, file)
             free = self.home(self._occupancy(settings, picture, notes), picture, notes)
-            return self.parts(free, settings.resolution, f"ROS map, {self.path.name}", notes)
+            return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
 
     def _occupancy(
         self, settings: "_MapSettings", picture: GreyPicture, notes: list[str]

@@ -18,10 +18,11 @@ from shapely import LineString, Polygon
 from fleet2d.bounds import CORNERS
 from fleet2d.configuration.units import InputPath, PositiveLength
 from fleet2d.errors import FloorPlanError, extra
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import in_file, reading
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.dxf import WALLS, WINDOWS
 from fleet2d.homes.formats.features import Draft, Feature
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.kernels import F64
 
 # Words in the names of groups and layers, in several languages.
@@ -36,7 +37,7 @@ CURVE_STEPS = 16
 WALL_M = 0.1  # of walls that are drawn as lines
 
 
-class Svg(ForeignSource):
+class Svg(FileSource):
     """A drawing in SVG; needs the extra `svg`.
 
     Attributes:
@@ -52,7 +53,7 @@ class Svg(ForeignSource):
     scale: float | None = Field(default=None, gt=0)
     wall_m: PositiveLength = WALL_M
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the drawing.
 
         Shapes count by the class, label or id of the group or layer that they are in, or by their
@@ -85,7 +86,7 @@ class Svg(ForeignSource):
             boxes = [f.shape.minimum_rotated_rectangle for f in windows]
             panes = [Feature("window", f.where, b, {}) for f, b in zip(windows, boxes, strict=True)]
             draft = Draft([*sound, *panes], self.wall_m, notes)
-            return draft.parts(self.path.stem, self.cell, f"SVG, {self.path.name}")
+            return draft.build(self.path.stem, self.cell, f"SVG, {self.path.name}")
 
 
 def _read(content: bytes, path: Path) -> Any:

@@ -11,11 +11,12 @@ from shapely import LineString, Polygon, affinity
 
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import MAX_COORDINATE_M, in_file
 from fleet2d.floorplan.furniture import FURNITURE, measured_height
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.homes.formats.features import Draft, Feature, choose_level
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 
 CM_PER_M = 100
 # What begins higher above the floor is a window or hangs on a wall [cm].
@@ -38,7 +39,7 @@ FURNITURE_WORDS = {
 MIN_SIDE_CM = 1.0
 
 
-class SweetHome(ForeignSource):
+class SweetHome(FileSource):
     """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
 
     Attributes:
@@ -51,7 +52,7 @@ class SweetHome(ForeignSource):
     path: InputPath
     level: str | None = None
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the home.
 
         Free space is the rooms without the walls or, without rooms, what the walls enclose. Doors
@@ -70,7 +71,7 @@ class SweetHome(ForeignSource):
             level = choose_level(named, self.level, notes)
             here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
             features = [feature for element in here for feature in _features(element)]
-            return Draft(features, 0.1, notes, scale=self.scale).parts(
+            return Draft(features, 0.1, notes, scale=self.scale).build(
                 root.get("name") or self.path.stem, self.cell, f"Sweet Home 3D, {self.path.name}"
             )
 

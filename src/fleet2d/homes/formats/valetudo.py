@@ -22,6 +22,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import (
     MAX_COORDINATE_M,
     Listed,
@@ -33,12 +34,11 @@ from fleet2d.floorplan.files import (
 )
 from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_names
-from fleet2d.floorplan.plan import LabelledRegion
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
 from fleet2d.floorplan.source import PixelSource
 from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
 from fleet2d.homes.formats.occupancy import outline
-from fleet2d.homes.formats.parts import ForeignSource, PlanParts
 from fleet2d.homes.formats.rand256 import (
     MAP_CLASS,
     MAX_PIXEL_NUMBER,
@@ -282,7 +282,7 @@ MAX_PARTS = 10_000
 TINY = 1e-6
 
 
-class Valetudo(PixelSource, ForeignSource):
+class Valetudo(PixelSource, FileSource):
     """A map of a robot vacuum that runs Valetudo.
 
     Attributes:
@@ -314,7 +314,7 @@ class Valetudo(PixelSource, ForeignSource):
         """Return the path that the vacuum drove, in pieces; see `read_valetudo_paths`."""
         return read_valetudo_paths(self.path)
 
-    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+    def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
         """Read the map.
 
         Free space is the pixels of floors and segments without those of walls, gaps at thresholds
@@ -340,12 +340,13 @@ class Valetudo(PixelSource, ForeignSource):
                 raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
             _note_entities(content, notes)
             regions = _regions(layers, free, box, (pixel_m, self.scrap_area_m2), notes)
-            return PlanParts(
+            return FloorPlan.build(
                 name=self.path.stem,
                 free=_in_metres(free, box, pixel_m),
                 regions=tuple(regions),
                 cell=pixel_m * (self.scale or 1.0) if self.cell is None else self.cell,
                 source=f"Valetudo map, {self.path.name}",
+                doorways=None,
                 regions_are=self.borders if regions else "vacuum",
                 objects=tuple(_charger(content, free, box)),
                 no_go=tuple(areas),

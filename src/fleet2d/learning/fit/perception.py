@@ -1,12 +1,8 @@
 """Perception fitted to a log of detections: estimates, goodness of fit, scenario section."""
 
-import csv
 import math
-from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from io import TextIOWrapper
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from fleet2d.bounds import LOG_BYTES, LOG_ROWS, check_file, one_line
+from fleet2d.bounds import LOG_ROWS, one_line
 from fleet2d.errors import InputError
-from fleet2d.inputs import open_input
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.learning.fit.likelihood import (
     Constant,
@@ -28,16 +23,17 @@ from fleet2d.learning.fit.likelihood import (
     ProductLikelihood,
     wilson,
 )
+from fleet2d.logs.tables import LogTable
 from fleet2d.runtime.determinism import sum_in_order
 
 MIN_ROWS = 50
 MAX_METRES = 100.0  # a larger distance in a home is in another unit
 MAX_DEGREES = 360.0
 FLAGS = {"1": 1.0, "true": 1.0, "yes": 1.0, "0": 0.0, "false": 0.0, "no": 0.0}
-COLUMNS = frozenset(
-    {"distance", "detected", "identity", "true_identity"}
-    | {f"{angle}{unit}" for angle in ("bearing", "orientation") for unit in ("", "_deg", "_rad")}
-)
+COLUMNS = (
+    "distance", "detected", "identity", "true_identity", "bearing", "bearing_deg", "bearing_rad",
+    "orientation", "orientation_deg", "orientation_rad",
+)  # fmt: skip
 UNKNOWN = frozenset({"", "unknown", "none", "null"})
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
@@ -73,7 +69,7 @@ class DetectionLog:
 
 
 def read_detections(path: Path) -> DetectionLog:
-    """Read a CSV file with a heading line.
+    """Read a table: CSV, Parquet or JSON Lines.
 
     It has the columns `distance` [m] and `detected` (0 or 1); it may have `bearing_deg` or
     `bearing_rad`, `orientation_deg` or `orientation_rad`, and `identity` with `true_identity`.
@@ -83,22 +79,23 @@ def read_detections(path: Path) -> DetectionLog:
         InputError: The file can't be read, lacks a column, or has a wrong value; the message names
             the line and the column.
     """
-    table = _read_table(path)
-    if len(table) < MIN_ROWS:
-        raise InputError(f"{path} has {len(table)} rows: a fit needs at least {MIN_ROWS}")
-    has_identity = {"identity", "true_identity"} <= table.cells.keys()
+    table = LogTable.read(path, {}, {name: (name,) for name in COLUMNS}, ("distance", "detected"))
+    LOG_ROWS.check(len(table.line), path)
+    if len(table.line) < MIN_ROWS:
+        raise InputError(f"{path} has {len(table.line)} rows: a fit needs at least {MIN_ROWS}")
+    has_identity = {"identity", "true_identity"} <= table.named.keys()
     log = DetectionLog(
         path,
-        table.numbers("distance", 0, MAX_METRES, f"a distance from 0 to {MAX_METRES:g} m"),
-        table.flags("detected"),
-        table.angle("bearing"),
-        table.angle("orientation"),
-        table.names("true_identity") if has_identity else None,
-        table.names("identity") if has_identity else None,
+        _numbers(table, "distance", 0, MAX_METRES, f"a distance from 0 to {MAX_METRES:g} m"),
+        _flags(table, "detected"),
+        _angle(table, "bearing"),
+        _angle(table, "orientation"),
+        _names(table, "true_identity") if has_identity else None,
+        _names(table, "identity") if has_identity else None,
     )
     if log.true_identity is not None and (log.true_identity == "").any():
-        line = table.lines[int(np.argmax(log.true_identity == ""))]
-        raise InputError(f"{path}:{line}: true_identity is empty: who it was must be known")
+        line = table.line[int(np.argmax(log.true_identity == ""))]
+        raise InputError(f"{path}, line {line}: true_identity is empty: who it was must be known")
     if log.detected.all() or not log.detected.any():
         every = "all" if log.detected.any() else "none"
         raise InputError(
@@ -115,113 +112,54 @@ def recognized(log: DetectionLog) -> Bool:
     return np.equal(log.true_identity, log.identity)[log.detected]
 
 
-def _read_table(path: Path) -> "_PerceptionLog":
-    try:
-        check_file(path, LOG_BYTES)
-        with TextIOWrapper(open_input(path), "utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            columns = [name.strip() for name in next(reader, [])]
-            _check_columns(path, columns)
-            table = _PerceptionLog(path, columns)
-            for row in islice(filter(None, reader), LOG_ROWS.limit + 1):
-                table.add(reader.line_num, row)
-        LOG_ROWS.check(len(table), path, prefix="at least ")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not text in UTF-8: save it as a CSV file in UTF-8") from None
-    except (OSError, csv.Error) as error:
-        why = getattr(error, "strerror", None) or error
-        raise InputError(f"{path} can't be read: {why}") from None
-    return table
+def _numbers(table: LogTable, name: str, low: float, high: float, expected: str) -> F64:
+    """Return a column of numbers from a range."""
+    values = table.numbers(name)
+    _refuse(table, name, ~((values >= low) & (values <= high)), expected)
+    return values
 
 
-def _check_columns(path: Path, columns: list[str]) -> None:
-    """Refuse a heading line that lacks a column, or names one twice."""
-    for name in columns:
-        if columns.count(name) > 1:
-            raise InputError(f"{path} names the column {one_line(name)!r} twice: name each once")
-    for required in ("distance", "detected"):
-        if required not in columns:
-            has_other_marks = any(mark in name for name in columns for mark in ";\t")
-            known = one_line(", ".join(columns), 200) or "none"
-            raise InputError(
-                f"{path} has no column {required!r}; it has: {known}. Wanted are"
-                " distance [m] and detected (0 or 1), and if known bearing_deg,"
-                " orientation_deg, identity, true_identity"
-                f"{', with commas between' * has_other_marks}"
-            )
+def _flags(table: LogTable, name: str) -> Bool:
+    """Return a column of yes and no."""
+    texts = table.texts(name).to_pylist()
+    values = np.array([FLAGS.get((text or "").lower(), math.nan) for text in texts])
+    _refuse(table, name, np.isnan(values), "0 or 1")
+    return values > 0
 
 
-class _PerceptionLog:
-    """The columns of a file that have a meaning, and which line each row is on."""
-
-    def __init__(self, path: Path, columns: list[str]) -> None:
-        self.path = path
-        self.lines = array("q")  # a log has millions of rows
-        self.cells: dict[str, list[str]] = {name: [] for name in columns if name in COLUMNS}
-        self._places = [(columns.index(name), cells) for name, cells in self.cells.items()]
-
-    def __len__(self) -> int:
-        return len(self.lines)
-
-    def add(self, line: int, row: list[str]) -> None:
-        """Add a row; what it lacks is empty."""
-        self.lines.append(line)
-        for place, cells in self._places:
-            cells.append(row[place].strip() if place < len(row) else "")
-
-    def numbers(self, name: str, low: float, high: float, expected: str) -> F64:
-        """Return a column of numbers from a range."""
-        values = self._values(name, _number, "a number")
-        self._refuse(name, ~((values >= low) & (values <= high)), expected)
-        return values
-
-    def flags(self, name: str) -> Bool:
-        """Return a column of yes and no."""
-        return self._values(name, lambda text: FLAGS.get(text.lower(), math.nan), "0 or 1") > 0
-
-    def _values(self, name: str, read: Callable[[str], float], expected: str) -> F64:
-        values = np.fromiter(map(read, self.cells[name]), np.float64, len(self))
-        self._refuse(name, ~np.isfinite(values), expected)
-        return values
-
-    def _refuse(self, name: str, wrong: Bool, expected: str) -> None:
-        """Refuse the first wrong value of a column."""
-        for i in np.flatnonzero(wrong)[:1].tolist():
-            text = one_line(self.cells[name][i])
-            raise InputError(
-                f"{self.path}:{self.lines[i]}: {name}: expected {expected}, got {text!r}"
-            )
-
-    def names(self, name: str) -> NDArray[np.str_]:
-        """Return a column of names of people; empty for unknown people."""
-        texts = self.cells[name]
-        return np.array(["" if text.lower() in UNKNOWN else text for text in texts])
-
-    def angle(self, name: str) -> F64 | None:
-        """Return the size of an angle, 0 to 180 [deg], from the column with its unit in the name.
-
-        Raises:
-            InputError: There is only a column without a unit.
-        """
-        for unit, factor in (("deg", 1.0), ("rad", 180 / math.pi)):
-            if (column := f"{name}_{unit}") in self.cells:
-                most = MAX_DEGREES / factor
-                expected = f"an angle from -{most:.4g} to {most:.4g}"
-                degrees = self.numbers(column, -most - 1e-3, most + 1e-3, expected) * factor
-                return np.abs((degrees + 180) % 360 - 180)
-        if name in self.cells:
-            raise InputError(
-                f"{self.path}: the unit of the column {name!r} is unknown: call it {name}_deg or"
-                f" {name}_rad"
-            )
-        return None
+def _refuse(table: LogTable, name: str, wrong: Bool, expected: str) -> None:
+    """Refuse the first wrong value of a column."""
+    for row in np.flatnonzero(wrong)[:1].tolist():
+        text = one_line(str(table.column(name)[row].as_py()))
+        raise InputError(
+            f"{table.path}, line {table.line[row]}: {name}: expected {expected}, got {text!r}"
+        )
 
 
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+def _names(table: LogTable, name: str) -> NDArray[np.str_]:
+    """Return a column of names of people; empty for unknown people."""
+    texts = [text or "" for text in table.texts(name).to_pylist()]
+    return np.array(["" if text.lower() in UNKNOWN else text for text in texts])
+
+
+def _angle(table: LogTable, name: str) -> F64 | None:
+    """Return the size of an angle, 0 to 180 [deg], from the column with its unit in the name.
+
+    Raises:
+        InputError: There is only a column without a unit.
+    """
+    for unit, factor in (("deg", 1.0), ("rad", 180 / math.pi)):
+        if (column := f"{name}_{unit}") in table.named:
+            most = MAX_DEGREES / factor
+            expected = f"an angle from -{most:.4g} to {most:.4g}"
+            degrees = _numbers(table, column, -most - 1e-3, most + 1e-3, expected) * factor
+            return np.abs((degrees + 180) % 360 - 180)
+    if name in table.named:
+        raise InputError(
+            f"{table.path}: the unit of the column {name!r} is unknown: call it {name}_deg or"
+            f" {name}_rad"
+        )
+    return None
 
 
 class ProbabilityGroup(NamedTuple):

@@ -12,13 +12,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Timer
 
+import numpy as np
 import pytest
-from tests.homes.test_damaged_files import FORMATS, PGM
+import shapely
+from tests.homes.formats import test_geojson
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.homes.formats import apart
-from fleet2d.homes.formats.parts import PlanParts
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.homes.formats.geojson import GeoJson
+from fleet2d.storage import apart
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
 
@@ -30,7 +33,7 @@ def end_children() -> Iterator[None]:
 
 
 def good(folder: Path) -> Path:
-    name, content, _ = FORMATS["geojson"]
+    name, content = test_geojson.SAMPLE
     path = folder / name
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
@@ -140,7 +143,7 @@ def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_child_ends_with_its_parent(tmp_path: Path) -> None:
     program = (
-        "import sys, fleet2d; from fleet2d.homes.formats import apart;"
+        "import sys, fleet2d; from fleet2d.storage import apart;"
         "fleet2d.load_floorplan(sys.argv[1]); print(apart._child.pid, flush=True);"
         "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     )
@@ -203,7 +206,7 @@ def test_processor_time_ends_before_the_clock_does(
     monkeypatch.setattr(
         apart,
         "_death",
-        lambda path, late, status: (ends.append(status), death(path, late, status))[1],
+        lambda *death_of: (ends.append(death_of[-1]), death(*death_of))[1],
     )
     monkeypatch.setattr(apart, "PATIENCE", 20)
     monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
@@ -234,8 +237,7 @@ def test_memory_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
     with pytest.raises(FloorPlanError, match="more memory to read than 40 MB"):
         load_floorplan(path, resolution=0.05)
-    path.write_bytes(PGM)
-    load_floorplan(path, resolution=0.05)
+    load_floorplan(good(tmp_path))
 
 
 def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path: Path) -> None:
@@ -254,10 +256,12 @@ def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path: Path) -> None:
 
 # --- Answers ------------------------------------------------------------------------------------
 
-PARTS = {
-    "name": "flat", "free": {"rings": [[[0, 0], [9, 0], [9, 9], [0, 9], [0, 0]]]}, "cell": 0.05,
-    "source": "", "regions_are": "none", "notes": [],
-}  # fmt: skip
+FLAT = json.loads(apart._encode(FloorPlan.build("flat", shapely.box(0, 0, 2, 2))))
+
+
+def changed(**changes: object) -> bytes:
+    """Return an answer that is a plan but for some fields."""
+    return json.dumps({"value": FLAT | changes}).encode()
 
 
 def _short(content: bytes) -> str:
@@ -268,25 +272,44 @@ def answering(content: bytes, length: int | None = None) -> str:
     """Return the program of a child that has one answer."""
     head = (len(content) if length is None else length).to_bytes(8, "big")
     return (
-        "import sys, pickle; pickle.load(sys.stdin.buffer);"
+        "import sys, pickle; pickle.load(sys.stdin.buffer); pickle.load(sys.stdin.buffer);"
         f"sys.stdout.buffer.write({head!r}); sys.stdout.buffer.write({_short(content)});"
         "sys.stdout.flush(); sys.stdin.read()"
     )
 
 
+def test_plan_arrives_as_it_was_built(tmp_path: Path) -> None:
+    path = good(tmp_path)
+    source = GeoJson(path=path)
+    built = source.read(source.contents())
+
+    plan = source.load()
+
+    assert {**vars(built), "mesh": None} == {**vars(plan), "mesh": None} | {
+        name: getattr(built, name) for name in ("free", "room_of_cell")
+    }
+    for name in ("free", "room_of_cell"):
+        np.testing.assert_array_equal(getattr(built, name), getattr(plan, name), strict=True)
+    for name in ("vertices", "triangles", "neighbors"):
+        arrays = [getattr(each.mesh, name) for each in (built, plan)]
+        np.testing.assert_array_equal(*arrays, strict=True)
+
+
 def test_coordinate_beyond_all_floats_is_refused() -> None:
     """JSON may spell infinity as a number, too, which no check of words refuses."""
-    corners = [[0, 0], [9, 0], [9, 9], [0, 9]]
-    answer = json.dumps({"value": PARTS | {"free": {"rings": [corners]}}})
-    apart._decode(answer.encode(), PlanParts)
+    answer = changed(polygons=[{"#rings": [[[0, 0], [9, 0], [9, 9], [0, 9]]]}])
+    apart._decode(answer, FloorPlan)
     with pytest.raises(ValueError, match="a coordinate is infinite"):
-        apart._decode(answer.replace("[9, 0]", "[1e999, 0]").encode(), PlanParts)
+        apart._decode(answer.replace(b"[9, 0]", b"[1e999, 0]"), FloorPlan)
 
 
 def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apart, "_CODE", answering(json.dumps({"value": PARTS}).encode()))
+    monkeypatch.setattr(apart, "_CODE", answering(changed()))
 
-    assert 81 == load_floorplan(good(tmp_path)).area_m2
+    assert 4 == load_floorplan(good(tmp_path)).area_m2
+
+
+TRIANGLE = [[0, 0], [9, 0], [9, 9]]
 
 
 @pytest.mark.parametrize(
@@ -301,35 +324,33 @@ def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         b'{"failure": {"kind": "code", "text": ""}}',
         b"[" * 100_000,
         b'{"value": [' + b"1," * 3_100_000 + b"1]}",
-        *(
-            json.dumps({"value": PARTS | change}).encode()
-            for change in (
-                {"name": 7},
-                {"cell": "x"},
-                {"cell": float("nan")},
-                {"free": None},
-                {"free": {"rings": [[[0, 0], [1, 1]]]}},
-                {"free": {"rings": [[[0, 0], [1e999, 0], [9, 9], [0, 9]]]}},
-                {"free": {"rings": [["x"]]}},
-                {"free": {"polygons": [7]}},
-                {"objects": [{"name": "x"}]},
-                {"regions": [PARTS["free"]]},
-            )
-        ),
+        changed(name=7),
+        changed(lattice=FLAT["lattice"] | {"cell": "x"}),
+        changed(lattice=FLAT["lattice"] | {"cell": float("nan")}),
+        changed(free=None),
+        changed(free={"#array": ["|b1", [9, 9], "AAAA"]}),
+        changed(free={"#array": ["|O", [1], "AAAAAAAAAAA="]}),
+        changed(free={"#array": ["|b1", [3], 7]}),
+        changed(mesh={"#mesh": [7, 7, 7]}),
+        changed(mesh={"#mesh": [FLAT["free"]] * 3}),
+        changed(polygons=[{"#rings": [[[0, 0], [1, 1]]]}]),
+        changed(polygons=[{"#rings": [["x"]]}]),
+        changed(polygons=[{"#polygons": [7]}]),
+        changed(objects=[{"name": "x"}]),
+        changed(regions=[{"#rings": [TRIANGLE]}]),
     ],
-    ids=lambda answer: answer[:80].decode("latin-1"),
+    ids=lambda answer: answer[:40].decode("latin-1"),
 )
 def test_wrong_answer_is_refused(answer: bytes) -> None:
     with pytest.raises(apart.WRONG):
-        apart._decode(answer, PlanParts)
+        apart._decode(answer, FloorPlan)
 
 
 def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch) -> None:
-    answer = json.dumps({"value": PARTS}).encode()
-    apart._decode(answer, PlanParts)
+    apart._decode(changed(), FloorPlan)
     monkeypatch.setenv("FLEET2D_MAX_JSON_VALUES", "9")
     with pytest.raises(ValueError, match="too many values"):
-        apart._decode(answer, PlanParts)
+        apart._decode(changed(), FloorPlan)
 
 
 @pytest.mark.parametrize(
@@ -340,6 +361,7 @@ def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch
 def test_wrong_answer_is_an_error_of_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: bytes, length: int | None
 ) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_READ_MB", "64")
     monkeypatch.setattr(apart, "_CODE", answering(answer, length))
     with pytest.raises(FloorPlanError, match="its reader gave no valid answer: export the file"):
         load_floorplan(good(tmp_path))

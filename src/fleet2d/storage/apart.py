@@ -1,9 +1,9 @@
-"""A child process that reads files of other programs, within limits of time and memory.
+"""A child process that reads files of floor plans and bags, within limits of time and memory.
 
-What parses such a file, much of it in libraries, may crash, hang or swell. Then the child dies, and
-its parent raises an error of one line. A process starts its child for the first such file, and
-keeps it. The child gets a function and the content of files by pickle, and answers in JSON, which
-the parent checks: what came of hostile bytes is hostile, too.
+What parses a file, much of it in libraries, and finds its rooms may crash, hang or swell. Then the
+child dies, and its parent raises an error of one line. A process starts its child for the first
+file, and keeps it. The child gets a function and the content of files by pickle, and answers in
+JSON, which the parent checks: what came of hostile bytes is hostile, too.
 """
 
 import atexit
@@ -15,6 +15,7 @@ import signal
 import sys
 import time
 import traceback
+from base64 import b64decode, b64encode
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
@@ -30,9 +31,15 @@ import shapely
 from pydantic import ConfigDict, TypeAdapter
 from shapely import MultiPolygon, Polygon
 
-from fleet2d.bounds import FILE_BYTES, JSON_VALUES, READ_MB, READ_SECONDS, Bound, one_line
-from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, os_errors_as
-from fleet2d.homes.formats.raster import UnclearPixelError
+from fleet2d.bounds import JSON_VALUES, LOG_BYTES, READ_MB, READ_SECONDS, Bound, one_line
+from fleet2d.errors import (
+    Fleet2DError,
+    FloorPlanError,
+    InputError,
+    UnclearPlaceError,
+    os_errors_as,
+)
+from fleet2d.kernels import Mesh
 
 try:
     import resource
@@ -42,11 +49,19 @@ except ImportError:  # on Windows
 T = TypeVar("T")
 
 # By the clock a file may take so many times its processor time, which others may use meanwhile.
-PATIENCE = 3
+PATIENCE = 10
 # What is raised by an answer that isn't valid.
 WRONG = (ValueError, TypeError, KeyError, RecursionError, shapely.errors.ShapelyError)
-_CODE = "from fleet2d.homes.formats.apart import serve; serve()"
+_CODE = "from fleet2d.storage.apart import serve; serve()"
 _VARIABLES = "FLEET2D_MAX_"
+_ENVIRONMENT = {
+    "OPENBLAS_NUM_THREADS": "1",  # each thread takes memory
+    "ARROW_DEFAULT_MEMORY_POOL": "system",  # others reserve a gigabyte
+    # Freed arrays are used again. To return them to the system, and get them back page by page,
+    # takes as long as to read a picture.
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 30),
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}
 
 _lock = Lock()
 _child: Popen[bytes] | None = None
@@ -67,44 +82,53 @@ class _Failure:
     text: str = ""
     place: tuple[int, int, float] | None = None
 
-    def error(self, path: Path) -> InputError:
+    def error(self, path: Path, failure: type[InputError]) -> InputError:
         """Return the error that the parent raises."""
         if self.kind == "memory":
-            return _beyond(path, "more memory", READ_MB)
+            return failure(_beyond(path, "more memory", READ_MB))
         if self.kind == "other":
-            return FloorPlanError(
+            return failure(
                 f"{path} can't be read: {self.text}: if the file isn't damaged, simplify it or"
                 " export it again"
             )
-        return (FloorPlanError if self.kind == "file" else InputError)(self.text)
+        return (failure if self.kind == "file" else InputError)(self.text)
 
 
-def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
+def apart(
+    path: Path,
+    read: Callable[..., T],
+    *arguments: Any,
+    failure: type[InputError] = FloorPlanError,
+    seconds: Bound = READ_SECONDS,
+) -> T:
     """Return what a function of Fleet2D returns for a file, called in the child.
 
     Args:
         path: The file, for messages.
         read: The function, or a method of a component. Its annotation says what it returns: plain
-            data, dataclasses and polygons.
+            data, dataclasses, arrays, meshes and polygons.
         arguments: Its arguments, among them the content of the file.
+        failure: The type of the error about the file.
+        seconds: The processor time that it may take.
 
     Raises:
-        FloorPlanError: The function raises it or fails, it exceeds a limit, or the child dies.
-        InputError: The function raises it.
+        InputError: The function raises it or fails, it exceeds a limit, or the child dies; of the
+            type `failure`, unless the function raises another one.
     """
-    patience = PATIENCE * READ_SECONDS.limit
+    patience = PATIENCE * seconds.limit
     limits = {key: text for key, text in os.environ.items() if key.startswith(_VARIABLES)}
     with _lock:
         start = time.monotonic()
-        answer = _exchange((limits, read, arguments), patience)
+        rest = limits, arguments, failure, seconds.limit
+        answer = _exchange(read, rest, patience)
         if not answer:
             is_late = time.monotonic() - start >= patience
-            raise _death(path, is_late, _stop(grace=1.0))
+            raise failure(_death(path, seconds, is_late, _stop(grace=1.0)))
         try:
             result: T | _Failure = _decode(answer, get_type_hints(read)["return"])
         except WRONG:
             _stop()
-            raise FloorPlanError(
+            raise failure(
                 f"{path} can't be read: its reader gave no valid answer: export the file again"
             ) from None
         if isinstance(result, _Failure) and result.kind in ("memory", "other"):
@@ -112,21 +136,22 @@ def apart(path: Path, read: Callable[..., T], *arguments: Any) -> T:
     if not isinstance(result, _Failure):
         return result
     place = result.place
-    unclear = place and UnclearPixelError(result.text, place[:2], place[2])
-    raise result.error(path) from unclear
+    unclear = place and UnclearPlaceError(result.text, place[:2], place[2])
+    raise result.error(path, failure) from unclear
 
 
-def _exchange(request: object, patience: float) -> bytes:
-    """Return the answer to a request; empty if the child died or took too long."""
+def _exchange(read: object, rest: object, patience: float) -> bytes:
+    """Return the answer to a request, in two parts; empty if the child died or took too long."""
     process = _running()
     timer = Timer(patience, process.kill)
     timer.start()
     try:
         assert process.stdin is not None
         assert process.stdout is not None
-        pickle.dump(request, process.stdin)
+        pickle.dump(read, process.stdin)
+        pickle.dump(rest, process.stdin)
         process.stdin.flush()
-        length = min(int.from_bytes(process.stdout.read(8), "big"), FILE_BYTES.limit)
+        length = min(int.from_bytes(process.stdout.read(8), "big"), READ_MB.limit << 20)
         answer = process.stdout.read(length)
         return answer if len(answer) == length else b""
     except BrokenPipeError:
@@ -150,7 +175,7 @@ def _running() -> Popen[bytes]:
                 stdin=PIPE,
                 stdout=PIPE,
                 stderr=DEVNULL,
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # each thread takes memory
+                env={**os.environ, **_ENVIRONMENT},
                 creationflags=0x08000000 if sys.platform == "win32" else 0,  # without a window
             )
     return _child
@@ -195,19 +220,19 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forget)
 
 
-def _death(path: Path, is_late: bool, status: int) -> FloorPlanError:
-    """Return the error about a file at which the child died."""
+def _death(path: Path, seconds: Bound, is_late: bool, status: int) -> str:
+    """Return the message about a file at which the child died."""
     name = signal.Signals(-status).name if status < 0 else f"exit code {status}"
     if is_late or name == "SIGXCPU":
-        return _beyond(path, "longer", READ_SECONDS)
+        return _beyond(path, "longer", seconds)
     cause = f"died ({name}): if the file isn't damaged, simplify it or export it again"
     if name == "SIGKILL":
         cause = "was killed, perhaps because memory ran out: try again"
-    return FloorPlanError(f"{path} can't be read: its reader {cause}")
+    return f"{path} can't be read: its reader {cause}"
 
 
-def _beyond(path: Path, what: str, bound: Bound) -> FloorPlanError:
-    return FloorPlanError(
+def _beyond(path: Path, what: str, bound: Bound) -> str:
+    return (
         f"{path} takes {what} to read than {bound.limit} {bound.noun}: simplify it, or set"
         f" {bound.variable}={2 * bound.limit} in the environment"
     )
@@ -221,12 +246,16 @@ def _encode(value: object) -> bytes:
 
 
 def _plain(part: Any) -> Any:
-    """Return a polygon or a dataclass as plain data."""
+    """Return a part of an answer as plain data."""
     if isinstance(part, MultiPolygon):
-        return {"polygons": list(part.geoms)}
+        return {"#polygons": list(part.geoms)}
+    if isinstance(part, np.ndarray):
+        return {"#array": [part.dtype.str, part.shape, b64encode(part.tobytes()).decode()]}
+    if isinstance(part, Mesh):
+        return {"#mesh": [part.vertices, part.triangles, part.neighbors]}
     if isinstance(part, Polygon):
         rings = shapely.get_rings(part)
-        return {"rings": [shapely.get_coordinates(ring).tolist() for ring in rings]}
+        return {"#rings": [shapely.get_coordinates(ring).tolist() for ring in rings]}
     if is_dataclass(part):
         return {field.name: getattr(part, field.name) for field in fields(part)}
     raise TypeError(f"{type(part).__name__} is no part of an answer")
@@ -240,22 +269,27 @@ def _decode(answer: bytes, kind: Any) -> Any:
     """
     if answer.count(b",") > JSON_VALUES.limit:
         raise ValueError("too many values")
-    content = json.loads(answer, object_hook=_polygon, parse_constant=int)  # NaN is refused
+    content = json.loads(answer, object_hook=_part, parse_constant=int)  # NaN is refused
     if "failure" in content:
         return _checked(content["failure"], _Failure)
     return _checked(content["value"], kind)
 
 
-def _polygon(content: dict[str, Any]) -> Any:
-    """Return the polygon that a mapping stands for, else the mapping."""
-    if content.keys() == {"polygons"}:
-        return MultiPolygon(content["polygons"])
-    if content.keys() != {"rings"}:
-        return content
-    rings = [np.array(ring, np.float64).reshape(-1, 2) for ring in content["rings"]]
-    if not all(np.isfinite(ring).all() for ring in rings):
-        raise ValueError("a coordinate is infinite")
-    return Polygon(rings[0], rings[1:]) if rings else Polygon()
+def _part(content: dict[str, Any]) -> Any:
+    """Return the array, mesh or polygon that a mapping stands for, else the mapping."""
+    match content:
+        case {"#array": [dtype, shape, text]}:
+            return np.frombuffer(b64decode(text), dtype).reshape(shape)
+        case {"#mesh": arrays}:
+            return Mesh(*arrays)
+        case {"#polygons": polygons}:
+            return MultiPolygon(polygons)
+        case {"#rings": rings}:
+            corners = [np.array(ring, np.float64).reshape(-1, 2) for ring in rings]
+            if not all(np.isfinite(ring).all() for ring in corners):
+                raise ValueError("a coordinate is infinite")
+            return Polygon(corners[0], corners[1:]) if corners else Polygon()
+    return content
 
 
 def _checked(content: object, kind: Any) -> Any:
@@ -282,25 +316,28 @@ def serve() -> None:
     base = _size()
     while True:
         try:
-            limits, read, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301 - of the parent
+            before = _size()
+            read = pickle.load(sys.stdin.buffer)  # noqa: S301 - of the parent
+            base += _size() - before  # the module with its libraries
+            limits, arguments, failure, seconds = pickle.load(sys.stdin.buffer)  # noqa: S301
         except EOFError:
             return
         for name in [name for name in os.environ if name.startswith(_VARIABLES)]:
             del os.environ[name]
         os.environ.update(limits)
-        _limit(base)
-        answer = _answer(read, arguments)
+        _limit(base, seconds)
+        answer = _answer(read, arguments, failure)
         answers.write(len(answer).to_bytes(8, "big") + answer)
         answers.flush()
 
 
-def _answer(read: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+def _answer(read: Callable[..., Any], arguments: tuple[Any, ...], kind: type[InputError]) -> bytes:
     try:
         return _encode({"value": read(*arguments)})
     except Fleet2DError as error:
         cause = error.__cause__
-        at = (*cause.place, cause.radius) if isinstance(cause, UnclearPixelError) else None
-        failure = _Failure("file" if isinstance(error, FloorPlanError) else "input", str(error), at)
+        at = (*cause.place, cause.radius) if isinstance(cause, UnclearPlaceError) else None
+        failure = _Failure("file" if isinstance(error, kind) else "input", str(error), at)
     except RecursionError:
         failure = _Failure("other", "its parts are nested too deeply")
     except MemoryError:
@@ -322,17 +359,19 @@ def _size() -> int:
     return 0
 
 
-def _limit(base: int) -> None:
+def _limit(base: int, seconds: int) -> None:
     """Limit the processor time and memory that this process takes from now on.
 
     Args:
         base: Size of the process when it began [bytes].
+        seconds: The processor time.
     """
     if resource is None:
         return
     limits = {
         resource.RLIMIT_CORE: 0,
-        resource.RLIMIT_CPU: math.ceil(time.process_time() + READ_SECONDS.limit),
+        resource.RLIMIT_FSIZE: LOG_BYTES.limit,  # of files that a bag unpacks to
+        resource.RLIMIT_CPU: math.ceil(time.process_time() + seconds),
     }
     if base:
         limits[resource.RLIMIT_AS] = base + (READ_MB.limit << 20)
