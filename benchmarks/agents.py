@@ -25,7 +25,7 @@ def best_s(function: Callable[[], object], repeats: int) -> float:
 
 def decisions_a_second(task: str) -> float:
     """Return the rate of decisions drawn at random in a known home."""
-    from fleet2d.gym import RobotEnv
+    from fleet2d.learning.gym import RobotEnv
 
     env, random, counts = RobotEnv(task), Random(0), list[int]()
     values = {key: HOME[key] for key in env.variants.task.vary}
@@ -47,7 +47,7 @@ def decisions_a_second(task: str) -> float:
 
 def main() -> None:
     """Print all measurements."""
-    from fleet2d.gym import RobotEnv
+    from fleet2d.learning.gym import RobotEnv
 
     for task in ("hangout", "find", "patrol"):
         print(f"{task:<8} {decisions_a_second(task):7.0f} decisions a second")

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import fleet2d
-from fleet2d.datasets.generate import dataset
-from fleet2d.datasets.specification import DatasetPlan, PlannedRun, plan_dataset
-from fleet2d.datasets.tables import tables_of
 from fleet2d.engine.simulation import Simulation
+from fleet2d.learning.datasets.generate import dataset
+from fleet2d.learning.datasets.specification import DatasetPlan, PlannedRun, plan_dataset
+from fleet2d.learning.datasets.tables import tables_of
 
 DAYS = 10
 ROUNDS, RANDOM = "rounds, 10 min a room", "rounds in random order, 10 min a room"
@@ -97,7 +97,7 @@ def whole(runs: int, days: int) -> None:
 def fresh(days: int, windows: int) -> None:
     """Print how many days a second come as windows into torch, simulated on the fly."""
     try:
-        from fleet2d.datasets.torch_data import fresh_windows
+        from fleet2d.learning.datasets.torch_data import fresh_windows
     except ImportError as error:
         print(f"windows into torch: left out, {error}")
         return

@@ -11,12 +11,12 @@ repeats of its log, and the shares of time per room.
 import argparse
 from pathlib import Path
 
-from fleet2d.fit.command import table
-from fleet2d.fit.persona import fit_persona
-from fleet2d.fit.picture import SAMPLED, draw_persona
-from fleet2d.fit.privacy import repeats
-from fleet2d.fit.timeline import find_days, read_timeline, shares
-from fleet2d.fit.validation import sample_persona, simulated_repeats, validate
+from fleet2d.learning.fit.command import table
+from fleet2d.learning.fit.persona import fit_persona
+from fleet2d.learning.fit.picture import SAMPLED, draw_persona
+from fleet2d.learning.fit.privacy import repeats
+from fleet2d.learning.fit.timeline import find_days, read_timeline, shares
+from fleet2d.learning.fit.validation import sample_persona, simulated_repeats, validate
 from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog
 

@@ -30,7 +30,7 @@ from fleet2d.floorplan.furnish import furnish
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.room import room_type, usual_type
-from fleet2d.floorplan.synthetic.source import Synthetic
+from fleet2d.homes.synthetic.source import Synthetic
 from fleet2d.kernels import rasterize_cells, regions_of_cells
 
 ROUNDS = 5

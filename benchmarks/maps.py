@@ -26,8 +26,8 @@ from shapely import Polygon, affinity
 
 import fleet2d
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.ros import Ros
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.homes.formats.ros import Ros
 from fleet2d.kernels import label_parts
 
 DATA = Path(__file__).parents[2] / "shared" / "data"

@@ -54,9 +54,9 @@ from visits import (
 
 import fleet2d
 import fleet2d.routines.survey as survey
-from fleet2d.fit.command import table
-from fleet2d.fit.timeline import ks_distance, read_timeline
-from fleet2d.fit.validation import validate
+from fleet2d.learning.fit.command import table
+from fleet2d.learning.fit.timeline import ks_distance, read_timeline
+from fleet2d.learning.fit.validation import validate
 from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog
 from fleet2d.routines.interruptions import without_interruptions

@@ -24,7 +24,7 @@ import numpy as np
 import fleet2d
 from fleet2d.algorithms.external import Process
 from fleet2d.live import Bridge, open_peer
-from fleet2d.runs.exporters import export
+from fleet2d.live.exporters import export
 
 DAY_S = 86_400
 PLACE = 16.5, 7.7  # in the kitchen of the bundled home [m]

@@ -27,7 +27,7 @@ import shapely
 from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.synthetic.source import Synthetic
+from fleet2d.homes.synthetic.source import Synthetic
 
 LEFT_OUT = ("empty", "tiny", "big")
 TOLERANCE_M = 0.1
@@ -172,7 +172,7 @@ def draw(real: Values, editions: dict[int, Values], path: Path) -> None:
     """Draw the distributions of real plans and of each edition, one panel a measure."""
     from matplotlib.figure import Figure
 
-    from fleet2d.pictures.floorplan import drawing_style
+    from fleet2d.viewing.pictures.floorplan import drawing_style
 
     names = [name for name in real if all(name in values for values in editions.values())]
     colors = dict(zip(editions, ("#c8452f", "#2f6fc8"), strict=False))

@@ -21,12 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import fleet2d
-from fleet2d.viewer.film import write_film
-from fleet2d.viewer.live import LiveRun
-from fleet2d.viewer.page_server import PageServer
+from fleet2d.viewing.film import write_film
+from fleet2d.viewing.live import LiveRun
+from fleet2d.viewing.page_server import PageServer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from tests.viewer.browser import chromium, page_at
+from tests.viewing.browser import chromium, page_at
 
 FRAMES = 240
 SCRUB = """async (frames) => {

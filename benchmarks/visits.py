@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import TypeAdapter
 
-from fleet2d.fit.timeline import read_seconds, runs
 from fleet2d.kernels import I16, Bool
+from fleet2d.learning.fit.timeline import read_seconds, runs
 from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
 from fleet2d.routines.life import Life

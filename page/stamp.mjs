@@ -12,4 +12,4 @@ for (const name of [...files, ...sources].sort()) {
   hash.update(`${name}\n`);
   hash.update(readFileSync(name));
 }
-writeFileSync("../src/fleet2d/viewer/page/sources.sha256", `${hash.digest("hex")}\n`);
+writeFileSync("../src/fleet2d/viewing/page/sources.sha256", `${hash.digest("hex")}\n`);

@@ -5,7 +5,7 @@ import { defineConfig } from "vitest/config";
 export default defineConfig({
   base: "./",
   build: {
-    outDir: "../src/fleet2d/viewer/page",
+    outDir: "../src/fleet2d/viewing/page",
     emptyOutDir: true,
     target: "es2022",
     modulePreload: false,

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from tests.homes import plan_files
+from tests.meshed_homes import plan_files
 from tests.thorough import some
 
 import fleet2d

@@ -326,7 +326,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
 }  # fmt: skip
 # What is not told by tables, and which test sees it.
 ELSEWHERE = {
-    (User, "color"): "tests/pictures: pictures",
+    (User, "color"): "tests/viewing/pictures: pictures",
     (User, "lights"): "tests/engine/test_change_queue_lights: it is day here",
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (User, "height"): "tests/engine/test_heights: there is no furniture here",
@@ -339,7 +339,7 @@ ELSEWHERE = {
         "daylight",
     ): "tests/engine/test_change_queue_lights: nothing depends on the sun here",
     (Robot, "localization"): "tests/entities/test_equipment",
-    (Robot, "color"): "tests/pictures: pictures",
+    (Robot, "color"): "tests/viewing/pictures: pictures",
     (Robot, "perceives"): "tests/entities/test_replayed_detections: it needs a table",
     (User, "opens_doors"): "tests/engine/test_change_queue: there is no door in this home",
     (Robot, "gives_way"): "tests/engine/test_collisions_clearance: it meets nobody on its way here",
@@ -450,7 +450,7 @@ def test_known_failure_05_a_color_is_drawn(tmp_path: Path) -> None:
         content = life()
         content["users"]["ana"]["color"] = color
         fleet2d.run(content, out=tmp_path / str(number))
-        from fleet2d.pictures.run import draw_run
+        from fleet2d.viewing.pictures.run import draw_run
 
         target = tmp_path / f"{number}.svg"
         draw_run(fleet2d.open_run(tmp_path / str(number)), target)

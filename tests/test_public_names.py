@@ -17,6 +17,15 @@ def test_every_public_name_can_be_imported(name: str) -> None:
     assert name in dir(fleet2d)
 
 
+def test_stub_has_the_public_names_with_their_modules() -> None:
+    stub = Path(fleet2d.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    imports = re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)
+
+    assert sorted([name for _, name in imports] + ["__version__"]) == fleet2d.__all__
+    for module, name in imports:
+        assert getattr(import_module(module), name) is getattr(fleet2d, name)
+
+
 def test_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'Roomba'"):
         fleet2d.Roomba  # type: ignore[attr-defined]  # noqa: B018
@@ -36,7 +45,7 @@ def test_documented_modules_are_named_as_public() -> None:
 
     assert documented - {"fleet2d"}
     for module in documented:
-        if module.startswith("fleet2d.gym"):
+        if module.startswith("fleet2d.learning.gym"):
             pytest.importorskip("gymnasium", reason="needs the extra gym")
         import_module(module)
         assert f"`{module}`" in page, f"{module} is documented, and docs/api.md doesn't list it"

@@ -127,9 +127,9 @@ def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(
     """One learner, a real log and its twin: both are runs of one scenario, shown on one page."""
     from starlette.testclient import TestClient
 
-    from fleet2d.fit.command import fit_routine
-    from fleet2d.viewer.page_server import new_token, page_app
-    from fleet2d.viewer.served_runs import ServedRuns
+    from fleet2d.learning.fit.command import fit_routine
+    from fleet2d.viewing.page_server import new_token, page_app
+    from fleet2d.viewing.served_runs import ServedRuns
 
     log = shared_data / "activity" / "uci_adl_a"
     content = {

@@ -18,7 +18,7 @@ from benchmarks.visits import (
 )
 from tests.thorough import THOROUGH
 
-from fleet2d.fit.timeline import ks_distance
+from fleet2d.learning.fit.timeline import ks_distance
 from fleet2d.routines.persona import bundled_names
 
 KINDS = ("away", "bathroom", "hallway", "kitchen", "living_room")

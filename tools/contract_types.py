@@ -7,16 +7,22 @@ from typing import Any, Literal
 
 from typing_extensions import is_typeddict
 
-from fleet2d.viewer import contract
+from fleet2d.runtime.events import EventKind
+from fleet2d.viewing import contract
 
-HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewer.contract.\n"
+HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewing.contract.\n"
 _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
 
 
 def contract_source() -> str:
     """Return the TypeScript interfaces of all types of the contract."""
     shapes = [value for value in vars(contract).values() if is_typeddict(value)]
-    return "\n".join([HEADER, *map(_interface, shapes)])
+    return "\n".join([HEADER, _event_kinds(), *map(_interface, shapes)])
+
+
+def _event_kinds() -> str:
+    kinds = _typescript(Literal[*EventKind])
+    return f"/** Every kind of event that Fleet2D records. */\nexport type EventKind = {kinds};\n"
 
 
 def _interface(shape: Any) -> str:
@@ -34,7 +40,7 @@ def _typescript(kind: Any) -> str:
         return "unknown"
     if kind in _PLAIN:
         return _PLAIN[kind]
-    if is_typeddict(kind):
+    if is_typeddict(kind) or kind is EventKind:
         return str(kind.__name__)
     if origin is Literal:
         return " | ".join(f'"{word}"' for word in arguments)

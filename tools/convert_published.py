@@ -28,10 +28,11 @@ from fleet2d.configuration.documents import Document, Keys, read_document
 from fleet2d.configuration.problems import shown
 from fleet2d.configuration.units import format_duration, micros, parse_duration
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioError
-from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.homes.formats.houseexpo import read_houseexpo
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import Camera
 from fleet2d.storage.files import is_disk_full, write_atomically
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import shapely
 
-from fleet2d.floorplan.formats.native import native_document, read_native
 from fleet2d.floorplan.furnish import furnish
+from fleet2d.floorplan.native import native_document, read_native
 
-HOME = Path("src/fleet2d/floorplan/formats/homes/family_home.json")
+HOME = Path("src/fleet2d/floorplan/homes/family_home.json")
 WALL = 0.15
 DOOR = 0.9
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "CONTRIBUTING.md"
+TOP_OF_HEART = "__main__"
 BEGIN, END = "<!-- packages: made by tools/package_map.py -->\n", "<!-- end of packages -->\n"
 
 
@@ -39,14 +40,26 @@ def picture() -> str:
     """Return the layers of the contract from top to bottom, each package with what it is.
 
     Example:
-        >>> picture().splitlines()[1].split()[0]
-        'cli/'
+        >>> picture().splitlines()[1]
+        'LIMBS: each can be taken away'
     """
-    lines = ["```"]
+    lines = ["```", "LIMBS: each can be taken away"]
     for number, layer in enumerate(layers()):
         lines += ["  │"] if number else []
-        lines += [f"{name:<15} {summary(name)}" for name in re.split(r" [|:] ", layer)]
+        lines += ["HEART: it imports no limb"] if layer == TOP_OF_HEART else []
+        lines += [f"{name:<15} {summary(name)}" for name in packages_of(layer)]
     return "\n".join([*map(_shown, lines), "```"]) + "\n"
+
+
+def limbs() -> list[str]:
+    """Return the packages above the heart, in the order of the contract."""
+    above = layers()[: layers().index(TOP_OF_HEART)]
+    return [name for layer in above for name in packages_of(layer)]
+
+
+def packages_of(layer: str) -> list[str]:
+    """Return the packages that stand side by side in a layer."""
+    return re.split(r" [|:] ", layer)
 
 
 def _shown(line: str) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 
 import fleet2d
 from fleet2d.floorplan.home import Home
-from fleet2d.pictures.life import SightWalls
 from fleet2d.sight.fov import VisibleRegion
-from fleet2d.viewer.page_data import PageData, embedded_run
+from fleet2d.viewing.page_data import PageData, embedded_run
+from fleet2d.viewing.pictures.life import SightWalls
 
 TARGET = Path(__file__).parents[1] / "page" / "test" / "run.json"
 SCENARIO: dict[str, Any] = {

@@ -1,20 +1,33 @@
 """Redraws the README's pictures from the bundled family, with the digests of the runs they show.
 
-python tools/pictures.py            # a minute or two
+python tools/pictures.py            # some minutes; needs the extra `browser` and Debian's chromium
 """
 
+import io
 import json
+from collections.abc import Sequence
+from datetime import timedelta
 from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
 
 import fleet2d
-from fleet2d.pictures.run import draw_run
-from fleet2d.viewer.film import write_film
+from fleet2d.runs.run import Run
+from fleet2d.viewing.page_data import PageData
+from fleet2d.viewing.page_server import PageServer
+from fleet2d.viewing.pictures.run import draw_run
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 DAY = "simulation.duration=1 d"
-FILM_S = 20
-WIDE_PX = 820  # the height at which a film of the bundled home is 1,000 pixels wide
-HOURS = (6, 23)
+CHROMIUM = "/usr/bin/chromium"
+PAGE = {"width": 1440, "height": 900}  # of the still picture of the page [px]
+FILM = {"width": 1368, "height": 1000}  # of a page whose plan is 1,000 pixels wide [px]
+FRAMES_PER_S = 10
+# What the film shows of the day, and for how many seconds of the film.
+SCENES = ((7.2, 8.4, 9), (17.9, 18.9, 8), (21.5, 23.0, 3))
+STILL_H = 18.75
 
 
 def main() -> None:
@@ -22,11 +35,59 @@ def main() -> None:
     month = fleet2d.run("bundled:family")
     draw_run(month, IMAGES / "month.png")
     day = fleet2d.run("bundled:family", DAY)
-    first, end = (hour * 3600 for hour in HOURS)
-    speed = (end - first) / FILM_S
-    write_film(day, IMAGES / "day.webp", first, end, speed=speed, height=WIDE_PX, frames_per_s=10)
-    digests = {"day.webp": day.digest, "month.png": month.digest}
+    draw_page(month, IMAGES / "page.png")
+    film_page(day, IMAGES / "day.webp")
+    shown = {"day.webp": day, "month.png": month, "page.png": month}
+    digests = {name: run.digest for name, run in shown.items()}
     (IMAGES / "digests.json").write_text(json.dumps(digests, indent=2) + "\n", encoding="utf-8")
+
+
+def draw_page(run: Run, path: Path) -> None:
+    """Write a picture of the page of a run, at an evening of its last week."""
+    evening = run.clock.start + timedelta(days=25, hours=STILL_H)
+    (picture,) = pictures_of(run, [f"at={evening:%Y-%m-%dT%H:%M:%S}"], PAGE, "body")
+    picture.save(path, optimize=True)
+
+
+def film_page(run: Run, path: Path) -> None:
+    """Write a film of the plan on the page: some scenes of a day."""
+    moments = []
+    for begin_h, end_h, film_s in SCENES:
+        frames = film_s * FRAMES_PER_S
+        hours = (begin_h + (end_h - begin_h) * i / frames for i in range(frames))
+        moments += [run.clock.start + timedelta(hours=hour) for hour in hours]
+    views = [
+        f"at={moment:%Y-%m-%dT%H:%M:%S}&show=names,furniture,sight,lights,ways"
+        for moment in moments
+    ]
+    first, *others = pictures_of(run, views, FILM, ".plans")
+    first.save(
+        path, save_all=True, append_images=others, duration=1000 // FRAMES_PER_S, loop=0, quality=55
+    )
+
+
+def pictures_of(
+    run: Run, views: Sequence[str], size: dict[str, int], part: str
+) -> list[Image.Image]:
+    """Return pictures of a part of the page of a run, one of each view."""
+    server = PageServer([PageData(run)])
+    stop = server.start()
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            page: Any = browser.new_page(viewport=size, color_scheme="light")
+            page.goto(f"{server.address}#{views[0]}")
+            page.wait_for_selector("html[data-ready=true]")
+            return [picture_of(page, f"{server.address}#{view}", part) for view in views]
+    finally:
+        stop()
+
+
+def picture_of(page: Any, address: str, part: str) -> Image.Image:
+    """Return a picture of a part of a page that is open, at another view."""
+    page.goto(address)
+    page.wait_for_timeout(250)  # two frames, also on a busy machine
+    return Image.open(io.BytesIO(page.locator(part).screenshot())).convert("RGB")
 
 
 if __name__ == "__main__":

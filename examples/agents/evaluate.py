@@ -17,8 +17,8 @@ import numpy as np
 
 from fleet2d import Simulation
 from fleet2d.entities.robots.policy import COLUMNS
-from fleet2d.gym import RobotEnv, load_task, perceived_s
-from fleet2d.gym.task import Variants
+from fleet2d.learning.gym import RobotEnv, load_task, perceived_s
+from fleet2d.learning.gym.task import Variants
 
 LTP = {"ltp": {"type": "ltp", "estimator": "likelihood"}}
 BUNDLED: dict[str, dict[str, Any]] = {

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 from torch.distributions import Categorical
 
-from fleet2d.gym import VectorRobotEnv
+from fleet2d.learning.gym import VectorRobotEnv
 
 LIVES, HORIZON, EPOCHS, BATCHES, WIDTH = 16, 128, 4, 4, 64
 HALF_LIFE_S = {"hangout": 4 * 3600.0, "find": 600.0, "patrol": 3600.0}

@@ -17,7 +17,7 @@ from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
 from stable_baselines3.common.vec_env import DummyVecEnv
 from torch import Tensor, nn
 
-from fleet2d.gym import RobotEnv
+from fleet2d.learning.gym import RobotEnv
 
 LIVES, HORIZON = 8, 256
 

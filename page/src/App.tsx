@@ -6,8 +6,7 @@ import { useRef } from "preact/hooks";
 import { copyLink } from "./address";
 import type { Run } from "./data/run";
 import { KEYS } from "./keyboard";
-import { LiveControls } from "./live/LiveControls";
-import { branchHere, branching, refusal } from "./live/orders";
+import { Icon } from "./Icon";
 import { BeliefsPanel } from "./panels/BeliefsPanel";
 import { EventsPanel, KindChoice } from "./panels/EventsPanel";
 import { Inspect } from "./panels/Inspect";
@@ -19,8 +18,11 @@ import { Terms } from "./panels/Terms";
 import { downloadFilm, filming } from "./film";
 import { Plan } from "./plan/Plan";
 import * as state from "./state";
+import { dark } from "./theme";
 import { Ask } from "./timeline/Ask";
+import { Calendar, CalendarHead } from "./timeline/Calendar";
 import { Timeline } from "./timeline/Timeline";
+import { Clock, Transport } from "./Transport";
 
 const PANELS: Record<state.Panel, [string, ComponentType]> = {
   now: ["Now", Now],
@@ -41,14 +43,16 @@ export function App() {
       <Notes />
       <main>
         <div class="plans">
+          <Clock />
           {runs.map((run, i) => (
             <Plan key={run.path || i} run={run} other={two ? (runs[i === 0 ? 1 : 0] ?? null) : null} title={two ? run.facts.title : ""} />
           ))}
         </div>
         <Panels />
       </main>
-      <Controls />
-      <Timeline />
+      <Transport />
+      <Tools />
+      {state.view.value === "calendar" ? <Calendar /> : <Timeline />}
     </div>
   );
 }
@@ -69,7 +73,68 @@ function Header() {
       {state.runs.value.map((entry, i) => (
         <Verdicts key={i} run={entry} title={state.runs.value.length > 1 ? `${entry.facts.title}: ` : ""} />
       ))}
+      <span class="spacer" />
+      <Ask />
+      {run.path && !state.live.value && (
+        <button type="button" class="round" disabled={filming.value} aria-label={filming.value ? "Filming" : "Film"} title="A film of the minute around this moment (m)" onClick={() => void downloadFilm(run)}>
+          <Icon name="film" />
+        </button>
+      )}
+      {run.path && <CopyLink />}
+      <button
+        type="button"
+        class="round"
+        aria-label={dark.value ? "Light" : "Dark"}
+        onClick={() => {
+          state.theme.value = dark.value ? "light" : "dark";
+        }}
+      >
+        <Icon name="theme" />
+      </button>
+      <Help />
     </header>
+  );
+}
+
+/** How the timeline shows the run, and which part of it. */
+function Tools() {
+  const run = state.run.value!;
+  const { view } = state;
+  return (
+    <section class="tools" aria-label="Timeline settings">
+      <div class="segments" role="group" aria-label="View of the timeline">
+        {(["calendar", "lanes"] as const).map((name) => (
+          <button key={name} type="button" aria-pressed={view.value === name} onClick={() => (view.value = name)}>
+            {name === "calendar" ? "Calendar" : "Lanes"}
+          </button>
+        ))}
+      </div>
+      {view.value === "calendar" && <CalendarHead />}
+      <GoTo />
+      <KindChoice />
+      {view.value === "lanes" && (
+        <span class="group">
+          <button type="button" aria-label="Zoom in" onClick={() => state.zoom(0.5)}>
+            +
+          </button>
+          <button type="button" aria-label="Zoom out" onClick={() => state.zoom(2)}>
+            −
+          </button>
+          <button type="button" onClick={() => state.showRange(state.beginUs.value, state.endUs.value)}>
+            Whole run
+          </button>
+          <button
+            type="button"
+            onClick={() => {
+              const start = run.clock.dayStart(run.clock.day(state.moment.value));
+              state.showRange(start, start + 86_400e6);
+            }}
+          >
+            Day
+          </button>
+        </span>
+      )}
+    </section>
   );
 }
 
@@ -152,109 +217,6 @@ function Panels() {
   );
 }
 
-function Controls() {
-  const run = state.run.value!;
-  const playing = state.playing.value;
-  return (
-    <section class="controls" aria-label="Time">
-      {state.live.value ? (
-        <LiveControls />
-      ) : (
-        <button
-          type="button"
-          class="play"
-          aria-pressed={playing}
-          onClick={() => {
-            state.playing.value = !playing;
-          }}
-        >
-          {playing ? "❚❚ Pause" : "▶ Play"}
-        </button>
-      )}
-      {!state.live.value && <SpeedChoice />}
-      {run.path && state.runs.value.length === 1 && (
-        <button
-          type="button"
-          disabled={branching.value}
-          title="A second future from this moment, beside this one"
-          onClick={() => void branchHere(run)}
-        >
-          {branching.value ? "Repeating the run …" : "Continue from here"}
-        </button>
-      )}
-      {refusal.value && (
-        <strong role="alert" class="status">
-          {refusal.value}
-        </strong>
-      )}
-      <GoTo />
-      <Ask />
-      <output class="clock" aria-label="Shown moment">
-        day {run.clock.day(state.moment.value)} · {run.clock.text(state.moment.value)}
-      </output>
-      <span class="group">
-        <button type="button" aria-label={state.answer.value ? "Previous answer" : "Previous event"} onClick={() => state.jump(false)}>
-          ‹
-        </button>
-        <KindChoice />
-        <button type="button" aria-label={state.answer.value ? "Next answer" : "Next event"} onClick={() => state.jump(true)}>
-          ›
-        </button>
-      </span>
-      <span class="group">
-        <button type="button" aria-label="Zoom in" onClick={() => state.zoom(0.5)}>
-          +
-        </button>
-        <button type="button" aria-label="Zoom out" onClick={() => state.zoom(2)}>
-          −
-        </button>
-        <button type="button" onClick={() => state.showRange(state.beginUs.value, state.endUs.value)}>
-          Whole run
-        </button>
-        <button
-          type="button"
-          onClick={() => {
-            const start = run.clock.dayStart(run.clock.day(state.moment.value));
-            state.showRange(start, start + 86_400e6);
-          }}
-        >
-          Day
-        </button>
-      </span>
-      {run.path && !state.live.value && (
-        <button type="button" disabled={filming.value} title="A film of the minute around this moment (m)" onClick={() => void downloadFilm(run)}>
-          {filming.value ? "Filming …" : "Film"}
-        </button>
-      )}
-      {run.path && <CopyLink />}
-      <Help />
-    </section>
-  );
-}
-
-function speedText(factor: number): string {
-  return factor >= 86_400 ? "a day a second" : factor >= 3600 ? `${factor / 3600} h a second` : `${factor} ×`;
-}
-
-function SpeedChoice() {
-  const choices = state.SPEEDS.includes(state.speed.value) ? state.SPEEDS : [...state.SPEEDS, state.speed.value];
-  return (
-    <select
-      aria-label="Speed"
-      value={String(state.speed.value)}
-      onChange={(event) => {
-        state.speed.value = Number(event.currentTarget.value);
-      }}
-    >
-      {choices.map((factor) => (
-        <option key={factor} value={String(factor)}>
-          {speedText(factor)}
-        </option>
-      ))}
-    </select>
-  );
-}
-
 function GoTo() {
   const isWrong = useSignal(false);
   const input = useRef<HTMLInputElement>(null);
@@ -294,8 +256,8 @@ function CopyLink() {
     }, 2000);
   };
   return (
-    <button type="button" title="A link to this moment and view" onClick={() => void copy()}>
-      {words.value}
+    <button type="button" class="quiet" title="A link to this moment and view" onClick={() => void copy()}>
+      <Icon name="link" /> {words.value}
     </button>
   );
 }

@@ -18,7 +18,8 @@ export function addressOf(run: Run): string {
   }
   words.set("show", state.SWITCHES.filter((name) => state.shown.value.has(name)).join(","));
   words.set("panel", state.panel.value);
-  words.set("speed", String(state.speed.value));
+  words.set("view", state.view.value);
+  if (state.speed.value !== state.ADAPTIVE) words.set("speed", String(state.speed.value));
   const optional = {
     select: state.selected.value,
     layer: state.layer.value,
@@ -51,6 +52,8 @@ export function applyAddress(text: string, run: Run): void {
   if (panel) state.panel.value = panel;
   const speed = Number(words.get("speed"));
   if (speed > 0 && speed <= 86_400) state.speed.value = speed;
+  const view = words.get("view");
+  if (view === "calendar" || view === "lanes") state.view.value = view;
   state.selected.value = words.get("select") ?? "";
   state.layer.value = words.get("layer") ?? "";
   state.belief.value = words.get("belief") ?? "";

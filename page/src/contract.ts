@@ -1,4 +1,7 @@
-// Written by `python -m tools.contract_types` from fleet2d.viewer.contract.
+// Written by `python -m tools.contract_types` from fleet2d.viewing.contract.
+
+/** Every kind of event that Fleet2D records. */
+export type EventKind = "user_lost" | "user_seen" | "robot_lost" | "robot_seen" | "activity" | "came_home" | "known" | "left_home" | "reacts" | "unknown" | "uses" | "accepted" | "allowed" | "approaches" | "asks" | "banned" | "battery" | "called" | "calls" | "charged" | "collects" | "declined" | "deferred" | "delivered" | "docks" | "due" | "expired" | "explored" | "explores" | "find_begins" | "follows" | "found" | "gave_up" | "gives_up" | "gives_way" | "ignored" | "interaction_over" | "interacts" | "localization_lost" | "lost" | "mistaken" | "not_at_home" | "opportunity" | "question" | "relocalized" | "relocates" | "replay" | "replies" | "retraced" | "retraces" | "sent_away" | "switched_off" | "told" | "visits" | "way_blocked" | "withdraws" | "light_off" | "light_on" | "locked" | "moved" | "opened" | "room_changed" | "sensor" | "shut" | "unlocked";
 
 /** A room: its colours on the plan and in lanes, and the anchor of its name [m]. */
 export interface RoomFacts {
@@ -19,12 +22,29 @@ export interface DoorFacts {
   locked: boolean;
 }
 
-/** A piece of furniture: its outline [m], and whether it blocks nothing, paths or sight. */
+/** A passage between two rooms: its jambs [m], and whether a door can shut it. */
+export interface DoorwayFacts {
+  start: [number, number];
+  end: [number, number];
+  leaf: boolean;
+}
+
+/** A place from which a piece of furniture is used [m], and how a person is there [rad]. */
+export interface UseFacts {
+  x: number;
+  y: number;
+  heading: number;
+  posture: string;
+}
+
+/** A piece of furniture: its outline [m], the direction of its front [rad], its uses. `blocks` says whether it is in the way of nothing, paths or sight. */
 export interface ObjectFacts {
   name: string;
   type: string;
   outline: [number, number][];
   blocks: string;
+  front: number;
+  uses: UseFacts[];
 }
 
 /** A home: outlines in metres, cells as runs of equal rooms. `free` lists polygons, each an outline and its holes. `room_cells` are pairs (room, number of cells), row by row from the lowest; -1 is no room. `place_cells` are such pairs, too, in which cells that a wall cuts have the room of a cell beside them: somebody may be in their free part. */
@@ -41,7 +61,7 @@ export interface HomeFacts {
   rooms: RoomFacts[];
   room_cells: number[];
   place_cells: number[];
-  doorways: [[number, number], [number, number]][];
+  doorways: DoorwayFacts[];
   doors: DoorFacts[];
   objects: ObjectFacts[];
   no_go: [number, number][][];
@@ -119,6 +139,13 @@ export interface VerdictFacts {
   step: number | null;
 }
 
+/** A moment that is worth a look. */
+export interface StoryFacts {
+  step: number;
+  title: string;
+  words: string;
+}
+
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
 export interface SlowFacts {
   outline: [number, number][];
@@ -156,9 +183,10 @@ export interface RunFacts {
   marks: MarkFacts[];
   verdict: string;
   verdicts: VerdictFacts[];
+  story: StoryFacts[];
   slows: SlowFacts[];
   starts_unlit: boolean;
-  event_kinds: string[];
+  event_kinds: EventKind[];
   metrics: Record<string, unknown>;
   scenario: Record<string, unknown>;
   walks_every_s: number;

@@ -7,13 +7,14 @@ import { Run } from "./data/run";
 import { openSession } from "./data/source";
 import { followKeyboard } from "./keyboard";
 import { Feed, show } from "./live/feed";
-import { followPlaying } from "./player";
+import { followPlaying, openInMotion } from "./player";
 import * as state from "./state";
 import "./style.css";
 import { followTheme } from "./theme";
 
 /** Runs beside each other at first, as many as the command takes; branches join them. */
 const MOST_RUNS = 4;
+const DAY_US = 86_400e6;
 
 async function start(box: HTMLElement): Promise<void> {
   followTheme();
@@ -29,6 +30,8 @@ async function start(box: HTMLElement): Promise<void> {
   show(feed ? [feed] : []);
   state.setRange(state.beginUs.value, state.endUs.value);
   state.goTo(state.beginUs.value);
+  const asked = location.hash.length > 1;
+  if (runs.length > 1 || state.endUs.value - state.beginUs.value < 2 * DAY_US || feed) state.view.value = "lanes";
   applyAddress(location.hash, runs[0]!);
   document.title = `${runs.map((run) => run.facts.title).join(" · ")} – Fleet2D`;
   render(<App />, box);
@@ -39,6 +42,7 @@ async function start(box: HTMLElement): Promise<void> {
   followPlaying();
   if (feed) feed.follow();
   else await Promise.all(runs.map((run) => run.readRest()));
+  if (!feed && !asked) openInMotion();
   document.documentElement.dataset.ready = "true";
 }
 

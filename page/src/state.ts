@@ -1,5 +1,6 @@
 /** The state of the page: signals that all parts read, and the few functions that change them. */
 
+import type { EventKind } from "./contract";
 import { batch, computed, signal } from "@preact/signals";
 import { type Answer, ask, withWords } from "./data/ask";
 import type { EventRow } from "./data/events";
@@ -7,6 +8,8 @@ import type { Run } from "./data/run";
 import { firstAtLeast, lastAtMost } from "./data/search";
 
 export const SPEEDS = [1, 10, 60, 600, 3600, 14_400, 86_400];
+/** The speed that follows what happens: dull time flies. */
+export const ADAPTIVE = 0;
 export const SWITCHES = ["names", "furniture", "ways", "sight", "observations", "beliefs", "lights", "slows"] as const;
 export type Switch = (typeof SWITCHES)[number];
 export const PANELS = ["now", "inspect", "beliefs", "events", "metrics", "layers", "notes"] as const;
@@ -21,7 +24,9 @@ export const range = signal<[number, number]>([0, 1]);
 /** A range whose totals are shown [us]. */
 export const marked = signal<[number, number] | null>(null);
 export const playing = signal(false);
-export const speed = signal(60);
+export const speed = signal(ADAPTIVE);
+/** How the timeline shows the run: a row a day, or a lane for each body. */
+export const view = signal<"calendar" | "lanes">("calendar");
 export const selected = signal("");
 /** The body that the plan follows; empty: none. */
 export const followed = signal("");
@@ -50,7 +55,7 @@ export const foundEvents = computed<readonly EventRow[]>(() => {
   if (!entry) return [];
   void entry.version.value;
   const [kind, words] = [eventKind.value, search.value.trim()];
-  const rows = kind ? entry.events.ofKind(kind) : entry.events.rows;
+  const rows = kind ? entry.events.ofKind(kind as EventKind) : entry.events.rows;
   return words ? withWords(entry, rows, words) : rows;
 });
 
@@ -136,7 +141,8 @@ export function toggle(name: Switch): void {
 }
 
 export function faster(by: 1 | -1): void {
-  const at = SPEEDS.findIndex((entry) => entry >= speed.value);
+  const from = speed.value === ADAPTIVE ? 60 : speed.value;
+  const at = SPEEDS.findIndex((entry) => entry >= from);
   const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, (at < 0 ? SPEEDS.length : at) + by))];
   speed.value = next ?? speed.value;
 }

@@ -20,6 +20,9 @@ export interface Colors {
   halo: string;
   hatch: string;
   slow: string;
+  shadow: string;
+  /** How much people move, in the overview. */
+  bars: string;
 }
 
 const LIGHT: Colors = {
@@ -32,13 +35,15 @@ const LIGHT: Colors = {
   furniture: "rgba(251,250,247,0.75)",
   furnitureEdge: "#8b9099",
   door: "#8a5a2b",
-  view: "rgba(255,210,63,0.42)",
-  viewEdge: "#b98900",
+  view: "#0e9e9a",
+  viewEdge: "#0b7d7a",
   alarm: "#c8452f",
-  cursor: "#c8452f",
+  cursor: "#0a7470",
   halo: "rgba(255,255,255,0.8)",
   hatch: "#cfd2d6",
   slow: "#0077bb",
+  shadow: "rgba(70, 60, 45, 0.28)",
+  bars: "#9a9fa8",
 };
 
 const DARK: Colors = {
@@ -51,13 +56,15 @@ const DARK: Colors = {
   furniture: "rgba(22,24,28,0.45)",
   furnitureEdge: "#858b95",
   door: "#d49a5c",
-  view: "rgba(255,210,63,0.24)",
-  viewEdge: "#e0b13a",
+  view: "#5ae1d7",
+  viewEdge: "#6ff0e6",
   alarm: "#ff7a63",
-  cursor: "#ff7a63",
+  cursor: "#3cc7c0",
   halo: "rgba(22,24,28,0.8)",
   hatch: "#4a5059",
   slow: "#66bbee",
+  shadow: "rgba(0, 0, 0, 0.65)",
+  bars: "#6a727d",
 };
 
 const query = typeof matchMedia === "function" ? matchMedia("(prefers-color-scheme: dark)") : null;
@@ -77,13 +84,13 @@ export function followTheme(): void {
 
 /** Colours of words and lines, distinct with any kind of colour blindness (Paul Tol's muted scheme). */
 export const PALETTE = ["#88ccee", "#ddcc77", "#cc6677", "#44aa99", "#aa4499", "#999933", "#332288", "#117733", "#882255"];
-/** What each camera of a robot has in view. */
-const CAMERA_COLORS = ["#ffd23f", "#33bbee", "#ee7733", "#bbbbbb"];
+/** What each camera of a robot but the first has in view. */
+const CAMERA_COLORS = ["#bbbbbb", "#33bbee", "#ee7733"];
 
-/** The fill of the region that a camera sees, by the camera's number, and its edge. */
+/** The colour of the region that a camera sees, by the camera's number, and of its edge. */
 export function cameraColors(number: number, { view, viewEdge }: Colors): [string, string] {
   const color = CAMERA_COLORS[number % CAMERA_COLORS.length]!;
-  return number === 0 ? [view, viewEdge] : [`${color}55`, mix(color, "#000000", 0.3)];
+  return number === 0 ? [view, viewEdge] : [color, mix(color, "#000000", 0.3)];
 }
 
 type Rgb = [number, number, number];

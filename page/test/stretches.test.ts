@@ -37,6 +37,6 @@ describe("events", () => {
 
   it("knows the last of an entity", () => {
     expect(events.last("ana", "activity", 25)?.detail).toBe("0");
-    expect(events.last("ben", "", 25)).toBeNull();
+    expect(events.last("ben", "activity", 25)).toBeNull();
   });
 });

@@ -39,7 +39,7 @@ void follow_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     Steps<W> steps(group);
     ForwardPass<W> pass(group, steps, filtered);
     for (i64 t = 0; t < count; ++t) pass.step(t);
-    for (std::size_t lane = 0; lane < W; ++lane) {
+    for (std::size_t lane = 0; lane < static_cast<std::size_t>(group.people); ++lane) {
         for (i64 t = 0; t < places[lane].size(); ++t) {
             const View<const Lanes<W>> mass = filtered.mass[t + 1];
             const View<f64> row = places[lane][t];
@@ -61,7 +61,7 @@ Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f6
     const Array<bool, 2> in_view = rooms_in_view(model, stretches.views);
     auto places = Array<f64, 2>::zeros({count, model.rooms()});
     Filtered<1> filtered;
-    follow_group<1>({{model}, {stretches}, in_view, {now}, {shown}}, filtered, {places.view()}, {now});
+    follow_group<1>({1, {model}, {stretches}, in_view, {now}, {shown}}, filtered, {places.view()}, {now});
     const View<const u8> last = stretches.shown(count - 1);
     std::copy(last.begin(), last.end(), shown.begin());
     return places;
@@ -135,10 +135,11 @@ OwnedStretches merge_bins(View<const i64> minute, View<const i64> view, const Pa
     return result;
 }
 
-std::vector<OwnedStretches> DayEvidence::stretches(i64 longest) const {
+std::vector<OwnedStretches> DayEvidence::stretches(i64 people, i64 longest) const {
     std::vector<OwnedStretches> result;
-    for (i64 person = 0; person + 1 < begin.size(); ++person) {
-        const auto own = [&](View<const i64> all) { return all.slice(begin[person], begin[person + 1]); };
+    for (i64 person = 0; person < people; ++person) {
+        const auto [begin, end] = sightings_of(person);
+        const auto own = [begin = begin, end = end](View<const i64> all) { return all.slice(begin, end); };
         result.push_back(merge_bins(minute, view, {own(bin), own(patch), own(steps)}, longest));
     }
     return result;
@@ -165,17 +166,18 @@ Array<f64, 3> all_hidden(View<const f64, 2> places) {
 }
 
 PeoplePlaces follow_people(const PeopleModel& model, const DayEvidence& day, i64 longest, View<f64, 3> now) {
-    const std::vector<OwnedStretches> stretches = day.stretches(longest);
+    const std::vector<OwnedStretches> stretches = day.stretches(model.size(), longest);
     PeoplePlaces result = PeoplePlaces::of(stretches, model.restless.shape[1]);
     if (model.size() == 0) return result;
     const SharedViews shared(model.of(0), day.views);
     in_groups(model.size(), [&]<int W>(Filtered<W>& filtered, i64 first) {
-        auto states = for_lanes<W>([&](i64 lane) { return all_hidden(now[first + lane]); });
+        const auto of = [&](i64 lane) { return person_of(lane, first, model.size()); };
+        auto states = for_lanes<W>([&](i64 lane) { return all_hidden(now[of(lane)]); });
         const Group<W> group = group_of<W>(model, stretches, shared, first, states);
-        const auto places = for_lanes<W>([&](i64 lane) { return result.of(first + lane); });
+        const auto places = for_lanes<W>([&](i64 lane) { return result.of(of(lane)); });
         const auto after = for_lanes<W>([&](i64 lane) { return states[static_cast<std::size_t>(lane)].view(); });
         side_by_side<W>([&] { follow_group<W>(group, filtered, places, after); });
-        for (std::size_t lane = 0; lane < W; ++lane) {
+        for (std::size_t lane = 0; lane < static_cast<std::size_t>(group.people); ++lane) {
             const View<f64, 2> after = now[first + static_cast<i64>(lane)];
             for (i64 stage = 0; stage < after.size(); ++stage) {
                 for (i64 p = 0; p < after.shape[1]; ++p) {

@@ -2,17 +2,14 @@ from fleet2d.algorithms.algorithm import Algorithm as Algorithm
 from fleet2d.algorithms.algorithm import Present as Present
 from fleet2d.algorithms.algorithm import RoomDistribution as RoomDistribution
 from fleet2d.algorithms.history import History as History
-from fleet2d.configuration.components import register as register
 from fleet2d.configuration.units import Duration as Duration
 from fleet2d.configuration.units import InputPath as InputPath
 from fleet2d.configuration.units import Length as Length
 from fleet2d.configuration.units import Share as Share
-from fleet2d.datasets.generate import dataset as dataset
-from fleet2d.datasets.reader import Dataset as Dataset
-from fleet2d.datasets.reader import open_dataset as open_dataset
 from fleet2d.engine.interrupt import Interrupt as Interrupt
 from fleet2d.engine.interrupt import SpanView as SpanView
 from fleet2d.engine.repeat import branch as branch
+from fleet2d.engine.repeat import judge as judge
 from fleet2d.engine.repeat import reproduce as reproduce
 from fleet2d.engine.repeat import resume as resume
 from fleet2d.engine.simulation import Simulation as Simulation
@@ -34,12 +31,15 @@ from fleet2d.floorplan.home import HomeChanges as HomeChanges
 from fleet2d.floorplan.load import load_floorplan as load_floorplan
 from fleet2d.floorplan.plan import FloorPlan as FloorPlan
 from fleet2d.floorplan.plan import LabelledRegion as LabelledRegion
+from fleet2d.learning.datasets.generate import dataset as dataset
+from fleet2d.learning.datasets.reader import Dataset as Dataset
+from fleet2d.learning.datasets.reader import open_dataset as open_dataset
+from fleet2d.live.exporters import export as export
 from fleet2d.metrics.metric import Metric as Metric
-from fleet2d.runs.exporters import export as export
 from fleet2d.runs.run import Run as Run
 from fleet2d.runs.run import open_run as open_run
+from fleet2d.scenario.load import load_scenario as load_scenario
 from fleet2d.scenario.model import Scenario as Scenario
-from fleet2d.scenario.model import load_scenario as load_scenario
 from fleet2d.sight.fov import FieldOfView as FieldOfView
 from fleet2d.sight.fov import VisibleRegion as VisibleRegion
 from fleet2d.sight.perception_error import CameraSightings as CameraSightings
@@ -48,5 +48,7 @@ from fleet2d.studies.api import map_runs as map_runs
 from fleet2d.studies.api import study as study
 from fleet2d.studies.reader import Study as Study
 from fleet2d.studies.reader import open_study as open_study
+from fleet2d.viewing.notebook import draw as draw
+from fleet2d.viewing.notebook import view as view
 
 __version__: str

@@ -480,23 +480,24 @@ class Moments(NamedTuple):
     rests: F64
 
 
-class PeopleEvidence(NamedTuple):
-    """Evidence of consecutive bins of a day.
+class DayEvidence(NamedTuple):
+    """Evidence of a day, or of consecutive bins of it, as stays are learned from it.
 
     Attributes:
         minute: int64 (bins,), beginning of each bin [minutes since midnight].
         view: int64 (bins,), the row of `views`; consecutive bins with the same view have the same.
-        views: uint8 (views, patches), as in `fleet2d.kernels.Stretches`.
-        begin: int64 (people + 1,), offsets of each person's sightings in `bin`, `patch`, `steps`.
-        bin: int64 (sightings,), ascending for each person.
-        patch: int64 (sightings,), where the person was perceived, ascending within each bin.
+        views: uint8 (views, patches), how much of each patch was watched, as in
+            `fleet2d.kernels.Stretches`; consecutive rows differ.
+        user: int64 (sightings,), ascending, row of the user of each sighting.
+        bin: int64 (sightings,), ascending for each user.
+        patch: int64 (sightings,), where the user was perceived, ascending within each bin.
         steps: int64 (sightings,), number of steps with a sighting in that bin and patch.
     """
 
     minute: I64
     view: I64
     views: U8
-    begin: I64
+    user: I64
     bin: I64
     patch: I64
     steps: I64

@@ -24,6 +24,11 @@ Scale = Annotated[
     ),
 ]
 
+BODY_RADIUS_M = 0.15
+Radius = Annotated[
+    float, typer.Option(min=0.01, max=5, help="Radius of the robot for a floor plan [m].")
+]
+
 
 def resume_hint(time: datetime, directory: Path) -> str:
     """Return a line about a run that was interrupted at a local time."""

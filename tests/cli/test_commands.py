@@ -155,4 +155,4 @@ def test_command_imports_no_other() -> None:
         [sys.executable, "-c", OTHERS], capture_output=True, text=True, check=True
     )
 
-    assert "fleet2d.cli.run" == done.stdout.splitlines()[-1]
+    assert "fleet2d.cli.results fleet2d.cli.run" == done.stdout.splitlines()[-1]

@@ -20,6 +20,7 @@ from fleet2d.configuration.trust import (
     running_code,
     stored_code,
 )
+from fleet2d.engine.interrupt import Interruptions
 from fleet2d.entities.plan import data_of
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.interventions import Decide
@@ -181,7 +182,7 @@ def test_a_stored_run_is_shown_without_code_unless_a_body_needs_it(
 def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d: Cli, tmp_path: Path) -> None:
     stored(tmp_path)
     run = package.open_run("run")
-    for use in (lambda: run.path("ana"), lambda: run.judge("always(room(ana) != bath)")):
+    for use in (lambda: run.path("ana"), lambda: package.judge("always(room(ana) != bath)", run)):
         with pytest.raises(UntrustedCodeError, match="which would run"):
             use()
     assert not Path("ran").exists()
@@ -218,7 +219,9 @@ def half_a_run(name: str) -> package.Simulation:
         Decide("astro", data_of(simulation.plan("astro").stay().interrupt_on("home_empty")))
     )
     simulation.advance(200)
-    waits = simulation._state.interruptions._held
+    interruptions = simulation._state.find(Interruptions)
+    assert interruptions is not None
+    waits = interruptions._held
     waits[next(iter(waits))[0], name] = False
     return simulation
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.homes import walls_of
+from tests.meshed_homes import walls_of
 from tests.reference import visible_cells as slow
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
 

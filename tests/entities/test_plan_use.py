@@ -9,7 +9,7 @@ import shapely
 import fleet2d
 from fleet2d import Behavior, ComponentError, Situation
 from fleet2d.entities.plan import Plan
-from fleet2d.floorplan.formats.native import native_document
+from fleet2d.floorplan.native import native_document
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.space import Space

@@ -4,8 +4,8 @@ from typing import Any
 import pytest
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.dxf import Dxf
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.homes.formats.dxf import Dxf
 
 ezdxf = pytest.importorskip("ezdxf")
 

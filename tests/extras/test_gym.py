@@ -15,7 +15,7 @@ from tests.entities.robots.robots import OUT, home_with  # noqa: E402
 
 import fleet2d  # noqa: E402
 from fleet2d.errors import InputError  # noqa: E402
-from fleet2d.gym import DiscountByTime, RobotEnv, RobotsEnv, VectorRobotEnv, load_task  # noqa: E402
+from fleet2d.learning.gym import DiscountByTime, RobotEnv, RobotsEnv, VectorRobotEnv, load_task  # noqa: E402
 
 SHORT = "simulation.duration=1 d"
 TASKS = ["hangout", "find", "patrol"]
@@ -396,7 +396,7 @@ def test_unknown_task_has_the_nearest_name() -> None:
 
 def test_picture_of_a_life_shows_the_scores() -> None:
     pytest.importorskip("matplotlib")
-    from fleet2d.gym.pictures import life_figure
+    from fleet2d.learning.gym.pictures import life_figure
 
     env = RobotEnv(flat(), render_mode="rgb_array")
     env.reset(seed=1)

@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.ifc import Ifc
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.homes.formats.ifc import Ifc
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
 

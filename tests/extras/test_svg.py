@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.svg import Svg
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.homes.formats.svg import Svg
 
 pytest.importorskip("svgelements")
 

@@ -4,9 +4,9 @@ import itertools
 from pathlib import Path
 
 import pytest
-from tests.datasets.small import SOURCE, make
+from tests.learning.datasets.small import SOURCE, make
 
-from fleet2d.datasets.tasks import windows
+from fleet2d.learning.datasets.tasks import windows
 
 torch = pytest.importorskip("torch", reason="torch isn't installed")
 
@@ -20,7 +20,7 @@ def test_workers_share_the_windows(folder: Path) -> None:
     from torch.utils.data import DataLoader
 
     import fleet2d
-    from fleet2d.datasets.torch_data import torch_windows
+    from fleet2d.learning.datasets.torch_data import torch_windows
 
     data = fleet2d.open_dataset(folder)
     parts = list(windows(data, "train"))
@@ -34,7 +34,7 @@ def test_workers_share_the_windows(folder: Path) -> None:
 
 def test_shuffled_windows_are_the_same_ones_in_another_order(folder: Path) -> None:
     import fleet2d
-    from fleet2d.datasets.torch_data import torch_windows
+    from fleet2d.learning.datasets.torch_data import torch_windows
 
     data = fleet2d.open_dataset(folder)
     plain, shuffled, again = (
@@ -48,7 +48,7 @@ def test_shuffled_windows_are_the_same_ones_in_another_order(folder: Path) -> No
 
 
 def test_fresh_windows_have_no_end_and_other_people() -> None:
-    from fleet2d.datasets.torch_data import fresh_windows
+    from fleet2d.learning.datasets.torch_data import fresh_windows
 
     first, other = (
         [

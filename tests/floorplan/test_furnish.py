@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely import Polygon
-from tests.homes import plan_files
+from tests.meshed_homes import plan_files
 from tests.strategies import homes, quick
 from tests.thorough import some
 

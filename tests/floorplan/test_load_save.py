@@ -9,8 +9,8 @@ import yaml
 from tests.scenes import Cli
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.native import HOMES, native_document, native_schema
 from fleet2d.floorplan.load import is_floorplan, load_floorplan, save_floorplan
+from fleet2d.floorplan.native import HOMES, native_document, native_schema
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine

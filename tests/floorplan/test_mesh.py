@@ -7,12 +7,12 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import all_homes, home_of
+from tests.meshed_homes import all_homes, home_of
 from tests.strategies import homes, quick
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
+from fleet2d.homes.formats.occupancy import outline
 from fleet2d.kernels import Mesh
 
 SQUARE = [(0, 0), (640, 0), (640, 640), (0, 640)]

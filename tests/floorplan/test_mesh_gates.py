@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given, settings
-from tests.homes import Home, all_homes, awkward_points, home_of
+from tests.meshed_homes import Home, all_homes, awkward_points, home_of
 from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
 from tests.thorough import examples

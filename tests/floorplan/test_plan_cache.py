@@ -10,7 +10,7 @@ import pytest
 import fleet2d
 from fleet2d.floorplan import home as homes
 from fleet2d.floorplan import source
-from fleet2d.floorplan.formats.native import HOMES
+from fleet2d.floorplan.native import HOMES
 from fleet2d.floorplan.plan import Cache
 from fleet2d.metrics.ltp_error import walking_distances
 

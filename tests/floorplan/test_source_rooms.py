@@ -3,7 +3,7 @@ import shapely
 from pydantic import ValidationError
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.native import Bundled
+from fleet2d.floorplan.native import Bundled
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import RoomCorrection, correct_rooms
 

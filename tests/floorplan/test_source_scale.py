@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image as Picture
-from tests.floorplan.test_damaged_files import FORMATS, PGM, write
+from tests.homes.test_damaged_files import FORMATS, PGM, write
 
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.checkup import checkup
-from fleet2d.floorplan.formats.drawing import Image
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.floorplan.synthetic.source import Synthetic
+from fleet2d.homes.formats.drawing import Image
+from fleet2d.homes.synthetic.source import Synthetic
 
 
 @pytest.mark.parametrize("kind", sorted({name.split()[0] for name in FORMATS}))

@@ -11,17 +11,17 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from tests.homes import plan_files, walls_of
+from tests.meshed_homes import plan_files, walls_of
 from tests.reference.line_of_sight import visible
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 from tests.thorough import some
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats.houseexpo import read_houseexpo
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import ROUNDING, PointDistances, Space, grow_polygons, grow_shape
+from fleet2d.homes.formats.houseexpo import read_houseexpo
 from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280

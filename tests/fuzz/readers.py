@@ -14,8 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
 from hypothesis import strategies as st
-from tests.floorplan.test_damaged_files import FORMATS, PGM
 from tests.fuzz.changes import lines, pieces, structures
+from tests.homes.test_damaged_files import FORMATS, PGM
 from tests.logs.test_layout_reading import ADLS, CASAS, HOMER, SENSORS
 from tests.scenes import flat_document, scenario
 
@@ -23,15 +23,15 @@ import fleet2d
 from fleet2d.algorithms.algorithm import load_learned
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.configuration.trust import running_code
-from fleet2d.fit.perception import read_detections
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.learning.fit.perception import read_detections
 from fleet2d.live.messages import parse_message
 from fleet2d.logs.layout import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.specification import read_specification
 
-RUN = Path(__file__).parents[1] / "fixtures" / "runs" / "v2"
+RUN = Path(__file__).parents[1] / "fixtures" / "run"
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ import pytest
 from fleet2d.algorithms.algorithm import load_learned
 from fleet2d.algorithms.presence.learned import WEIGHTS, Weights
 from fleet2d.errors import InputError
-from fleet2d.floorplan.formats.bag import BagMap
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.homes.formats.bag import BagMap
 from fleet2d.logs.bags import read_bag
 from fleet2d.logs.detections import read_detections
 

@@ -17,7 +17,7 @@ import resource, sys, time
 from pathlib import Path
 import fleet2d
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats import apart
+from fleet2d.homes.formats import apart
 
 resolution = 0.05 if sys.argv[1].endswith(".pgm") else None
 start = time.process_time()

@@ -11,13 +11,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from tests.datasets.small import make
 from tests.hostile.test_folders import attack, state_of
+from tests.learning.datasets.small import make
 
 import fleet2d
-from fleet2d.datasets.reader import open_dataset
-from fleet2d.datasets.tables import SCHEMAS
-from fleet2d.datasets.tasks import leaderboard, windows
+from fleet2d.learning.datasets.reader import open_dataset
+from fleet2d.learning.datasets.tables import SCHEMAS
+from fleet2d.learning.datasets.tasks import leaderboard, windows
 
 MANIFEST = "dataset.json"
 
@@ -314,7 +314,7 @@ def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(
 def test_names_of_models_are_printed_without_control_characters(
     copy: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from fleet2d.datasets.command import _print_scores
+    from fleet2d.learning.datasets.command import _print_scores
 
     def change(content: pa.Table) -> pa.Table:
         index = content.column_names.index("model")

@@ -26,10 +26,10 @@ import fleet2d
 from fleet2d.artifacts.seal import verify_run
 from fleet2d.engine.repeat import reproduce, resume
 from fleet2d.errors import Fleet2DError, RunDirectoryError
-from fleet2d.runs.exporters import Selection, exporter
+from fleet2d.live.exporters import Selection, exporter
 from fleet2d.runs.run import open_run
-from fleet2d.viewer.page_data import export_html
-from fleet2d.viewer.report import write_report
+from fleet2d.viewing.page_data import export_html
+from fleet2d.viewing.report import write_report
 
 SECRET = "precious, and nobody's business"
 
@@ -61,13 +61,13 @@ def to_report(run: Path) -> None:
 
 
 def to_film(run: Path) -> None:
-    from fleet2d.viewer.film import write_film
+    from fleet2d.viewing.film import write_film
 
     write_film(open_run(run), run / "film.gif", 0, 60, height=120)
 
 
 def to_picture(run: Path) -> None:
-    from fleet2d.pictures.run import draw_run
+    from fleet2d.viewing.pictures.run import draw_run
 
     draw_run(open_run(run), run / "picture.png")
 

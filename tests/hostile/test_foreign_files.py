@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.formats import apart
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.homes.formats import apart
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">{}</svg>'
 IFC = """ISO-10303-21;

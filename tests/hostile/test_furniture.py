@@ -13,7 +13,7 @@ import pytest
 import shapely
 import shapely.affinity
 from shapely import Polygon
-from tests.homes import plan_files
+from tests.meshed_homes import plan_files
 from tests.thorough import THOROUGH, some
 
 from fleet2d.errors import FloorPlanError

@@ -14,7 +14,7 @@ import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tests.homes import home_of
+from tests.meshed_homes import home_of
 
 import fleet2d
 from fleet2d import _core, kernels
@@ -26,11 +26,11 @@ from fleet2d.kernels import (
     Corners,
     CoverageRecord,
     CoverageSetup,
+    DayEvidence,
     DetectionRule,
     ErrorTables,
     Lenses,
     Moments,
-    PeopleEvidence,
     PlaceNetwork,
     Reach,
     RoomMemory,
@@ -174,7 +174,6 @@ def test_the_core_exports_only_what_others_import_and_the_parts_that_are_tested(
 
 # Structs of the core with other names than their named tuples.
 NAMED_TUPLES = {
-    "DayEvidence": "PeopleEvidence",
     "PeopleModel": "StayModel",
     "PeopleMoments": "Moments",
     "PosesToFill": "Poses",
@@ -182,13 +181,24 @@ NAMED_TUPLES = {
 }
 
 
+def members_declared_in(core: str, name: str) -> tuple[str, ...]:
+    """The members of a struct of the core, in the order of their declaration."""
+    content = re.search(rf"struct {name}(?: : [\w:, ]+)? \{{\n(.*?)\n\}};", core, re.S)
+    assert content is not None
+    lines = re.sub(r" *//[^\n]*", "", content[1]).splitlines()
+    declared = [line for line in lines if re.match(r"    \w", line) and "(" not in line]
+    names = [re.sub(r"^ *(?:const )?[\w:]+(?:<[^;]*>)? ", "", line) for line in declared]
+    return tuple(re.match(r" *(\w+)", name)[1] for line in names for name in line.split(","))  # type: ignore[index]
+
+
 def test_named_tuples_have_the_members_of_their_structs_in_order() -> None:
     """Tuples become structs by position, so two fields in another order would be taken for each other."""
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "src" / "core").rglob("*.[ch]pp")]
+    core = "\n".join(texts)
     members = {}
-    for path in (ROOT / "src" / "core" / "python").iterdir():
-        text = path.read_text(encoding="utf-8")
-        for match in re.finditer(r"members_of<(\w+)> =\s*std::tuple\((.*?)\);", text, re.S):
-            members[match[1]] = tuple(re.findall(r"::(\w+)", match[2]))
+    for name, count in re.findall(r"members_of<(\w+)> = (\d+);", core):
+        members[name] = members_declared_in(core, name)
+        assert len(members[name]) == int(count)
     del members["Chains"]  # plain tuples of the probabilities, bins and offsets of `PeoplePlaces`
     fields = {
         name: value._fields for name, value in vars(kernels).items() if hasattr(value, "_fields")
@@ -389,12 +399,12 @@ def people() -> StayModel:
     return StayModel(*(np.repeat(part[None], 5, axis=0) for part in arrays), first, detection)
 
 
-def evidence() -> PeopleEvidence:
+def evidence() -> DayEvidence:
     views = np.zeros((2, 4), np.uint8)
     views[1, 2] = 60
-    begin, view = np.array([0, 1, 1, 3, 3, 4]), np.array([0, 0, 1, 1, 1])
+    user, view = np.array([0, 2, 2, 4]), np.array([0, 0, 1, 1, 1])
     columns = np.array([1, 0, 4, 2]), np.array([2, 1, 2, 0]), np.array([1, 2, 2, 3])
-    return PeopleEvidence(np.arange(5), view, views, begin, *columns)
+    return DayEvidence(np.arange(5), view, views, user, *columns)
 
 
 def stretches() -> Stretches:

@@ -7,8 +7,8 @@ from math import ceil
 import numpy as np
 import pytest
 import shapely
-from tests.homes import home_of
 from tests.kernels.test_space_routes import routes_of
+from tests.meshed_homes import home_of
 
 from fleet2d.kernels import TURN, Legs, time_route, turn_between
 

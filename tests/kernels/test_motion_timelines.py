@@ -16,7 +16,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
-from tests.homes import Home, home_of
+from tests.meshed_homes import Home, home_of
 from tests.reference import motion as slow
 from tests.strategies import quick
 

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from tests.homes import Home, home_of, houseexpo
+from tests.meshed_homes import Home, home_of, houseexpo
 from tests.reference import motion as slow
 from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, quick, seeds

@@ -9,8 +9,8 @@ from tests.kernels.test_presence_stays import PATCHES, SIZES, by_place, case, no
 from tests.reference import presence as slow
 
 from fleet2d.kernels import (
+    DayEvidence,
     Moments,
-    PeopleEvidence,
     PeoplePlaces,
     StayModel,
     follow_people,
@@ -33,7 +33,7 @@ def models(seed: int, stages: int, people: int) -> StayModel:
     return StayModel(*columns, each[0].first, each[0].detection)
 
 
-def evidence(seed: int, people: int) -> PeopleEvidence:
+def evidence(seed: int, people: int) -> DayEvidence:
     """Bins with views that change, in which some people are perceived in one patch or in two."""
     random = np.random.default_rng(seed)
     views = random.choice([0, 0, 60, 255], (3, PATCHES)).astype(np.uint8)
@@ -42,9 +42,8 @@ def evidence(seed: int, people: int) -> PeopleEvidence:
     hit = random.random((people, BINS, PATCHES)) < 0.08
     hit[..., -1] = False
     person, bin_, patch = np.nonzero(hit)
-    begin = np.searchsorted(person, np.arange(people + 1))
     steps = random.integers(1, 9, len(patch))
-    return PeopleEvidence(np.arange(BINS), view, views, begin, bin_, patch, steps)
+    return DayEvidence(np.arange(BINS), view, views, person, bin_, patch, steps)
 
 
 def states(random: np.random.Generator, people: int, stages: int) -> Any:

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.homes import Home, home_of
+from tests.meshed_homes import Home, home_of
 from tests.reference import visible_cells as slow
 from tests.strategies import quick, seeds
 

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from tests.homes import Home, home_of
+from tests.meshed_homes import Home, home_of
 from tests.reference import detections as slow
 from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import all_homes, awkward_points, behind_corners, home_of
+from tests.meshed_homes import all_homes, awkward_points, behind_corners, home_of
 from tests.reference.line_of_sight import visible
 from tests.strategies import homes, quick, seeds
 

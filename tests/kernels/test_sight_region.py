@@ -8,7 +8,7 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import (
+from tests.meshed_homes import (
     Home,
     all_homes,
     awkward_points,

@@ -7,7 +7,15 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import Home, all_homes, awkward_points, home_of, shuffled, transformed, turns
+from tests.meshed_homes import (
+    Home,
+    all_homes,
+    awkward_points,
+    home_of,
+    shuffled,
+    transformed,
+    turns,
+)
 from tests.reference import visible_cells as slow
 from tests.strategies import homes, quick, seeds
 

@@ -3,7 +3,7 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import home_of
+from tests.meshed_homes import home_of
 from tests.reference.routes import parts_of
 from tests.strategies import homes, quick
 

@@ -9,7 +9,7 @@ import pytest
 import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
-from tests.homes import Home, home_of, shuffled
+from tests.meshed_homes import Home, home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 

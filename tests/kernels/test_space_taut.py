@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from tests.homes import home_of
+from tests.meshed_homes import home_of
 from tests.reference.costs import cost_distance as slow_cost_distance
 
 from fleet2d._core import leg_cost, step_cost

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from tests.live.scenes import LIVE, place
-from tests.viewer.browser import chromium
+from tests.viewing.browser import chromium
 
 import fleet2d
 from fleet2d.errors import InputError

@@ -106,14 +106,14 @@ def people(model: Any, day: Any, prior: Any, future: Any) -> list[tuple[Any, Any
 
     Args:
         model: As for `stays`, with people as the first dimension.
-        day: view, views, begin, bin, patch, steps: the evidence of all people.
+        day: view, views, user, bin, patch, steps: the evidence of all people.
         prior: Of each person by stage and patch, out of view.
         future: Likelihood of later evidence, of each person by stage and patch.
     """
     chains = []
-    for person, (first, last) in enumerate(pairwise(day.begin.tolist())):
+    for person in range(len(model.stay)):
         seen = np.zeros((len(day.view), day.views.shape[1]))
-        for i in range(first, last):
+        for i in np.flatnonzero(day.user == person).tolist():
             seen[day.bin[i], day.patch[i]] = day.steps[i]
         seen /= np.maximum(seen.sum(axis=1, keepdims=True), 1)
         parts = (model.stay, model.follow, model.spread, model.restless)

@@ -9,7 +9,7 @@ from jsonschema.protocols import Validator
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.compose import BUNDLED, ENTRIES
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.schema import schema
 
 EXAMPLES = sorted(
@@ -48,11 +48,10 @@ def test_paper_scenario_has_its_numbers() -> None:
     assert (1, 1) == (len(scenario.users), len(scenario.robots))
 
 
-@pytest.mark.parametrize("name", ["houseexpo", "he"])
 @pytest.mark.parametrize("order", [1, -1])
-def test_any_plan_goes_under_the_paper_scenario(shared_data: Path, name: str, order: int) -> None:
+def test_any_plan_goes_under_the_paper_scenario(shared_data: Path, order: int) -> None:
     plan = sorted((shared_data / "houseexpo").glob("*.json"))[0]
-    overrides = [f"floorplan.type={name}", f"floorplan.path={plan}"][::order]
+    overrides = ["floorplan.type=houseexpo", f"floorplan.path={plan}"][::order]
     scenario = load_scenario("bundled:paper", *overrides, "simulation.duration.days=7")
 
     assert "houseexpo" == scenario.floorplan.type_name

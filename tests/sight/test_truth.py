@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
-from tests.homes import SUB, Home, home_of
+from tests.meshed_homes import SUB, Home, home_of
 
 from fleet2d.floorplan.mesh import snap_polygon
 from fleet2d.kernels import line_of_sight, locate, region_outline, visible_region

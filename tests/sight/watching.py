@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import shapely
-from tests.homes import home_of
+from tests.meshed_homes import home_of
 
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.floorplan.lattice import Lattice

@@ -17,7 +17,7 @@ CAMERA = {"range": [0.3, 4], "angle_deg": 108}
 
 
 def flat(duration: str = "20 min", **sections: Any) -> Variant:
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     content = scenario(
         duration,

@@ -8,6 +8,7 @@
  *     kitchen at 13 Jan 19:30
  */
 
+import type { EventKind } from "../contract";
 import { durationText } from "./clock";
 import { type EventRow, shownText } from "./events";
 import { Misunderstood, namesOf, type Names } from "./names";
@@ -320,7 +321,7 @@ class Question {
   }
 }
 
-const SIGHTS = new Set(["user_seen", "user_lost", "robot_seen", "robot_lost"]);
+const SIGHTS = new Set<EventKind>(["user_seen", "user_lost", "robot_seen", "robot_lost"]);
 
 /** What holds of all of a group at the same time, or of any of it. */
 function combined({ names, any }: Group, spansOf: (name: string) => Span[]): Span[] {

@@ -43,6 +43,11 @@ export class Clock {
     return ((first + day - 1) * DAY_MS - this.startMs) * 1000;
   }
 
+  /** The hours since midnight. */
+  hourAt(us: number): number {
+    return (us - this.dayStart(this.day(us))) / 3600e6;
+  }
+
   timeText(us: number, seconds = true): string {
     const date = this.date(us);
     const text = `${two(date.getUTCHours())}:${two(date.getUTCMinutes())}`;

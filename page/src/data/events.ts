@@ -1,5 +1,6 @@
 /** Events of a run, in order. */
 
+import type { EventKind } from "../contract";
 import type { Clock } from "./clock";
 import type { Table } from "./parquet";
 import { firstAtLeast, lastAtMost } from "./search";
@@ -9,7 +10,8 @@ export interface EventRow {
   us: number;
   step: number;
   entity: string;
-  event: string;
+  /** Behaviors of users record others, too, which the page only shows. */
+  event: EventKind;
   user: string;
   detail: string;
 }
@@ -17,29 +19,30 @@ export interface EventRow {
 export class Events {
   readonly us: number[] = [];
   readonly rows: EventRow[] = [];
-  private readonly byKind = new Map<string, number[]>();
+  private readonly byKind = new Map<EventKind, number[]>();
   private readonly byEntity = new Map<string, number[]>();
   private readonly byBoth = new Map<string, number[]>();
 
   add(step: number, us: number, entity: string, event: string, user: string, detail: string): void {
     const index = this.rows.length;
     this.us.push(us);
-    this.rows.push({ index, us, step, entity, event, user, detail });
-    file(this.byKind, event, index);
+    const kind = event as EventKind;
+    this.rows.push({ index, us, step, entity, event: kind, user, detail });
+    file(this.byKind, kind, index);
     file(this.byEntity, entity, index);
     file(this.byBoth, `${entity}/${event}`, index);
     if (user && user !== entity) file(this.byEntity, user, index);
   }
 
-  get kinds(): string[] {
+  get kinds(): EventKind[] {
     return [...this.byKind.keys()].sort();
   }
 
-  has(kind: string): boolean {
+  has(kind: EventKind): boolean {
     return this.byKind.has(kind);
   }
 
-  ofKind(kind: string): EventRow[] {
+  ofKind(kind: EventKind): EventRow[] {
     return this.rowsAt(this.byKind.get(kind));
   }
 
@@ -54,7 +57,7 @@ export class Events {
   }
 
   /** The kinds of events that happen to an entity. */
-  kindsOf(entity: string): string[] {
+  kindsOf(entity: string): EventKind[] {
     return this.kinds.filter((kind) => this.byBoth.has(`${entity}/${kind}`));
   }
 
@@ -67,12 +70,12 @@ export class Events {
     return this.about(entity).filter((row) => row.entity === entity);
   }
 
-  of(entity: string, kind: string): EventRow[] {
+  of(entity: string, kind: EventKind): EventRow[] {
     return this.rowsAt(this.byBoth.get(`${entity}/${kind}`));
   }
 
   /** The last event of an entity and kind up to a moment. */
-  last(entity: string, kind: string, us: number): EventRow | null {
+  last(entity: string, kind: EventKind, us: number): EventRow | null {
     const indices = this.byBoth.get(`${entity}/${kind}`) ?? [];
     const index = indices[lastAtMost(indices, this.after(us) - 1)];
     return index === undefined ? null : this.rows[index]!;
@@ -83,7 +86,7 @@ export class Events {
   }
 }
 
-function file(index: Map<string, number[]>, key: string, row: number): void {
+function file<Key>(index: Map<Key, number[]>, key: Key, row: number): void {
   const rows = index.get(key);
   if (rows) rows.push(row);
   else index.set(key, [row]);

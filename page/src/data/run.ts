@@ -1,7 +1,7 @@
 /** One run: everything that the page shows of it, read when it is needed. */
 
 import { signal } from "@preact/signals";
-import type { BodyFacts, NoteFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
+import type { BodyFacts, EventKind, NoteFacts, RunFacts, SightingFacts, TableFacts, WallsFacts } from "../contract";
 import { type Beliefs, readBeliefs } from "./beliefs";
 import { Clock } from "./clock";
 import { Decisions, readDecisions } from "./decisions";
@@ -211,6 +211,23 @@ export class Run {
     return computed;
   }
 
+  private readonly seenBy = new Map<string, { read: readonly SightingFacts[]; stretches: Stretches }>();
+
+  /** When any robot noticed somebody; taken for somebody else doesn't count. */
+  seen(name: string): Stretches {
+    let known = this.seenBy.get(name);
+    if (known?.read !== this.sightings) {
+      const { stepUs } = this.clock;
+      const spans = this.sightings
+        .filter((lane) => lane.user === name)
+        .flatMap((lane) => lane.first.flatMap((first, i) => (lane.false[i] ? [] : [[first * stepUs, (lane.last[i]! + 1) * stepUs] as const])));
+      spans.sort(([one], [other]) => one - other);
+      const stretches = { from: spans.map(([from]) => from), to: spans.map(([, to]) => to), value: spans.map(() => 1) };
+      this.seenBy.set(name, (known = { read: this.sightings, stretches }));
+    }
+    return known.stretches;
+  }
+
   /** What ends sight at a moment; null while it isn't read yet. */
   wallsAt(us: number): Walls | null {
     const { walls } = this.facts;
@@ -282,7 +299,7 @@ export class Run {
   private readonly switched = new Map<string, Switches & { seen: number }>();
 
   /** When something was switched on and off, by the events of an entity. */
-  private switches(key: string, entity: string, isAbout: (row: EventRow) => boolean, on: string, off: string): Switches {
+  private switches(key: string, entity: string, isAbout: (row: EventRow) => boolean, on: EventKind, off: EventKind): Switches {
     let found = this.switched.get(key);
     if (!found || found.seen !== this.events.rows.length) {
       const rows = this.events.ofEntity(entity).filter((row) => (row.event === on || row.event === off) && isAbout(row));

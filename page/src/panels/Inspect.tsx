@@ -1,5 +1,6 @@
 /** One body, door or room: its state, its plan, why it does so, its history. */
 
+import type { EventKind } from "../contract";
 import { useEffect } from "preact/hooks";
 import { durationText } from "../data/clock";
 import type { EventRow } from "../data/events";
@@ -75,7 +76,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
 
 /** The last note of a behavior: an event that is neither sight nor activity. */
 function noteOf(run: Run, name: string, us: number): string {
-  const routine = new Set(["user_seen", "user_lost", "activity", "left_home", "came_home"]);
+  const routine = new Set<EventKind>(["user_seen", "user_lost", "activity", "left_home", "came_home"]);
   const kinds = run.events.kindsOf(name).filter((kind) => !routine.has(kind));
   const rows = kinds.flatMap((kind) => run.events.last(name, kind, us) ?? []);
   const row = rows.sort((a, b) => b.index - a.index)[0];

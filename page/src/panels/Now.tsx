@@ -1,11 +1,17 @@
 /** Everybody at the moment: room, place, activity, who is seen. */
 
+import type { BodyFacts } from "../contract";
+import { durationText } from "../data/clock";
 import { isFalse } from "../data/observations";
 import { AWAY, roomOf } from "../data/rooms";
 import type { Run } from "../data/run";
+import { lastAtMost } from "../data/search";
 import { TURN } from "../data/tracks";
+import { doing, title } from "../data/words";
+import { Icon } from "../Icon";
 import * as state from "../state";
 import { bodyColor } from "../theme";
+import { Tiles } from "./Tiles";
 
 export interface BodyState {
   name: string;
@@ -46,47 +52,116 @@ export function Now() {
   );
 }
 
-function NowOf({ run, title }: { run: Run; title: string }) {
+function NowOf({ run, title: heading }: { run: Run; title: string }) {
   void run.version.value;
   const us = state.moment.value;
   const step = run.clock.stepAt(us);
   return (
-    <table class="now" data-step={step}>
-      <caption>{title ? `${title}: ` : ""}step {step}</caption>
-      <thead>
-        <tr>
-          <th scope="col">Who</th>
-          <th scope="col">Room</th>
-          <th scope="col">Place [m]</th>
-          <th scope="col">Does, sees</th>
-        </tr>
-      </thead>
-      <tbody>
-        {run.bodies.map((body) => {
-          const now = bodyState(run, body.name, us);
-          return (
-            <tr
-              key={body.name}
-              data-body={body.name}
-              data-x={now?.x}
-              data-y={now?.y}
-              data-heading={now?.headingDeg}
-              data-room={now?.room}
-              data-away={now?.away}
-            >
-              <th scope="row">
-                <button type="button" class="link" onClick={() => state.select(body.name)}>
-                  <span class={body.robot ? "chip robot" : "chip"} style={{ background: bodyColor(body.color) }} />
-                  {body.name}
-                </button>
-              </th>
-              <td>{now ? now.room.replaceAll("_", " ") : "not stored"}</td>
-              <td class="number">{now && !now.away ? `${now.x.toFixed(2)}, ${now.y.toFixed(2)}` : "–"}</td>
-              <td>{[now?.activity, now?.sees.length ? `sees ${now.sees.join(", ")}` : ""].filter(Boolean).join(", ")}</td>
-            </tr>
-          );
-        })}
-      </tbody>
-    </table>
+    <>
+      <table class="now" data-step={step}>
+        <caption>
+          {heading ? `${heading}: ` : ""}step {step}
+        </caption>
+        <thead class="visually-hidden">
+          <tr>
+            <th scope="col">Who</th>
+            <th scope="col">Does</th>
+            <th scope="col">In view</th>
+          </tr>
+        </thead>
+        <tbody>
+          {run.bodies.map((body) => (
+            <BodyRow key={body.name} run={run} body={body} us={us} />
+          ))}
+        </tbody>
+      </table>
+      <Expectations run={run} />
+      <Tiles run={run} />
+      <Story run={run} />
+    </>
+  );
+}
+
+function BodyRow({ run, body, us }: { run: Run; body: BodyFacts; us: number }) {
+  void run.version.value;
+  const now = bodyState(run, body.name, us);
+  const index = now ? run.home.roomIndex(now.room) : -1;
+  const place = now?.away ? "out of home" : (run.home.labels[index] ?? now?.room ?? "not stored");
+  const what = [now?.activity && !now.away ? doing(now.activity) : "", title(place)].filter(Boolean).join(" · ");
+  return (
+    <tr data-body={body.name} data-x={now?.x} data-y={now?.y} data-heading={now?.headingDeg} data-room={now?.room} data-away={now?.away}>
+      <th scope="row">
+        <button type="button" class="link" onClick={() => state.select(body.name)}>
+          <span class={body.robot ? "chip robot" : "chip"} style={{ background: bodyColor(body.color) }} />
+          {body.name}
+        </button>
+      </th>
+      <td title={now && !now.away ? `${now.x.toFixed(2)} m, ${now.y.toFixed(2)} m` : ""}>
+        {what}
+        {now && now.sees.length > 0 && <small> sees {now.sees.join(", ")}</small>}
+      </td>
+      <td class="number seen-ago">
+        {!body.robot && run.storesSightings && run.sightings.length > 0 && (
+          <>
+            <Icon name="eye" size={13} /> {seenAgo(run, body.name, us)}
+          </>
+        )}
+      </td>
+    </tr>
+  );
+}
+
+/** How long ago a robot noticed somebody last. */
+function seenAgo(run: Run, name: string, us: number): string {
+  const { from, to } = run.seen(name);
+  const i = lastAtMost(from, us);
+  if (i < 0) return "never";
+  return us < to[i]! ? "now" : durationText(us - to[i]!).replace(/ \d+ s$/, "");
+}
+
+function Expectations({ run }: { run: Run }) {
+  const { verdicts } = run.facts;
+  if (verdicts.length === 0) return null;
+  return (
+    <section class="expectations">
+      <h3>Expectations</h3>
+      <ul>
+        {verdicts.map(({ name, outcome, says, step }) => (
+          <li key={name} class={outcome === "violated" ? "is-violated" : outcome === "held" ? "is-held" : ""} title={says}>
+            <Icon name={outcome === "violated" ? "cross" : "check"} size={13} />
+            {step === null ? (
+              <span>{title(name)}</span>
+            ) : (
+              <button type="button" class="link" onClick={() => state.goTo(step * run.clock.stepUs)}>
+                {title(name)}
+              </button>
+            )}
+            <small>{outcome}</small>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+/** Moments that are worth a look. */
+function Story({ run }: { run: Run }) {
+  const { story } = run.facts;
+  if (story.length === 0) return null;
+  return (
+    <section class="story">
+      <h3>Story</h3>
+      <ol>
+        {story.map(({ step, title: words, words: about }) => (
+          <li key={words}>
+            <button type="button" class="link" onClick={() => state.goTo(step * run.clock.stepUs)}>
+              <b>{words}</b>
+              <span>{about}</span>
+              <time>{run.clock.text(step * run.clock.stepUs).slice(0, -3)}</time>
+            </button>
+          </li>
+        ))}
+      </ol>
+    </section>
   );
 }

@@ -4,17 +4,21 @@ import { effect, untracked, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Run } from "../data/run";
 import type { Layer } from "../data/layers";
+import type { Pose } from "../data/tracks";
 import { feedOf } from "../live/feed";
 import { askCall, askPlace, branchHere, branching, calling, closeRun, placing } from "../live/orders";
 import * as state from "../state";
 import { colors, dark, scaleColor } from "../theme";
 import { drawBeliefs } from "./beliefs";
 import { bodyState } from "../panels/Now";
-import { bodyRadius, drawScene, slowFloorsAt } from "./bodies";
+import { bodyRadius, drawScene, posesAt, slowFloorsAt } from "./bodies";
 import { fitted, oncePerFrame } from "./canvas";
 import { FOOT, Frame } from "./frame";
 import { olderWords } from "./older";
-import { cellImage, drawCells, drawGround, drawNames, tracePolygons } from "./ground";
+import { cellImage, drawCells, drawGround, drawScale, tracePolygons } from "./ground";
+import { type Box, Labels } from "./labels";
+import { Light, litRooms, skyAt } from "./light";
+import { drawTags } from "./tags";
 
 const FOLLOW_ZOOM = 3;
 const READ_MS = 120;
@@ -35,8 +39,9 @@ class PlanPainter {
   private layerImage: HTMLCanvasElement | null = null;
   private layerName = "";
   private layerKey = "";
-  private night: HTMLCanvasElement | null = null;
-  private nightKey = "";
+  private readonly light = new Light();
+  private labels: Labels | null = null;
+  private nameBoxes: Box[] = [];
   private frame: Frame | null = null;
 
   constructor(
@@ -51,21 +56,22 @@ class PlanPainter {
     this.centre(width, height);
     const frame = Frame.fit(this.run.home, width, height, this.zoom, this.shift);
     this.frame = frame;
-    this.paintGround(frame, width, height);
+    const ratio = window.devicePixelRatio || 1;
+    this.paintGround(frame, width, height, ratio);
+    const { run } = this;
+    const us = state.moment.value;
+    const shows = (name: string): boolean => state.shown.value.has(name as state.Switch);
+    const picture = shows("lights") ? this.light.of(this.ground, this.groundKey, run, us, frame, ratio) : this.ground;
     context.clearRect(0, 0, width, height);
-    context.drawImage(this.ground, 0, 0, width, height);
+    context.drawImage(picture, 0, 0, width, height);
     if (this.layerImage && this.layerName === state.layer.value) this.paintCells(context, frame, this.layerImage, 0.7);
-    if (state.shown.value.has("lights")) this.paintNight(context, frame);
     if (state.shown.value.has("beliefs")) drawBeliefs(context, this.run, frame, state.moment.value);
-    drawScene(context, {
-      run: this.run,
-      us: state.moment.value,
-      frame,
-      colors: colors.value,
-      selected: state.selected.value,
-      shows: (name) => state.shown.value.has(name as state.Switch),
-      other: this.other,
-    });
+    const selected = state.selected.value;
+    const poses = posesAt(run, us);
+    if (shows("names")) this.paintNames(context, frame, poses, us, shows("lights"));
+    drawScene(context, { run, us, poses, frame, colors: colors.value, selected, steps: state.playing.value, shows, other: this.other });
+    if (shows("names")) drawTags(context, run, poses, frame, this.nameBoxes, width, height);
+    drawScale(context, run.home, frame, colors.value, height);
     context.font = "12px system-ui, sans-serif";
     context.textAlign = "right";
     context.fillStyle = colors.value.text;
@@ -82,17 +88,26 @@ class PlanPainter {
     this.shift = [width / 2 - frame.ux(pose.x), (height - FOOT) / 2 - frame.uy(pose.y)];
   }
 
-  private paintGround(frame: Frame, width: number, height: number): void {
-    const [names, furniture] = [state.shown.value.has("names"), state.shown.value.has("furniture")];
-    const ratio = window.devicePixelRatio || 1;
-    const key = [width, height, ratio, this.zoom, ...this.shift, dark.value, names, furniture].join();
+  private paintGround(frame: Frame, width: number, height: number, ratio: number): void {
+    const withFurniture = state.shown.value.has("furniture");
+    const key = [width, height, ratio, this.zoom, ...this.shift, dark.value, withFurniture].join();
     if (key === this.groundKey) return;
     this.groundKey = key;
     this.ground.width = Math.round(width * ratio);
     this.ground.height = Math.round(height * ratio);
-    const context = this.ground.getContext("2d")!;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    drawGround(context, this.run.home, frame, { colors: colors.value, dark: dark.value, names, furniture });
+    drawGround(this.ground, this.run.home, frame, ratio, colors.value, withFurniture);
+    this.labels = new Labels(this.ground.getContext("2d")!, this.run.home, frame, withFurniture);
+  }
+
+  /** Write the names of rooms where no body is, pale in the dark. */
+  private paintNames(context: CanvasRenderingContext2D, frame: Frame, poses: ReadonlyMap<string, Pose>, us: number, hasLight: boolean): void {
+    const bodies = this.run.bodies.flatMap((body) => {
+      const pose = poses.get(body.name);
+      return pose && !pose.away ? [{ x: frame.ux(pose.x), y: frame.uy(pose.y), radius: 1.6 * bodyRadius(frame, body) }] : [];
+    });
+    const isNight = hasLight && skyAt(this.run.clock.hourAt(us)).day < 0.5;
+    const lit = isNight ? litRooms(this.run, us) : null;
+    this.nameBoxes = this.labels!.draw(context, bodies, (room) => (lit && !lit.has(room) ? "#e8ecf8" : "#4a4438"));
   }
 
   private paintCells(context: CanvasRenderingContext2D, frame: Frame, image: HTMLCanvasElement, opacity: number): void {
@@ -102,20 +117,6 @@ class PlanPainter {
     context.globalAlpha = opacity;
     drawCells(context, this.run.home, frame, image);
     context.restore();
-  }
-
-  /** Darken the rooms whose lights are off. */
-  private paintNight(context: CanvasRenderingContext2D, frame: Frame): void {
-    const rooms = this.run.unlitAt(state.moment.value);
-    if (rooms.length === 0) return;
-    const key = rooms.join();
-    if (key !== this.nightKey) {
-      const unlit = new Set(rooms);
-      this.night = cellImage(this.run.home, (cell) => (unlit.has(this.run.home.cells[cell]!) ? [0, 0, 0, 255] : null));
-      this.nightKey = key;
-    }
-    this.paintCells(context, frame, this.night!, dark.value ? 0.55 : 0.35);
-    if (state.shown.value.has("names")) drawNames(context, this.run.home, frame, colors.value);
   }
 
   async loadLayer(name: string, step: number): Promise<void> {

@@ -1,24 +1,30 @@
 /** What moves on the plan: people, robots, their ways, what is in view, what was noticed. */
 
-import type { BodyFacts, CameraFacts, SlowFacts } from "../contract";
+import type { BodyFacts, CameraFacts, SlowFacts, UseFacts } from "../contract";
 import { isFalse } from "../data/observations";
 import type { Run } from "../data/run";
 import { type Pose, TURN } from "../data/tracks";
-import { bodyColor, cameraColors, type Colors } from "../theme";
+import { cameraColors, type Colors, mix } from "../theme";
+import { drawPerson, drawRobot, type Posture } from "./figures";
 import type { Frame } from "./frame";
-import { tracePolygons } from "./ground";
+import { drawLeaf, tracePolygons } from "./ground";
+import { Pen } from "./pen";
 
 type Context = CanvasRenderingContext2D;
 
 const BEHIND_US = 5 * 60e6;
 const AHEAD_US = 2 * 60e6;
+const FADES = 5;
 
 export interface Scene {
   run: Run;
   us: number;
+  poses: ReadonlyMap<string, Pose>;
   frame: Frame;
   colors: Colors;
   selected: string;
+  /** Whether people's legs move as they walk. */
+  steps: boolean;
   shows: (name: string) => boolean;
   /** Where the bodies of the other run are, when two are compared. */
   other: Run | null;
@@ -28,13 +34,18 @@ export function angleOf(heading: number): number {
   return (heading * 2 * Math.PI) / TURN;
 }
 
-export function drawScene(context: Context, scene: Scene): void {
-  const { run, us, shows } = scene;
+/** Where everybody is whose track is read. */
+export function posesAt(run: Run, us: number): Map<string, Pose> {
   const poses = new Map<string, Pose>();
   for (const body of run.bodies) {
     const track = run.tracks.get(body.name);
     if (track && !track.empty) poses.set(body.name, track.poseAt(us));
   }
+  return poses;
+}
+
+export function drawScene(context: Context, scene: Scene): void {
+  const { run, poses, shows } = scene;
   if (shows("slows")) drawSlowFloors(context, scene);
   drawDoors(context, scene);
   if (shows("sight")) {
@@ -77,17 +88,18 @@ function drawSlowFloors(context: Context, { run, us, frame, colors }: Scene): vo
   context.restore();
 }
 
+/** Doors that can be shut: open with their swing, or shut. */
 function drawDoors(context: Context, { run, us, frame, colors }: Scene): void {
-  context.strokeStyle = colors.door;
-  for (const door of run.facts.home.doors) {
-    const [x0, y0] = [frame.x(door.start[0]), frame.y(door.start[1])];
-    const [x1, y1] = [frame.x(door.end[0]), frame.y(door.end[1])];
-    context.lineWidth = 3;
-    context.beginPath();
-    context.moveTo(x0, y0);
-    if (run.doorOpen(door.name, us)) context.lineTo(x0 + (y1 - y0), y0 - (x1 - x0));
-    else context.lineTo(x1, y1);
-    context.stroke();
+  for (const { name, start, end } of run.facts.home.doors) {
+    const width = Math.hypot(end[0] - start[0], end[1] - start[1]);
+    context.save();
+    context.translate(frame.x(start[0]), frame.y(start[1]));
+    context.scale(frame.scale, -frame.scale);
+    context.rotate(Math.atan2(end[1] - start[1], end[0] - start[0]));
+    const pen = new Pen(context);
+    if (run.doorOpen(name, us)) drawLeaf(pen, width);
+    else pen.box(0, -0.05, width, 0.05, colors.door, 0.02);
+    context.restore();
   }
 }
 
@@ -122,34 +134,43 @@ function drawView(context: Context, scene: Scene, pose: Pose, camera: CameraFact
   if (camera.near > 0) context.arc(px, py, camera.near * frame.scale, to, from, true);
   else if (camera.angle < 2 * Math.PI - 1e-9) context.lineTo(px, py);
   context.closePath();
-  const [fill, edge] = cameraColors(number, colors);
+  const [color, edge] = cameraColors(number, colors);
+  const far = camera.far * frame.scale;
+  const fill = context.createRadialGradient(px, py, 0, px, py, Math.max(1, far));
+  for (const [at, opacity] of [[0, "6b"], [0.55, "38"], [1, "0a"]] as const) fill.addColorStop(at, `${color}${opacity}`);
   context.fillStyle = fill;
   context.fill();
-  context.strokeStyle = edge;
+  context.strokeStyle = `${edge}66`;
   context.lineWidth = 1;
   context.stroke();
   context.restore();
   if (cameras < 2 || !scene.shows("names")) return;
-  const far = Math.min(camera.far * 0.4 * frame.scale, 60);
-  drawName(context, colors, camera.name, edge, px + far * Math.cos(-heading), py + far * Math.sin(-heading));
+  const out = Math.min(0.4 * far, 60);
+  drawName(context, colors, camera.name, edge, px + out * Math.cos(-heading), py + out * Math.sin(-heading));
 }
 
+/** The way behind a body fades with its age; the way ahead is dotted. */
 function drawWay(context: Context, scene: Scene, body: BodyFacts): void {
   const { run, us, frame, selected } = scene;
   const track = run.tracks.get(body.name);
   if (!track || track.empty) return;
-  const behind = track.way(Math.max(0, us - BEHIND_US), us);
+  context.strokeStyle = body.color;
+  context.lineJoin = "round";
+  context.lineCap = "round";
+  for (let i = 0; i < FADES; i++) {
+    const from = us - (BEHIND_US * (FADES - i)) / FADES;
+    context.globalAlpha = 0.6 * ((i + 1) / FADES);
+    context.lineWidth = (body.name === selected ? 4 : 3) * ((i + 2) / (FADES + 1));
+    strokeLine(context, frame, track.way(Math.max(0, from), Math.max(0, from + BEHIND_US / FADES)));
+  }
   // What a live simulation plans is ahead of its present only.
   const planned = us >= run.knownUs ? run.ahead.get(body.name) : undefined;
-  const ahead = planned ?? track.way(us, Math.min(run.presentUs, us + AHEAD_US));
-  context.strokeStyle = bodyColor(body.color);
-  context.lineWidth = body.name === selected ? 2.5 : 1.5;
-  context.lineJoin = "round";
   context.globalAlpha = 0.7;
-  strokeLine(context, frame, behind);
-  context.setLineDash([2, 4]);
-  strokeLine(context, frame, ahead);
+  context.lineWidth = 1.5;
+  context.setLineDash([1, 5]);
+  strokeLine(context, frame, planned ?? track.way(us, Math.min(run.presentUs, us + AHEAD_US)));
   context.setLineDash([]);
+  context.lineCap = "butt";
   context.globalAlpha = 1;
 }
 
@@ -159,40 +180,58 @@ function strokeLine(context: Context, frame: Frame, corners: readonly number[]):
   context.stroke();
 }
 
+const SMALLEST_PX = 9;
+
 export function bodyRadius(frame: Frame, body: BodyFacts): number {
-  return Math.max(7, body.radius * frame.scale);
+  return Math.max(SMALLEST_PX, body.radius * frame.scale);
 }
 
+/** Farther than this from a place to use furniture, nobody uses it [m]. */
+const USED_WITHIN_M = 0.16;
+const GLANCE_US = 0.5e6;
+
+/** How somebody is at a moment: who stands still at a chair, a sofa or a bed sits or lies on it. */
+function usePlace(run: Run, body: BodyFacts, pose: Pose, us: number): UseFacts | null {
+  if (body.robot || isMoving(run, body, pose, us)) return null;
+  const [x, y] = [run.home.metres(pose.x, 0), run.home.metres(pose.y, 1)];
+  return run.home.restPlaces.find((use) => Math.hypot(use.x - x, use.y - y) < USED_WITHIN_M) ?? null;
+}
+
+function isMoving(run: Run, body: BodyFacts, pose: Pose, us: number): boolean {
+  const later = run.tracks.get(body.name)!.poseAt(Math.min(us + GLANCE_US, run.presentUs));
+  return later.x !== pose.x || later.y !== pose.y;
+}
+
+/** The phase of a step, which follows the clock of who watches: at any speed people walk at ease. */
+const STEP_MS = 170;
+
 function drawBody(context: Context, scene: Scene, body: BodyFacts, pose: Pose): void {
-  const { frame, colors, selected } = scene;
-  const [x, y] = [frame.ux(pose.x), frame.uy(pose.y)];
+  const { run, us, frame, colors, selected } = scene;
   const radius = bodyRadius(frame, body);
-  const heading = -angleOf(pose.heading);
-  const color = bodyColor(body.color);
+  const { color } = body;
+  const use = usePlace(run, body, pose, us);
+  const x = use ? frame.x(use.x) : frame.ux(pose.x);
+  const y = use ? frame.y(use.y) : frame.uy(pose.y);
+  const heading = use ? use.heading : angleOf(pose.heading);
   if (body.name === selected) {
     context.beginPath();
-    context.arc(x, y, radius + 5, 0, 2 * Math.PI);
+    context.arc(x, y, 1.6 * radius + 3, 0, 2 * Math.PI);
+    context.fillStyle = `${mix(color, colors.ground, 0.2)}33`;
+    context.fill();
     context.strokeStyle = colors.cursor;
     context.lineWidth = 2;
     context.stroke();
   }
-  context.beginPath();
-  if (body.robot) context.roundRect(x - radius, y - radius, 2 * radius, 2 * radius, 0.45 * radius);
-  else context.arc(x, y, radius, 0, 2 * Math.PI);
-  context.fillStyle = color;
-  context.fill();
-  context.strokeStyle = colors.ground;
-  context.lineWidth = 1.5;
-  context.stroke();
-  context.beginPath();
-  context.moveTo(x + 1.5 * radius * Math.cos(heading), y + 1.5 * radius * Math.sin(heading));
-  for (const side of [2.5, -2.5]) {
-    context.lineTo(x + radius * Math.cos(heading + side / 4), y + radius * Math.sin(heading + side / 4));
-  }
-  context.closePath();
-  context.fillStyle = color;
-  context.fill();
-  if (scene.shows("names")) drawName(context, colors, body.name, color, x, y - radius - 8);
+  const size = radius / frame.scale;
+  const step = scene.steps && isMoving(run, body, pose, us) ? Math.sin(performance.now() / STEP_MS) : 0;
+  context.save();
+  context.translate(x, y);
+  context.scale(frame.scale, -frame.scale);
+  context.rotate(heading);
+  const edge = 2 / frame.scale;
+  if (body.robot) drawRobot(context, { color, radius: size, step }, null, edge);
+  else drawPerson(context, { color, radius: 1.1 * size, step }, (use?.posture ?? "stand") as Posture, edge);
+  context.restore();
 }
 
 function drawName(context: Context, colors: Colors, name: string, color: string, x: number, y: number): void {

@@ -42,6 +42,12 @@ export class Frame {
     return this.y(this.home.metres(units, 1));
   }
 
+  /** Have a context draw in metres, y upwards, at a ratio of its pixels to those of the screen. */
+  enter(context: CanvasRenderingContext2D, ratio: number): void {
+    const scale = this.scale * ratio;
+    context.setTransform(scale, 0, 0, -scale, this.left * ratio, this.bottom * ratio);
+  }
+
   /** The place [m] of a pixel. */
   place(px: number, py: number): [number, number] {
     return [(px - this.left) / this.scale, (this.bottom - py) / this.scale];

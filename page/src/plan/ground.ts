@@ -1,18 +1,21 @@
-/** What of the plan stands still: walls, rooms, furniture, names. Drawn once for each size. */
+/** What of the plan stands still: floors, furniture, doors, walls. Drawn once for each size. */
 
-import type { ObjectFacts } from "../contract";
+import type { DoorwayFacts } from "../contract";
 import type { Home } from "../data/home";
-import { type Colors, rgb, roomColor } from "../theme";
+import type { Colors } from "../theme";
+import { drawFloors } from "./floors";
 import type { Frame } from "./frame";
+import { drawPiece } from "./furniture";
+import { Pen } from "./pen";
 
-const WALL_M = 0.15;
-
-export interface GroundOptions {
-  colors: Colors;
-  dark: boolean;
-  names: boolean;
-  furniture: boolean;
-}
+export const WALL_M = 0.15;
+/** How far the tops of walls are drawn above the floor, as if one looked at the home a little from the south [m]. */
+export const LIFT_M = 0.17;
+const WALL_TOP = "#fcfbf8";
+const WALL_FACE = "#bdb4a6";
+const WALL_EDGE = "#a79e90";
+const WALL_SHADOW = "rgba(60, 45, 25, 0.42)";
+const DOOR = "#a9783f";
 
 type Context = CanvasRenderingContext2D;
 
@@ -27,32 +30,160 @@ export function tracePolygons(context: Context, frame: Frame, polygons: readonly
   }
 }
 
-export function drawGround(context: Context, home: Home, frame: Frame, options: GroundOptions): void {
-  const { facts } = home;
-  const rings = facts.free.flat();
-  tracePolygons(context, frame, rings);
-  context.strokeStyle = options.colors.wall;
-  context.lineWidth = 2 * WALL_M * frame.scale;
-  context.lineJoin = "miter";
-  context.miterLimit = 3;
-  context.stroke();
+/** The free space of a home, and all that its outer walls enclose, as paths in metres. */
+class Outlines {
+  readonly free = new Path2D();
+  readonly outer = new Path2D();
+
+  constructor(home: Home) {
+    for (const rings of home.facts.free) {
+      rings.forEach((ring, i) => {
+        const path = new Path2D();
+        ring.forEach(([x, y], k) => (k === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
+        path.closePath();
+        this.free.addPath(path);
+        if (i === 0) this.outer.addPath(path);
+      });
+    }
+  }
+
+  /** Fill the home with its outer walls. */
+  fillHull(context: Context): void {
+    context.lineWidth = 2 * WALL_M;
+    context.lineJoin = "miter";
+    context.miterLimit = 3;
+    context.stroke(this.outer);
+    context.fill(this.outer);
+  }
+}
+
+/** Draw a home at the size of a canvas, whose pixels are `ratio` times as many as those of the screen. */
+export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, ratio: number, colors: Colors, withFurniture: boolean): void {
+  const context = canvas.getContext("2d")!;
+  const scale = frame.scale * ratio;
+  const outlines = new Outlines(home);
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.clearRect(0, 0, canvas.width, canvas.height);
+  frame.enter(context, ratio);
   context.save();
-  tracePolygons(context, frame, rings);
-  context.clip("evenodd");
-  drawCells(context, home, frame, roomImage(home, options.dark));
+  context.shadowColor = colors.shadow;
+  context.shadowBlur = 1.1 * scale;
+  context.shadowOffsetX = 0.15 * scale;
+  context.shadowOffsetY = 0.4 * scale;
+  context.fillStyle = WALL_FACE;
+  context.strokeStyle = WALL_FACE;
+  outlines.fillHull(context);
   context.restore();
-  if (options.furniture) facts.objects.forEach((thing) => drawObject(context, frame, thing, options.colors));
-  if (options.furniture && options.names) facts.objects.forEach((thing) => nameObject(context, frame, thing, options.colors));
-  for (const area of facts.no_go) {
+  context.save();
+  context.clip(outlines.free, "evenodd");
+  drawFloors(context, home);
+  if (withFurniture) home.facts.objects.forEach((thing) => drawPiece(context, thing, scale));
+  context.restore();
+  const pen = new Pen(context);
+  const movable = new Set(home.facts.doors.map((door) => String([door.start, door.end])));
+  for (const doorway of home.facts.doorways) {
+    if (!movable.has(String([doorway.start, doorway.end]))) drawDoorway(pen, doorway);
+  }
+  drawWalls(canvas, frame, ratio, outlines);
+  drawNoGo(context, home, frame, ratio, colors);
+}
+
+/** An open door with its swing, or the threshold of an opening. */
+function drawDoorway(pen: Pen, { start, end, leaf }: DoorwayFacts): void {
+  const { context } = pen;
+  const width = Math.hypot(end[0] - start[0], end[1] - start[1]);
+  context.save();
+  context.translate(...start);
+  context.rotate(Math.atan2(end[1] - start[1], end[0] - start[0]));
+  if (leaf) drawLeaf(pen, width);
+  else {
+    context.fillStyle = "rgba(122, 95, 60, 0.16)";
+    context.fillRect(0, -0.075, width, 0.15);
+  }
+  context.restore();
+}
+
+/** A door that stands open at the left of an opening along the x axis. */
+export function drawLeaf(pen: Pen, width: number): void {
+  const { context } = pen;
+  context.beginPath();
+  context.moveTo(0, 0);
+  context.arc(0, 0, width, 0, Math.PI / 2);
+  context.closePath();
+  context.fillStyle = "rgba(255, 255, 255, 0.2)";
+  context.fill();
+  context.beginPath();
+  context.arc(0, 0, width, 0, Math.PI / 2);
+  context.strokeStyle = "rgba(120, 95, 60, 0.5)";
+  context.lineWidth = 0.018;
+  context.setLineDash([0.07, 0.06]);
+  context.stroke();
+  context.setLineDash([]);
+  pen.box(-0.028, 0, 0.028, width, DOOR, 0.02);
+  pen.disc(0, Math.max(0, width - 0.1), 0.03, "#ebd9b6");
+}
+
+/** Walls rise from the floor: their shadow falls into the rooms, their faces look south. */
+function drawWalls(canvas: HTMLCanvasElement, frame: Frame, ratio: number, outlines: Outlines): void {
+  const context = canvas.getContext("2d")!;
+  const scale = frame.scale * ratio;
+  const mask = (color: string): HTMLCanvasElement => {
+    const layer = document.createElement("canvas");
+    layer.width = canvas.width;
+    layer.height = canvas.height;
+    const inner = layer.getContext("2d")!;
+    frame.enter(inner, ratio);
+    inner.fillStyle = color;
+    inner.strokeStyle = color;
+    outlines.fillHull(inner);
+    inner.globalCompositeOperation = "destination-out";
+    inner.fill(outlines.free, "evenodd");
+    return layer;
+  };
+  const [face, edge, top] = [mask(WALL_FACE), mask(WALL_EDGE), mask(WALL_TOP)];
+  context.save();
+  context.clip(outlines.free, "evenodd");
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.shadowColor = WALL_SHADOW;
+  context.shadowBlur = 0.3 * scale;
+  context.shadowOffsetX = 0.09 * scale;
+  context.shadowOffsetY = 0.13 * scale;
+  context.drawImage(face, 0, 0);
+  context.restore();
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  const lift = Math.max(1, Math.round(LIFT_M * scale));
+  for (let rise = 0; rise < lift; rise++) context.drawImage(face, 0, -rise);
+  for (const [x, y] of [[-1, 0], [1, 0], [0, -1], [0, 1]] as const) context.drawImage(edge, x, y - lift);
+  context.drawImage(top, 0, -lift);
+  frame.enter(context, ratio);
+}
+
+function drawNoGo(context: Context, home: Home, frame: Frame, ratio: number, colors: Colors): void {
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  for (const area of home.facts.no_go) {
     tracePolygons(context, frame, [area]);
-    context.strokeStyle = options.colors.alarm;
+    context.strokeStyle = colors.alarm;
     context.lineWidth = 1;
     context.setLineDash([4, 3]);
     context.stroke();
     context.setLineDash([]);
   }
-  if (options.names) drawNames(context, home, frame, options.colors);
-  drawScale(context, home, frame, options.colors);
+}
+
+/** The scale of the plan, at its foot. */
+export function drawScale(context: Context, home: Home, frame: Frame, colors: Colors, height: number): void {
+  const [x0, , x1] = home.facts.bounds;
+  const length = [50, 20, 10, 5, 2].find((metres) => metres <= (x1 - x0) / 3) ?? 1;
+  const [x, y] = [24, height - 12];
+  const wide = length * frame.scale;
+  context.fillStyle = colors.quiet;
+  context.fillRect(x, y, wide, 1.5);
+  context.fillRect(x, y - 3, 1.5, 7.5);
+  context.fillRect(x + wide, y - 3, 1.5, 7.5);
+  context.font = "500 11px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  context.fillText(`${length} m`, x + wide + 8, y + 1);
 }
 
 /** An image with a pixel for each cell, its first row the lowest. */
@@ -84,92 +215,4 @@ export function drawCells(context: Context, home: Home, frame: Frame, image: HTM
     columns * cell * frame.scale,
     rows * cell * frame.scale,
   );
-}
-
-const images = new WeakMap<Home, Map<boolean, HTMLCanvasElement>>();
-
-function roomImage(home: Home, dark: boolean): HTMLCanvasElement {
-  let byTheme = images.get(home);
-  if (!byTheme) images.set(home, (byTheme = new Map()));
-  let image = byTheme.get(dark);
-  if (!image) {
-    const table = home.facts.rooms.map((room) => [...rgb(roomColor(room.color, room.deep_color, dark)), 255] as const);
-    const spread = spreadCells(home);
-    image = cellImage(home, (cell) => (table[spread[cell]!] as [number, number, number, number] | undefined) ?? null);
-    byTheme.set(dark, image);
-  }
-  return image;
-}
-
-/** Rooms grown by two cells into what isn't free, so that their colour reaches slanted walls. */
-function spreadCells(home: Home): Int16Array {
-  const { columns } = home.facts;
-  let cells = home.cells;
-  for (let round = 0; round < 2; round++) {
-    const grown = Int16Array.from(cells);
-    cells.forEach((room, i) => {
-      if (room < 0) {
-        grown[i] = Math.max(cells[i - 1] ?? -1, cells[i + 1] ?? -1, cells[i - columns] ?? -1, cells[i + columns] ?? -1);
-      }
-    });
-    cells = grown;
-  }
-  return cells;
-}
-
-function drawObject(context: Context, frame: Frame, thing: ObjectFacts, colors: Colors): void {
-  tracePolygons(context, frame, [thing.outline]);
-  if (thing.blocks !== "nothing") {
-    context.fillStyle = colors.furniture;
-    context.fill();
-  }
-  context.strokeStyle = colors.furnitureEdge;
-  context.lineWidth = thing.blocks === "sight" ? 1.6 : 0.8;
-  context.stroke();
-}
-
-/** Name a piece of furniture if the name fits into it. */
-function nameObject(context: Context, frame: Frame, thing: ObjectFacts, colors: Colors): void {
-  const [xs, ys] = [0, 1].map((axis) => thing.outline.map((corner) => corner[axis]!)) as [number[], number[]];
-  const [left, right] = [Math.min(...xs), Math.max(...xs)];
-  const words = thing.type.replaceAll("_", " ");
-  context.font = "9px system-ui, sans-serif";
-  const [wide, tall] = [(right - left) * frame.scale, (Math.max(...ys) - Math.min(...ys)) * frame.scale];
-  if (context.measureText(words).width > wide - 2 || tall < 11) return;
-  context.textAlign = "center";
-  context.textBaseline = "middle";
-  context.fillStyle = colors.quiet;
-  context.fillText(words, frame.x((left + right) / 2), frame.y((Math.min(...ys) + Math.max(...ys)) / 2));
-}
-
-/** Write the names of rooms. */
-export function drawNames(context: Context, home: Home, frame: Frame, colors: Colors): void {
-  context.textAlign = "center";
-  context.textBaseline = "middle";
-  context.lineJoin = "round";
-  for (const room of home.facts.rooms) {
-    const size = Math.min(13, Math.max(0, 0.28 * frame.scale, Math.sqrt(room.area_m2) * frame.scale * 0.07));
-    if (size < 6) continue;
-    context.font = `${size}px system-ui, sans-serif`;
-    const [x, y] = [frame.x(room.anchor[0]), frame.y(room.anchor[1])];
-    const words = room.name.replaceAll("_", " ");
-    if (context.measureText(words).width > 1.6 * Math.sqrt(room.area_m2) * frame.scale) continue;
-    context.strokeStyle = colors.halo;
-    context.lineWidth = 3;
-    context.strokeText(words, x, y);
-    context.fillStyle = colors.text;
-    context.fillText(words, x, y);
-  }
-}
-
-function drawScale(context: Context, home: Home, frame: Frame, colors: Colors): void {
-  const [x0, y0, x1] = home.facts.bounds;
-  const length = [50, 20, 10, 5, 2].find((metres) => metres <= (x1 - x0) / 3) ?? 1;
-  const [x, y] = [frame.x(x0), frame.y(y0) + 0.15 * frame.scale + 8];
-  context.fillStyle = colors.quiet;
-  context.fillRect(x, y, length * frame.scale, 2);
-  context.font = "11px system-ui, sans-serif";
-  context.textAlign = "left";
-  context.textBaseline = "top";
-  context.fillText(`${length} m`, x, y + 4);
 }

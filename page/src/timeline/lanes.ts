@@ -4,7 +4,7 @@ import type { Answer } from "../data/ask";
 import { type BeliefSeries, percents } from "../data/beliefs";
 import type { Clock } from "../data/clock";
 import type { Run, Switches } from "../data/run";
-import type { BodyFacts } from "../contract";
+import type { BodyFacts, EventKind } from "../contract";
 import { type EventRow, shownText } from "../data/events";
 import { firstAtLeast, lastAtMost } from "../data/search";
 import { differences, type Stretches, valueAt } from "../data/stretches";
@@ -53,8 +53,8 @@ function wordColor(word: string): string {
   return color;
 }
 
-const SEEN_KINDS = ["user_seen", "user_lost"];
-const ROUTINE_KINDS = new Set(["activity", "left_home", "came_home", "opened", "shut", ...SEEN_KINDS]);
+const SEEN_KINDS: readonly EventKind[] = ["user_seen", "user_lost"];
+const ROUTINE_KINDS = new Set<EventKind>(["activity", "left_home", "came_home", "opened", "shut", ...SEEN_KINDS]);
 
 export function lanesOf(run: Run, prefix: string, other: Run | null, title = ""): Lane[] {
   const lanes = ownLanes(run, prefix, other);
@@ -149,10 +149,8 @@ function once<T>(compute: () => T): () => T {
 }
 
 function ownLanes(run: Run, prefix: string, other: Run | null): Lane[] {
-  const byKind = new Map<string, string[]>();
-  for (const { name } of run.bodies) byKind.set(name, run.events.kindsOf(name));
   const bodies = run.bodies.flatMap((body) => {
-    const kinds = byKind.get(body.name)!;
+    const kinds = run.events.kindsOf(body.name);
     const group: Group = body.robot ? "Robots" : "Users";
     const lanes = [roomLane(run, body.name, prefix, group)];
     if (other) lanes.push(differenceLane(run, other, body.name, prefix, group));
@@ -251,7 +249,7 @@ const OUTCOME_COLORS = ["#009988", "#ee7733", "#cc3311", "#bbbbbb", "#9a9a9a", "
 const NO_ANSWER = OUTCOMES.indexOf("no answer");
 const OPEN = OUTCOMES.indexOf("open");
 /** Events that end a request, and what came of it; after others the robot may try again. */
-const ENDS = new Map([
+const ENDS = new Map<EventKind, number>([
   ["accepted", 0],
   ["declined", 1],
   ["sent_away", 2],

@@ -6,19 +6,13 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<PeopleModel> =
-    std::tuple(&PeopleModel::stay, &PeopleModel::follow, &PeopleModel::spread, &PeopleModel::restless,
-               &PeopleModel::first, &PeopleModel::detection);
+inline constexpr std::size_t border::members_of<PeopleModel> = 6;
 
 template <>
-inline constexpr auto border::members_of<DayEvidence> =
-    std::tuple(&DayEvidence::minute, &DayEvidence::view, &DayEvidence::views, &DayEvidence::begin, &DayEvidence::bin,
-               &DayEvidence::patch, &DayEvidence::steps);
+inline constexpr std::size_t border::members_of<DayEvidence> = 7;
 
 template <>
-inline constexpr auto border::members_of<PeopleMoments> =
-    std::tuple(&PeopleMoments::time, &PeopleMoments::exits, &PeopleMoments::arrivals, &PeopleMoments::moves,
-               &PeopleMoments::rests);
+inline constexpr std::size_t border::members_of<PeopleMoments> = 5;
 
 namespace {
 
@@ -35,15 +29,14 @@ void check_day(const DayEvidence& day, const PeopleModel& model, i64 longest) {
     require(bins > 0 && day.minute.size() == bins && longest > 0, "minute and view must be (bins,), not empty");
     require(day.views.shape[1] == patches && all_in_range(day.view, 0, day.views.size()),
             "views must be (views, patches), and view hold numbers of views");
-    require(day.patch.size() == sightings && day.steps.size() == sightings,
-            "bin, patch and steps must have one length");
-    require(day.begin.size() == model.size() + 1 && all_in_range(day.begin, 0, sightings + 1) &&
-                std::is_sorted(day.begin.begin(), day.begin.end()),
-            "begin must be (people + 1,) and ascend, as numbers of sightings");
+    require(day.user.size() == sightings && day.patch.size() == sightings && day.steps.size() == sightings,
+            "user, bin, patch and steps must have one length");
+    require(std::is_sorted(day.user.begin(), day.user.end()), "user must ascend");
     require(all_in_range(day.patch, 0, patches) && all_in_range(day.bin, 0, bins),
             "bin must hold numbers of bins, patch numbers of patches");
     for (i64 person = 0; person < model.size(); ++person) {
-        require(std::is_sorted(day.bin.begin() + day.begin[person], day.bin.begin() + day.begin[person + 1]),
+        const auto [begin, end] = day.sightings_of(person);
+        require(std::is_sorted(day.bin.begin() + begin, day.bin.begin() + end),
                 "the bins of a person's sightings must ascend");
     }
 }

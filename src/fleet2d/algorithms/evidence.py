@@ -1,10 +1,9 @@
-"""Evidence: what robots watched, and where they perceived users, by rooms and by patches of rooms.
+"""Evidence: views of robots, and sightings of users in them, by rooms and by patches of rooms.
 
 Rows of observations are counted by user, bin and patch; with the share of each patch in view, these
 counts are what algorithms learn presence from.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
@@ -190,19 +189,6 @@ class SightingCounts(NamedTuple):
         """
         return cls(*list_sightings(step, user, place, bin_steps, *shape), shape)
 
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return the counts of consecutive bins as one."""
-        first = np.cumsum([0, *(part.shape[0] for part in parts)]).tolist()
-        user, place, steps = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("user", "place", "steps")
-        )
-        bins = np.concatenate([part.bin + begin for part, begin in zip(parts, first, strict=False)])
-        order = np.argsort(user, kind="stable")
-        shape = (first[-1], *parts[0].shape[1:])
-        return cls(user[order], bins[order], place[order], steps[order], shape)
-
     def between(self, begin: int, end: int) -> Self:
         """Return the counts of the bins `begin` to `end` - 1."""
         rows = (begin <= self.bin) & (self.bin < end)
@@ -223,7 +209,7 @@ class SightingCounts(NamedTuple):
 
     @property
     def unknown(self) -> Bool:
-        """Whether somebody was perceived who wasn't recognized as a user: bool (bins, places).
+        """Whether an unknown person, not recognized as a user, was perceived: bool (bins, places).
 
         True where somebody was perceived at more steps than all users were recognized, added up;
         nowhere without users, where everybody is the same person.
@@ -267,7 +253,7 @@ class PatchEvidence(NamedTuple):
 
 @dataclass(frozen=True)
 class Evidence:
-    """What robots watched, and where they perceived users, in bins of equal length.
+    """Views of robots, and sightings of users in them, in bins of equal length.
 
     Looks at which nobody was perceived are evidence, too: they distinguish a user who is somewhere
     else from one in a room that no robot looked at.

@@ -14,7 +14,15 @@ from pydantic import BeforeValidator
 
 from fleet2d.artifacts.manifest import FILE_NAME, Manifest, Status, TableRecord, table_record
 from fleet2d.artifacts.seal import TableDigest, make_seal, run_digest
-from fleet2d.artifacts.table import FLUSH_ROWS, Batch, Chunk, TableBuffer, TableSpec, rows_of
+from fleet2d.artifacts.table import (
+    FLUSH_ROWS,
+    Batch,
+    Chunk,
+    Columns,
+    TableBuffer,
+    TableSpec,
+    rows_of,
+)
 from fleet2d.artifacts.unfinished import FOLDER as UNFINISHED
 from fleet2d.artifacts.unfinished import (
     LOCK_NAME,
@@ -344,6 +352,17 @@ class RunStore:
     def names(self) -> tuple[str, ...]:
         """Names of the tables, in the order in which they were added."""
         return tuple(self._tables)
+
+    def add_rows(self, table: str, columns: Columns, description: str = "") -> None:
+        """Add rows to a table that is declared by them; see `append`.
+
+        Args:
+            table: The name of the table.
+            columns: The values of each column.
+            description: One line for a reader of the table.
+        """
+        self.add_table(TableSpec(table, tuple(columns), description))
+        self.append(table, **{column.name: values for column, values in columns.items()})
 
     def append(self, table: str, **columns: Any) -> None:
         """Add rows to a table; arrays are copied.

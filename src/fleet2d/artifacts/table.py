@@ -27,6 +27,8 @@ DTYPES: dict[str, np.dtype[Any]] = {
     "bool": np.dtype(np.bool_),
     "category": np.dtype(np.int32),
 }
+KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
+"""The kind of column for values of each kind of NumPy's types."""
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
 
 TRACK = 0
@@ -83,6 +85,12 @@ class Column:
     def takes_strings(self) -> bool:
         """Whether values are appended as strings."""
         return self.kind == "string" or self.is_growing
+
+
+Columns = dict[Column, Any]
+"""Columns and their values, which make a table and rows of it."""
+STEP = Column("step", "step", description="step at which the row takes effect")
+TIME = Column("time", "time", description="local time")
 
 
 @dataclass(frozen=True, slots=True)

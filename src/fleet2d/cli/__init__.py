@@ -60,12 +60,16 @@ def named_extras() -> Iterator[None]:
     """Name the extra that installs a module that is imported in the block and isn't there.
 
     Raises:
-        InputError: An extra has it.
+        InputError: An extra has it, or it is a limb of Fleet2D.
     """
     try:
         yield
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
+        if name == "fleet2d":  # a limb that was taken away
+            raise InputError(
+                f"this needs {error.name}, which is missing: reinstall fleet2d"
+            ) from None
         if extra := extra_with(name):
             raise InputError(f'this needs {name}: pip install "fleet2d[{extra}]"') from None
         raise

@@ -24,12 +24,8 @@ GROUP = "fleet2d.command"
 COMMANDS = {
     "components": "scenarios",
     "convert": "scenarios",
-    "demo": "demo",
-    "export": "show",
     "resume": "run",
     "run": "run",
-    "show": "show",
-    "test": "test",
     "validate": "scenarios",
     "verify": "run",
 }

@@ -1,23 +1,20 @@
 """`fleet2d run`, `resume` and `verify`: simulate, continue, and check what is stored."""
 
 import gc
-import json
-import os
 import sys
 import threading
 import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
-from datetime import timedelta
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fleet2d.cli.results import print_results
 from fleet2d.errors import (
-    ArtifactError,
     InputError,
     RunDirectoryError,
     blame,
@@ -25,12 +22,10 @@ from fleet2d.errors import (
     own_frames,
 )
 from fleet2d.options import Trust, file_name, resume_hint, show_code, split
-from fleet2d.runs.verdicts import verdict_line, verdicts_of
-from fleet2d.runtime.memory import peak_memory_mb, rare_collections
+from fleet2d.runtime.memory import rare_collections
 
 if TYPE_CHECKING:
     from fleet2d.engine.simulation import Simulation
-    from fleet2d.metrics.metric import Metric
     from fleet2d.runs.run import Run
 
 
@@ -116,121 +111,6 @@ def _run_with_bar(simulation: "Simulation") -> "Run":
         return simulation.run(update)
 
 
-_LOADED = time.perf_counter()
-
-
-def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
-    """Print the results of a run: as one JSON object, as a table, or nothing.
-
-    Raises:
-        ArtifactError: They can't be written; the run is stored nevertheless.
-    """
-    summary = summary_of(result)
-    try:
-        if as_json:
-            typer.echo(json.dumps(summary))
-        elif not quiet:
-            print_summary(summary, result)
-    except BrokenPipeError:  # its reader has seen enough
-        raise
-    except OSError as error:
-        raise ArtifactError(
-            f"the results can't be printed ({error.strerror or error}): the run is stored in"
-            f" {result.directory}"
-        ) from error
-
-
-def summary_of(run: "Run") -> dict[str, Any]:
-    """Return the content of `--json`."""
-    manifest = run.manifest
-    verdicts = verdicts_of(run)
-    wall = {**manifest["wall_s"], "total": _since_start()}
-    return {
-        **({"verdict": verdict_line(run, verdicts)} if verdicts else {}),
-        "run_dir": str(run.directory),
-        "steps": manifest["steps"],
-        "simulated_s": manifest["simulated_s"],
-        "seed": manifest["seed"],
-        "digest": run.digest,
-        "wall_s": wall,
-        "speedup": manifest["simulated_s"] / (wall["setup"] + wall["simulate"] + wall["save"]),
-        "peak_rss_mb": peak_memory_mb(),
-        "metrics": run.metrics,
-        **({"expectations": manifest["expectations"]} if verdicts else {}),
-    }
-
-
-def print_summary(summary: dict[str, Any], run: "Run") -> None:
-    """Print the summary as text: verdicts, speed, a table of metrics, notes."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from fleet2d.configuration.components import lookup
-    from fleet2d.configuration.units import format_duration
-    from fleet2d.metrics.metric import SEPARATOR, flat
-
-    print_verdict(run)
-    console = Console(highlight=False, markup=False, soft_wrap=True)
-    wall = summary["wall_s"]
-    simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
-    seconds = wall["setup"] + wall["simulate"] + wall["save"]
-    peak = summary["peak_rss_mb"]
-    memory = "" if peak is None else f", {peak:.0f} MB"
-    console.print(
-        f"{simulated} in {seconds:.2f} s: {summary['speedup']:,.0f} x real time"
-        f" (set-up {wall['setup']:.2f} s, simulate {wall['simulate']:.2f} s,"
-        f" save {wall['save']:.2f} s; whole process {wall['total']:.2f} s{memory})"
-    )
-    table = Table("metric", "of", "value", "", show_edge=False)
-    hidden = 0
-    for metric, result in summary["metrics"].items():
-        configured = run.manifest["scenario"]["metrics"][metric]
-        metric_class = cast("type[Metric]", lookup("metric", configured["type"]))
-        rows = flat(metric_class.summary(result))
-        hidden += len(flat(result)) - len(rows)
-        last_unit = None
-        for name, value in rows:
-            unit = metric_class.units.get(name.rsplit(SEPARATOR, 1)[-1], metric_class.unit)
-            table.add_row(metric, name, _text(value, unit), "" if unit == last_unit else unit)
-            metric = ""
-            last_unit = unit
-    if table.row_count:
-        console.print(table, soft_wrap=False)
-    lines = [f"{hidden} more numbers are in the run: --json shows them"] if hidden else []
-    lines += [verdict.says for verdict in verdicts_of(run) if verdict.outcome != "violated"]
-    lines += [f"note: {note}" for note in run.notes or run.manifest["notes"]]
-    lines += [f"seed {summary['seed']}, digest {summary['digest'][:16]}"]
-    lines += [f"stored in {summary['run_dir']}"]
-    console.print(*lines, sep="\n")
-
-
-def print_verdict(run: "Run", *, err: bool = False) -> None:
-    """Print what became of the expectations, a line for each violated one; red if one is."""
-    verdicts = verdicts_of(run)
-    violated = [verdict.says for verdict in verdicts if verdict.outcome == "violated"]
-    if line := verdict_line(run, verdicts):
-        typer.secho("\n".join([line, *violated]), fg="red" if violated else None, err=err)
-
-
-def _text(value: Any, unit: str) -> str:
-    """Return a value as text: shares in percent, other numbers with few digits."""
-    if not isinstance(value, float):
-        return str(value)
-    if unit.startswith("share"):
-        return f"{100 * value:.1f} %" if value >= 0.001 or value == 0 else "< 0.1 %"
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-
-
-def _since_start() -> float:
-    """Return the wall time since this process started [s]."""
-    try:
-        ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
-        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
-    except (OSError, AttributeError, ValueError, IndexError):
-        # Not on Linux: the time since this module was loaded.
-        return time.perf_counter() - _LOADED
-
-
 Strict = Annotated[
     bool, typer.Option("--strict", help="Refuse a home in which something will not work.")
 ]
@@ -295,7 +175,7 @@ def set_up(
     """
     with rare_collections():
         from fleet2d.engine.simulation import Simulation
-        from fleet2d.scenario.model import load_scenario
+        from fleet2d.scenario.load import load_scenario
 
         gc.freeze()
 
@@ -404,12 +284,10 @@ def _compare_with_seal(directory: Path) -> None:
     from fleet2d.artifacts.seal import verify_run
 
     result = verify_run(directory)
-    for note in result.notes:
-        typer.echo(f"note: {note}")
     for name in result.foreign:
         typer.echo(f"note: {name} is not part of the run")
     for name, difference in result.differing.items():
         typer.echo(f"{name} {difference}", err=True)
     if result.differing:
         raise typer.Exit(1)
-    typer.echo(f"verified: {f'seal {result.digest}' if result.digest else 'the tables'}")
+    typer.echo(f"verified: seal {result.digest}")

@@ -9,7 +9,7 @@ import typer
 
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError
-from fleet2d.options import Resolution, Scale, file_name, split
+from fleet2d.options import BODY_RADIUS_M, Radius, Resolution, Scale, split
 
 if TYPE_CHECKING:
     from fleet2d.floorplan.plan import FloorPlan
@@ -23,12 +23,7 @@ def validate(
             help="A scenario and changes to it, or a floor plan of any format.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Picture of a floor plan's check-up, .png or .svg.")
-    ] = None,
-    radius: Annotated[
-        float, typer.Option(min=0.01, max=5, help="Radius of the robot for a floor plan [m].")
-    ] = 0.15,
+    radius: Radius = BODY_RADIUS_M,
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
@@ -51,7 +46,7 @@ def validate(
                 " or name a scenario"
             )
         plan = load_or_mark(scenario, resolution=resolution, scale=scale)
-        _check_floorplan(plan, out, radius)
+        _check_floorplan(plan, radius)
         return
     from fleet2d.engine.simulation import Simulation, flaws_of
 
@@ -75,23 +70,11 @@ def validate(
         raise typer.Exit(2)
 
 
-def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None:
-    """Print the findings of a floor plan and draw them; exit with 2 if something is wrong.
-
-    Without matplotlib there is no picture, which is an error only if one is asked for.
-    """
+def _check_floorplan(plan: "FloorPlan", radius: float) -> None:
+    """Print the findings of a floor plan; exit with 2 if something is wrong."""
     from fleet2d.floorplan.checkup import checkup
 
     findings = checkup(plan, radius)
-    picture = str(out or Path(f"{file_name(plan.name) or 'plan'}-checkup.png"))
-    try:
-        from fleet2d.pictures.floorplan import draw_checkup
-    except InputError as error:
-        if out is not None:
-            raise
-        picture = f"no picture: {error}"
-    else:
-        draw_checkup(plan, findings, Path(picture))
     typer.echo(f"{plan.name}: {plan.area_m2:.1f} m2, {counted(len(plan.rooms), 'room')}")
     for number, finding in enumerate(findings, start=1):
         typer.echo(f"{number:>3} {finding.severity}: {finding.text}")
@@ -100,7 +83,6 @@ def _check_floorplan(plan: "FloorPlan", out: Path | None, radius: float) -> None
         typer.echo(f"ok: nothing wrong{odd}")
     for note in plan.notes:
         typer.echo(f"note: {note}")
-    typer.echo(picture)
     if any(finding.severity != "odd" for finding in findings):
         raise typer.Exit(2)
 
@@ -162,12 +144,14 @@ def components(
             typer.echo(f"    {field.name}: {field.type} {default}")
             if field.description:
                 typer.echo(f"        {field.description}")
+        if component.shares:
+            typer.echo(f"    and the keys of {', '.join(component.shares)}")
         typer.echo("")
 
 
 def _print_schema(of: Literal["scenario", "floorplan"]) -> None:
     if of == "floorplan":
-        from fleet2d.floorplan.formats.native import native_schema as content
+        from fleet2d.floorplan.native import native_schema as content
     else:
         from fleet2d.scenario.schema import schema as content
     typer.echo(json.dumps(content(), indent=2))

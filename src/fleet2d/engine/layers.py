@@ -1,4 +1,4 @@
-"""The layers of a run: those of what robots have seen, and when each layer is stored."""
+"""The layers of a run: the cells that robots have seen, and the times of storing layers."""
 
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.history import Log
+from fleet2d.artifacts.table import DTYPES, KINDS, TIME, Column
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, Watcher
@@ -33,7 +34,7 @@ from fleet2d.kernels import (
     settle_coverage,
 )
 from fleet2d.metrics.metric import Metric
-from fleet2d.runs.run import layer_rows, layer_table
+from fleet2d.runs.run import ALL_CELLS, LAYER_PREFIX
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import TableContext, stack_lenses
@@ -212,7 +213,7 @@ NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 
 
 def add_layers(home: Home, source: FloorPlanSource) -> None:
-    """Add the layers of a scenario to a home, except those of what robots have seen."""
+    """Add the layers of a scenario to a home, except those of seen cells."""
     layers = dict(source.layers)
     costs = layers.pop(COSTMAP, None)
     if source.costmap is not None or costs is not None:
@@ -226,7 +227,7 @@ def add_layers(home: Home, source: FloorPlanSource) -> None:
 
 
 class LayerBook:
-    """The layers of a run: it records what robots have seen, and stores layers at their times.
+    """The layers of a run: it records the cells that robots see, and stores layers at their times.
 
     Attributes:
         areas: The area that each robot with a camera has seen; empty if no component needs it.
@@ -334,17 +335,29 @@ class LayerBook:
         return whole_steps(layer.every, self._clock.step_us, key)
 
     def _put(self, layer: Layer, step: int) -> None:
-        spec = layer_table(layer)
-        self._store.add_table(spec)
-        columns = layer_rows(layer)
-        steps = np.full(len(columns["row"]), step, np.int64)
-        self._store.append(spec.name, step=steps, time=self._clock.times(steps), **columns)
+        """Store a layer after a step: its fill value, and the cells with another one."""
+        values = layer.values
+        fill = np.array(layer.fill)
+        differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
+        row, column = np.nonzero(differs)
+        kind = KINDS[layer.dtype.kind]
+        dtype = DTYPES[kind]
+        value = np.concatenate([[fill.astype(dtype)], values[differs].astype(dtype)])
+        named = Column("row", "int32", description="of the cell; -1: all cells not named")
+        columns = {
+            Column("step", "step", description="the layer as it was after this step"): step,
+            TIME: np.datetime64(self._clock.time(step)),
+            named: np.concatenate([[ALL_CELLS], row]),
+            Column("column", "int32"): np.concatenate([[ALL_CELLS], column]),
+            Column("value", kind, layer.unit, kind == "float64", (), layer.description): value,
+        }
+        self._store.add_rows(f"{LAYER_PREFIX}{layer.name}", columns, layer.description)
         self._stored_at[layer.name] = step
 
 
 @dataclass(frozen=True)
 class _Cells:
-    """The values of a layer of what a robot has seen, computed when they are read."""
+    """The values of a layer of seen cells, computed when they are read."""
 
     area: SeenArea
     name: str

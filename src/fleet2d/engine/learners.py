@@ -2,7 +2,7 @@
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -22,15 +22,13 @@ from fleet2d.algorithms.algorithm import (
     to_columns,
 )
 from fleet2d.algorithms.history import History, Log
-from fleet2d.artifacts.table import Column, Kind, TableSpec
+from fleet2d.artifacts.table import KINDS, Column, Kind
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame, errors_as
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import HOME, Event
-
-KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
 
 
 @dataclass
@@ -109,6 +107,14 @@ class Learners:
         self._show_outputs()
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 
+    def results_at(self, step: int) -> dict[str, Callable[[], Any]]:
+        """Return how to read the results of the metrics that were updated at a step, by name."""
+        return {
+            learner.name: learner.component.result
+            for learner in self.all
+            if isinstance(learner.component, Metric) and learner.since == step
+        }
+
     def _show_outputs(self) -> None:
         """Set the outputs that behaviors read, after some have changed."""
         self.readable_outputs = Outputs(self._as_read(self.outputs), self.known)
@@ -148,7 +154,7 @@ class Learners:
     def _start(
         self, path: str, origin: Algorithm | Metric, learned: Path | None
     ) -> Algorithm | Metric:
-        """Return a started copy of an algorithm or a metric, with what a file holds."""
+        """Return a started copy of an algorithm or a metric, with the learned state of a file."""
         component = origin.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
@@ -214,7 +220,7 @@ class Learners:
         ]
 
     def remember(self, directory: Path) -> list[str]:
-        """Write what each algorithm has learned to a file of its own; return notes on failures."""
+        """Write the learned state of each algorithm to its own file; return notes on failures."""
         notes = []
         for learner in self.all:
             if isinstance(learner.component, Algorithm):
@@ -266,12 +272,13 @@ class Learners:
             return  # without values even the kinds of the columns are unknown
         if not learner.kinds:
             learner.kinds = kinds
-            specs = [Column(name, kind) for name, kind in kinds.items()]
-            first = (Column("step", "step"), Column("time", "time"))
-            self.store.add_table(TableSpec(learner.table, (*first, *specs)))
         _check_kinds(learner, kinds)
-        steps = np.full(len(next(iter(columns.values()))), step, np.int64)
-        self.store.append(learner.table, step=steps, time=self.clock.times(steps), **columns)
+        rows = {
+            Column("step", "step"): step,
+            Column("time", "time"): np.datetime64(self.clock.time(step)),
+            **{Column(name, kind): columns[name] for name, kind in learner.kinds.items()},
+        }
+        self.store.add_rows(learner.table, rows)
 
 
 def _copy(output: Any) -> Any:

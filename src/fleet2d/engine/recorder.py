@@ -20,119 +20,29 @@ from fleet2d.algorithms.observations import (
     SightingTable,
     Truth,
 )
-from fleet2d.artifacts.table import KEY_KINDS, Column, TableSpec
+from fleet2d.artifacts.table import STEP, TIME, Column, Columns, TableSpec
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.trajectories import HEADING, STEP, TIME, KeyFrames, Samples, X, Y
+from fleet2d.engine.trajectories import (
+    HEADING,
+    KeyFrames,
+    Samples,
+    X,
+    Y,
+    entity_column,
+    room_column,
+)
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import I8, I32, I64, NOBODY, UNKNOWN_TRUTH
+from fleet2d.kernels import I8, I32, NOBODY, UNKNOWN_TRUTH
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
-
-def table_specs(
-    basis: Basis, cameras: Sequence[Cameras], sensors: Sensors, *, activities: bool
-) -> list[TableSpec]:
-    """Return the tables that a run stores.
-
-    Args:
-        basis: The basis of the run.
-        cameras: The cameras of robots.
-        sensors: The sensors of the home.
-        activities: Whether robots perceive activities.
-    """
-    scenario = basis.scenario
-    settings = scenario.artifacts
-    users = tuple(scenario.users)
-    robots = tuple(scenario.robots)
-    rooms = tuple(room.name for room in basis.home.rooms)
-    entity = Column("entity", "category", categories=(*users, *robots))
-    room = Column("room", "category", nullable=True, categories=rooms)
-    specs = []
-    if settings.trajectories != "off":
-        away = Column("away", "bool", description="not at home: x, y and room are missing")
-        specs.append(TableSpec("trajectories", (STEP, TIME, entity, X, Y, HEADING, room, away)))
-    if settings.key_frames:
-        kind = Column("kind", "category", categories=KEY_KINDS)
-        away = Column("away", "bool", description="not at home: x and y are where it left")
-        specs.append(TableSpec("key_frames", (STEP, TIME, entity, kind, X, Y, HEADING, away)))
-    if settings.observations and users and robots:
-        specs.append(_observation_table(basis, room, cameras, activities))
-    if settings.events:
-        event = Column("event", "category")
-        detail = Column("detail", "string")
-        user = Column("user", "category", nullable=True, categories=users)
-        user_columns = (user,) if users else ()
-        entities = entity
-        if basis.may_change:
-            text = "what did it, or what it happened to; none: the home itself"
-            names = (*users, *robots, *scenario.objects)
-            entities = Column(
-                "entity", "category", categories=names, nullable=True, description=text
-            )
-        specs.append(TableSpec("events", (STEP, TIME, entities, event, *user_columns, detail)))
-    if settings.decisions:
-        specs.append(TableSpec("decisions", (STEP, TIME, entity, *DECISION)))
-    if sensors.names:  # in the layout of the CASAS smart homes
-        where = Column("room", "category")
-        state = Column("state", "category")
-        sensor = Column("sensor", "category", categories=tuple(sensors.names))
-        activity = Column("activity", "string", description="what the person does, if known")
-        specs.append(TableSpec("sensors", (STEP, TIME, where, sensor, state, activity)))
-    return specs
-
-
-def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
-    """Return the names of all cameras if the table of observations has to name them.
-
-    It does if a robot has several cameras, or cameras that err.
-    """
-    if not any(group.errs or len(group.names) > 1 for group in cameras):
-        return ()
-    return tuple(dict.fromkeys(name for group in cameras for name in group.names))
-
-
-def _observation_table(
-    basis: Basis, room: Column, groups: Sequence[Cameras], activities: bool
-) -> TableSpec:
-    """Return the table of what was perceived, with the truth if that can differ."""
-    cameras = camera_names(groups)
-    users = tuple(basis.scenario.users)
-    robots = tuple(basis.scenario.robots)
-    robot = Column("robot", "category", categories=robots)
-    user = Column("user", "category", nullable=bool(cameras), categories=users)
-    columns = [STEP, TIME, robot, user, X, Y, room]
-    if cameras:
-        posture = Column("posture", "category", categories=POSTURES)
-        true = {
-            column.name: replace(column, name=f"true_{column.name}", nullable=True)
-            for column in (user, X, Y, HEADING, posture)
-        }
-        camera = Column("camera", "category", categories=tuple(cameras))
-        columns += [HEADING, posture, camera, *true.values()]
-    if not all(group.knows_truth for group in groups):
-        text = "whether it is known who was there: not for what real robots perceived"
-        columns.append(Column("truth_known", "bool", description=text))
-    if activities:
-        text = "what the user does, if a behavior says so"
-        for name in ("activity", "true_activity"):
-            columns.append(Column(name, "category", nullable=True, description=text))
-    return TableSpec("observations", tuple(columns))
-
-
-DECISION = (
-    Column("behavior", "category", nullable=True, description="the one whose plan it follows"),
-    Column("reason", "string", description="the last note of the plan"),
-    Column(
-        "next_step",
-        "int64",
-        nullable=True,
-        description="when it decides next if nothing interrupts it",
-    ),
-)
-# Events whose detail is a user, who has a column of their own.
+# Descriptions of columns.
+ANY_ENTITY = "what did it, or what it happened to; none: the home itself"
+TRUTH_KNOWN = "whether it is known who was there: not for what real robots perceived"
+ACTIVITY_SAID = "what the user does, if a behavior says so"
+# Events with a user as their detail, which is stored in a column of its own.
 USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
-ACTIVITY = EventKind.ACTIVITY.value
 # Rows that are collected before they are stored: so many, or more with many bodies.
 MAX_ROWS = 1 << 16
 # Sightings that repeat another one take as much memory as one other row, if they are so many.
@@ -150,7 +60,7 @@ class Recorder:
     Attributes:
         activities: The activities of users so far.
         wall_s: Wall time of storing [s].
-        keeps_none: Whether rows are stored at once, for those who listen to them.
+        flushes_every_span: Whether rows are stored at once, for those who listen to them.
     """
 
     def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
@@ -163,17 +73,25 @@ class Recorder:
         """
         self.store = basis.store
         self.clock = basis.clock
-        self.home, self.bodies = basis.home, basis.bodies
-        self._samples, self._keys = Samples(basis), KeyFrames(basis)
+        self.home = basis.home
+        self.bodies = basis.bodies
+        self._samples = Samples(basis)
+        self._keys = KeyFrames(basis)
         senses = {(g.index, c): s for g in cameras for c, s in enumerate(g.activity_senses)}
         self.activities = Activities(basis.bodies.users, senses)
-        perceived = self.activities.are_perceived
-        for spec in table_specs(basis, cameras, sensors, activities=perceived):
-            self.store.add_table(spec)
-        self._tables = set(self.store.names)
-        self._users = {actor.name: row for row, actor in enumerate(basis.users)}
-        entities = [*(actor.name for actor in basis.actors), *basis.scenario.objects]
+        scenario = basis.scenario
+        self._user_names = tuple(scenario.users)
+        self._robot_names = tuple(scenario.robots)
+        self._users = {name: row for row, name in enumerate(self._user_names)}
+        entities = [*(actor.name for actor in basis.actors), *scenario.objects]
         self._rows = {name: row for row, name in enumerate(entities)} | {HOME: -1}
+        self._entity = entity_column(basis)
+        self._room = room_column(basis)
+        self._event_entity = self._entity
+        if basis.may_change:
+            self._event_entity = replace(
+                self._entity, categories=tuple(entities), nullable=True, description=ANY_ENTITY
+            )
         self._stores_home = basis.may_change
         self._events: ImmutableRows[Event] = ImmutableRows()
         self._actors = basis.actors
@@ -182,13 +100,39 @@ class Recorder:
         self._sensors = sensors
         self._readings = list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
-        names = camera_names(cameras)
-        self._camera_codes = {g.index: [names.index(n) for n in g.names] for g in cameras if names}
+        self._camera_names = camera_names(cameras)
+        named = cameras if self._camera_names else ()
+        codes = {name: code for code, name in enumerate(self._camera_names)}
+        self._camera_codes = {group.index: [codes[name] for name in group.names] for group in named}
         self._has_unknown_truth = not all(group.knows_truth for group in cameras)
         self._count = 0  # observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
         self.wall_s = 0.0
-        self.keeps_none = False
+        self.flushes_every_span = False
+        settings = scenario.artifacts
+        is_stored = {
+            "trajectories": settings.trajectories != "off",
+            "key_frames": settings.key_frames,
+            "observations": settings.observations and scenario.users and scenario.robots,
+            "events": settings.events,
+            "decisions": settings.decisions,
+            "sensors": sensors.names,
+        }
+        self._tables = [name for name, is_on in is_stored.items() if is_on]
+        for name in self._tables:
+            self.store.add_table(TableSpec(name, tuple(self._drain(name))))
+
+    def _drain(self, table: str) -> Columns:
+        """Return and remove the collected rows of a table."""
+        drains = {
+            "trajectories": self._samples.drain,
+            "key_frames": self._keys.drain,
+            "observations": self._drain_observations,
+            "events": self._drain_events,
+            "decisions": self._drain_decisions,
+            "sensors": self._drain_readings,
+        }
+        return drains[table]()
 
     def before_plan(self, row: int, step: int) -> None:
         """Collect the end of the plan that is replaced at `step`."""
@@ -211,7 +155,9 @@ class Recorder:
         """Collect events."""
         if "events" in self._tables:
             self._events += events
-        begun = [event for event in events if event[2] == ACTIVITY and event[1] in self._users]
+        begun = [
+            event for event in events if event[2] == EventKind.ACTIVITY and event[1] in self._users
+        ]
         if not self.activities.are_perceived:  # then only the present one is asked for
             begun = list({event[1]: event for event in begun}.values())
         for step, entity, _, detail in begun:
@@ -238,7 +184,7 @@ class Recorder:
         self._count += len(readings)
         count = self._count + self._samples.count + self._keys.count
         count += len(self._events) + len(self._decisions)
-        if count > self._most or self.keeps_none:
+        if count > self._most or self.flushes_every_span:
             self.drain()
 
     def end(self, step: int, rows: int) -> None:
@@ -253,53 +199,54 @@ class Recorder:
     def drain(self) -> None:
         """Append all collected rows to the store."""
         began = time.perf_counter()
-        self._samples.store()
-        if "key_frames" in self._tables:
-            self._keys.store()
-        self._store_observations()
-        self._store_events()
-        self._store_decisions()
-        self._store_readings()
+        for name in self._tables:
+            self.store.add_rows(name, self._drain(name))
+        while self._observations:
+            self.store.add_rows("observations", self._drain_observations())
         self._count = 0
         self.wall_s += time.perf_counter() - began
 
-    def _store_observations(self) -> None:
-        blocks = self._observations
-        self._observations = ImmutableRows()
-        while blocks:  # so many rows at a time that their columns take little memory
-            counts = accumulate(map(len, blocks))
-            size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), len(blocks))
-            self._store_blocks(blocks[:size])
-            del blocks[:size]
-
-    def _store_blocks(self, blocks: Sequence[SightingTable]) -> None:
-        o = Observations(self.home.plan, self._rooms, blocks, self.activities)
-        columns: dict[str, Any] = {
-            **self._times(o.step),
-            "robot": o.robot,
-            "user": o.user,
-            "x": o.x,
-            "y": o.y,
-            "room": o.room.astype(np.int32),
+    def _drain_observations(self) -> Columns:
+        """Return and remove observations: so many that their columns take little memory."""
+        counts = accumulate(map(len, self._observations))
+        size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), None)
+        o = Observations(self.home.plan, self._rooms, self._observations[:size], self.activities)
+        del self._observations[:size]
+        has_cameras = bool(self._camera_names)
+        user = Column("user", "category", nullable=has_cameras, categories=self._user_names)
+        columns: Columns = {
+            STEP: o.step,
+            TIME: self.clock.times(o.step),
+            Column("robot", "category", categories=self._robot_names): o.robot,
+            user: o.user,
+            X: o.x,
+            Y: o.y,
+            self._room: o.room.astype(np.int32),
         }
-        if self._camera_codes:
-            t = Truth.behind(o)
-            is_user = t.user >= 0
-            columns |= {
-                "heading": o.heading,
-                "posture": o.posture.astype(np.int32),
-                "camera": self._cameras(o.robot, o.camera),
-                "true_user": np.where(is_user, t.user, np.int32(NOBODY)),
-                "true_x": np.where(is_user, t.x, np.nan),
-                "true_y": np.where(is_user, t.y, np.nan),
-                "true_heading": np.where(is_user, t.heading, np.nan),
-                "true_posture": np.where(is_user, t.posture, -1).astype(np.int32),
-            }
-            if self._has_unknown_truth:
-                columns["truth_known"] = t.user != UNKNOWN_TRUTH
-            if self.activities.are_perceived:
-                columns |= {"activity": o.activity.tolist(), "true_activity": t.activity.tolist()}
-        self.store.append("observations", **columns)
+        if not has_cameras:
+            return columns
+        t = Truth.behind(o)
+        is_user = t.user >= 0
+        posture = Column("posture", "category", categories=POSTURES)
+        camera = Column("camera", "category", categories=self._camera_names)
+        columns |= {
+            HEADING: o.heading,
+            posture: o.posture.astype(np.int32),
+            camera: self._cameras(o.robot, o.camera),
+            _true(user): np.where(is_user, t.user, np.int32(NOBODY)),
+            _true(X): np.where(is_user, t.x, np.nan),
+            _true(Y): np.where(is_user, t.y, np.nan),
+            _true(HEADING): np.where(is_user, t.heading, np.nan),
+            _true(posture): np.where(is_user, t.posture, -1).astype(np.int32),
+        }
+        if self._has_unknown_truth:
+            known = Column("truth_known", "bool", description=TRUTH_KNOWN)
+            columns[known] = t.user != UNKNOWN_TRUTH
+        if self.activities.are_perceived:
+            activity = Column("activity", "category", nullable=True, description=ACTIVITY_SAID)
+            columns[activity] = o.activity.tolist()
+            columns[_true(activity)] = t.activity.tolist()
+        return columns
 
     def _cameras(self, robot: I32, camera: I8) -> I32:
         """Return the codes of cameras from their indices among the cameras of their robot."""
@@ -309,65 +256,89 @@ class Recorder:
             codes[index, : len(names)] = names
         return codes[robot, camera]
 
-    def _store_events(self) -> None:
-        if not self._events:
-            return
-        users = self._users
-        step, entity, kind, detail = zip(*self._events, strict=True)
+    def _drain_events(self) -> Columns:
+        step, entity, kind, detail = _transposed(self._events, 4)
         self._events = ImmutableRows()
         steps = np.array(step, np.int64)
         rows = np.array([self._rows[name] for name in entity], np.int32)
         ranks = np.array([RANKS.get(name, 0) for name in kind], np.int8)
         order = np.lexsort((ranks, rows, steps))
-        if not self._stores_home and rows.min() < 0:  # a change by hand, which nobody announced
+        if not self._stores_home and (rows < 0).any():  # a change by hand, which nobody announced
             order = order[rows[order] >= 0]
             if UNSTORED not in self.store.manifest.notes:
                 self.store.manifest.notes.append(UNSTORED)
         kinds, details = ([column[i] for i in order.tolist()] for column in (kind, detail))
         of_users = [i for i, name in enumerate(kinds) if name in USER_EVENTS]
-        columns: dict[str, Any] = self._times(steps[order])
-        if users:
-            user = np.full(len(kinds), -1, np.int32)
-            user[of_users] = [users.get(details[i], -1) for i in of_users]
-            columns["user"] = user
+        user = np.full(len(kinds), -1, np.int32)
+        user[of_users] = [self._users.get(details[i], -1) for i in of_users]
         for i in of_users:
             details[i] = ""
-        words = {"event": list(map(str, kinds)), "detail": details}
-        self.store.append("events", **columns, entity=rows[order], **words)
+        columns: Columns = {
+            STEP: steps[order],
+            TIME: self.clock.times(steps[order]),
+            self._event_entity: rows[order],
+            Column("event", "category"): list(map(str, kinds)),
+        }
+        if self._users:
+            columns[Column("user", "category", nullable=True, categories=self._user_names)] = user
+        return columns | {Column("detail", "string"): details}
 
-    def _store_decisions(self) -> None:
-        if not self._decisions:
-            return
-        # Who gives way at the step of its decision decides twice: the last one counts.
+    def _drain_decisions(self) -> Columns:
+        # A body that gives way at the step of its decision decides twice: the last one counts.
         last = {entry[:2]: entry for entry in self._decisions}
         self._decisions = []
         entries = [last[key] for key in sorted(last)]
-        step, row, behavior, reason, next_step = zip(*entries, strict=True)
-        missing = np.array([at is None for at in next_step])
-        self.store.append(
-            "decisions",
-            **self._times(np.array(step, np.int64)),
-            entity=np.array(row, np.int32),
-            behavior=[name or None for name in behavior],
-            reason=list(reason),
-            next_step=np.ma.array([at or 0 for at in next_step], np.int64, mask=missing),
-        )
+        step, row, behavior, reason, next_step = _transposed(entries, 5)
+        steps = np.array(step, np.int64)
+        missing = np.array([at is None for at in next_step], np.bool_)
+        who = "the one whose plan it follows"
+        when = "when it decides next if nothing interrupts it"
+        behaviors = [name or None for name in behavior]
+        next_steps = np.ma.array([at or 0 for at in next_step], np.int64, mask=missing)
+        return {
+            STEP: steps,
+            TIME: self.clock.times(steps),
+            self._entity: np.array(row, np.int32),
+            Column("behavior", "category", nullable=True, description=who): behaviors,
+            Column("reason", "string", description="the last note of the plan"): list(reason),
+            Column("next_step", "int64", nullable=True, description=when): next_steps,
+        }
 
-    def _store_readings(self) -> None:
-        if not self._readings:
-            return
-        step, sensor, on, activity = zip(*self._readings, strict=True)
+    def _drain_readings(self) -> Columns:
+        """Return and remove readings, in the layout of the CASAS smart homes."""
+        step, sensor, on, activity = _transposed(self._readings, 4)
         self._readings = []
+        steps = np.array(step, np.int64)
         rooms = self._sensors.rooms
         words = self._sensors.words
-        self.store.append(
-            "sensors",
-            **self._times(np.array(step, np.int64)),
-            room=[rooms[number] for number in sensor],
-            sensor=np.array(sensor, np.int32),
-            state=[words[number][not is_on] for number, is_on in zip(sensor, on, strict=True)],
-            activity=list(activity),
-        )
+        states = [words[number][not is_on] for number, is_on in zip(sensor, on, strict=True)]
+        names = tuple(self._sensors.names)
+        said = "what the person does, if known"
+        return {
+            STEP: steps,
+            TIME: self.clock.times(steps),
+            Column("room", "category"): [rooms[number] for number in sensor],
+            Column("sensor", "category", categories=names): np.array(sensor, np.int32),
+            Column("state", "category"): states,
+            Column("activity", "string", description=said): list(activity),
+        }
 
-    def _times(self, step: I64) -> dict[str, Any]:
-        return {"step": step, "time": self.clock.times(step)}
+
+def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
+    """Return the names of all cameras if the table of observations has to name them.
+
+    It does if a robot has several cameras, or cameras that err.
+    """
+    if not any(group.errs or len(group.names) > 1 for group in cameras):
+        return ()
+    return tuple(dict.fromkeys(name for group in cameras for name in group.names))
+
+
+def _true(column: Column) -> Column:
+    """Return the column of the true value behind a perceived one."""
+    return replace(column, name=f"true_{column.name}", nullable=True)
+
+
+def _transposed(rows: Sequence[tuple[Any, ...]], width: int) -> Sequence[tuple[Any, ...]]:
+    """Return the columns of rows of some width; empty ones without rows."""
+    return list(zip(*rows, strict=True)) or [()] * width

@@ -7,18 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.artifacts.table import PLANNED, TRACK, WALK, Column
+from fleet2d.artifacts.table import KEY_KINDS, PLANNED, STEP, TIME, TRACK, WALK, Column, Columns
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.kernels import I64, SUB, Breakpoints, in_radians
 from fleet2d.runtime.clock import HOUR_US
 
-STEP = Column("step", "step", description="step at which the row takes effect")
-TIME = Column("time", "time", description="local time")
 X = Column("x", "float64", "m", nullable=True)
 Y = Column("y", "float64", "m", nullable=True)
 HEADING = Column("heading", "float64", "rad", description="counter-clockwise from +x")
+
+
+def entity_column(basis: Basis) -> Column:
+    """Return the column of bodies, as codes: users, then robots."""
+    return Column("entity", "category", categories=tuple(actor.name for actor in basis.actors))
+
+
+def room_column(basis: Basis) -> Column:
+    """Return the column of rooms, as codes."""
+    rooms = tuple(room.name for room in basis.home.rooms)
+    return Column("room", "category", nullable=True, categories=rooms)
 
 
 class Samples:
@@ -34,8 +43,9 @@ class Samples:
         Raises:
             ScenarioError: The interval between samples is not a multiple of the step.
         """
-        self._store = basis.store
         self._clock = basis.clock
+        self._entity = entity_column(basis)
+        self._room = room_column(basis)
         self._home = basis.home
         every = basis.scenario.artifacts.trajectories
         named = {"off": 0, "every step": 1}
@@ -65,11 +75,9 @@ class Samples:
             self._blocks.append(rows.reshape(-1, 6))
             self.count += len(steps) * len(bodies)
 
-    def store(self) -> None:
-        """Append all collected rows to the store."""
-        if not self._blocks:
-            return
-        rows = np.concatenate(self._blocks)
+    def drain(self) -> Columns:
+        """Return and remove all collected rows."""
+        rows = np.concatenate([np.empty((0, 6), np.int64), *self._blocks])
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
         self._blocks = []
         self.count = 0
@@ -79,21 +87,22 @@ class Samples:
         xy = plan.lattice.to_metres(rows[:, 2:4])
         xy[is_away] = np.nan
         room = plan.room_of_place[y // SUB, x // SUB].astype(np.int32)
-        self._store.append(
-            "trajectories",
-            step=step,
-            time=self._clock.times(step),
-            entity=entity.astype(np.int32),
-            x=xy[:, 0],
-            y=xy[:, 1],
-            heading=in_radians(heading),
-            room=np.where(is_away, np.int32(-1), room),
-            away=is_away,
-        )
+        away_text = "not at home: x, y and room are missing"
+        return {
+            STEP: step,
+            TIME: self._clock.times(step),
+            self._entity: entity.astype(np.int32),
+            X: xy[:, 0],
+            Y: xy[:, 1],
+            HEADING: in_radians(heading),
+            self._room: np.where(is_away, np.int32(-1), room),
+            Column("away", "bool", description=away_text): is_away,
+        }
 
 
 # Time between the key frames of a random walk [us].
 WALK_KEY_US = HOUR_US
+NO_FRAMES = [np.empty(0, np.int64)] * len(Breakpoints._fields)
 
 
 class KeySegment(NamedTuple):
@@ -121,8 +130,8 @@ class KeyFrames:
 
     def __init__(self, basis: Basis) -> None:
         """Start without key frames."""
-        self._store = basis.store
         self._clock = basis.clock
+        self._entity = entity_column(basis)
         self._home = basis.home
         self._actors = basis.actors
         self._bodies = basis.bodies
@@ -235,33 +244,31 @@ class KeyFrames:
             self._segments.append(_key(row, self._walk_kind, moment, pose))
         self._walked[row] = max(first, end)
 
-    def store(self) -> None:
-        """Append all key frames so far to the store."""
+    def drain(self) -> Columns:
+        """Return and remove all key frames so far."""
         self.collect()
-        if not self._segments:
-            return
         segments = self._segments
         self._segments = ImmutableRows()
         self._rows = 0
-        parts = [[column[s.begin : s.end] for column in s.track] for s in segments]
+        parts = [NO_FRAMES, *([column[s.begin : s.end] for column in s.track] for s in segments)]
         time, x, y, heading, away = (np.concatenate(column) for column in zip(*parts, strict=True))
-        numbers = np.array([(s.row, s.kind, s.step) for s in segments], np.int64)
+        numbers = np.array([(s.row, s.kind, s.step) for s in segments], np.int64).reshape(-1, 3)
         counts = [s.end - s.begin for s in segments]
         entity, kind, step = np.repeat(numbers, counts, axis=0).T
         step = np.where(step < 0, -(-time // self._clock.step_us), step)
         order = np.lexsort((entity, step))
         xy = self._home.plan.lattice.to_metres(np.stack([x, y], axis=1)[order])
-        self._store.append(
-            "key_frames",
-            step=step[order],
-            time=self._clock.moments(time[order]),
-            entity=entity[order].astype(np.int32),
-            kind=kind[order].astype(np.int32),
-            x=xy[:, 0],
-            y=xy[:, 1],
-            heading=in_radians(heading[order]),
-            away=away[order].astype(bool),
-        )
+        away_text = "not at home: x and y are where it left"
+        return {
+            STEP: step[order],
+            TIME: self._clock.moments(time[order]),
+            self._entity: entity[order].astype(np.int32),
+            Column("kind", "category", categories=KEY_KINDS): kind[order].astype(np.int32),
+            X: xy[:, 0],
+            Y: xy[:, 1],
+            HEADING: in_radians(heading[order]),
+            Column("away", "bool", description=away_text): away[order].astype(bool),
+        }
 
 
 def _key(row: int, kind: int, time_us: int, pose: Pose) -> KeySegment:

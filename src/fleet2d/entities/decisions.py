@@ -33,6 +33,7 @@ from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
 from fleet2d.floorplan.placed_objects import Posture
+from fleet2d.runtime.events import EventKind
 
 Ask = Callable[[Behavior, Situation], Plan | None]
 
@@ -284,7 +285,7 @@ class LeaveRoom:
         if self._has_tried or room is None or room.index not in banned:
             return None
         self._has_tried = True
-        plan = now.plan().note("withdraws", self.about)
+        plan = now.plan().note(EventKind.WITHDRAWS, self.about)
         allowed = actor.space_without(banned).rooms_of(0)
         others = [r for r in actor.reachable_rooms() if r.index in allowed - banned]
         if others:
@@ -326,7 +327,7 @@ class DoActivity(Trip):
             plan.come_home().go_to(self.place, "send")
         elif performer is not None:
             performer.perform(plan, self.activity)
-        plan.note("activity", self.activity)
+        plan.note(EventKind.ACTIVITY, self.activity)
 
     def _performer(self, now: Situation) -> Behavior | None:
         capable = (b for b in now.actor.behaviors if self.activity in b.activities())
@@ -370,7 +371,9 @@ class DecidingActor(Actor):
 
     def follow_order(self, order: Order | None, step: int) -> None:
         """Follow an order from a step on, in place of its behaviors; None: follow them again."""
-        self.order, self.waiting, self.arbiter.own = order, None, frozenset()
+        self.order = order
+        self.waiting = None
+        self.arbiter.own = frozenset()
         self._chosen = None
         self.decide_again(step)
 
@@ -484,7 +487,9 @@ class DecidingActor(Actor):
 
     def decide(self, now: Situation) -> None:
         """Ask the behaviors, in order, for a plan that begins now."""
-        step, (plan, self._chosen) = now.step, (self._chosen, None)
+        step = now.step
+        plan = self._chosen
+        self._chosen = None
         if self.is_stuck or (self.charge is not None and self.charge.is_empty):
             plan = now.plan().stay()
         waiting = self.waiting
@@ -508,7 +513,7 @@ class DecidingActor(Actor):
                 f"{self.path}: decide() returned a plan that doesn't begin here and now: make one"
                 " by now.plan()"
             )
-        self.plan, self.motion, self.planned_at = plan, plan.finish(), step
+        self._follow(plan, step)
         if self.charge is not None:
             self.charge.record(plan)
         with blame(self.path, step):
@@ -570,8 +575,13 @@ class DecidingActor(Actor):
         self._runs_down(now)
         if self.plan.began[0] == step:  # its first rows happened, though it ends at once
             plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]
-        self.plan, self.motion, self.planned_at = plan, plan.finish(), step
+        self._follow(plan, step)
         self._set_next_decision(now, fresh=True)
+
+    def _follow(self, plan: Plan, step: int) -> None:
+        self.plan = plan
+        self.motion = plan.finish()
+        self.planned_at = step
 
     def _set_next_decision(self, now: Situation, *, fresh: bool) -> None:
         """Set when it decides next: the plan is over, or another behavior may interrupt it."""
@@ -601,7 +611,7 @@ class DecidingActor(Actor):
             plan = now.plan()
             reason = str(error)
             if self._blocked != (reason, now.step):  # else the row was written before the wait
-                plan.note("way_blocked", reason)
+                plan.note(EventKind.WAY_BLOCKED, reason)
             plan.stay(DOOR_WAIT)
             self._blocked = reason, self.clock.step_at_or_after(plan.time_us)
             return plan

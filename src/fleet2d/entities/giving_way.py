@@ -20,9 +20,11 @@ from fleet2d.entities.body import Arrangement, Body, Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
+from fleet2d.runtime.events import EventKind
 
-Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
+Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
 
 
 def resumed(plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None) -> Plan | None:
@@ -80,7 +82,7 @@ def _rest(
         return None
     goes_on_us = max(int(track.time[stop]), interrupted_us)
     goal = int(track.x[stop]), int(track.y[stop])
-    route = detour((plan.x, plan.y), goal) if detour else None
+    route = detour(plan.position, goal) if detour else None
     if detour and route is None:
         return None
     try:
@@ -110,7 +112,8 @@ def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
     """Return the heading at a moment between a breakpoint and the next."""
     times = track.time
     headings = track.heading
-    begin, end = int(times[stop]), int(times[stop + 1])
+    begin = int(times[stop])
+    end = int(times[stop + 1])
     turn = int(turn_between(int(headings[stop]), int(headings[stop + 1])))
     return (int(headings[stop]) + turn * (time_us - begin) // max(end - begin, 1)) % TURN
 
@@ -215,7 +218,7 @@ class WaitForPeople:
         look = self._look_after(now.step)
         patience = micros(gives_way.patience)
         if now.step == self.since:
-            plan.note("gives_way", person)
+            plan.note(EventKind.GIVES_WAY, person)
         if self._waited(now.step) >= patience:  # it has already looked for a way round
             patience = max(patience, micros(gives_way.gives_up))
         # At its first look it may still turn towards its next leg.
@@ -254,7 +257,7 @@ class WaitForPeople:
 
     def give_up(self, now: Situation, person: str) -> Plan:
         """Stand for a step, after which the behaviors are asked again."""
-        return self._stand_for_a_step(now).note("gives_up", person)
+        return self._stand_for_a_step(now).note(EventKind.GIVES_UP, person)
 
     def _stand_for_a_step(self, now: Situation) -> Plan:
         """Return a plan that begins with a step of standing, so that people in the way are seen."""
@@ -284,7 +287,7 @@ class RoutesAround:
         for x, y, reach in people.tolist():
             self.cost[(xs - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach] = CLOSED
 
-    def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+    def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
         return route_by_cost(self._space, self.cost, start, goal)
 
@@ -345,7 +348,7 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         goal = beside
         rest[:, 1:3] = goal
     plan = now.plan()
-    route = detour((plan.x, plan.y), goal)
+    route = detour(plan.position, goal)
     if route is None:
         return None
     since_us = max(int(rows[stop, 0]), begin_us)
@@ -399,7 +402,7 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def _beside(actor: Actor, goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
+def _beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan = actor.home.plan
     space = actor.space

@@ -16,16 +16,13 @@ from fleet2d.expectations.parse import parse_expectation as parse_expectation
 from fleet2d.expectations.signals import Scene as Scene
 from fleet2d.expectations.temporal import Violation as Violation
 from fleet2d.expectations.verdict import Verdict as Verdict
-from fleet2d.expectations.verdict import judge as judge
 
 if TYPE_CHECKING:
     from fleet2d.expectations.learned import *  # noqa: F403
     from fleet2d.expectations.temporal import *  # noqa: F403
     from fleet2d.expectations.vocabulary import *  # noqa: F403
 else:  # every word, whichever module defines it
-    __all__ = sorted(
-        {"Expectation", "Scene", "Verdict", "Violation", "judge", "parse_expectation", *WORDS}
-    )
+    __all__ = sorted({"Expectation", "Scene", "Verdict", "Violation", "parse_expectation", *WORDS})
 
     def __getattr__(name: str) -> Any:
         if name not in WORDS:

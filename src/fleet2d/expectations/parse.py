@@ -1,4 +1,4 @@
-"""Read expectations: text in Python's syntax, or mappings from operators to conditions.
+"""Read expectations: text in Python's syntax.
 
 Names need quotes only where they aren't one word.
 """
@@ -8,13 +8,16 @@ import inspect
 import operator
 import re
 from collections.abc import Callable, Mapping
-from functools import partial, reduce
+from functools import reduce
 from typing import Any
 
-from fleet2d.configuration.problems import did_you_mean, problem, problem_at
+from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.errors import InputError, errors_as
-from fleet2d.expectations import learned as learned  # its words
-from fleet2d.expectations import temporal, vocabulary
+
+# Their classes are the words of texts.
+from fleet2d.expectations import learned as learned
+from fleet2d.expectations import temporal as temporal
+from fleet2d.expectations import vocabulary as vocabulary
 from fleet2d.expectations.expectation import WORDS, Expectation
 from fleet2d.expectations.signals import Signal, WordSignal
 from fleet2d.expectations.verdict import check_judged
@@ -219,116 +222,17 @@ class _Reader:
         return _OPERATORS[sign](left, right)
 
 
-# Fields of a scenario
-
-OPERATORS = ("always", "never", "eventually", "at_end", "at_most")
-KEYS = (
-    *OPERATORS, "until", "after", "within", "holds_for", "during", "of", "per", "may_be_untested",
-)  # fmt: skip
-
-
 def read_expectation(value: Any) -> Expectation:
-    """Read an expectation of a scenario: text, or a mapping of `KEYS` to its parts.
+    """Read an expectation of a scenario.
 
     Raises:
         PydanticCustomError: It can't be read, or doesn't say when it must hold.
-
-    Example:
-        >>> print(read_expectation({"eventually": "seen(ana, by=astro)", "within": "2 min"}))
-        eventually(seen("ana", by="astro"), within="2 min")
-        >>> print(read_expectation({"never": "moving(astro)", "during": "22:00-07:00"}))
-        never(during("22:00-07:00") and moving("astro"))
     """
     if isinstance(value, Expectation):
         return value
+    if not isinstance(value, str):
+        raise problem(
+            f"expected an expectation like always(distance(ana, astro) > 0.5 m), got {value!r}"
+        )
     with errors_as(problem):
-        if isinstance(value, str):
-            return check_judged(parse_expectation(value))
-        if isinstance(value, Mapping) and value:
-            return check_judged(_read_mapping(value))
-    raise problem(
-        f"expected an expectation like always(distance(ana, astro) > 0.5 m), got {value!r}"
-    )
-
-
-def _read_mapping(value: Mapping[str, Any]) -> Expectation:
-    may_be_untested = value.get("may_be_untested", False)
-    if not isinstance(may_be_untested, bool):
-        raise problem_at(("may_be_untested",), f"expected true or false, got {may_be_untested!r}")
-    expectation = _read_operator(value)
-    return temporal.may_be_untested(expectation) if may_be_untested else expectation
-
-
-def _read_operator(value: Mapping[str, Any]) -> temporal.Temporal:
-    name = _operator(value)
-    if name == "at_most" and "of" not in value:
-        raise InputError("at_most needs the key 'of', such as of: events(find_begins, astro)")
-    if "until" in value and name != "always":
-        raise problem_at(
-            ("until",), f"'until' can only be combined with 'always', not with {name!r}"
-        )
-    for key in _REFUSED.get(name, ("of", "per")):
-        if key in value:
-            raise problem_at((key,), f"{key!r} can't be combined with {name}")
-    part = _condition(value, name)
-    within = {"within": value.get("within")}
-    if name == "eventually" and "after" in value:
-        return temporal.after(_part(value, "after"), part, **within)
-    if name == "at_most":
-        return temporal.at_most(value[name], part, per=value.get("per"))
-    if "until" in value:
-        whole: temporal.Temporal = temporal.until(part, _part(value, "until"), **within)
-    else:
-        whole = getattr(temporal, name)(part, **({} if name == "at_end" else within))
-    return temporal.after(_part(value, "after"), whole) if "after" in value else whole
-
-
-def _operator(value: Mapping[str, Any]) -> str:
-    """Return the only operator among the keys, which must all be known."""
-    for key in value:
-        if key not in KEYS:
-            near = did_you_mean(key, KEYS)
-            raise problem_at((key,), f"unknown key {key!r}{near} Allowed here: {', '.join(KEYS)}")
-    operators = [key for key in OPERATORS if key in value]
-    if len(operators) != 1:
-        raise InputError(
-            f"expected exactly one of {', '.join(OPERATORS)}, got {', '.join(operators) or 'none'}"
-        )
-    return operators[0]
-
-
-# Keys that can't be combined with an operator, if these are not "of" and "per".
-_REFUSED = {"at_end": ("of", "per", "within"), "at_most": ("after", "within", "during")}
-
-
-def _condition(value: Mapping[str, Any], name: str) -> Expectation:
-    """Return the condition of an operator, with `holds_for` and `during` applied."""
-    part = _part(value, "of" if name == "at_most" else name)
-    if "holds_for" in value:
-        part = temporal.holds_for(part, value["holds_for"])
-    if "during" not in value:
-        return part
-    hours = vocabulary.during(str(value["during"]))
-    return (~hours | part) if name == "always" else (hours & part)
-
-
-def _part(value: Mapping[str, Any], key: str) -> Expectation:
-    text = value[key]
-    if isinstance(text, Expectation):
-        return text
-    if not isinstance(text, str):
-        raise problem_at((key,), f"expected text like moving(astro), got {text!r}")
-    with errors_as(partial(problem_at, (key,))):
-        return parse_expectation(text)
-
-
-JSON_SCHEMA: dict[str, Any] = {
-    "description": "an expectation: text such as always(distance(ana, astro) > 0.5 m), or the same"
-    " as a mapping",
-    "anyOf": [
-        {"type": "string"},
-        {"type": "object", "properties": {key: {} for key in KEYS}, "additionalProperties": False},
-    ],
-    "examples": ["always(distance(ana, astro) > 0.5 m)"],
-}
-"""What `read_expectation` reads."""
+        return check_judged(parse_expectation(value))

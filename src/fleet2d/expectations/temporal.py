@@ -30,8 +30,9 @@ from fleet2d.expectations.signals import Scene, Signal
 from fleet2d.expectations.vocabulary import during, events
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import I64, Bool
+from fleet2d.runtime.events import EventKind
 
-ANSWERS = (*map(str, Outcome), "delivered")
+ANSWERS = (*Outcome, EventKind.DELIVERED)
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
 
 
@@ -389,7 +390,7 @@ class answered(Limited):
 
     interaction: str
     person: str
-    outcome: str = "accepted"
+    outcome: str = EventKind.ACCEPTED
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -409,7 +410,7 @@ class answered(Limited):
         scene.check_name(f"{self.interaction} to", self.person, people, self)
         expected = (
             after(
-                events("due", detail=f"{name} {self.person}"),
+                events(EventKind.DUE, detail=f"{name} {self.person}"),
                 events(self.outcome, detail=f"{name} {self.person}"),
                 within=wanted[name].within if self.within is None else self.within,
             )

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
@@ -199,35 +199,6 @@ def _atoms(expectation: Expectation) -> Iterator[Expectation]:
         yield from _atoms(part)
     if not parts and not isinstance(expectation, during):
         yield expectation
-
-
-class Judged(Protocol):
-    """What can be judged: a finished run, or a simulation."""
-
-    def judge(self, expectation: Expectation, name: str = "") -> Verdict:
-        """Return the verdict on an expectation."""
-
-
-def judge(expectation: Expectation, run: Judged, name: str = "") -> Verdict:
-    """Return the verdict on an expectation in a run.
-
-    Args:
-        expectation: The expectation.
-        run: A finished run, or a simulation: then the expectation counts from the first call on,
-            and the verdict is about the time until now.
-        name: Name of the expectation, for messages.
-
-    Raises:
-        InputError: A name in it is unknown, or the run didn't store what it needs.
-
-    Example:
-        >>> import fleet2d
-        >>> from fleet2d.expectations import always, distance
-        >>> run = fleet2d.run(None, "simulation.duration=2 h", seed=4)
-        >>> judge(always(distance("ana", "astro") > 0.1), run).holds
-        True
-    """
-    return run.judge(expectation, name)
 
 
 def verdict_of(name: str, expectation: Expectation, run: RunSignals, text: str = "") -> Verdict:

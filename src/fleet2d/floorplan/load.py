@@ -1,7 +1,7 @@
 """Read a floor plan by its name, a file, a bundled home or a synthetic one, and write it to a file.
 
-A synthetic home is named by its seed, such as `synthetic:7`. The readers of foreign formats are
-imported when a file needs them.
+A synthetic home is named by its seed, such as `synthetic:7`. Foreign formats and synthetic homes
+are components of a limb, imported when they are needed.
 """
 
 import json
@@ -14,9 +14,9 @@ from fleet2d.configuration.components import components, lookup
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import named_path
 from fleet2d.errors import FloorPlanError, InputError
-from fleet2d.floorplan.formats.files import YAML, read_document, read_yaml
-from fleet2d.floorplan.formats.foreign import foreign_document, foreign_file
-from fleet2d.floorplan.formats.native import (
+from fleet2d.floorplan.files import YAML, read_document, read_yaml
+from fleet2d.floorplan.foreign import foreign_document, foreign_file
+from fleet2d.floorplan.native import (
     FORMAT,
     bundled_names,
     native_document,
@@ -24,7 +24,7 @@ from fleet2d.floorplan.formats.native import (
     read_bundled,
 )
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import FloorPlanSource
+from fleet2d.floorplan.source import FloorPlanSource, UnclearPlaceError
 from fleet2d.inputs import open_input
 
 DEFAULT_CELL_M = 0.05
@@ -61,7 +61,7 @@ def load_floorplan(
     path = Path(plan)
     usual = DEFAULT_CELL_M if cell is None else cell
     if path.suffix.lower() in IMAGES and path.is_file():
-        return _load_image(path, resolution, cell, scale)
+        return source_of("image", path=path, resolution=resolution, cell=cell, scale=scale).load()
     if resolution is not None:
         raise FloorPlanError(
             f"{plan} is not a picture: leave out --resolution, because the file contains lengths"
@@ -70,7 +70,7 @@ def load_floorplan(
         return read_bundled(str(plan), usual, scale)
     seed = SYNTHETIC.fullmatch(str(plan))
     if seed is not None:
-        return _load_by("synthetic", seed=int(seed[1]), cell=usual, scale=scale)
+        return source_of("synthetic", seed=int(seed[1]), cell=usual, scale=scale).load()
     if not path.exists() and path.suffix == "" and path.name == str(plan):
         raise FloorPlanError(
             f"there is no floor plan file {str(plan)!r}, and no bundled home of that name"
@@ -80,7 +80,7 @@ def load_floorplan(
     kind, content = _recognize(path)
     if kind == "native":
         return native_plan(content, path, usual, scale)
-    return _load_by(kind, path=path, cell=cell, scale=scale)
+    return source_of(kind, path=path, cell=cell, scale=scale).load()
 
 
 def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
@@ -96,8 +96,6 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
     try:
         return load_floorplan(plan, **lengths)
     except FloorPlanError as error:
-        from fleet2d.floorplan.formats.raster import UnclearPlaceError
-
         if not isinstance(error.__cause__, UnclearPlaceError):
             raise
         out = Path(f"{Path(plan).stem}-question.png")
@@ -105,12 +103,25 @@ def load_or_mark(plan: str | Path, **lengths: float | None) -> FloorPlan:
         raise FloorPlanError(f"{error}; {out} marks it") from error
 
 
-def _load_by(kind: str, **settings: Any) -> FloorPlan:
-    """Read a floor plan by its type and settings; those that are None have their defaults."""
-    own = {key: value for key, value in settings.items() if value is not None}
-    source = lookup("floorplan", kind).model_construct(**own)
-    assert isinstance(source, FloorPlanSource)
-    return source.load()
+def source_of(kind: str, **settings: Any) -> FloorPlanSource:
+    """Return a source by its type and settings; those that are None have their defaults.
+
+    Raises:
+        FloorPlanError: It needs another setting.
+        ScenarioError: There is no such type.
+    """
+    return source_type(kind).of_file(**settings)
+
+
+def source_type(kind: str) -> type[FloorPlanSource]:
+    """Return the class of a source by its `type` in a scenario.
+
+    Raises:
+        ScenarioError: There is no such type.
+    """
+    cls = lookup("floorplan", kind)
+    assert issubclass(cls, FloorPlanSource)
+    return cls
 
 
 def is_floorplan(plan: str | Path) -> bool:
@@ -245,22 +256,6 @@ def _marks() -> list[tuple[str, tuple[str, str | None]]]:
     return [(kind, mark) for kind, source in sources for mark in getattr(source, "marks", ())]
 
 
-def _load_image(
-    path: Path, resolution: float | None, cell: float | None, scale: float | None
-) -> FloorPlan:
-    if resolution is None:
-        from fleet2d.floorplan.formats.drawing import guess_resolution
-
-        guess = guess_resolution(path)
-        by_doors = "" if guess is None else f": {guess[0]:g}, if its {guess[1]} doors are as usual"
-        raise FloorPlanError(
-            f"{path} is an image, without its scale: name the YAML file that goes with the map of a"
-            f" robot, such as {path.with_suffix('.yaml').name}; of a drawing, give the metres per"
-            f" pixel as resolution{by_doors}"
-        )
-    return _load_by("image", path=path, resolution=resolution, cell=cell, scale=scale)
-
-
 _NUMBER = r"[-+.\deE]+"
 _POINT = re.compile(rf"\[\s+({_NUMBER}),\s+({_NUMBER})\s+\]")
 
@@ -277,9 +272,7 @@ def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".geojson":
-        from fleet2d.floorplan.formats.geojson import geojson_document
-
-        text = _json(geojson_document(plan))
+        text = _json(source_type("geojson").document(plan))
     elif suffix == ".json":
         text = _json(native_document(plan))
     elif suffix in YAML:

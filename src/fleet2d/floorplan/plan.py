@@ -530,22 +530,3 @@ class FloorPlan:
         centre = self.lattice.cell_centre(*cells[nearest].tolist())
         near_x, near_y = self.lattice.to_metres(centre).tolist()
         return near_x, near_y
-
-    def draw(self, ax: Any = None) -> Any:
-        """Draw the plan; needs the extra `viz`.
-
-        Args:
-            ax: Matplotlib axes to draw on, in metres; None for a new figure.
-
-        Returns:
-            A matplotlib figure, or `ax`.
-        """
-        from fleet2d.configuration.components import hook  # with pydantic: only to draw
-
-        return hook("plan", "draw")(self, ax)
-
-    def _repr_png_(self) -> bytes | None:
-        """Show the plan in a notebook, where matplotlib is installed."""
-        from fleet2d.configuration.components import hook
-
-        return hook("plan", "png")(self)

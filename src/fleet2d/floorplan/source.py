@@ -46,7 +46,7 @@ from fleet2d.floorplan.rooms.room import (
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.floorplan.space import BODY_RADIUS, standing_cells, with_approaches
 from fleet2d.inputs import sha256_of_file
-from fleet2d.kernels import I64, TURN, fill_from_neighbors
+from fleet2d.kernels import F64, I64, TURN, fill_from_neighbors
 
 
 class RoomCorrection(Settings):
@@ -286,6 +286,14 @@ def _check_stands(plan: FloorPlan, thing: PlacedObject, where: str) -> None:
         )
 
 
+class UnclearPlaceError(FloorPlanError):
+    """A drawing is unclear at a place, which can be marked in a copy of it."""
+
+    @abstractmethod
+    def mark(self, drawing: Path, out: Path) -> None:
+        """Write a copy of the drawing with the place marked."""
+
+
 # Homes that a process caches, read and furnished.
 CACHED_PLANS = 8
 
@@ -313,7 +321,7 @@ class FloorPlanSource(Component):
         slows: Areas that slow robots down: wet floors, carpets, edges at which they stop.
     """
 
-    kind: ClassVar[str] = "floorplan"
+    kind = "floorplan"
 
     # Keys, each with its value unless that is None; by one the content of a file is recognized.
     marks: ClassVar[tuple[tuple[str, str | None], ...]] = ()
@@ -340,6 +348,21 @@ class FloorPlanSource(Component):
         examples=[[{"area": [[1, 0.5], [2.5, 0.5], [2.5, 2]], "speed": "40 %", "stop": "2 s"}]],
     )
 
+    @classmethod
+    def of_file(cls, **settings: Any) -> "FloorPlanSource":
+        """Return the source with settings beside a file; those that are None have their defaults.
+
+        Raises:
+            FloorPlanError: It needs another setting.
+        """
+        given = {key: value for key, value in settings.items() if value is not None}
+        return cls.model_construct(**given)
+
+    @classmethod
+    def document(cls, plan: FloorPlan) -> dict[str, Any]:
+        """Return the content of a JSON file that has a plan, if such files are written."""
+        raise NotImplementedError
+
     @abstractmethod
     def load(self) -> FloorPlan:
         """Read the floor plan.
@@ -347,6 +370,14 @@ class FloorPlanSource(Component):
         Raises:
             FloorPlanError: The file can't be read, or is not a home.
         """
+
+    def driven_ways(self) -> list[F64]:
+        """Return the ways that a robot drove when it made the map, each float64 (n, 2) [m].
+
+        Raises:
+            FloorPlanError: The file can't be read.
+        """
+        return []
 
     def plan(self) -> FloorPlan:
         """Return the floor plan with the rooms and furniture that the scenario adds.

@@ -14,6 +14,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Length, OnDays, PositiveDuration, Share, TimeOfDay
 from fleet2d.runtime.clock import midnights
+from fleet2d.runtime.events import EventKind
 
 InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_report"]
 
@@ -21,17 +22,26 @@ InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_
 class Outcome(StrEnum):
     """What can come of addressing a person: the events of the robot that sees it."""
 
-    ACCEPTED = "accepted"
-    DECLINED = "declined"
-    DEFERRED = "deferred"
-    IGNORED = "ignored"  # noticed, and not answered; a robot that isn't noticed sees the same
-    MISTAKEN = "mistaken"  # it addressed somebody else
-    SENT_AWAY = "sent_away"
-    BANNED = "banned"  # from the room that it is in
-    SWITCHED_OFF = "switched_off"
+    ACCEPTED = EventKind.ACCEPTED
+    DECLINED = EventKind.DECLINED
+    DEFERRED = EventKind.DEFERRED
+    # Noticed, and not answered; a robot that isn't noticed sees the same.
+    IGNORED = EventKind.IGNORED
+    # It addressed somebody else.
+    MISTAKEN = EventKind.MISTAKEN
+    SENT_AWAY = EventKind.SENT_AWAY
+    # Banned from the room that it is in.
+    BANNED = EventKind.BANNED
+    SWITCHED_OFF = EventKind.SWITCHED_OFF
 
 
-REQUEST_EVENTS = frozenset({"due", "expired", "question", "allowed", "told", *map(str, Outcome)})
+OUTCOMES = frozenset(Outcome)
+REQUEST_EVENTS = frozenset(
+    {
+        EventKind.DUE, EventKind.EXPIRED, EventKind.QUESTION, EventKind.ALLOWED, EventKind.TOLD,
+        *OUTCOMES,
+    }
+)  # fmt: skip
 """What a robot hears: requests come up and expire, people answer, ask it, and let it in again."""
 
 
@@ -171,7 +181,7 @@ class RequestChange(NamedTuple):
     """A request that came up, or whose deadline has passed."""
 
     time: datetime
-    event: Literal["due", "expired"]
+    event: EventKind
     request: Request
 
 
@@ -209,7 +219,7 @@ class RequestQueue:
             return {}
         until = [request.until for request in self.open]
         until += [due + self.interactions[name].within for name, due in self._next.items()]
-        return {"due": min(self._next.values()), "expired": min(until)}
+        return {EventKind.DUE: min(self._next.values()), EventKind.EXPIRED: min(until)}
 
     def advance(self, time: datetime) -> list[RequestChange]:
         """Open what has come up by a time, drop what is too late; return what has changed."""
@@ -225,8 +235,9 @@ class RequestQueue:
         requests = [*self.open, *came_up]
         self.open = [request for request in requests if request.until > time]
         self.open.sort(key=lambda request: (request.since, request.name))
-        changes = [RequestChange(r.until, "expired", r) for r in requests if r.until <= time]
-        changes += [RequestChange(request.since, "due", request) for request in came_up]
+        late = [request for request in requests if request.until <= time]
+        changes = [RequestChange(request.until, EventKind.EXPIRED, request) for request in late]
+        changes += [RequestChange(request.since, EventKind.DUE, request) for request in came_up]
         return sorted(changes, key=lambda change: (change.time, change.request.name))
 
     def find(self, text: str) -> Request | None:

@@ -1,1 +1,1 @@
-"""Reading runs back: their tables, the way of each body, layers; exporting them."""
+"""Reading runs back: their tables, the way of each body, moments, layers."""

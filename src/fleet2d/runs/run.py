@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
 from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
-from fleet2d.artifacts.table import DTYPES, Column, Kind, TableSpec
 from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
-from fleet2d.configuration.components import hook
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
-from fleet2d.floorplan.layers import Layer
 from fleet2d.runtime.clock import Clock
 from fleet2d.storage.files import PARTIAL, path_in
 
@@ -30,15 +27,12 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from fleet2d.artifacts.store import RunStore
-    from fleet2d.expectations.expectation import Expectation
-    from fleet2d.expectations.verdict import Verdict
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
 
 LAYER_PREFIX = "layer."
 ALL_CELLS = -1
 """Row and column of the entry that holds the fill value: of all cells without an entry."""
-LAYER_KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64"}
 
 
 class Tables(Mapping[str, "pa.Table"]):
@@ -144,7 +138,7 @@ class Run:
             ArtifactError: The run directory holds none.
         """
         if self._plan is None:
-            from fleet2d.floorplan.formats.native import read_native
+            from fleet2d.floorplan.native import read_native
 
             path = path_in(self.directory or Path(), FLOORPLAN_NAME)
             if self.directory is None or not path.is_file():
@@ -186,52 +180,6 @@ class Run:
         from fleet2d.runs.trajectory import rebuild_path
 
         return rebuild_path(self, self.plan, entity, every)
-
-    def judge(self, expectation: Expectation | str, name: str = "") -> Verdict:
-        """Judge the run by an expectation; the run is repeated exactly for this, from its manifest.
-
-        Args:
-            expectation: What is expected, from the first step on.
-            name: A name for the verdict.
-
-        Raises:
-            InputError: It names something unknown, or an event that can never happen; or the run
-                isn't complete.
-            ArtifactError: The run can't be reproduced: its tables differ from the stored ones.
-        """
-        return hook("run", "judge")(self, expectation, name)
-
-    def draw(self, at: str | int | None = None, ax: Any = None) -> Any:
-        """Draw the run, or one moment of it; needs the extra `viz`.
-
-        Args:
-            at: A moment, such as "day 3 18:30", or a step; None: the whole run.
-            ax: Matplotlib axes to draw the moment on (the last one, if `at` is None).
-
-        Returns:
-            A matplotlib figure, or `ax`.
-
-        Raises:
-            InputError: `at` names no moment, or matplotlib is missing.
-            ArtifactError: The run stored no floor plan or no key frames.
-        """
-        return hook("run", "draw")(self, at, ax)
-
-    def view(self, height: int = 720) -> Any:
-        """Return the page of the run as a widget, for Jupyter and marimo; needs the extra `view`.
-
-        Args:
-            height: Height of the widget [pixels].
-
-        Raises:
-            InputError: anywidget is not installed.
-            ArtifactError: The run stored no floor plan.
-        """
-        return hook("run", "view")(self, height)
-
-    def _repr_html_(self) -> str:
-        """Show the run in a notebook."""
-        return hook("run", "html")(self)
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as an Arrow table.
@@ -304,7 +252,7 @@ def open_run(directory: Path | str, *, trust: bool = False) -> Run:
 
     Args:
         directory: The run directory.
-        trust: Whether its own code and programs may run when it is repeated, as by `Run.judge`;
+        trust: Whether its own code and programs may run when it is repeated, as by `judge`;
             to read it, none is needed.
 
     Raises:
@@ -405,36 +353,6 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
     if names := sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}")):
         notes.append(f"cut off and not readable: {printable(', '.join(names))}")
     return notes
-
-
-def layer_table(layer: Layer) -> TableSpec:
-    """Return the table that a layer is stored in."""
-    kind = LAYER_KINDS[layer.dtype.kind]
-    return TableSpec(
-        f"{LAYER_PREFIX}{layer.name}",
-        (
-            Column("step", "step", description="the layer as it was after this step"),
-            Column("time", "time", description="local time"),
-            Column("row", "int32", description="of the cell; -1: all cells not named"),
-            Column("column", "int32"),
-            Column("value", kind, layer.unit, kind == "float64", description=layer.description),
-        ),
-        layer.description,
-    )
-
-
-def layer_rows(layer: Layer) -> dict[str, NDArray[Any]]:
-    """Return the present values of a layer as rows: columns row, column and value."""
-    values = layer.values
-    fill = np.array(layer.fill)
-    differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
-    row, column = np.nonzero(differs)
-    kind = DTYPES[LAYER_KINDS[layer.dtype.kind]]
-    return {
-        "row": np.concatenate([[ALL_CELLS], row]).astype(np.int32),
-        "column": np.concatenate([[ALL_CELLS], column]).astype(np.int32),
-        "value": np.concatenate([[fill.astype(kind)], values[differs].astype(kind)]),
-    }
 
 
 def layer_names(run: Run) -> list[str]:

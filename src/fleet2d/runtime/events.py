@@ -15,6 +15,8 @@ class EventKind(StrEnum):
     A behavior that records others declares them by `records` in its class.
     """
 
+    __repr__ = str.__repr__
+
     # Cameras
     USER_LOST = "user_lost"
     USER_SEEN = "user_seen"
@@ -86,18 +88,18 @@ class EventKind(StrEnum):
     UNLOCKED = "unlocked"
 
 
-KINDS = frozenset(kind.value for kind in EventKind)
-SIGHTS = frozenset(
+KINDS = frozenset(EventKind)
+SIGHTS: frozenset[str] = frozenset(
     {EventKind.USER_LOST, EventKind.USER_SEEN, EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN}
 )
-CHANGES = frozenset(
+CHANGES: frozenset[str] = frozenset(
     {
         EventKind.LIGHT_OFF, EventKind.LIGHT_ON, EventKind.LOCKED, EventKind.MOVED,
         EventKind.OPENED, EventKind.ROOM_CHANGED, EventKind.SHUT, EventKind.UNLOCKED,
     }
 )  # fmt: skip
 
-RANKS = {kind.value: 1 for kind in SIGHTS} | {kind.value: 2 for kind in CHANGES}
+RANKS = dict.fromkeys(SIGHTS, 1) | dict.fromkeys(CHANGES, 2)
 """The order among the events of one entity at one step: plans, 0, come before the others."""
 
 

@@ -22,6 +22,7 @@ from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY, midnight_of
+from fleet2d.runtime.events import EventKind
 from fleet2d.studies.intervals import MeanEstimate, estimate
 
 
@@ -58,13 +59,13 @@ def read_opportunities(run: Run) -> LoggedOpportunities:
     those of the calendar.
     """
     events = (run.tables["events"][name].to_pylist() for name in ("step", "event", "detail"))
-    wanted = {"opportunity", "accepted"}
+    wanted = {EventKind.OPPORTUNITY, EventKind.ACCEPTED}
     rows = (row for row in zip(*events, strict=True) if row[1] in wanted)
     logged: list[tuple[str, int, bool, float]] = []
     rewards: list[float] = []
     last: dict[str, int] = {}
     for step, event, detail in sorted(rows, key=itemgetter(0)):
-        if event == "accepted":
+        if event == EventKind.ACCEPTED:
             if detail in last:
                 rewards[last[detail]] = 1.0
             continue

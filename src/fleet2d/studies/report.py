@@ -63,7 +63,7 @@ def write_report(study: "Study", folder: Path) -> Path:
         ArtifactError: No variant is complete.
         InputError: matplotlib, polars or scipy is missing, or the folder can't be created.
     """
-    from fleet2d.pictures.floorplan import drawing_style
+    from fleet2d.viewing.pictures.floorplan import drawing_style
 
     if not study.counts.complete:
         failed = study.counts.failed
@@ -338,7 +338,7 @@ class _Page:
 
     def _figure(self, figure: "Figure", name: str) -> str:
         """Write a figure to a file; return it as an HTML image."""
-        from fleet2d.pictures.floorplan import save_figure
+        from fleet2d.viewing.pictures.floorplan import save_figure
 
         path = self.folder / "figures" / f"{_file_name(name)}.svg"
         save_figure(figure, path)

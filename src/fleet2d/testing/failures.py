@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from fleet2d.errors import Fleet2DError
 from fleet2d.runtime.clock import Clock
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.testing.claim import Variant
 from fleet2d.testing.trials import (
     ASSERT,
@@ -334,7 +335,7 @@ def _store(
     yield f"  run: {out}"
     try:
         from fleet2d.runs.run import open_run
-        from fleet2d.viewer.figures import draw_failure
+        from fleet2d.viewing.figures import draw_failure
 
         picture = out.with_suffix(".png")
         run = open_run(out)

@@ -13,12 +13,12 @@ from tests.algorithms.presence.worlds import MONDAY, any_evidence, evidence_of, 
 import fleet2d
 from fleet2d.algorithms.presence.belief import BeliefSeries
 from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights, shipped_weights
-from fleet2d.datasets.specification import plan_dataset
-from fleet2d.datasets.tables import tables_of
-from fleet2d.datasets.training import predict
-from fleet2d.datasets.windows import windows_of
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.kernels import F64
+from fleet2d.learning.datasets.specification import plan_dataset
+from fleet2d.learning.datasets.tables import tables_of
+from fleet2d.learning.datasets.training import predict
+from fleet2d.learning.datasets.windows import windows_of
 from fleet2d.metrics.rtp_score import calibration_error
 
 LEARNED = {"rtp": {"type": "rtp", "model": "learned"}}

@@ -10,17 +10,19 @@ from tests.kernels.test_presence_people import by_bin
 from tests.kernels.test_presence_stays import PATCHES, PLACES, ROOM, by_state, case, twin
 
 from fleet2d._core import smooth
-from fleet2d.algorithms.evidence import Evidence, SightingCounts
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.people import (
     MEAN_STAY,
-    DayEvidence,
     People,
     Prior,
     StateLayout,
+    between,
+    day_evidence,
     distinct,
     model_of,
+    stretches_of,
 )
-from fleet2d.kernels import Moments, Stretches, merge_bins
+from fleet2d.kernels import DayEvidence, Moments, Stretches, merge_bins
 
 PRIOR = Prior(0.9, 0.05)
 
@@ -99,8 +101,8 @@ def bins_of(shown: Any, seen: Any, start: int = 0) -> Evidence:
     return evidence_of(by_room, in_rooms, MONDAY, 10, by_patch, begin=start * 10)
 
 
-def stretches_of(bins: Evidence, longest: int) -> Stretches:
-    return DayEvidence.of(bins).stretches(0, longest)
+def first_stretches(bins: Evidence, longest: int) -> Stretches:
+    return stretches_of(day_evidence(bins), 0, longest)
 
 
 def shown_of(stretches: Stretches) -> Any:
@@ -111,21 +113,21 @@ def shown_of(stretches: Stretches) -> Any:
 def test_equal_bins_are_merged_within_an_hour() -> None:
     shown = [[0, 1, 0]] * 6 + [[0, 1, 0.5]] * 2
     seen = [[0, 0, 0]] * 2 + [[0, 7, 0]] * 2 + [[0, 3, 3]] * 2 + [[0, 0, 0]] * 2
-    merged = stretches_of(bins_of(shown, seen, start=57), longest=5)
+    merged = first_stretches(bins_of(shown, seen, start=57), longest=5)
     assert [2, 1, 1, 1, 1, 2] == merged.bins.tolist()  # the hour ends after three
     assert [0, 0, 0, 0, 0, 1] == merged.view.tolist()
     assert [0, 0, 1, 2, 4, 6, 6] == merged.begin.tolist()
     assert [1, 1, 1, 2, 1, 2] == merged.patch.tolist()
     assert [1, 1, 0.5, 0.5, 0.5, 0.5] == merged.share.tolist()
     assert [0, 255, 128, 0] == shown_of(merged)[-1].tolist()
-    assert [1] * 8 == stretches_of(bins_of(shown, seen), longest=1).bins.tolist()
+    assert [1] * 8 == first_stretches(bins_of(shown, seen), longest=1).bins.tolist()
 
 
 def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
     bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
     seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
     bins = replace(bins, by_patch=bins.by_patch._replace(sightings=counts_of(seen)))
-    assert [255, 255, 0, 0] == shown_of(stretches_of(bins, longest=1))[0].tolist()
+    assert [255, 255, 0, 0] == shown_of(first_stretches(bins, longest=1))[0].tolist()
 
 
 def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
@@ -133,12 +135,12 @@ def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
     people = People(StateLayout.of(bins, 1), prior, 1, longest=5)
-    places = by_bin(people.end_day(DayEvidence.of(bins)), 0)
+    places = by_bin(people.end_day(day_evidence(bins)), 0)
     assert places[300, 0] > 0.1
     assert places[300, 1] < 0.01
     hidden = bins_of([[0.5, 0, 1]] * 600, seen)
     people = People(StateLayout.of(hidden, 1), prior, 1, longest=5)
-    again = by_bin(people.end_day(DayEvidence.of(hidden)), 0)
+    again = by_bin(people.end_day(day_evidence(hidden)), 0)
     assert places[300, 0] + 0.02 < again[300, 0]
 
 
@@ -149,7 +151,7 @@ def test_revisited_days_count_once() -> None:
     seen = (np.eye(3)[looks] * (random.random((3 * 1440, 1)) < 0.3) * 5).astype(int)
     bins = bins_of(shown, seen)
     people = People(StateLayout.of(bins, 2), PRIOR, 1, longest=1)
-    days = [DayEvidence.of(bins.between(day * 1440, (day + 1) * 1440)) for day in range(3)]
+    days = [day_evidence(bins.between(day * 1440, (day + 1) * 1440)) for day in range(3)]
     for day in days:
         people.end_day(day)
     for _ in range(20):
@@ -178,17 +180,17 @@ def crowd_of(count: int, bins: int, seed: int) -> Evidence:
 @pytest.mark.parametrize("stages", [1, 3])
 def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages: int) -> None:
     bins = crowd_of(count, 300, count)
-    layout, day = StateLayout.of(bins, stages), DayEvidence.of(bins)
+    layout, day = StateLayout.of(bins, stages), day_evidence(bins)
     people = People(layout, PRIOR, count, longest=5)
     alone = [People(layout, PRIOR, 1, longest=5) for _ in range(count)]
     for user, person in enumerate(alone):
-        rows = day.sightings.user == user
-        own = SightingCounts(*(column[rows] for column in day.sightings[:4]), (300, 2, 3))
-        only = day._replace(sightings=own._replace(user=np.zeros(rows.sum(), np.int64)))
-        person.follow(only.between(0, 100))
+        rows = day.user == user
+        only = DayEvidence(*day[:3], *(column[rows] for column in day[3:]))
+        only = only._replace(user=np.zeros(rows.sum(), np.int64))
+        person.follow(between(only, 0, 100))
         person.end_day(only)
         person.revisit(0, 0.7)
-    people.follow(day.between(0, 100))
+    people.follow(between(day, 0, 100))
     people.end_day(day)
     people.revisit(0, 0.7)
     for user, person in enumerate(alone):

@@ -13,7 +13,7 @@ from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.floorplan.formats.valetudo import read_valetudo_path
+from fleet2d.homes.formats.valetudo import read_valetudo_path
 
 MAP = "dreame_z10_named_rooms_and_paths.json"
 

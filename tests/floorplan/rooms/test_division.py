@@ -7,10 +7,10 @@ import pytest
 import shapely
 from shapely import Polygon, affinity
 
-from fleet2d.floorplan.formats.occupancy import outline
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.division import MAX_CORNERS, _without_islands
+from fleet2d.homes.formats.occupancy import outline
 from fleet2d.kernels import label_parts
 
 # Two rooms of 3 x 3 m with a wall of 0.1 m and a door between them.

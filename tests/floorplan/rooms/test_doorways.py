@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import example, given, settings
-from tests.homes import all_homes
+from tests.meshed_homes import all_homes
 from tests.strategies import homes, seeds
 from tests.thorough import examples
 

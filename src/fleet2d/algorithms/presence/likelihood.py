@@ -2,25 +2,39 @@
 
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import MIN_DAYS, Estimator, normalized
-from fleet2d.algorithms.presence.people import DayEvidence, People, Prior, StateLayout
-from fleet2d.configuration.components import register
+from fleet2d.algorithms.presence.people import People, Prior, StateLayout, day_evidence, joined
 from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
-from fleet2d.kernels import F64, I64, Bool, PeoplePlaces, sum_places
+from fleet2d.kernels import F64, I64, Bool, DayEvidence, PeoplePlaces, sum_places
 
+# Chance per bin that a person in a room changes patch, before it is learned.
+RESTLESS = 0.05
 # Number of earlier days that are revisited in turn when a day is over, and of those stored.
 REVISITS = 2
 STORED_DAYS = 64
 
 
-@register("presence_estimator", "likelihood", aliases=("hmm",))
+class StoredDay(NamedTuple):
+    """A day that is revisited, beside what `People.days` has of it.
+
+    Attributes:
+        number: The day, as `date.toordinal` counts.
+        hours: float64 (24, users + 1, width), its sums by hour.
+        unknown: bool (bins, rooms), where an unknown person was perceived.
+    """
+
+    number: int
+    hours: F64
+    unknown: Bool
+
+
 class Likelihood(Estimator):
     """Expected share of time in each room given all evidence, in a hidden Markov chain.
 
@@ -62,13 +76,11 @@ class Likelihood(Estimator):
 
     Attributes:
         detection: Chance that somebody in view is perceived.
-        restless: Chance per bin that a person in a room changes patch, before it is learned.
         stages: Number of stages of a stay; above 1 its length isn't geometric.
         together: Largest number of consecutive bins with equal evidence that are merged.
     """
 
     detection: Share = Field(default=0.95, gt=0, lt=1)
-    restless: Share = 0.05
     stages: int = Field(default=1, ge=1, le=4)
     together: int = Field(default=5, ge=1, le=60)
 
@@ -78,7 +90,8 @@ class Likelihood(Estimator):
         self.people: People | None = None
         self.learned: Mapping[str, Any] = {}
         self.parts: list[DayEvidence] = []  # the parts of the present day
-        self.hours: list[F64] = []  # the sums by hour of the days that are revisited
+        self.unknown: list[Bool] = []  # where an unknown person was perceived in each of them
+        self.days: list[StoredDay] = []  # the days that are revisited
         self.turn = 0  # index of the day that was revisited last
         self.is_watched = np.zeros(rooms, bool)  # whether a robot has looked into the room
         self.island: I64 | None = None  # as in `Parts`
@@ -155,23 +168,26 @@ class Likelihood(Estimator):
         """Process the next bins of evidence."""
         for day in evidence.days:
             part, people = self.add(day)
-            self.counts.add_hours(*self._by_hour(people.follow(part), part))
+            hours, sums = self._by_hour(people.follow(part), part, day.sightings.unknown)
+            self.counts.add_hours(self.counts.today * 24 + hours, sums)
 
     def add(self, evidence: Evidence) -> tuple[DayEvidence, People]:
         """Add evidence of one day, which is learned from when the next day begins."""
         people = self.people = self.people or self._create_people(evidence)
         self._look_into(evidence, people)
-        part = DayEvidence.of(evidence)
-        if part.number != self.counts.today:
+        number = int(evidence.day[0])
+        if number != self.counts.today:
             if self.parts:
-                self._end_day(part.number, people)
-            self.counts.begin_day(part.number)
+                self._end_day(number, people)
+            self.counts.begin_day(number)
+        part = day_evidence(evidence)
         self.parts.append(part)
+        self.unknown.append(evidence.sightings.unknown)
         return part, people
 
     def _create_people(self, evidence: Evidence) -> People:
         layout = StateLayout.of(evidence, self.stages)
-        prior = Prior(self.detection, self.restless)
+        prior = Prior(self.detection, RESTLESS)
         people = People(layout, prior, max(self.users, 1), self.together)
         if self.learned and not people.recall(self.learned):
             raise ComponentError(
@@ -199,46 +215,48 @@ class Likelihood(Estimator):
             return np.ones(self.rooms, bool)
         return np.isin(self.island, self.island[self.is_watched])
 
-    def _by_hour(self, places: PeoplePlaces, day: DayEvidence) -> tuple[I64, F64]:
-        """Return the hours of the bins, as ordinal * 24 + hour, and the sums of each hour.
+    def _by_hour(self, places: PeoplePlaces, day: DayEvidence, unknown: Bool) -> tuple[I64, F64]:
+        """Return the hours of the bins, and the sums of each hour.
 
         The sums are those of p, p (1 - p), and 1: float64 (hours, users + 1, width).
         """
         hour = day.minute // 60
         first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
-        sums = sum_places(places, day.unknown, self.users, first)
-        return day.number * 24 + hour[first], sums
+        return hour[first], sum_places(places, unknown, self.users, first)
 
-    def _whole_day(self, places: PeoplePlaces, day: DayEvidence) -> F64:
+    def _whole_day(self, places: PeoplePlaces, day: DayEvidence, unknown: Bool) -> F64:
         """Return a day's sums of places and of moments per hour: float64 (24, users + 1, width).
 
         The last row is of anybody.
         """
-        hours, sums = self._by_hour(places, day)
+        hours, sums = self._by_hour(places, day, unknown)
         by_hour = np.zeros((24, *sums.shape[1:]))
-        by_hour[hours % 24] = sums
+        by_hour[hours] = sums
         return by_hour
 
     def _end_day(self, next_day: int, people: People) -> None:
         """Smooth the present day as a whole, learn from it, and revisit earlier days."""
-        day = DayEvidence.joined(self.parts)
+        day = joined(self.parts)
+        unknown = np.concatenate(self.unknown)
         self.parts = []
-        self.counts.hours = self._whole_day(people.end_day(day), day)
-        self.hours.append(self.counts.hours)
+        self.unknown = []
+        self.counts.hours = self._whole_day(people.end_day(day), day, unknown)
+        self.days.append(StoredDay(self.counts.today, self.counts.hours, unknown))
         for _ in range(REVISITS):
-            self.turn = (self.turn - 1) % len(self.hours)
+            self.turn = (self.turn - 1) % len(self.days)
             self._revisit(self.turn, people)
         fade = self.counts.faded(next_day - self.counts.today)
         people.fade(fade)
-        del people.days[:-STORED_DAYS], self.hours[:-STORED_DAYS]
+        del people.days[:-STORED_DAYS], self.days[:-STORED_DAYS]
 
     def _revisit(self, number: int, people: People) -> None:
         """Smooth a day with the present model, and replace its sums."""
-        day = people.days[number].evidence
+        day = self.days[number]
         weight = self.counts.faded(self.counts.today - day.number)
-        hours = self._whole_day(people.revisit(number, weight), day)
-        self.counts.put(day.number, self.hours[number], hours)
-        self.hours[number] = hours
+        places = people.revisit(number, weight)
+        hours = self._whole_day(places, people.days[number].evidence, day.unknown)
+        self.counts.put(day.number, day.hours, hours)
+        self.days[number] = day._replace(hours=hours)
 
     def remember(self) -> dict[str, Any]:
         """Return the learned state, as arrays in mappings."""

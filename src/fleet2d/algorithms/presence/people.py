@@ -6,14 +6,13 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from fleet2d.algorithms.evidence import Evidence, SightingCounts
+from fleet2d.algorithms.evidence import Evidence
 from fleet2d.kernels import (
     F64,
     I64,
     U8,
-    Bool,
+    DayEvidence,
     Moments,
-    PeopleEvidence,
     PeoplePlaces,
     StayModel,
     Stretches,
@@ -29,78 +28,47 @@ SHORTEST_STAGE = 5.0
 LONGEST_STAGE = 240.0
 
 
-class DayEvidence(NamedTuple):
-    """Evidence of one day, or of a part of it.
+def day_evidence(evidence: Evidence) -> DayEvidence:
+    """Return the evidence of bins of one day."""
+    sightings = evidence.by_patch.sightings
+    # An unknown person may be any user, so a patch with one counts as unwatched.
+    shown = evidence.by_patch.shown_255
+    watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
+    watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
+    return DayEvidence(evidence.minute, *distinct(watched), *sightings[:-1])
 
-    Attributes:
-        number: The day, as `date.toordinal` counts.
-        minute: int64 (bins,), beginning of each bin [minutes since midnight].
-        unknown: bool (bins, rooms), where an unknown person was perceived.
-        view: int64 (bins,), the row of `views`.
-        views: uint8 (views, patches + 1), how much of each patch was watched, 0 to WHOLE_PATCH,
-            as in Stretches; consecutive rows differ.
-        sightings: Where users were perceived, by patches.
+
+def joined(parts: Sequence[DayEvidence]) -> DayEvidence:
+    """Return consecutive parts of a day as one."""
+    first = np.cumsum([0, *(len(part.minute) for part in parts)]).tolist()
+    views = np.concatenate([part.views[part.view] for part in parts])
+    moved = [part._replace(bin=part.bin + begin) for part, begin in zip(parts, first, strict=False)]
+    minute, _, _, *sightings = (np.concatenate(column) for column in zip(*moved, strict=True))
+    order = np.argsort(sightings[0], kind="stable")
+    return DayEvidence(minute, *distinct(views), *(column[order] for column in sightings))
+
+
+def between(day: DayEvidence, begin: int, end: int) -> DayEvidence:
+    """Return the bins from `begin` to `end` - 1 of a day."""
+    minute, view, views, *sightings = day
+    is_part = (begin <= day.bin) & (day.bin < end)
+    columns = (column[is_part] for column in sightings)
+    part = DayEvidence(minute[begin:end], view[begin:end], views, *columns)
+    return part._replace(bin=part.bin - begin)
+
+
+def stretches_of(day: DayEvidence, user: int, longest: int) -> Stretches:
+    """Return the evidence of one user, with runs of identical consecutive bins merged.
+
+    Args:
+        day: The evidence.
+        user: Row of the user; the last row is anybody.
+        longest: Largest number of bins in a stretch.
     """
-
-    number: int
-    minute: I64
-    unknown: Bool
-    view: I64
-    views: U8
-    sightings: SightingCounts
-
-    @classmethod
-    def of(cls, evidence: Evidence) -> Self:
-        """Return the evidence of bins of one day."""
-        sightings = evidence.by_patch.sightings
-        # Where somebody unknown was perceived, who may be any user, the patch counts as unwatched.
-        shown = evidence.by_patch.shown_255
-        watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
-        watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
-        number = int(evidence.day[0])
-        unknown = evidence.sightings.unknown
-        return cls(number, evidence.minute, unknown, *distinct(watched), sightings)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return consecutive parts of a day as one."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(
-            parts[0].number,
-            np.concatenate([part.minute for part in parts]),
-            np.concatenate([part.unknown for part in parts]),
-            *distinct(np.concatenate([part.views[part.view] for part in parts])),
-            SightingCounts.joined([part.sightings for part in parts]),
-        )
-
-    def between(self, begin: int, end: int) -> Self:
-        """Return the bins from `begin` to `end` - 1."""
-        rows = slice(begin, end)
-        sightings = self.sightings.between(begin, end)
-        return self._replace(
-            minute=self.minute[rows],
-            unknown=self.unknown[rows],
-            view=self.view[rows],
-            sightings=sightings,
-        )
-
-    def stretches(self, user: int, longest: int) -> Stretches:
-        """Return the evidence of one user, with runs of identical consecutive bins merged.
-
-        Args:
-            user: Row of the user; the last row is anybody.
-            longest: Largest number of bins in a stretch.
-        """
-        seen = self.sightings.of_user(user)
-        bins, view, begin, patch, share = merge_bins(self.minute, self.view, *seen, longest)
-        return Stretches(bins, view, self.views, begin, patch, share)
-
-    def of_people(self, count: int) -> PeopleEvidence:
-        """Return the evidence of the first `count` users; without users, the first is anybody."""
-        user, seen_bin, patch, steps, _ = self.sightings
-        begin = np.searchsorted(user, np.arange(count + 1)).astype(np.int64)
-        return PeopleEvidence(self.minute, self.view, self.views, begin, seen_bin, patch, steps)
+    own = slice(*np.searchsorted(day.user, [user, user + 1]).tolist())
+    sightings = day.bin[own], day.patch[own], day.steps[own]
+    bins, view, begin, patch, share = merge_bins(day.minute, day.view, *sightings, longest)
+    return Stretches(bins, view, day.views, begin, patch, share)
 
 
 def distinct(rows: U8) -> tuple[I64, U8]:
@@ -299,8 +267,7 @@ class People:
     def follow(self, part: DayEvidence) -> PeoplePlaces:
         """Filter over the next part of a day; return P(room | evidence up to the stretch)."""
         self.now = self.now.copy()
-        evidence = part.of_people(self.count)
-        return PeoplePlaces(*follow_people(self.model, evidence, self.longest, self.now))
+        return PeoplePlaces(*follow_people(self.model, part, self.longest, self.now))
 
     def end_day(self, day: DayEvidence) -> PeoplePlaces:
         """Smooth the finished day as a whole, and learn from it."""
@@ -320,9 +287,8 @@ class People:
         """
         day = self.days[number]
         moments = self.layout.no_moments(self.count)
-        evidence = day.evidence.of_people(self.count)
         places, end, begin = smooth_people(
-            self.model, evidence, self.longest, day.start, day.backward, moments
+            self.model, day.evidence, self.longest, day.start, day.backward, moments
         )
         if number > 0:
             self.days[number - 1].backward = begin
@@ -342,7 +308,7 @@ class People:
             self.total = Moments(*(weight * part for part in self.total))
 
     def remember(self) -> dict[str, Any]:
-        """Return what was learned of each person, as arrays, by number."""
+        """Return the learned moments of each person, as arrays, by number."""
         return {
             str(person): {name: part[person] for name, part in self.total._asdict().items()}
             for person in range(self.count)

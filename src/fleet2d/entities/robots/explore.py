@@ -1,18 +1,17 @@
 """Explore: drive from frontier to frontier of the floor seen so far, until all of it is seen."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import centres, check_has_camera, spread, visible_from
 from fleet2d.kernels import TURN, Bool, squared_distance
+from fleet2d.runtime.events import EventKind
 
 # Maximum number of cells of the home that are tried as viewpoints, and as targets to be seen.
 MAX_VIEWPOINT_CELLS = 800
@@ -23,7 +22,6 @@ WORTH = 0.002
 RETRY_INTERVAL = timedelta(minutes=1)
 
 
-@register("behavior", "explore")
 class Explore(Behavior):
     """Complete the layer `explored` of the robot, frontier by frontier.
 
@@ -42,8 +40,8 @@ class Explore(Behavior):
             round in none of them, and their floor needn't be seen.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"explored", "explores"})
-    needs: ClassVar[frozenset[str]] = frozenset({"explored"})
+    records = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})
+    needs = frozenset({"explored"})
 
     enough: Share = 0.98
     reach: Length = Field(default=1.0, ge=0.1, le=5)
@@ -93,8 +91,10 @@ class Explore(Behavior):
             return None
         if self.stand is None:
             self.is_done = True
-            return plan.note("explored", f"{100 * share:.1f} %").stay(timedelta(microseconds=1))
-        plan.note("explores", f"{100 * share:.1f} %")
+            return plan.note(EventKind.EXPLORED, f"{100 * share:.1f} %").stay(
+                timedelta(microseconds=1)
+            )
+        plan.note(EventKind.EXPLORES, f"{100 * share:.1f} %")
         row, column = self.stands[self.stand].tolist()
         plan.go_to_point(*now.home.plan.lattice.cell_centre(row, column))
         self.plan = plan.turn_by(1.0)
@@ -114,7 +114,7 @@ class Explore(Behavior):
         if not len(near):
             return None
         actor = now.actor
-        position = (actor.state.x, actor.state.y)
+        position = actor.state.position
         metres = actor.space.distances(position, centres(self.stands[near]))
         seconds = actor.seconds(metres) + TURN / actor.turn_rate
         best = int(np.argmax(gain / seconds))

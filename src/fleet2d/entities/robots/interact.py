@@ -2,11 +2,10 @@
 
 import math
 from datetime import datetime, timedelta
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.giving_way import resumed
@@ -20,14 +19,17 @@ from fleet2d.entities.robots.approach import (
     is_in_rooms,
 )
 from fleet2d.errors import ComponentError
-from fleet2d.interactions.interaction import Outcome, Request
+from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.interactions.interaction import OUTCOMES, Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import exp2, sum_in_order
+from fleet2d.runtime.events import EventKind
 
 Step = Literal["seek", "ask", "carry_out"]
-ANSWERS = frozenset(str(outcome) for outcome in Outcome)
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
+# It looks for a person who is at home with this probability, by `source`, at least.
+SOUGHT_FROM = 0.25
 # It looks into the likeliest rooms, until they have this part of the probability.
 ENOUGH = 0.9
 # No source is surer that a person is at home: without one, all of the probability is there.
@@ -123,10 +125,9 @@ class ServedRequest(NamedTuple):
     step: Step
     text: str
     place: Point = (0.0, 0.0)
-    came_from: tuple[int, int] = (0, 0)
+    came_from: LatticePoint = (0, 0)
 
 
-@register("behavior", "interact")
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
@@ -157,25 +158,23 @@ class Interact(BeliefBehavior):
         patience: How long it waits for an answer.
         again: Time after an answer other than yes before it addresses the same person again.
         seek: Whether it looks for people; else it serves only those who come into view.
-        seek_at: Minimum probability, by `source`, that the person is at home for it to look.
-        only_urgent_at: With `timing`: part of the time to the deadline after which it no longer
-            waits for a better moment.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {"asks", "collects", "delivered", "withdraws", "opportunity", "replies"}
-    )
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen", "due", "question"})
+    records = frozenset(
+        {
+            EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED, EventKind.WITHDRAWS,
+            EventKind.OPPORTUNITY, EventKind.REPLIES,
+        }
+    )  # fmt: skip
+    listens = frozenset({EventKind.USER_SEEN, EventKind.DUE, EventKind.QUESTION})
 
-    serves_requests: ClassVar[bool] = True
+    serves_requests = True
 
     timing: str | None = None
     look: PositiveDuration = timedelta(minutes=20)
     patience: PositiveDuration = timedelta(seconds=20)
     again: Duration = timedelta(minutes=10)
     seek: bool = True
-    seek_at: Share = 0.25
-    only_urgent_at: Share = Field(default=1.0)
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithms that it reads."""
@@ -196,7 +195,7 @@ class Interact(BeliefBehavior):
     def awaits(self, now: Situation) -> frozenset[str]:
         """Leave out `user_seen` unless it waits for somebody to come into view."""
         waits = any(self._waits_for(now, request) for request in self._ready(now))
-        return self.listens if waits else self.listens - {"user_seen"}
+        return self.listens if waits else self.listens - {EventKind.USER_SEEN}
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when a request may be served that has to wait now."""
@@ -246,11 +245,11 @@ class Interact(BeliefBehavior):
 
     def _reply(self, now: Situation) -> Plan | None:
         """Answer the question of a person, if there is one."""
-        event = next((event for event in now.events if event.event == "question"), None)
+        event = next((event for event in now.events if event.event == EventKind.QUESTION), None)
         if event is None:
             return None
-        plan = now.plan().face(*now.home.plan.lattice.point_at((event.x, event.y)))
-        return plan.note("replies", event.user).stay(REPLY_TAKES)
+        plan = now.plan().face_place((event.x, event.y))
+        return plan.note(EventKind.REPLIES, event.user).stay(REPLY_TAKES)
 
     def _address(
         self, now: Situation, ready: list[Request], served: ServedRequest | None
@@ -286,7 +285,7 @@ class Interact(BeliefBehavior):
                 continue
             joint = self.belief(now, to).joint
             usual = min(MOST_SURE, sum_in_order(joint.tolist()))
-            if self.at_home.chance(to, now.time, usual) < self.seek_at:
+            if self.at_home.chance(to, now.time, usual) < SOUGHT_FROM:
                 self.not_sought[to] = now.time + SEARCH_PAUSE
             elif self._is_good_time(now, request):
                 return self._seek(now, request, joint)
@@ -297,7 +296,7 @@ class Interact(BeliefBehavior):
         pause = UNANSWERED_PAUSE if person in self.unanswered else SEARCH_PAUSE
         if not is_in_view:
             usual = min(MOST_SURE, sum_in_order(self.belief(now, person).joint.tolist()))
-            doubted = self.at_home.note_empty(person, now.time, usual, self.seek_at)
+            doubted = self.at_home.note_empty(person, now.time, usual, SOUGHT_FROM)
             pause = max(SEARCH_PAUSE, doubted)
         self.not_sought[person] = now.time + pause
 
@@ -330,8 +329,7 @@ class Interact(BeliefBehavior):
                 f"the output of {self.timing!r} has no chances of asking: name an algorithm of type"
                 " timing, or one whose output has a method `chance`, as TimingChances has"
             )
-        age = (now.time - request.since) / request.interaction.within
-        if output is not None and age < self.only_urgent_at:
+        if output is not None:
             chance = output.chance(to, request.name, now.time, self._room_of(now, to))
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
@@ -362,8 +360,8 @@ class Interact(BeliefBehavior):
         self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
-        plan.face(*now.home.plan.lattice.point_at(place))
-        plan.note("asks", request.text).stay(self.patience).interrupt_on(*ANSWERS)
+        plan.face_place(place)
+        plan.note(EventKind.ASKS, request.text).stay(self.patience).interrupt_on(*OUTCOMES)
         self.plan = plan.root
         return plan
 
@@ -371,10 +369,10 @@ class Interact(BeliefBehavior):
         """Carry out what was accepted, or withdraw after another answer."""
         request = served.request
         to = served.text.rpartition(" ")[2]
-        answers = [e.event for e in now.events if e.event in ANSWERS and e.user == served.text]
+        answers = [e.event for e in now.events if e.event in OUTCOMES and e.user == served.text]
         if Outcome.ACCEPTED in answers:
             self.served = served._replace(step="carry_out")
-            done = "delivered" if to == request.interaction.to else "collects"
+            done = EventKind.DELIVERED if to == request.interaction.to else EventKind.COLLECTS
             self.plan = now.plan().stay(request.interaction.takes).note(done, served.text)
             return self.plan.stay(timedelta(seconds=1))
         if not answers:
@@ -384,7 +382,7 @@ class Interact(BeliefBehavior):
             self.unanswered[to] = served.place
             self.not_sought[to] = now.time + UNANSWERED_PAUSE
         self.left_alone[to] = now.time + self.again
-        plan = now.plan().note("withdraws", served.text)
+        plan = now.plan().note(EventKind.WITHDRAWS, served.text)
         return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
 
     def _seek(self, now: Situation, request: Request, joint: F64) -> Plan:
@@ -392,14 +390,15 @@ class Interact(BeliefBehavior):
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
         total = sum_in_order(float(joint[room.index]) for room in rooms)
-        self.served, self.plan = ServedRequest(request, "seek", request.text), now.plan()
+        self.served = ServedRequest(request, "seek", request.text)
+        self.plan = now.plan()
         looked = 0.0
         for room in rooms:
             if looked > ENOUGH * total:
                 break
             looked += float(joint[room.index])
             self.plan.go_to_point(*now.actor.middle(room)).turn_by(1)
-        return self.plan.interrupt_on("user_seen")
+        return self.plan.interrupt_on(EventKind.USER_SEEN)
 
     def _look_on(
         self, now: Situation, ready: list[Request], served: ServedRequest | None
@@ -416,10 +415,9 @@ class Interact(BeliefBehavior):
             self._end_round(now, served.request.to, is_in_view=is_in_view)
             return None
         self.served = served
-        return plan.interrupt_on("user_seen")
+        return plan.interrupt_on(EventKind.USER_SEEN)
 
 
-@register("behavior", "opportunistic")
 class Opportunistic(Behavior):
     """Approach a person who comes into view, and interact for a while.
 
@@ -438,10 +436,13 @@ class Opportunistic(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {"approaches", "asks", "collects", "delivered", "interaction_over", "interacts"}
-    )
-    listens: ClassVar[frozenset[str]] = frozenset({"user_seen"})
+    records = frozenset(
+        {
+            EventKind.APPROACHES, EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED,
+            EventKind.INTERACTION_OVER, EventKind.INTERACTS,
+        }
+    )  # fmt: skip
+    listens = frozenset({EventKind.USER_SEEN})
 
     users: tuple[str, ...] = ()
     distance: Length = Field(default=1.2, ge=0.3, le=10)
@@ -465,13 +466,13 @@ class Opportunistic(Behavior):
         """Approach somebody in view, or leave the decision to later behaviors."""
         asked = self.asked
         self.asked = None
-        texts = [event.user for event in now.events if event.event == "accepted"]
+        texts = [event.user for event in now.events if event.event == EventKind.ACCEPTED]
         if asked is not None and asked[1] in texts:
             request, text = asked
             person = text.rpartition(" ")[2]
-            done = "delivered" if person == request.interaction.to else "collects"
+            done = EventKind.DELIVERED if person == request.interaction.to else EventKind.COLLECTS
             plan = now.plan().stay(request.interaction.takes).note(done, text)
-            return plan.note("interaction_over", person)
+            return plan.note(EventKind.INTERACTION_OVER, person)
         avoided = self.avoided | now.actor.banned(now.step)
         for name, (x, y) in sorted(now.in_view.items()):
             is_meant = not self.users or name in self.users
@@ -484,12 +485,12 @@ class Opportunistic(Behavior):
         return None
 
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
-        plan = now.plan().note("approaches", name)
+        plan = now.plan().note(EventKind.APPROACHES, name)
         approach(now, plan, x, y, self.distance)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
-        plan.note("interacts", name)
+        plan.face_place((x, y))
+        plan.note(EventKind.INTERACTS, name)
         ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
         self.asked = (ready[0], ready[0].text) if ready else None
         if self.asked is not None:
-            plan.note("asks", self.asked[1]).interrupt_on("accepted")
-        return plan.stay(self.interaction).note("interaction_over", name)
+            plan.note(EventKind.ASKS, self.asked[1]).interrupt_on(EventKind.ACCEPTED)
+        return plan.stay(self.interaction).note(EventKind.INTERACTION_OVER, name)

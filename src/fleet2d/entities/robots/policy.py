@@ -9,13 +9,12 @@ robot's sightings (`SightingMemory`).
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import register
 from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath, PositiveDuration
@@ -30,6 +29,7 @@ from fleet2d.floorplan.space import PointDistances
 from fleet2d.kernels import F32, F64, I32, I64, TURN, UNIT, Bool, RoomMemory, ShownMemory
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import DAY_MINUTES, HOUR_S, MICROSECOND, Clock, midnight_of
+from fleet2d.runtime.events import EventKind
 
 # How many people have columns of their own, in the order of the scenario.
 PEOPLE = 4
@@ -72,8 +72,8 @@ INPUTS = ("observation", "action_mask")
 # The rows of `ShownMemory.fresh_rows` and its like: first the visits, then the person.
 PERSON = 2
 
-TALLIED = ("relocations", "found", "gave_up", "searching_min", "overdue_h")
-"""What a policy counts for rewards: see `fleet2d.gym.task.REWARDS`."""
+TALLIED = ("relocations", EventKind.FOUND, EventKind.GAVE_UP, "searching_min", "overdue_h")
+"""What a policy counts for rewards: see `fleet2d.learning.gym.task.REWARDS`."""
 MAX_OVERDUE_H = 24.0
 MINUTE = timedelta(minutes=1)
 SATURDAY = 5
@@ -224,7 +224,6 @@ def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
     )
 
 
-@register("behavior", "policy")
 class Policy(BeliefBehavior):
     """Let a learned policy choose the next room: to wait in, to look for a person in, or to visit.
 
@@ -248,11 +247,14 @@ class Policy(BeliefBehavior):
         deadline: Duration of a search after which it gives up (find).
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {"docks", "find_begins", "found", "gave_up", "relocates", "visits"}
-    )
+    records = frozenset(
+        {
+            EventKind.DOCKS, EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP,
+            EventKind.RELOCATES, EventKind.VISITS,
+        }
+    )  # fmt: skip
 
-    remembers: ClassVar[bool] = True
+    remembers = True
 
     task: Literal["hangout", "find", "patrol"] = "hangout"
     file: InputPath | None = None
@@ -317,7 +319,8 @@ class Policy(BeliefBehavior):
         away = 0.0
         if self.source is not None:
             belief = self.belief(now, self.user)
-            part[:, _AT["belief"]], away = belief.joint, belief.away
+            part[:, _AT["belief"]] = belief.joint
+            away = belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
                 part[:, _AT[f"belief_{number}"]] = self.belief(now, name).joint
         step_s = actor.clock.step_us / 1e6
@@ -351,7 +354,8 @@ class Policy(BeliefBehavior):
         types = {kind: name for name, kinds in KINDS.items() for kind in kinds}
         for room in actor.home.rooms:
             row = table[room.index]
-            row[_AT["room"]], row[_AT["area"]] = 1, room.cells / cells
+            row[_AT["room"]] = 1
+            row[_AT["area"]] = room.cells / cells
             if self.source is None:
                 row[_AT["belief"]] = row[_AT["area"]]
             row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1
@@ -367,36 +371,40 @@ class Policy(BeliefBehavior):
 
     def asks(self, now: Situation) -> bool:
         """Return whether its decision at a step depends on the policy."""
-        return self.task != "find" or self._phase(now) == "asks"
+        if self.task != "find":
+            return True
+        return not self._is_idle(now) and self._search_end(now) is None
 
-    def _phase(self, now: Situation) -> Literal["idle", "asks", "found", "gave_up"]:
-        """Return what becomes of its search at a step."""
-        if self.since is None and now.time < self.due:
-            return "idle"
+    def _is_idle(self, now: Situation) -> bool:
+        """Return whether it has no search to do at a step."""
+        return self.since is None and now.time < self.due
+
+    def _search_end(self, now: Situation) -> EventKind | None:
+        """Return how its search ends at a step; None: it goes on."""
         in_view = now.in_view
         if self.user in in_view or (self.user == ANYONE and in_view):
-            return "found"
+            return EventKind.FOUND
         if self.since is not None and now.time >= self.since + self.deadline:
-            return "gave_up"
-        return "asks"
+            return EventKind.GAVE_UP
+        return None
 
     def decide(self, now: Situation) -> Plan | None:
         """Carry out the action that the policy chooses."""
         plan = now.plan()
         if self.task == "find":
-            phase = self._phase(now)
-            if phase == "idle":
+            if self._is_idle(now):
                 return plan.stay(until=self.due)
+            end = self._search_end(now)
             if self.since is None:
                 self.since = now.time
-                plan.note("find_begins", self.user)
-            if phase != "asks":
+                plan.note(EventKind.FIND_BEGINS, self.user)
+            if end is not None:
                 self._tally["searching_min"] += (now.time - self.since) / MINUTE
-                self._tally[phase] += 1
+                self._tally[end] += 1
                 self.since = None
                 while self.due <= now.time:
                     self.due += self.every
-                return plan.note(phase, self.user).stay(until=self.due)
+                return plan.note(end, self.user).stay(until=self.due)
         action = self._action(now)
         if action == self.rooms:
             return self._rest(now, plan)
@@ -415,7 +423,7 @@ class Policy(BeliefBehavior):
         if self.file is None:
             raise ComponentError(
                 "the policy has no file: give one, as file: hangout.onnx, derive a class from"
-                " Policy that overrides act, or use fleet2d.gym"
+                " Policy that overrides act, or use fleet2d.learning.gym"
             )
         output = compute(self.file, {INPUTS[0]: observation[None], INPUTS[1]: mask[None]})
         scores = output[0] if output.ndim else output
@@ -455,11 +463,11 @@ class Policy(BeliefBehavior):
         charge = now.actor.charge
         lasts = MINUTE if self.task == "find" else self.period
         if charge is not None and plan.reaches(*charge.charger):
-            if (plan.x, plan.y) != charge.charger:
-                plan.go_to_point(*charge.charger).note("docks", charge.percent)
+            if plan.position != charge.charger:
+                plan.go_to_point(*charge.charger).note(EventKind.DOCKS, charge.percent)
             lasts = max(timedelta(microseconds=charge.time_to_charge(1.0)), MINUTE)
         plan.stay(lasts)
-        return plan.interrupt_on("user_seen") if self.task == "find" else plan
+        return plan.interrupt_on(EventKind.USER_SEEN) if self.task == "find" else plan
 
     def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
         """Go to a room, and wait or look round there."""
@@ -470,11 +478,12 @@ class Policy(BeliefBehavior):
         if self.sites is not None and self.task == "find":
             self.sites.look_round(plan, number)
             self._tally["relocations"] += 1
-            return plan.interrupt_on("user_seen")
+            return plan.interrupt_on(EventKind.USER_SEEN)
         x, y = self.poses.points[number].tolist()
-        if (plan.x, plan.y) != (x, y):
+        if plan.position != (x, y):
             self._tally["relocations"] += 1
-            plan.note("relocates" if self.task == "hangout" else "visits", name).go_to_point(x, y)
+            kind = EventKind.RELOCATES if self.task == "hangout" else EventKind.VISITS
+            plan.note(kind, name).go_to_point(x, y)
             plan.turn_to(int(self.poses.headings[number]))
         if self.task == "hangout":
             return plan.stay(self.period)

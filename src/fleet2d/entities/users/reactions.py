@@ -1,16 +1,17 @@
 """Reactions: how people react to robots."""
 
 from datetime import timedelta
-from typing import ClassVar
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.routines.activity import DurationDistribution
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
+from fleet2d.runtime.events import EventKind
 
 # The events, the most important first, and the manner that is the probability of a reaction.
 PROBABILITIES = {
@@ -24,12 +25,13 @@ RANKS = list(PROBABILITIES)
 STEP_M = 0.7
 MEET_M = 0.9
 CLEAR_M = 0.1  # minimum distance added to what is too close
+# How long a person who left a robot stays in the other room.
+LEAVES_FOR = DurationDistribution(mean=timedelta(minutes=5))
 # How long a person waits for a robot to pass.
 PASSING_TIME = timedelta(seconds=4)
 DIRECTIONS = 16
 
 
-@register("behavior", "reactions")
 class Reactions(Behavior):
     """React to robots: turn to them, step aside, come, leave; list it before other behaviors.
 
@@ -40,7 +42,7 @@ class Reactions(Behavior):
         manners: The manners; left out: those of the persona.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"reacts"})
+    records = frozenset({EventKind.REACTS})
 
     manners: Manners | None = None
 
@@ -49,8 +51,12 @@ class Reactions(Behavior):
         personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
         persona = next((p for p in personas if p is not None), None)
         self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
-        durations = ("looks", "leaves_for", "comes_for")
-        self.durations = {name: getattr(self.used_manners, name).table() for name in durations}
+        manners = self.used_manners
+        self.durations = {
+            "looks": manners.looks.table(),
+            "leaves": LEAVES_FOR.table(),
+            "comes": manners.comes_for.table(),
+        }
         # of the present reaction, and the step at which it ends
         self.rank = 0
         self.until = -1
@@ -87,39 +93,39 @@ class Reactions(Behavior):
         elif event.event == "robot_coming":
             self._step_aside(now, plan, event, draws)
         else:
-            plan.note("reacts", f"turns to {event.user}")
+            plan.note(EventKind.REACTS, f"turns to {event.user}")
             self._look_at(now, plan, event, self.durations["looks"], draws)
         self.rank = RANKS.index(event.event)
         self.until = now.actor.clock.step_at_or_after(plan.time_us)
         return plan
 
     def _come(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
-        plan.note("reacts", f"comes to {event.user}")
+        plan.note(EventKind.REACTS, f"comes to {event.user}")
         self._maybe_stop(now, draws)
         at_x, at_y = _robot(now, event)
         distance_m = max(MEET_M, self.used_manners.too_close + CLEAR_M)
         points = [p for p in self._points_around(now, (at_x, at_y), distance_m) if plan.reaches(*p)]
         if points:
             plan.go_to_point(*min(points, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
-        self._look_at(now, plan, event, self.durations["comes_for"], draws)
+        self._look_at(now, plan, event, self.durations["comes"], draws)
 
     def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
-        plan.note("reacts", f"leaves {event.user}")
+        plan.note(EventKind.REACTS, f"leaves {event.user}")
         self._maybe_stop(now, draws)
         rooms = [room for room in now.actor.reachable_rooms() if room != now.room]
         if rooms:
             plan.go_to((draws.choice(rooms).name,), "retreat")
-        plan.stay(timedelta(seconds=self.durations["leaves_for"].draw(draws)))
+        plan.stay(timedelta(seconds=self.durations["leaves"].draw(draws)))
 
     def _step_aside(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         """Step out of the robot's way, to a random free point beside it."""
-        plan.note("reacts", f"steps aside for {event.user}")
+        plan.note(EventKind.REACTS, f"steps aside for {event.user}")
         at_x, at_y = _robot(now, event)
         dx, dy = plan.x - at_x, plan.y - at_y
         # Across the robot's way; along it, the robot would come closer again.
         across = [
             (x, y)
-            for x, y in self._points_around(now, (plan.x, plan.y), STEP_M)
+            for x, y in self._points_around(now, plan.position, STEP_M)
             if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
             <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
         ]
@@ -134,8 +140,8 @@ class Reactions(Behavior):
         plan.stay(timedelta(seconds=lasts.draw(draws)))
 
     def _points_around(
-        self, now: Situation, center: tuple[int, int], distance_m: float
-    ) -> list[tuple[int, int]]:
+        self, now: Situation, center: LatticePoint, distance_m: float
+    ) -> list[LatticePoint]:
         """Return free points at a distance [m] from a point, in the same room."""
         distance = round(distance_m * now.home.plan.lattice.units_per_m)
         return list(points_at_distance(now.actor, center, distance, DIRECTIONS))
@@ -146,7 +152,7 @@ class Reactions(Behavior):
                 behavior.give_up(now)
 
 
-def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
+def _robot(now: Situation, event: SightEvent) -> LatticePoint:
     return now.home.plan.lattice.point_at((event.x, event.y))
 
 

@@ -4,19 +4,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from fleet2d.configuration import units
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import counted
-from fleet2d.configuration.units import Duration, InputFileOrFolder, Length, PositiveDuration, Speed
+from fleet2d.configuration.units import Duration, InputFileOrFolder, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
 from fleet2d.logs import placement
@@ -31,11 +31,20 @@ from fleet2d.logs.log import (
     begin_of_run,
     files_of,
 )
-from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
+from fleet2d.logs.placement import (
+    COORDINATE_LIMIT_M,
+    DOOR,
+    UNKNOWN,
+    LogFrame,
+    LoggedVisit,
+    LoggedVisits,
+    RoomChoice,
+)
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import EventKind
 
-# Coordinates are clipped to this, far outside of any home [m].
-COORDINATE_LIMIT_M = 1e6
+# A leg faster than this is counted as implausible.
+FASTEST_M_S = 3.0
 # A move shorter than this is ignored for the heading [m].
 MIN_HEADING_MOVE_M = 0.1
 
@@ -102,14 +111,13 @@ class FixFollower:
         gap_us: Two fixes farther apart in time than this have a gap between them.
         gaps: What happens in a gap: "unknown": the body is away; "hold": it stays, and leaves in
             time for the next fix; "walk": it takes all that time for the way.
-        fastest: A leg faster than this is counted as implausible [m/s].
     """
 
-    def __init__(self, actor: Actor, fixes: Fixes, gap_us: int, gaps: str, fastest: float) -> None:
+    def __init__(self, actor: Actor, fixes: Fixes, gap_us: int, gaps: str) -> None:
         self.actor = actor
         self.fixes = fixes
         self.gap_us, self.gaps = gap_us, gaps
-        self.fastest = fastest * actor.home.plan.lattice.units_per_m
+        self.fastest = FASTEST_M_S * actor.home.plan.lattice.units_per_m
         self.unknown_us = self.gap_count = self.implausible = self.around = 0
         self.top_speed = 0.0
         self.heading = self._headings()
@@ -170,7 +178,7 @@ class FixFollower:
         x, y = self.fixes.xy[i].tolist()
         at_us = int(self.fixes.time_us[i])
         heading = int(self.heading[i])
-        plan.jump(at_us, x=x, y=y, heading=heading, away=0).note("known")
+        plan.jump(at_us, x=x, y=y, heading=heading, away=0).note(EventKind.KNOWN)
 
     def _route(self, j: int) -> I64:
         """Return the route to a fix from the one before, straight if that is free; int64 (n, 2)."""
@@ -218,14 +226,11 @@ class RoomFollower:
         actor: The body.
         visits: Its visits, in order; the first begins at step 0 or before.
         at_once: Whether it goes to the next room as soon as it may, and waits there.
-        limit: A walk faster than this is counted as implausible [m/s].
     """
 
-    def __init__(
-        self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool, limit: float
-    ) -> None:
+    def __init__(self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool) -> None:
         self.actor, self.visits = actor, visits
-        self.at_once, self.limit = at_once, limit
+        self.at_once = at_once
         self.step_us = actor.clock.step_us
         self.walks = self.hurried = self.implausible = 0
         self.top_speed = 0.0  # of the walks [m/s]
@@ -271,7 +276,7 @@ class RoomFollower:
         else:
             plan.go_to_point(*self._spot(visit, plan))
 
-    def _spot(self, visit: LoggedVisit, plan: Plan) -> tuple[int, int]:
+    def _spot(self, visit: LoggedVisit, plan: Plan) -> LatticePoint:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
         return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
@@ -281,7 +286,7 @@ class RoomFollower:
         x, y = self._spot(visit, plan)
         plan.jump(at_us, x=x, y=y, away=int(visit.place == AWAY))
         if known:
-            plan.note("known", visit.place)
+            plan.note(EventKind.KNOWN, visit.place)
 
     def _walk(self, plan: Plan, before: LoggedVisit, visit: LoggedVisit) -> None:
         """Walk from one visit to the next, so as to arrive in time."""
@@ -289,7 +294,7 @@ class RoomFollower:
         may_leave = max(plan.time_us, before.keep * self.step_us)
         if before.place == AWAY:
             back_us = max(plan.time_us, min((before.last + 1) * self.step_us, arrive_us - 1))
-            plan.jump(back_us, away=0).note("came_home")
+            plan.jump(back_us, away=0).note(EventKind.CAME_HOME)
             may_leave = max(plan.time_us, may_leave)
         spot = self._spot(visit, plan)
         rows = self._way(plan, spot)
@@ -300,9 +305,9 @@ class RoomFollower:
             rows = self._way(plan, self._near(plan, spot))
         self._set_out(plan, rows, may_leave, arrive_us, before)
         if visit.place == AWAY:
-            plan.jump(arrive_us, away=1).note("left_home")
+            plan.jump(arrive_us, away=1).note(EventKind.LEFT_HOME)
 
-    def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
+    def _near(self, plan: Plan, spot: LatticePoint) -> LatticePoint:
         """Return the place in the room of a spot that is nearest to the body."""
         room = self.actor.home.plan.room_of_point(*spot)
         if room is None:
@@ -312,11 +317,11 @@ class RoomFollower:
         ((x, y),) = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64)).tolist()
         return x, y
 
-    def _way(self, plan: Plan, spot: tuple[int, int]) -> I64:
+    def _way(self, plan: Plan, spot: LatticePoint) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
-        route = self.actor.space.route((plan.x, plan.y), spot)
+        route = self.actor.space.route(plan.position, spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
-            route = straight_way((plan.x, plan.y), spot)
+            route = straight_way(plan.position, spot)
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(
@@ -337,10 +342,11 @@ class RoomFollower:
             times = times * window // takes
             self.hurried += 1
             speed = self.actor.entity.speed * takes / max(window, 1)
-            self.implausible += speed > self.limit
+            self.implausible += speed > FASTEST_M_S
             self.top_speed = max(self.top_speed, speed)
         block = np.zeros((len(rows) + 1, 5), np.int64)
-        block[:-1, 0], block[:-1, 1:4] = leave + times, rows[:, 1:]
+        block[:-1, 0] = leave + times
+        block[:-1, 1:4] = rows[:, 1:]
         block[-1] = block[-2]
         block[-1, 0] = arrive_us
         plan.follow(block)
@@ -350,7 +356,7 @@ class RoomFollower:
         for step, activity in visit.activities:
             at_us = max(step, 0) * self.step_us
             if activity and at_us >= plan.began[0] * self.step_us:
-                plan.notes.append(Note(at_us, "activity", activity))
+                plan.notes.append(Note(at_us, EventKind.ACTIVITY, activity))
 
 
 GAP_OF_ROOMS = timedelta(minutes=10)
@@ -359,7 +365,7 @@ GAP_OF_FIXES = timedelta(minutes=1)
 
 def _vanish(plan: Plan, at_us: int) -> None:
     """Make the body's position unknown: it is away, without having walked out."""
-    plan.jump(at_us, away=1).note("unknown")
+    plan.jump(at_us, away=1).note(EventKind.UNKNOWN)
 
 
 def report_rooms(
@@ -388,7 +394,7 @@ def report_rooms(
         lines.append(
             f"{follower.hurried} of {follower.walks} walks are faster than the body walks, since"
             f" the log leaves no more time; {follower.implausible} of them faster than"
-            f" {follower.limit:g} m/s, the fastest at {follower.top_speed:.1f} m/s"
+            f" {FASTEST_M_S:g} m/s, the fastest at {follower.top_speed:.1f} m/s"
         )
     return tuple(lines)
 
@@ -441,7 +447,6 @@ RoomMap = Annotated[
 ]
 
 
-@register("behavior", "replay")
 class Replay(Behavior, LogKeys):
     """Be where a person was according to a log: a smart home's events, a script, or positions.
 
@@ -464,10 +469,9 @@ class Replay(Behavior, LogKeys):
             positions.
         still: Silence in one room up to this length is not a gap: sleepers trigger no sensor.
         reach: A position farther than this from free space is left out.
-        fastest: Walks faster than this are reported as implausible [m/s].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"known", "replay", "unknown"})
+    records = frozenset({EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN})
 
     path: InputFileOrFolder
     format: Layout = "auto"
@@ -479,7 +483,6 @@ class Replay(Behavior, LogKeys):
     gap: PositiveDuration | None = None
     still: Duration = timedelta(hours=12)
     reach: Length = Field(default=1.0, ge=0)
-    fastest: Speed = 3.0
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
@@ -508,7 +511,7 @@ class Replay(Behavior, LogKeys):
         plan = now.plan()
         if now.step == 0:
             for note in self.notes:
-                plan.note("replay", note)
+                plan.note(EventKind.REPLAY, note)
         if isinstance(self.follower, FixFollower):
             return self.follower.follow(plan)
         current = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
@@ -529,7 +532,7 @@ class Replay(Behavior, LogKeys):
         )
         logged = placement.visits_of(log, mapped, rule)
         self.visits = logged.visits
-        follower = RoomFollower(actor, self.visits, self.gaps == "walk", self.fastest)
+        follower = RoomFollower(actor, self.visits, self.gaps == "walk")
         self.follower: RoomFollower | FixFollower = follower
         # Planned once before the run, for the report on its walks.
         follower.follow(Plan(actor, 0), 0, rejoin=False)
@@ -552,7 +555,7 @@ class Replay(Behavior, LogKeys):
             self.reach,
         )
         gap_us = units.micros(self.gap or GAP_OF_FIXES)
-        self.follower = FixFollower(actor, fixes, gap_us, self.gaps, self.fastest)
+        self.follower = FixFollower(actor, fixes, gap_us, self.gaps)
         self.follower.follow(Plan(actor, 0))
         thinned = int(np.count_nonzero(step[1:] == step[:-1]))
         self.notes = report_fixes(log, self.follower, thinned, frame)

@@ -5,13 +5,14 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, format_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
 from fleet2d.runtime.clock import DAY, midnight_of, midnights
+from fleet2d.runtime.events import EventKind
 
 AWAY: tuple[()] = ()
 
@@ -70,7 +71,6 @@ class AgendaEntry(NamedTuple):
     activity: str
 
 
-@register("behavior", "schedule")
 class Schedule(Behavior):
     """Be at fixed places at fixed times, daily or by weekday.
 
@@ -101,7 +101,8 @@ class Schedule(Behavior):
             if is_point(place):
                 actor.point(place)  # type: ignore[arg-type]
         available = {(), *available_places(actor, "schedule.days", places)}
-        self.week = [[entry for entry in day if entry.place in available] for day in self.week]
+        for day in self.week:
+            day[:] = [entry for entry in day if entry.place in available]
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
         """Return the place of the last item before the run."""
@@ -164,7 +165,7 @@ def _add(plan: Plan, entry: AgendaEntry) -> None:
     else:
         plan.leave_home()
     if entry.activity:
-        plan.note("activity", entry.activity)
+        plan.note(EventKind.ACTIVITY, entry.activity)
 
 
 def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[AgendaEntry]:

@@ -2,23 +2,22 @@
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.runtime.events import EventKind
 from fleet2d.runtime.program import ExternalProgram
 
 MAX_ITEMS = 1000
 """The number of items of a plan."""
 
 
-@register("behavior", "guest")
 class Guest(Behavior):
     """Stay out of the home; leave it through the exit if inside.
 
@@ -34,7 +33,6 @@ class Guest(Behavior):
         return now.plan().leave_home().stay()
 
 
-@register("behavior", "unknown")
 class Unknown(Behavior):
     """Be somewhere that nobody recorded, while a real robot's detections are replayed.
 
@@ -42,14 +40,18 @@ class Unknown(Behavior):
     what would need their place. Event: `unknown`.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({"unknown"})
+    records = frozenset({EventKind.UNKNOWN})
 
     def decide(self, now: Situation) -> Plan:
         """Be away, without having walked out."""
-        return now.plan().jump(now.step * now.actor.clock.step_us, away=1).note("unknown").stay()
+        return (
+            now.plan()
+            .jump(now.step * now.actor.clock.step_us, away=1)
+            .note(EventKind.UNKNOWN)
+            .stay()
+        )
 
 
-@register("behavior", "live")
 class Live(Behavior):
     """Be where a real person or robot is, or go where another program says: see `fleet2d live`.
 
@@ -68,7 +70,6 @@ class Live(Behavior):
         return now.plan().stay()
 
 
-@register("behavior", "process")
 class ProcessBehavior(Behavior):
     """A behavior in another process, of any language.
 

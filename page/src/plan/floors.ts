@@ -1,0 +1,100 @@
+/** Floors of rooms: what they are made of follows from the type of the room. Drawn in metres. */
+
+import type { Home } from "../data/home";
+import { mix } from "../theme";
+
+type Context = CanvasRenderingContext2D;
+type Box = readonly [left: number, bottom: number, right: number, top: number];
+
+const WOOD = ["#e8d3b3", "#e5cfae", "#ebd8ba", "#e2caa6"];
+const CARPET = ["#dcdde8", "#e3dce0", "#dbe2e2"];
+/** Colour and pitch of tiles [m]. */
+const TILES: Record<string, readonly [string, number]> = {
+  kitchen: ["#eeeae2", 0.6],
+  bathroom: ["#dce9ea", 0.3],
+  toilet: ["#dce9ea", 0.3],
+  laundry: ["#dce9ea", 0.3],
+  entryway: ["#dfdbd3", 0.75],
+  lobby: ["#dfdbd3", 0.75],
+  storage: ["#dfdbd3", 0.75],
+  boiler_room: ["#dfdbd3", 0.75],
+  garage: ["#d6d7d6", 1.2],
+  balcony: ["#d5dccb", 0.5],
+  loggia: ["#d5dccb", 0.5],
+  terrace: ["#d5dccb", 0.5],
+};
+const CARPETED = new Set(["bedroom", "child_room", "guest_room", "wardrobe"]);
+const PLANK_M = 0.19;
+const JOINT_M = 0.012;
+/** In homes larger than this, floors are plain [m²]: their pattern would be finer than a pixel. */
+const MOST_PATTERNED_M2 = 2500;
+
+/** Numbers from 0 to 1 that are the same for the same seed, so that a floor looks the same each time. */
+function drawsOf(seed: number): () => number {
+  let state = (Math.abs(Math.round(seed)) % 2147483646) + 1;
+  return () => {
+    state = (state * 16807) % 2147483647;
+    return state / 2147483647;
+  };
+}
+
+export function drawFloors(context: Context, home: Home): void {
+  const { rooms, area_m2: area } = home.facts;
+  const isPlain = area > MOST_PATTERNED_M2;
+  rooms.forEach((room, i) => {
+    const floor = home.floors[i]!;
+    context.save();
+    context.clip(floor.path);
+    const seed = floor.box[0] * 100 + floor.box[1] * 10;
+    const tiles = TILES[room.type];
+    if (isPlain) fill(context, floor.box, tiles?.[0] ?? (CARPETED.has(room.type) ? CARPET[i % 3]! : WOOD[0]!));
+    else if (tiles) drawTiles(context, floor.box, ...tiles, drawsOf(seed + 5));
+    else if (CARPETED.has(room.type)) drawCarpet(context, floor.box, CARPET[i % CARPET.length]!, drawsOf(seed + 9));
+    else drawPlanks(context, floor.box, drawsOf(seed + 3));
+    context.restore();
+  });
+}
+
+function fill(context: Context, [left, bottom, right, top]: Box, color: string): void {
+  context.fillStyle = color;
+  context.fillRect(left, bottom, right - left, top - bottom);
+}
+
+/** Planks lie along the longer side. */
+function drawPlanks(context: Context, box: Box, draw: () => number): void {
+  const [left, bottom, right, top] = box;
+  fill(context, box, WOOD[0]!);
+  const lieAlong = right - left > top - bottom;
+  const [from, to, start, end] = lieAlong ? [bottom, top, left, right] : [left, right, bottom, top];
+  for (let across = from; across < to; across += PLANK_M) {
+    for (let along = start - draw() * 1.6; along < end; ) {
+      const length = 0.9 + draw() * 1.1;
+      context.fillStyle = WOOD[Math.floor(draw() * WOOD.length)]!;
+      const [wide, narrow] = [length - JOINT_M, PLANK_M - JOINT_M];
+      if (lieAlong) context.fillRect(along, across, wide, narrow);
+      else context.fillRect(across, along, narrow, wide);
+      along += length;
+    }
+  }
+}
+
+function drawCarpet(context: Context, box: Box, color: string, draw: () => number): void {
+  const [left, bottom, right, top] = box;
+  fill(context, box, color);
+  const dots = (right - left) * (top - bottom) * 200;
+  for (let i = 0; i < dots; i++) {
+    context.fillStyle = draw() > 0.5 ? "#ffffff55" : "#5b5f8a16";
+    context.fillRect(left + draw() * (right - left), bottom + draw() * (top - bottom), 0.025, 0.025);
+  }
+}
+
+function drawTiles(context: Context, box: Box, color: string, pitch: number, draw: () => number): void {
+  const [left, bottom, right, top] = box;
+  fill(context, box, mix(color, "#6b7680", 0.14));
+  for (let x = left; x < right; x += pitch) {
+    for (let y = bottom; y < top; y += pitch) {
+      context.fillStyle = mix(color, "#ffffff", draw() * 0.45);
+      context.fillRect(x + JOINT_M, y + JOINT_M, pitch - 2 * JOINT_M, pitch - 2 * JOINT_M);
+    }
+  }
+}

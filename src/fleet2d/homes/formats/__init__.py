@@ -1,0 +1,1 @@
+"""Files of other programs that floor plans are read from, one format a module."""

@@ -1,0 +1,152 @@
+"""Homes of Sweet Home 3D, as the Home.xml in their file has them."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from shapely import LineString, Polygon, affinity
+
+from fleet2d.configuration.units import InputPath
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.files import MAX_COORDINATE_M, in_file
+from fleet2d.floorplan.furniture import FURNITURE, measured_height
+from fleet2d.floorplan.rooms.room import room_type
+from fleet2d.homes.formats.features import Draft, Feature, choose_level
+from fleet2d.homes.formats.parts import ForeignSource, PlanParts
+
+CM_PER_M = 100
+# What begins higher above the floor is a window or hangs on a wall [cm].
+RAISED_CM = 20
+# Through what begins higher above the floor nobody is seen [cm].
+SILL_CM = 130
+# Words in names and catalogues of furniture, and the type in Fleet2D's catalogue.
+FURNITURE_WORDS = {
+    "refrigerator": "fridge",
+    "cooker": "stove",
+    "oven": "stove",
+    "television": "tv",
+    "washbasin": "washbasin",
+    "bath": "bathtub",
+    "couch": "sofa",
+    "closet": "wardrobe",
+    "bookcase": "bookshelf",
+    "bedsidetable": "nightstand",
+}
+MIN_SIDE_CM = 1.0
+
+
+class SweetHome(ForeignSource):
+    """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
+
+    Attributes:
+        path: The Home.xml file.
+        level: The floor, by name or id; left out: the lowest that is not below the ground.
+    """
+
+    suffixes = (".xml",)
+
+    path: InputPath
+    level: str | None = None
+
+    def read(self, files: Mapping[Path, bytes]) -> PlanParts:
+        """Read the home.
+
+        Free space is the rooms without the walls or, without rooms, what the walls enclose. Doors
+        lead through walls, and one sees through windows between rooms.
+
+        Raises:
+            FloorPlanError: The file can't be read, isn't such a home, or has no free space.
+        """
+        root = _parse(files[self.path], self.path)
+        with in_file(self.path):
+            if root.tag != "home":
+                raise FloorPlanError(f"no home of Sweet Home 3D: it begins with <{root.tag}>")
+            notes: list[str] = []
+            levels = [(str(e.get("id")), e) for e in root.findall("level")]
+            named = [(key, e.get("name") or key, _number(e, "elevation")) for key, e in levels]
+            level = choose_level(named, self.level, notes)
+            here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
+            features = [feature for element in here for feature in _features(element)]
+            return Draft(features, 0.1, notes, scale=self.scale).parts(
+                root.get("name") or self.path.stem, self.cell, f"Sweet Home 3D, {self.path.name}"
+            )
+
+
+def _parse(content: bytes, path: Path) -> ET.Element:
+    """Return the root of an XML file."""
+    try:
+        return ET.fromstring(content)  # noqa: S314 - within the child's limits
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise FloorPlanError(f"{path} is not XML: {error}") from None
+
+
+def _number(element: ET.Element, key: str, default: float = 0.0) -> float:
+    """Return an attribute as a number [cm or rad]."""
+    text = element.get(key)
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= MAX_COORDINATE_M * CM_PER_M:
+        raise FloorPlanError(f"<{element.tag}> has {key}={text!r}: a number is expected")
+    return value
+
+
+def _features(element: ET.Element) -> Iterator[Feature]:
+    """Yield what an element draws: a room, a wall, a door or a piece of furniture [m]."""
+    name = element.get("name")
+    where = f"<{element.tag}{f' {name}' if name else ''}>"
+    properties: dict[str, Any] = {"name": name} if name else {}
+    if element.tag == "room":
+        corners = _metres((_number(p, "x"), _number(p, "y")) for p in element.iter("point"))
+        if len(corners) > 2 and Polygon(corners).is_valid:
+            yield Feature("room", where, Polygon(corners), properties)
+    elif element.tag == "wall":
+        ends = _metres(
+            (_number(element, f"x{end}"), _number(element, f"y{end}")) for end in ("Start", "End")
+        )
+        thickness = max(_number(element, "thickness", 10.0), MIN_SIDE_CM) / CM_PER_M
+        if ends[0] != ends[1]:
+            wall = LineString(ends).buffer(thickness / 2, cap_style="square")
+            yield Feature("wall", where, wall, properties)
+    elif element.tag == "doorOrWindow":
+        elevation = _number(element, "elevation")
+        if elevation < SILL_CM:
+            kind = "door" if elevation < RAISED_CM else "window"
+            yield Feature(kind, where, _box(element), {})
+    elif element.tag == "pieceOfFurniture" and _number(element, "elevation") < RAISED_CM:
+        kind = furniture_type(f"{element.get('catalogId', '')} {name or ''}")
+        top = _number(element, "elevation") + _number(element, "height")
+        heading = -math.pi / 2 - _number(element, "angle")
+        height = measured_height(kind, top / CM_PER_M)
+        piece = {"type": kind, "heading": round(heading, 6) % math.tau, "height": height}
+        yield Feature("object", where, _box(element), piece)
+
+
+def _box(element: ET.Element) -> Polygon:
+    """Return the box that a door or a piece of furniture covers [m]."""
+    sides = (max(_number(element, key), MIN_SIDE_CM) for key in ("width", "depth"))
+    x, y = (side / CM_PER_M / 2 for side in sides)
+    box = Polygon([(-x, -y), (x, -y), (x, y), (-x, y)])
+    turned = affinity.rotate(box, -_number(element, "angle"), (0, 0), True)
+    (x, y) = _metres([(_number(element, "x"), _number(element, "y"))])[0]
+    moved = affinity.translate(turned, x, y)
+    return Polygon(np.round(np.asarray(moved.exterior.coords), 4))
+
+
+def _metres(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return places of the file, in centimetres with y downwards, in metres with y upwards."""
+    return [(round(x / CM_PER_M, 4), round(-y / CM_PER_M, 4)) for x, y in points]
+
+
+def furniture_type(words: str) -> str:
+    """Return the type in the catalogue that a name means, else the name as a type."""
+    kind = room_type(words.rpartition("#")[2])
+    flat = kind.replace("_", "")
+    for word, known in (*FURNITURE_WORDS.items(), *((name, name) for name in FURNITURE)):
+        if word.replace("_", "") in flat:
+            return known
+    return kind

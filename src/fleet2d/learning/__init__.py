@@ -1,0 +1,1 @@
+"""Learning: data sets of many homes, environments for agents, and models fitted to logs."""

@@ -1,0 +1,436 @@
+"""Making a data set: its runs are simulated in worker processes, and stored as shards."""
+
+import hashlib
+import json
+import shutil
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from datetime import timedelta
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+
+from fleet2d import __version__
+from fleet2d.algorithms.presence.belief import AWAY
+from fleet2d.artifacts.manifest import read_json, versions
+from fleet2d.bounds import FILE_BYTES, read_bytes
+from fleet2d.errors import InputError
+from fleet2d.learning.datasets.reader import (
+    MANIFEST,
+    Dataset,
+    DatasetManifest,
+    ShardRecord,
+    open_dataset,
+)
+from fleet2d.learning.datasets.specification import (
+    PARTS,
+    PICTURES,
+    DatasetFile,
+    DatasetPlan,
+    PlannedRun,
+    Shard,
+    plan_dataset,
+)
+from fleet2d.learning.datasets.tables import SCHEMAS, tables_of
+from fleet2d.runtime.progress import progress_bar
+from fleet2d.storage.files import FolderLock, partial_file, refuse_links, write_atomically
+from fleet2d.studies.api import map_runs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fleet2d.runs.run import Run
+
+
+CARD = "README.md"
+MAX_VALUES = 12  # of a distribution in a row
+TABLES = {
+    "runs": "a row for each run: split, home, household, what was varied, seed, digest",
+    "rooms": "a row for each room of the home of a run: kind, area, middle",
+    "evidence": "what the robot looked at and perceived, minute by minute; the only table that a"
+    " model may read",
+    "labels": "where each user truly was, where the user went next and at which step, and what the"
+    " user did",
+    "beliefs": "the belief of the models of real-time presence that ran along",
+}
+BIASES = (
+    "People are simulated: their days are drawn from personas, and repeat more than those of real"
+    " people. Nobody visits.",
+    "Homes have the rooms and the furniture that the generator, or the floor plans, know of. People"
+    " walk the shortest way.",
+    "The robot perceives rooms by line of sight and chance. Identities are right unless the"
+    " scenario says otherwise.",
+    "Rows of a run depend on each other: split and resample by run, or by home, never by row.",
+)
+
+
+def write_card(data: Dataset, file: DatasetFile) -> None:
+    """Write the data card of a data set, with pictures if matplotlib is installed."""
+    root = data.root
+    counts = {split: _count(data, split) for split in data.splits}
+    text = [
+        f"---\n{yaml.safe_dump(_head(data, file), sort_keys=False)}---\n",
+        f"# {file.name}\n",
+        f"{file.description or 'Evidence of robots in homes, and where people were.'} Made by"
+        f" Fleet2D; licence {file.licence}.\n",
+        "## How much\n",
+        _table(
+            ["split", "runs", "days", "homes", "labels", "rows of evidence"],
+            [
+                [s, c["runs"], f"{c['days']:g}", c["homes"], c["labels"], c["evidence"]]
+                for s, c in counts.items()
+            ],
+        ),
+        "No home, household or persona is in more than one split: this is checked before the first"
+        " run. No two runs have the same seed, so no two have the same days.\n",
+        "## Tables\n",
+        *(
+            f"- `{name}`: {words}. Columns: {', '.join(f'`{c}`' for c in SCHEMAS[name].names)}."
+            for name, words in TABLES.items()
+        ),
+        "\n`step` is the last step that a row knows of: join `evidence` up to a step with `labels`"
+        " of that step.\n",
+        "## Distributions\n",
+        *(_distribution(split, c) for split, c in counts.items()),
+        *(f"![{words}]({PICTURES}/{name}.png)\n" for name, words in _draw(root, counts).items()),
+        "## Known biases\n",
+        *(f"- {bias}" for bias in BIASES),
+    ]
+    write_atomically(root / CARD, "\n".join(text).encode())
+
+
+def _head(data: Dataset, file: DatasetFile) -> dict[str, Any]:
+    """Return the head of the card, which the Hub and `datasets` read."""
+    return {
+        "license": file.licence.lower(),
+        "pretty_name": file.name,
+        "configs": [
+            {
+                "config_name": table,
+                "data_files": [
+                    {"split": split, "path": f"{split}/{table}-*.parquet"} for split in data.splits
+                ],
+                **({"default": True} if table == "labels" else {}),
+            }
+            for table in SCHEMAS
+        ],
+    }
+
+
+def _count(data: Dataset, split: str) -> dict[str, Any]:
+    """Return how much there is in a split, and how it is distributed."""
+    runs = data.arrow("runs", split)
+    labels = data.arrow("labels", split).group_by(["run", "place"], use_threads=False)
+    rooms = {
+        (row["run"], row["room"]): row["kind"] for row in data.arrow("rooms", split).to_pylist()
+    }
+    files = data.manifest.files
+    evidence = f"{split}/evidence-"
+    kinds: Counter[str] = Counter()
+    for row in labels.aggregate([([], "count_all")]).to_pylist():
+        kinds[rooms.get((row["run"], row["place"]), AWAY)] += row["count_all"]
+    return {
+        "runs": len(runs),
+        "days": sum(runs["days"].to_pylist()),
+        "homes": len(set(runs["home"].to_pylist())),
+        "labels": kinds.total(),
+        "evidence": sum(files[name].rows for name in files if name.startswith(evidence)),
+        "household": Counter(runs["household"].to_pylist()),
+        "varied": Counter(filter(None, "; ".join(runs["varied"].to_pylist()).split("; "))),
+        "place": kinds,
+        "rooms in a home": Counter(str(n) for n in Counter(run for run, _ in rooms).values()),
+    }
+
+
+def _distribution(split: str, counts: Mapping[str, Any]) -> str:
+    lines = [f"**{split}**\n"]
+    for name in ("household", "varied", "rooms in a home", "place"):
+        total = sum(counts[name].values())
+        shares = [
+            f"{value} {count / total:.0%}" for value, count in counts[name].most_common(MAX_VALUES)
+        ]
+        if shares:
+            lines.append(f"- {name}: {', '.join(shares)}")
+    return "\n".join(lines) + "\n"
+
+
+def _table(head: list[str], rows: list[list[Any]]) -> str:
+    """Return a table in Markdown."""
+    cells = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(str(cell) for cell in row)} |" for row in cells) + "\n"
+
+
+def _draw(root: Path, counts: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Draw where people are, by split; return captions by name, none without matplotlib."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return {}
+    folder = root / PICTURES
+    folder.mkdir(exist_ok=True)
+    captions = {}
+    for name, words in (
+        ("place", "Share of time in each kind of room, and away, by split"),
+        ("rooms in a home", "Rooms of the homes, by split"),
+    ):
+        figure = _bars(Figure(figsize=(8, 3.2), layout="constrained"), counts, name)
+        slug = name.replace(" ", "_")
+        figure.savefig(folder / f"{slug}.png", dpi=110, metadata={"Software": None})
+        captions[slug] = words
+    return captions
+
+
+def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) -> "Figure":
+    from fleet2d.palette import USER_COLORS
+
+    axes = figure.subplots()
+    total: Counter[str] = sum((Counter(c[name]) for c in counts.values()), Counter())
+    keys = [key for key, _ in total.most_common(MAX_VALUES)]
+    if all(key.isdigit() for key in keys):
+        keys.sort(key=int)
+    width = 0.8 / len(counts)
+    for k, (split, own) in enumerate(counts.items()):
+        share = [own[name][key] / max(sum(own[name].values()), 1) for key in keys]
+        at = [i + (k - (len(counts) - 1) / 2) * width for i in range(len(keys))]
+        axes.bar(at, share, width, label=split, color=USER_COLORS[k % len(USER_COLORS)])
+    slanted: dict[str, Any] = {"rotation": 30, "ha": "right"} if name == "place" else {}
+    axes.set_xticks(range(len(keys)), keys, **slanted)
+    axes.set_ylabel("share")
+    axes.set_xlabel(name)
+    axes.legend(frameon=False)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+PLAN = "plan.txt"
+# Runs that are planned at a time: they are what a data set of any size keeps in memory.
+BLOCK_RUNS = 512
+
+
+def dataset(
+    source: str | Path | Mapping[str, Any], out: str | Path, *, workers: int | None = None
+) -> Dataset:
+    """Make a data set, the rest of one that was interrupted, or files that it lacks, and open it.
+
+    Its content is the same for any number of workers, and after an interruption.
+
+    Args:
+        source: A YAML file, or the same as a mapping.
+        out: The folder to write.
+        workers: The number of worker processes; None: one per core.
+
+    Raises:
+        InputError: The file is wrong, its splits overlap, the folder holds something else, or
+            files that are lacking can't be made again as they were.
+        ComponentError: A run failed.
+
+    Example:
+        >>> import fleet2d
+        >>> people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
+        >>> made = fleet2d.dataset({"splits": {"train": people}}, "small")  # doctest: +SKIP
+    """
+    plan = plan_dataset(source)
+    root = Path(out)
+    parts = root / PARTS
+    made = None
+    refuse_links(root, (PARTS, PICTURES, *plan.file.splits))
+    if (root / MANIFEST).is_file():
+        made = open_dataset(root)
+        if made.manifest.plan != plan.digest:
+            raise InputError(f"{root} holds another data set: choose another folder, or delete it")
+        if not made.lacking():
+            return made
+    elif root.exists() and any(root.iterdir()) and not parts.is_dir():
+        raise InputError(f"{root} is not empty, and holds no data set: choose another folder")
+    parts.mkdir(parents=True, exist_ok=True)
+    lock = FolderLock(parts, "dataset.lock")
+    try:
+        _check_plan(parts, plan)
+        if made is not None:
+            _record_shards(plan, made)
+        files = _write_shards(root, plan, workers)
+        if made is None:
+            _finish(root, plan, files)
+    finally:
+        lock.release()
+    shutil.rmtree(parts)
+    if made is not None and files != made.manifest.files:
+        raise InputError(
+            f"{root}: files that were lacking differ now from those that were written, by other"
+            " versions of libraries (see --verify): delete the data set, and make it again"
+        )
+    return open_dataset(root)
+
+
+def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
+    """Record the shards of a complete data set, so that only those that lack a file are made."""
+    version = made.manifest.versions.get("fleet2d")
+    if version != __version__:
+        raise InputError(
+            f"{made.root} lacks {made.lacking()[0]}, which Fleet2D {version} can make again; this"
+            f" is {__version__}"
+        )
+    for shard in plan.shards():
+        record = {name: made.manifest.files[name] for name in _files_of(shard).values()}
+        _write_record(made.root, shard, record)
+
+
+def _check_plan(parts: Path, plan: DatasetPlan) -> None:
+    """Refuse to continue a data set of another file or version; begin one."""
+    path = parts / PLAN
+    identity = f"{plan.digest} {__version__}".encode()
+    if path.is_file() and read_bytes(path, FILE_BYTES) != identity:
+        raise InputError(
+            f"{parts.parent} holds the unfinished data set of another file, or another version of"
+            " Fleet2D: choose another folder, or delete it"
+        )
+    write_atomically(path, identity)
+
+
+def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[str, ShardRecord]:
+    """Simulate the runs that are lacking, block by block; return the record of each file."""
+    records = {shard: _record_of(root, shard) for shard in plan.shards()}
+    lacking = [shard for shard, record in records.items() if not record]
+    size = max(1, BLOCK_RUNS // plan.file.runs_per_shard)
+    total, left = (sum(s.end - s.first for s in shards) for shards in (records, lacking))
+    with progress_bar(show=True) as bar:
+        task = bar.add_task("runs", total=total, completed=total - left)
+        for begin in range(0, len(lacking), size):
+            runs = {
+                shard: [plan.run(shard.split, k) for k in range(shard.first, shard.end)]
+                for shard in lacking[begin : begin + size]
+            }
+            planned = [run for own in runs.values() for run in own]
+            new = [run for run in planned if not _part_path(root, run).is_file()]
+            bar.advance(task, len(planned) - len(new))
+            by_seed = {run.seed: run for run in new}
+            writer = partial(write_part, root, by_seed, plan.file.labels)
+            scenarios = [run.scenario for run in new]
+            map_runs(writer, scenarios, workers=workers, on_result=lambda _: bar.advance(task))
+            records |= {shard: _join(root, shard, own) for shard, own in runs.items()}
+    return {name: file for record in records.values() for name, file in record.items()}
+
+
+def _record_path(root: Path, shard: Shard) -> Path:
+    return root / PARTS / f"{shard.split}-{shard.number:05}.json"
+
+
+def _record_of(root: Path, shard: Shard) -> dict[str, ShardRecord]:
+    """Return the record of a shard that was written whole, else nothing."""
+    try:
+        stored = read_json(read_bytes(_record_path(root, shard), FILE_BYTES))
+        names = _files_of(shard).values()
+        record = {name: ShardRecord.model_validate(stored[name]) for name in names}
+        is_whole = all((root / n).stat().st_size == file.bytes for n, file in record.items())
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}
+    return record if is_whole else {}
+
+
+def _write_record(root: Path, shard: Shard, record: Mapping[str, ShardRecord]) -> None:
+    """Record that the files of a shard are whole."""
+    content = {name: file.model_dump() for name, file in record.items()}
+    write_atomically(_record_path(root, shard), json.dumps(content).encode())
+
+
+def _files_of(shard: Shard) -> dict[str, str]:
+    """Return the name of the file of each table of a shard."""
+    return {table: f"{shard.split}/{table}-{shard.number:05}.parquet" for table in SCHEMAS}
+
+
+def _part_path(root: Path, run: PlannedRun) -> Path:
+    return root / PARTS / f"{run.number:06}.arrow"
+
+
+def write_part(
+    root: Path, planned: Mapping[int, PlannedRun], labels: timedelta, run: "Run"
+) -> None:
+    """Write what a data set stores of a run, in the process that simulated it.
+
+    The tables come one after the other, as streams of one file.
+
+    Args:
+        root: The folder of the data set.
+        planned: The planned runs, by seed.
+        labels: Time between labels.
+        run: The run.
+    """
+    own = planned[int(run.manifest["seed"])]
+    tables = tables_of(run, own, labels)
+    with partial_file(_part_path(root, own)) as path, pa.OSFile(str(path), "wb") as file:
+        for name in SCHEMAS:
+            with pa.ipc.new_stream(file, tables[name].schema) as stream:
+                stream.write_table(tables[name])
+
+
+def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, ShardRecord]:
+    """Turn the parts of some runs into the files of a shard; return a record of each file."""
+    tables: dict[str, list[pa.Table]] = {name: [] for name in SCHEMAS}
+    parts = [_part_path(root, run) for run in runs]
+    for part in parts:
+        try:
+            with pa.OSFile(str(part), "rb") as file:
+                for name, schema in SCHEMAS.items():
+                    table = pa.ipc.open_stream(file).read_all()
+                    table.cast(schema)
+                    tables[name].append(table)
+        except (OSError, ValueError, pa.ArrowException) as error:
+            part.unlink(missing_ok=True)
+            raise InputError(
+                f"{part} was damaged, and is deleted ({error}): run the same command again"
+            ) from None
+    record = {}
+    for table_name, name in _files_of(shard).items():
+        path = root / name
+        path.parent.mkdir(exist_ok=True)
+        table = pa.concat_tables(tables[table_name]).unify_dictionaries()
+        with partial_file(path) as partial:
+            pq.write_table(table, partial, **_encoding(table))
+        content = path.read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        record[name] = ShardRecord(rows=table.num_rows, bytes=len(content), sha256=digest)
+    _write_record(root, shard, record)
+    for part in parts:
+        part.unlink()
+    return record
+
+
+def _encoding(table: pa.Table) -> dict[str, Any]:
+    """Return how a table is stored: steps and times as differences, texts by their values.
+
+    Most rows follow the one before by the same time, so this takes a third less room. The values of
+    a belief hardly repeat: their bytes are stored one place after the other.
+    """
+    moments = {"step", "next_step", "time"} & {*table.column_names}
+    beliefs = {"probability"} & {*table.column_names}
+    return {
+        "compression": "zstd",
+        "compression_level": 3,
+        "column_encoding": {
+            **dict.fromkeys(moments, "DELTA_BINARY_PACKED"),
+            **dict.fromkeys(beliefs, "BYTE_STREAM_SPLIT"),
+        },
+        "use_dictionary": [
+            name for name in table.column_names if name not in moments and name not in beliefs
+        ],
+        "write_statistics": ["run", "step"],  # by which readers leave out parts of a file
+        "store_schema": False,  # that of the dictionaries: readers get texts
+    }
+
+
+def _finish(root: Path, plan: DatasetPlan, files: Mapping[str, ShardRecord]) -> None:
+    """Write the data card, then the manifest: a data set with one is complete."""
+    manifest = DatasetManifest(
+        name=plan.file.name,
+        plan=plan.digest,
+        versions=versions(),
+        splits={name: split.runs for name, split in plan.file.splits.items()},
+        file=plan.file.model_dump(mode="json"),
+        files=dict(files),
+    )
+    write_card(Dataset(root, manifest), plan.file)
+    write_atomically(root / MANIFEST, manifest.model_dump_json(indent=1).encode())

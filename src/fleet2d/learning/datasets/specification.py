@@ -1,0 +1,349 @@
+"""The file of a data set: homes, households and splits; and the runs that are drawn from it."""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from datetime import timedelta
+from itertools import combinations, takewhile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import Field, ValidationError, field_validator
+
+from fleet2d.algorithms.evidence import steps_of_bin
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.documents import Document, read_document
+from fleet2d.configuration.problems import problem, shown
+from fleet2d.configuration.units import PositiveDuration, micros, parse_duration
+from fleet2d.errors import InputError, ScenarioError, errors_as
+from fleet2d.routines.persona import origins_of
+from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.scenario.compose import apply_changes, assignment
+from fleet2d.scenario.load import explain, load_scenario
+from fleet2d.studies.axes import AnyAxis, Choice
+
+NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")
+# folders beside those of the splits
+PARTS = "unfinished"
+PICTURES = "pictures"
+EVIDENCE = "evidence"
+STAYS = "stays"
+BELIEF = "belief_"
+MAX_SEED = 1 << 31
+MAX_PERIOD = timedelta(days=1)
+
+
+class SplitSettings(Settings):
+    """The runs of one split, and what they are drawn from.
+
+    Attributes:
+        runs: The number of runs.
+        homes: Homes, as axes of a study have them: {synthetic: 40, first: 100}, {floorplans: …}.
+        households: Households: a list of the personas of their members, or of users by name.
+    """
+
+    runs: int = Field(ge=1, le=1_000_000)
+    homes: tuple[AnyAxis, ...] = Field(min_length=1)
+    households: tuple[tuple[Any, ...] | dict[str, Any], ...] = Field(min_length=1)
+
+
+class DatasetFile(Settings):
+    """A data set: what its runs are drawn from, and what is stored of them.
+
+    Attributes:
+        name: Its name, the title of the data card.
+        description: What it is for.
+        licence: The licence of its content, stated on the data card.
+        base: A scenario: a file, bundled:NAME, or its sections. Its users are replaced.
+        seed: The seed of all draws.
+        splits: The splits by name: train, validation, test.
+        vary: Axes of which each run has one value, drawn with equal chances.
+        beliefs: Models of real-time presence whose belief is stored, by name.
+        every: Time between stored beliefs.
+        labels: Time between labels.
+        runs_per_shard: The number of runs in a file.
+    """
+
+    name: str = "data set"
+    description: str = ""
+    licence: str = "CC0-1.0"
+    base: Any = None
+    seed: int = Field(default=0, ge=0)
+    splits: dict[str, SplitSettings] = Field(min_length=1)
+    vary: dict[str, AnyAxis] = Field(default={})
+    beliefs: tuple[str, ...] = ()
+    every: PositiveDuration = timedelta(minutes=7)
+    labels: PositiveDuration = timedelta(minutes=1)
+    runs_per_shard: int = Field(default=16, ge=1)
+
+    @field_validator("splits")
+    @classmethod
+    def _check_names(cls, splits: dict[str, SplitSettings]) -> dict[str, SplitSettings]:
+        for name in splits:
+            if not re.fullmatch(r"\w+", name, re.ASCII) or name in (PARTS, PICTURES):
+                raise problem(
+                    f"{shown(name)} can't be the name of a split, which has a folder: use letters,"
+                    f" digits and _, and neither {PARTS!r} nor {PICTURES!r}"
+                )
+        return splits
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run of a data set.
+
+    Attributes:
+        number: Its number, from 0 on.
+        split: The split.
+        labels: What was drawn for it: home, household, and the columns of `vary`.
+        scenario: The scenario, as plain data.
+    """
+
+    number: int
+    split: str
+    labels: Mapping[str, Any]
+    scenario: Mapping[str, Any]
+
+    @property
+    def seed(self) -> int:
+        """The seed of the run, which no other run of the data set has."""
+        return int(self.scenario["simulation"]["seed"])
+
+
+class Shard(NamedTuple):
+    """Runs of a split that are stored in one file of each table.
+
+    Attributes:
+        split: The split.
+        number: Its number in the split, from 0 on.
+        first: The number in the split of its first run.
+        end: That after its last run.
+    """
+
+    split: str
+    number: int
+    first: int
+    end: int
+
+
+@dataclass(frozen=True)
+class DatasetPlan:
+    """A data set that is checked. Its runs are drawn when they are needed, however many there are.
+
+    Attributes:
+        file: The settings.
+        base: The scenario that all runs share.
+        homes: The homes of each split.
+    """
+
+    file: DatasetFile
+    base: Document
+    homes: Mapping[str, Sequence[Choice]]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that its content depends on, but the code."""
+        homes = {name: [home.changes for home in homes] for name, homes in self.homes.items()}
+        file = self.file.model_dump(mode="json", exclude={"base"})
+        text = json.dumps([file, self.base.data, homes], sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def runs(self, split: str) -> Iterator[PlannedRun]:
+        """Draw the runs of a split."""
+        return (self.run(split, k) for k in range(self.file.splits[split].runs))
+
+    def shards(self) -> Iterator[Shard]:
+        """Yield the shards of all splits."""
+        size = self.file.runs_per_shard
+        for split, settings in self.file.splits.items():
+            for number, first in enumerate(range(0, settings.runs, size)):
+                yield Shard(split, number, first, min(first + size, settings.runs))
+
+    def run(self, split: str, k: int) -> PlannedRun:
+        """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
+        settings = self.file.splits[split]
+        homes = self.homes[split]
+        draws = Draws(np.uint64(stream_key(self.file.seed, f"datasets.{split}", "run")), k)
+        household = draws.choice(settings.households)
+        varied = [draws.choice(axis.choices(name)) for name, axis in self.file.vary.items()]
+        home = homes[k % len(homes)]
+        number = self._first_number(split) + k
+        scenario = self._scenario(home, household, varied)
+        scenario["simulation"]["seed"] = (self.file.seed * 1_000_003 + number) % MAX_SEED
+        labels = {
+            "home": home.words.partition("= ")[2],
+            "household": " + ".join(personas_of(household)),
+        }
+        for choice in varied:
+            labels.update({name: str(label) for name, label in choice.labels.items()})
+        return PlannedRun(number, split, labels, scenario)
+
+    def check(self) -> None:
+        """Check each household, home and varied value in a scenario, before the first run.
+
+        Raises:
+            InputError: A scenario would be wrong.
+        """
+        varied = {name: axis.choices(name) for name, axis in self.file.vary.items()}
+        usual = [choices[0] for choices in varied.values()]
+        for split, settings in self.file.splits.items():
+            homes = self.homes[split]
+            households = settings.households
+            firsts = [axis.choices("home")[0] for axis in settings.homes]
+            cases = [(f"homes: {home.words}", home, households[0], usual) for home in firsts]
+            cases += [
+                (f"households: {' + '.join(personas_of(people))}", homes[0], people, usual)
+                for people in households
+            ]
+            for k, (name, choices) in enumerate(varied.items()):
+                for choice in choices:
+                    values = [*usual[:k], choice, *usual[k + 1 :]]
+                    cases.append((f"vary.{name}: {choice.words}", homes[0], households[0], values))
+            for words, home, household, values in cases:
+                with errors_as(ScenarioError, f"{split}, {words}"):
+                    load_scenario(self._scenario(home, household, values))
+
+    def _first_number(self, split: str) -> int:
+        """Return the number of the first run of a split."""
+        before = takewhile(lambda name: name != split, self.file.splits)
+        return sum(self.file.splits[name].runs for name in before)
+
+    def _scenario(self, home: Choice, household: Any, varied: Sequence[Choice]) -> dict[str, Any]:
+        changes = [
+            assignment(keys, value, choice.words)
+            for choice in (home, *varied)
+            for keys, value in choice.changes
+        ]
+        scenario = deepcopy(apply_changes(self.base, changes).data)
+        scenario["users"] = members_of(household)
+        every = f"{self.file.every.total_seconds()} s"
+        period = f"{_period(scenario['simulation']).total_seconds()} s"
+        scenario["algorithms"] = {
+            **scenario.get("algorithms", {}),
+            EVIDENCE: {"type": "evidence_table", "period": period},
+            **{
+                f"{BELIEF}{model}": {
+                    "type": "belief_table",
+                    "model": model,
+                    "every": every,
+                    "period": period,
+                }
+                for model in self.file.beliefs
+            },
+        }
+        scenario["metrics"] = {STAYS: {}}
+        return scenario
+
+
+def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
+    """Read the file of a data set, and check that its splits don't overlap.
+
+    Args:
+        source: A YAML file, or the same as a mapping.
+
+    Raises:
+        ScenarioError: The file is wrong, or its base isn't a scenario.
+        InputError: Splits overlap; the message names the homes, households or personas.
+    """
+    document = (
+        Document(dict(source)) if isinstance(source, Mapping) else read_document(Path(source))
+    )
+    try:
+        file = DatasetFile.model_validate(document.data)
+    except ValidationError as error:
+        raise explain(error, document) from None
+    with errors_as(ScenarioError, "base", of=ScenarioError):
+        base = load_scenario(file.base).resolved()
+    base["users"] = {}
+    homes = {
+        name: [choice for axis in split.homes for choice in axis.choices("home")]
+        for name, split in file.splits.items()
+    }
+    plan = DatasetPlan(file, Document(base), homes)
+    plan.check()
+    _check_splits(file, homes)
+    return plan
+
+
+def _period(simulation: Mapping[str, Any]) -> timedelta:
+    """Return the longest time up to a day that divides a run into equal parts of whole bins.
+
+    The tables of a data set are filled once in that time, which costs least; an hour if there is
+    none.
+    """
+    duration, step = (parse_duration(simulation[name]) for name in ("duration", "step"))
+    parts = -(-duration // MAX_PERIOD)
+    is_even = duration % (parts * steps_of_bin(micros(step)) * step) == timedelta(0)
+    return duration / parts if is_even else timedelta(hours=1)
+
+
+def members_of(household: Any) -> dict[str, Any]:
+    """Return the section `users` of a household: a list of personas, or users by name.
+
+    Example:
+        >>> members_of(["retired"])
+        {'ana': {'type': 'routine', 'persona': 'retired'}}
+    """
+    if isinstance(household, Mapping):
+        return dict(household)
+    if len(household) > len(NAMES):
+        raise InputError(
+            f"a household of {len(household)} personas: name its users, as in {{ana: …}}, where"
+            f" there are more than {len(NAMES)}"
+        )
+    pairs = zip(NAMES, household, strict=False)
+    return {name: {"type": "routine", "persona": persona} for name, persona in pairs}
+
+
+def personas_of(household: Any) -> list[str]:
+    """Return what tells the people of a household: their personas, logs, or types."""
+    return [
+        str(user.get("persona") or user.get("path") or user.get("type"))
+        if isinstance(user, Mapping)
+        else str(user)
+        for user in members_of(household).values()
+    ]
+
+
+def _origins(user: Any) -> set[str]:
+    """Return what a user has in common with users of the same persona, however that is changed."""
+    persona = user.get("persona") if isinstance(user, Mapping) else None
+    return origins_of(persona) if persona else set(personas_of({"": user}))
+
+
+def _check_splits(file: DatasetFile, homes: Mapping[str, list[Choice]]) -> None:
+    """Refuse splits that share a home, a household or a persona.
+
+    Raises:
+        InputError: They do; the message names what they share.
+    """
+    people = {
+        name: {
+            origin
+            for household in split.households
+            for user in members_of(household).values()
+            for origin in _origins(user)
+        }
+        for name, split in file.splits.items()
+    }
+    plans = {
+        name: {json.dumps(choice.changes, default=str): choice.words for choice in choices}
+        for name, choices in homes.items()
+    }
+    problems = []
+    for one, other in combinations(file.splits, 2):
+        shared_homes = [plans[one][key] for key in plans[one] if key in plans[other]]
+        shared_people = sorted(people[one] & people[other])
+        for kind, shared in (("home", shared_homes), ("persona", shared_people)):
+            if shared:
+                names = ", ".join(shared[:5]) + (" …" if len(shared) > 5 else "")
+                problems.append(f"{one} and {other} share {len(shared)} {kind}(s): {names}")
+    if problems:
+        raise InputError(
+            "the splits overlap, so what is learned on one would be known to the other: "
+            + "; ".join(problems)
+        )

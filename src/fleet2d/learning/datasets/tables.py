@@ -1,0 +1,198 @@
+"""The tables of a data set, made from one run: evidence, labels, beliefs, rooms, and the run."""
+
+from collections.abc import Mapping, Sequence
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from fleet2d.algorithms.evidence import steps_of_bin
+from fleet2d.algorithms.presence.belief import ANYONE
+from fleet2d.artifacts.arrow import number_array, string_array, values_of
+from fleet2d.kernels import I64
+from fleet2d.learning.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
+from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.events import EventKind
+
+if TYPE_CHECKING:
+    from fleet2d.runs.run import Run
+
+_KINDS: Mapping[str, pa.DataType] = {
+    **dict.fromkeys(("run", "step", "next_step"), pa.int32()),
+    **dict.fromkeys(("time", "start"), pa.timestamp("us")),
+    **dict.fromkeys(("area_m2", "x", "y", "days"), pa.float64()),
+    **dict.fromkeys(("watched", "probability"), pa.float32()),
+    "seen": pa.int16(),
+    "seed": pa.int64(),
+    "users": pa.list_(pa.string()),
+}
+"""The types of columns; all others are texts."""
+_COLUMNS = {
+    "runs": "run split home household varied users seed start days digest",
+    "rooms": "run room kind area_m2 x y",
+    "evidence": "run time step room kind user watched seen",
+    "labels": "run time step user place next_place next_step activity",
+    "beliefs": "run time step model user place probability",
+}
+SCHEMAS: Mapping[str, pa.Schema] = {
+    table: pa.schema([(name, _KINDS.get(name, pa.string())) for name in names.split()])
+    for table, names in _COLUMNS.items()
+}
+"""The columns of each table.
+
+`step` and `time` are those of the last step that a row may know of: of a bin of evidence its last,
+of a belief the one at which it was held, of a label the one whose truth it tells. So evidence up to
+a step, joined with the labels of that step, has no knowledge of the future.
+"""
+
+
+def text_array(names: Sequence[str], index: I64) -> pa.DictionaryArray:
+    """Return names by their index, null where that is negative, without a copy of each.
+
+    Example:
+        >>> text_array(["office", "away", "office"], np.array([2, 1, 0, -1])).to_pylist()
+        ['office', 'away', 'office', None]
+    """
+    codes = {name: code for code, name in enumerate(dict.fromkeys(names))}
+    code_of = np.array([codes[name] for name in names] or [0], np.int32)
+    indices = number_array(code_of[index], pa.int32(), index < 0)
+    return pa.DictionaryArray.from_arrays(indices, string_array([*codes]))
+
+
+def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, pa.Table]:
+    """Return the tables of a run of a data set, with texts as dictionaries.
+
+    Args:
+        run: The run, in memory or stored.
+        planned: What was planned for it.
+        labels: Time between labels.
+    """
+    manifest = run.manifest
+    rooms = run.plan.rooms
+    start = np.datetime64(manifest["start"], "us")
+    step_us = int(manifest["step_us"])
+    users = list(manifest["scenario"]["users"])
+    every = max(1, labels // timedelta(microseconds=step_us))
+    steps = np.arange(every - 1, int(manifest["steps"]), every)
+    parts: dict[str, list[dict[str, Any]]] = {
+        "runs": [_run_row(planned, users, start, run)],
+        "rooms": [
+            {
+                "room": [room.name for room in rooms],
+                "kind": [room.type for room in rooms],
+                "area_m2": [room.area_m2 for room in rooms],
+                "x": [room.anchor_xy[0] for room in rooms],
+                "y": [room.anchor_xy[1] for room in rooms],
+            }
+        ],
+        "evidence": [_evidence(run, step_us)] if EVIDENCE in run.tables else [],
+        "labels": [_labels(run, user, steps) for user in users],
+        "beliefs": [_belief(run, name) for name in run.tables if name.startswith(BELIEF)],
+    }
+    for columns in (columns for of_table in parts.values() for columns in of_table):
+        rows = len(next(iter(columns.values())))
+        columns["run"] = np.full(rows, planned.number, np.int32)
+        if "step" in columns:
+            columns["time"] = start + np.asarray(columns["step"], np.int64) * step_us
+    return {name: _table(name, of_table) for name, of_table in parts.items()}
+
+
+def _table(name: str, parts: Sequence[Mapping[str, Any]]) -> pa.Table:
+    """Return a table of some parts, each with all columns; without parts, it has no rows."""
+    schema = SCHEMAS[name]
+    tables = [
+        pa.table([_array(columns[f.name], f.type) for f in schema], names=schema.names)
+        for columns in parts or [dict.fromkeys(schema.names, np.zeros(0, np.int64))]
+    ]
+    return pa.concat_tables(tables).unify_dictionaries()
+
+
+def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") -> dict[str, Any]:
+    fixed = {"home", "household"}
+    varied = [f"{name}={value}" for name, value in planned.labels.items() if name not in fixed]
+    return {
+        "split": [planned.split],
+        "home": [str(planned.labels["home"])],
+        "household": [str(planned.labels["household"])],
+        "varied": ["; ".join(varied)],
+        "users": pa.ListArray.from_arrays(
+            number_array(np.array([0, len(users)], np.int32), pa.int32()), string_array(users)
+        ),
+        "seed": [planned.seed],
+        "start": np.array([start]),
+        "days": [float(run.manifest["simulated_s"]) / DAY_S],
+        "digest": [run.digest],
+    }
+
+
+def columns_of(run: "Run", name: str, columns: Sequence[str]) -> dict[str, Any]:
+    """Return columns of a table of a run as arrays; texts as objects."""
+    table = run.arrow(name)
+    return {column: values_of(table[column]) for column in columns}
+
+
+def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
+    """Return where a user truly was at some steps, where next and when, and what the user did."""
+    stays = columns_of(run, STAYS, ["user", "place", "begin"])
+    own = stays["user"] == user
+    place = stays["place"][own]
+    begin = stays["begin"][own]
+    is_new = np.append(True, place[1:] != place[:-1])[: len(place)]
+    place = place[is_new]
+    begin = begin[is_new]
+    since: I64 = np.zeros(0, np.int64)
+    activity: Any = np.zeros(0, object)
+    if "events" in run.tables:
+        events = columns_of(run, "events", ["event", "entity", "step", "detail"])
+        is_own = (events["event"] == EventKind.ACTIVITY) & (events["entity"] == user)
+        since = events["step"][is_own]
+        activity = events["detail"][is_own]
+    stay = np.searchsorted(begin, steps, side="right") - 1
+    is_last = stay + 1 == len(begin)
+    following = np.where(is_last, -1, stay + 1)
+    return {
+        "step": steps,
+        "user": text_array([user], np.zeros(len(steps), np.int64)),
+        "place": text_array(place, stay),
+        "next_place": text_array(place, following),
+        "next_step": np.where(is_last, np.nan, begin[following]),
+        "activity": text_array(activity, np.searchsorted(since, steps, side="right") - 1),
+    }
+
+
+def _evidence(run: "Run", step_us: int) -> dict[str, Any]:
+    looks = run.arrow(EVIDENCE)
+    columns = {name: looks[name] for name in ("room", "kind", "user", "watched", "seen")}
+    return {**columns, "step": values_of(looks["bin"]) + steps_of_bin(step_us) - 1}
+
+
+def _belief(run: "Run", name: str) -> dict[str, Any]:
+    """Return the rows of the belief of a model about each user."""
+    rows = run.arrow(name)
+    rows = rows.filter(number_array(values_of(rows["user"]) != ANYONE, pa.bool_()))
+    share = values_of(rows["share"]).reshape(-1, len(run.plan.rooms) + 1).copy()  # away last
+    share[:, :-1] *= 1 - share[:, -1:]  # of all time, not given at home
+    at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`
+    return {
+        "step": values_of(rows[at]),
+        "model": text_array([name.removeprefix(BELIEF)], np.zeros(len(rows), np.int64)),
+        "user": rows["user"],
+        "place": rows["room"],
+        "probability": share.ravel(),
+    }
+
+
+def _array(values: Any, kind: pa.DataType) -> Any:
+    """Return values as an array of a type, a dictionary for text; NaN as null in whole numbers."""
+    if isinstance(values, pa.Array | pa.ChunkedArray):
+        if kind != pa.string():
+            return values.cast(kind)
+        return values if pa.types.is_dictionary(values.type) else values.dictionary_encode()
+    if kind == pa.string():
+        return text_array(values, np.arange(len(values)))
+    numbers = np.asarray(values)
+    missing = np.isnan(numbers) if kind in (pa.int32(), pa.int64()) else None
+    if missing is not None and missing.any():
+        numbers = np.where(missing, 0, numbers)
+    return number_array(numbers.astype(kind.to_pandas_dtype()), kind, missing)

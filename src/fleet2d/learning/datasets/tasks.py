@@ -1,0 +1,350 @@
+"""Tasks on a data set, each with its metrics and baselines, and the leaderboard that they fill.
+
+- `rtp`: where a person is now, given the evidence so far, at each label with a stored belief: log
+  loss [nats], accuracy and calibration error, over all and by the gap since the last sighting; and
+  the difference in log loss to `routine`, by home, with its 95 % interval.
+- `ltp`: the share of time in each room, at home: total variation distance to the true shares.
+- `next_room`: the kind of place where a person goes next, for each stay: log loss, accuracy.
+- `time_to_return`: when a person who is away comes back: mean absolute error [min].
+- `activity`: what a person does, given the kind of room and the hour: log loss, accuracy.
+
+Baselines learn from `train` and are scored on another split.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fleet2d.algorithms.presence.belief import ANYONE, AWAY
+from fleet2d.algorithms.presence.learned import Weights, shipped_weights
+from fleet2d.configuration.problems import check_known
+from fleet2d.errors import InputError, errors_as
+from fleet2d.kernels import F64, I64
+from fleet2d.learning.datasets.reader import Dataset
+from fleet2d.learning.datasets.training import predict
+from fleet2d.learning.datasets.windows import PRIOR, Windows, windows_of
+from fleet2d.metrics.rtp_score import GAP_ENDS, GAPS, calibration_error, log_loss, top_k
+from fleet2d.studies.intervals import estimate
+
+TRAIN = "train"
+Scores = dict[str, tuple[dict[str, float], int]]
+"""By model: its numbers by metric, and the number of cases that were scored."""
+SMOOTHING = 1.0  # added to each count of a baseline
+
+
+class LeaderboardEntry(NamedTuple):
+    """A row of the leaderboard.
+
+    Attributes:
+        task: The task.
+        model: What was scored.
+        scores: Numbers by metric.
+        cases: Number of scored cases.
+    """
+
+    task: str
+    model: str
+    scores: Mapping[str, float]
+    cases: int
+
+
+def windows(data: Dataset, split: str, worker: int = 0, workers: int = 1) -> Iterator[Windows]:
+    """Yield the windows of a split, as `windows_of`, shard by shard.
+
+    Args:
+        data: The data set.
+        split: The split.
+        worker: Which of the workers this is, from 0 on: it gets each shard whose number is `worker`
+            modulo `workers`.
+        workers: Among how many the shards are shared.
+    """
+    for number in range(worker, data.shards(split), workers):
+        with _agreeing(data, split):
+            yield from windows_of(data.shard(split, number))
+
+
+@contextmanager
+def _agreeing(data: Dataset, split: str) -> Iterator[None]:
+    """Refuse a data set whose tables don't fit together, such as a label in a room without a row.
+
+    Raises:
+        InputError: What is computed in the block failed, as it can't with the tables of a run.
+    """
+    place = f"{data.root}: its tables of {split!r} don't fit together, make the data set again"
+    with errors_as(InputError, place, of=(ArithmeticError, LookupError, ValueError)):
+        yield
+
+
+def leaderboard(
+    data: Dataset,
+    tasks: Sequence[str] = (),
+    split: str = "test",
+    models: Mapping[str, Weights] | None = None,
+) -> list[LeaderboardEntry]:
+    """Score the baselines of tasks on a split.
+
+    Args:
+        data: The data set.
+        tasks: Names of tasks; none: all.
+        split: The split to score on.
+        models: Further networks for `rtp`, by name.
+
+    Raises:
+        InputError: There is no such task or split.
+    """
+    for task in tasks:
+        check_known(task, "task", TASKS, InputError)
+    names = tasks or [t for t in TASKS if t == "rtp" or TRAIN in data.splits]
+    with _agreeing(data, split):
+        return [
+            LeaderboardEntry(task, model, scores, cases)
+            for task in names
+            for model, (scores, cases) in TASKS[task](data, split, models or {}).items()
+        ]
+
+
+def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
+    """Return log loss, accuracy and calibration error, and log loss and accuracy by gap.
+
+    Args:
+        belief: float64 (n, places).
+        truth: int64 (n,).
+        gap: float64 (n,), minutes since the newest sighting.
+    """
+    loss = log_loss(belief, truth)
+    hit = top_k(belief, truth, 1)
+    scores = {
+        "log_loss": float(loss.mean()),
+        "accuracy": float(hit.mean()),
+        "ece": calibration_error(belief, truth),
+    }
+    classes = np.searchsorted(GAP_ENDS, gap)
+    for k, name in enumerate(GAPS[: len(GAP_ENDS) + 1]):
+        own = classes == k
+        if own.any():
+            scores[f"log_loss {name}"] = float(loss[own].mean())
+            scores[f"accuracy {name}"] = float(hit[own].mean())
+    return scores
+
+
+class SplitForecasts(NamedTuple):
+    """Beliefs of models in the windows of a split.
+
+    Attributes:
+        beliefs: By model, float64 (n, places); homes with fewer places have zeros.
+        truth: int64 (n,), the place where the person was.
+        gap: float64 (n,), minutes since the newest sighting.
+        home: str (n,), the home.
+    """
+
+    beliefs: Mapping[str, F64]
+    truth: I64
+    gap: F64
+    home: Any
+
+
+def forecasts(
+    data: Dataset, split: str, models: Mapping[str, Weights] | None = None
+) -> SplitForecasts | None:
+    """Return the stored beliefs of a split, those of `learned`, and of further networks.
+
+    None if the split has no windows.
+    """
+    parts = [part for part in windows(data, split) if len(part.truth)]
+    if not parts:
+        return None
+    networks = {"learned": shipped_weights(), **(models or {})}
+    beliefs: dict[str, list[F64]] = {}
+    for part in parts:
+        new = {n: predict(w, part) for n, w in networks.items() if n not in part.beliefs}
+        for name, belief in {**part.beliefs, **new}.items():
+            beliefs.setdefault(name, []).append(belief)
+    width = max(belief.shape[1] for own in beliefs.values() for belief in own)
+    return SplitForecasts(
+        {
+            name: np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in own])
+            for name, own in beliefs.items()
+        },
+        np.concatenate([part.truth for part in parts]),
+        np.concatenate([part.gap for part in parts]),
+        np.repeat([part.home for part in parts], [len(part.truth) for part in parts]),
+    )
+
+
+def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> Scores:
+    made = forecasts(data, split, models)
+    if made is None:
+        return {}
+    return {
+        name: (
+            {**rtp_scores(belief, made.truth, made.gap), **_difference(made, name)},
+            len(made.truth),
+        )
+        for name, belief in made.beliefs.items()
+    }
+
+
+def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
+    """Return the difference in log loss to `routine`, and the ends of its interval over homes."""
+    loss, prior = (log_loss(made.beliefs[model], made.truth) for model in (name, PRIOR))
+    homes, number = np.unique(made.home, return_inverse=True)
+    by_home = np.bincount(number, loss - prior) / np.bincount(number)
+    difference = estimate(by_home, {"home": homes.tolist()})
+    low, high = (0.0, 0.0) if name == PRIOR else (difference.low, difference.high)
+    ends = {"lower end": low, "upper end": high}
+    scores = {"": difference.mean, **(ends if len(homes) > 1 else {})}
+    return {f"log_loss - {PRIOR} {words}".rstrip(): value for words, value in scores.items()}
+
+
+def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
+    """Score shares of rooms from all evidence of a run, against the true ones."""
+    errors: dict[str, list[float]] = {}
+    rooms = _groups(data, "rooms", split)
+    evidence = _groups(data, "evidence", split)
+    for (run, user), labels in _groups(data, "labels", split, "user").items():
+        names = rooms[(run,)]["room"].tolist()
+        at_home = labels["place"][labels["place"] != AWAY].tolist()
+        if not at_home:
+            continue
+        truth = np.array([at_home.count(name) for name in names]) / len(at_home)
+        seen = np.zeros(len(names))
+        watched = np.zeros(len(names))
+        if (rows := evidence.get((run,))) is not None:
+            room = np.array([names.index(name) for name in rows["room"]])
+            is_look = rows["user"] == ANYONE
+            is_user = rows["user"] == user
+            np.add.at(watched, room[is_look], rows["watched"][is_look])
+            np.add.at(seen, room[is_user], rows["seen"][is_user] / 60)
+        uniform = np.ones(len(names))
+        guesses = {
+            "uniform": uniform,
+            "sighting_share": seen if seen.any() else uniform,
+            "exposure_ratio": (seen + 0.01) / (watched + 1),
+        }
+        for name, guess in guesses.items():
+            error = float(np.abs(guess / guess.sum() - truth).sum() / 2)
+            errors.setdefault(name, []).append(error)
+    return {name: ({"tv": float(np.mean(own))}, len(own)) for name, own in errors.items()}
+
+
+def _next_rooms(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
+    """Yield for each stay the kind of its place, and that of the next one."""
+    following = labels["next_step"].astype(float)
+    is_last = np.append(following[1:] != following[:-1], True) & ~np.isnan(following)
+    yield from zip(labels["kind"][is_last], labels["next_kind"][is_last], strict=True)
+
+
+def _activities(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
+    """Yield for each label at home the kind of room and the hour, and the activity."""
+    rows = zip(labels["kind"], _hours(labels["time"]), labels["activity"], strict=True)
+    yield from (((kind, hour), what) for kind, hour, what in rows if kind != AWAY and what)
+
+
+def _hours(times: Any) -> I64:
+    return times.astype("datetime64[h]").astype(np.int64) % 24
+
+
+def _returns(data: Dataset, split: str) -> tuple[I64, F64]:
+    """Return the hour of each label of somebody away, and the time until the return [min]."""
+    hours = [np.zeros(0, np.int64)]
+    minutes = [np.zeros(0)]
+    for labels in _with_kinds(data, split):
+        time = labels["time"]
+        step = labels["step"]
+        if len(time) < 2:  # the length of a step is unknown
+            continue
+        until = labels["next_step"].astype(float) - step
+        own = (labels["kind"] == AWAY) & ~np.isnan(until)
+        step_s = (time[1] - time[0]) / np.timedelta64(1, "s") / max(int(step[1] - step[0]), 1)
+        hours.append(_hours(time[own]))
+        minutes.append(until[own] * step_s / 60)
+    return np.concatenate(hours), np.concatenate(minutes)
+
+
+def _score_time_to_return(data: Dataset, split: str, _: object) -> Scores:
+    (hour, known), (asked, truth) = _returns(data, TRAIN), _returns(data, split)
+    if not len(known) or not len(truth):
+        return {}
+    overall = float(np.median(known))
+    by_hour = [np.median(known[hour == h]) if (hour == h).any() else overall for h in range(24)]
+    guesses = {"median": np.full(len(truth), overall), "median by hour": np.take(by_hour, asked)}
+    return {
+        name: ({"mae_min": float(np.abs(guess - truth).mean())}, len(truth))
+        for name, guess in guesses.items()
+    }
+
+
+def _score_shares(
+    data: Dataset, split: str, _: object, cases: Callable[[Any], Iterable[Any]], given: str
+) -> Scores:
+    """Score the shares of each outcome in the training: overall, and given what is known."""
+    known, asked = (
+        [case for labels in _with_kinds(data, part) for case in cases(labels)]
+        for part in (TRAIN, split)
+    )
+    if not known or not asked:
+        return {}
+    outcomes = sorted({what for _, what in [*known, *asked]})
+    overall = Counter(what for _, what in known)
+    counts = Counter(known)
+    base = np.array([overall[what] + SMOOTHING for what in outcomes])
+    base /= base.sum()
+    tables = {}
+    for condition, number in Counter(condition for condition, _ in known).items():
+        own = np.array([counts[condition, what] for what in outcomes])
+        tables[condition] = (own + SMOOTHING * base) / (number + SMOOTHING)
+    truth = np.array([outcomes.index(what) for _, what in asked])
+    beliefs = {
+        "most common": np.tile(base, (len(truth), 1)),
+        f"by {given}": np.array([tables.get(condition, base) for condition, _ in asked]),
+    }
+    return {
+        name: (
+            {
+                "log_loss": float(log_loss(belief, truth).mean()),
+                "accuracy": float(top_k(belief, truth, 1).mean()),
+            },
+            len(truth),
+        )
+        for name, belief in beliefs.items()
+    }
+
+
+def _with_kinds(data: Dataset, split: str) -> Iterator[dict[str, Any]]:
+    """Yield the labels of each user of each run, with the kinds of present and next places."""
+    rooms = _groups(data, "rooms", split)
+    for (run, _), labels in _groups(data, "labels", split, "user").items():
+        own = rooms[(run,)]
+        kinds = {**dict(zip(own["room"], own["kind"], strict=True)), AWAY: AWAY, None: None}
+        labels["kind"] = np.array([kinds[place] for place in labels["place"]], object)
+        labels["next_kind"] = np.array([kinds[place] for place in labels["next_place"]], object)
+        yield labels
+
+
+def _groups(data: Dataset, table: str, split: str, *also: str) -> dict[Any, dict[str, Any]]:
+    """Return the rows of a table as arrays by run, and by further columns, in order."""
+    rows = data.arrow(table, split)
+    columns = {name: rows[name].to_numpy(zero_copy_only=False) for name in rows.column_names}
+    numbers = [np.unique(columns[name], return_inverse=True)[1] for name in ("run", *also)]
+    order = np.lexsort(numbers[::-1])
+    changes = np.any([np.diff(number[order], prepend=-1) != 0 for number in numbers], axis=0)
+    parts = np.split(order, np.flatnonzero(changes)[1:]) if len(order) else []
+    return {
+        tuple(columns[name][part[0]] for name in ("run", *also)): {
+            name: values[part] for name, values in columns.items()
+        }
+        for part in parts
+    }
+
+
+TASKS: Mapping[str, Callable[[Dataset, str, Mapping[str, Weights]], Scores]] = {
+    "rtp": _score_rtp,
+    "ltp": _score_ltp,
+    "next_room": partial(_score_shares, cases=_next_rooms, given="kind of room"),
+    "time_to_return": _score_time_to_return,
+    "activity": partial(_score_shares, cases=_activities, given="kind of room and hour"),
+}

@@ -1,0 +1,210 @@
+"""Windows: evidence of a person up to a moment as features, and where the person was then."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from fleet2d.algorithms.evidence import steps_of_bin
+from fleet2d.algorithms.presence.belief import ANYONE, AWAY
+from fleet2d.algorithms.presence.estimator import natural_log
+from fleet2d.algorithms.presence.learned import PlaceFacts
+from fleet2d.bounds import ENTRIES, TABLE_BYTES
+from fleet2d.errors import InputError
+from fleet2d.kernels import F64, I64, TRACE_FEATURES, TracedEvidence, trace_evidence, trace_size
+from fleet2d.learning.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
+from fleet2d.learning.datasets.tables import tables_of
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
+
+if TYPE_CHECKING:
+    from fleet2d.runs.run import Run
+
+MIN_BELIEF = 1e-6
+PRIOR = "routine"  # the model whose belief is corrected
+FIRST_DAY = np.datetime64("0001-01-01", "D")
+MICROSECOND = np.timedelta64(1, "us")
+GAP = 18  # the feature that is ln(1 + minutes since the newest sighting)
+
+
+class Windows(NamedTuple):
+    """Windows of one person in one run.
+
+    Attributes:
+        run: The number of the run.
+        home: Its home, by name.
+        user: The user.
+        places: float64 (places, PLACE_FEATURES), what doesn't change, away last.
+        features: float32 (windows, places, TRACE_FEATURES), what is known of each place.
+        truth: int64 (windows,), the place where the user was; the last is away.
+        step: int64 (windows,), the step of each window.
+        beliefs: The stored beliefs of models, by name: float64 (windows, places).
+    """
+
+    run: int
+    home: str
+    user: str
+    places: F64
+    features: Any
+    truth: I64
+    step: I64
+    beliefs: Mapping[str, F64]
+
+    @property
+    def gap(self) -> F64:
+        """Minutes since the newest sighting, 2,880 for longer ago, or never: float64 (windows,)."""
+        return np.expm1(self.features[:, -1, GAP].astype(np.float64)).round(1)
+
+
+def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
+    """Yield the windows of each person in the tables of a data set, in order of runs.
+
+    There is a window for each stored belief of `routine` that has a label. Its features use
+    evidence up to that step only.
+
+    Raises:
+        InputError: There are no beliefs of `routine`.
+    """
+    columns = {name: _by_run(table) for name, table in tables.items()}
+    for number, run in columns["runs"].items():
+        rooms = columns["rooms"][number]
+        evidence = columns["evidence"].get(number)
+        labels = columns["labels"].get(number)
+        beliefs = columns["beliefs"].get(number)
+        if labels is None or evidence is None:
+            continue
+        if beliefs is None or PRIOR not in beliefs["model"]:
+            raise InputError(f"run {number} has no beliefs of {PRIOR}: list it under beliefs")
+        names = rooms["room"].tolist()
+        ENTRIES.check(len(names), f"the home of run {number}")
+        xy = np.stack([rooms["x"], rooms["y"]], axis=1).tolist()
+        facts = PlaceFacts.of(rooms["kind"].tolist(), rooms["area_m2"], xy)
+        start = np.datetime64(run["start"][0], "us")
+        dense = _Dense(evidence, labels, beliefs, names, facts, start)
+        for user in run["users"][0]:
+            yield dense.windows(number, run["home"][0], user)
+
+
+def windows_of_run(run: "Run") -> list[Windows]:
+    """Return the windows of a run that stored its evidence, stays, and beliefs of `routine`.
+
+    Raises:
+        InputError: A table is missing; the message says what to add to the scenario.
+    """
+    lacking = [name for name in (EVIDENCE, STAYS, f"{BELIEF}{PRIOR}") if name not in run.tables]
+    if lacking:
+        raise InputError(
+            f"the run has no table {lacking[0]!r}: run it with algorithms: {{{EVIDENCE}: {{type:"
+            f" evidence_table}}, {BELIEF}{PRIOR}: {{type: rtp, model: {PRIOR}}}}} and metrics:"
+            f" {{{STAYS}: {{}}}}"
+        )
+    labels = {"home": "", "household": ""}
+    planned = PlannedRun(0, "", labels, {"simulation": {"seed": run.manifest["seed"]}})
+    return list(windows_of(tables_of(run, planned, timedelta(minutes=1))))
+
+
+class _Dense:
+    """The evidence of a run as arrays by bin and room, and what is known of its home."""
+
+    def __init__(
+        self,
+        evidence: Mapping[str, Any],
+        labels: Mapping[str, Any],
+        beliefs: Mapping[str, Any],
+        rooms: Sequence[str],
+        facts: PlaceFacts,
+        start: np.datetime64,
+    ) -> None:
+        self.labels, self.beliefs, self.facts = labels, beliefs, facts
+        step_us = int((labels["time"][0] - start) / MICROSECOND) // max(int(labels["step"][0]), 1)
+        self.bin_steps = steps_of_bin(step_us)
+        last = max(int(evidence["step"].max(initial=0)), int(labels["step"].max()))
+        count = (last + 1) // self.bin_steps
+        size = count * (len(rooms) + 1) * TRACE_FEATURES * np.float64().itemsize
+        TABLE_BYTES.check(size, "the evidence of a run")
+        self.rooms = {name: k for k, name in enumerate(rooms)}
+        self.step = (np.arange(count) + 1) * self.bin_steps - 1
+        bin_ = (evidence["step"] + 1) // self.bin_steps - 1
+        room = np.array([self.rooms[name] for name in evidence["room"]], np.int64)
+        self.watched = np.zeros((count, len(rooms)))
+        self.watched[bin_, room] = evidence["watched"]
+        self.seen: dict[str, F64] = {}
+        for user in set(evidence["user"].tolist()):
+            own = evidence["user"] == user
+            seen = self.seen[user] = np.zeros(self.watched.shape)
+            seen[bin_[own], room[own]] = evidence["seen"][own]
+        known = [seen for user, seen in self.seen.items() if user != ANYONE]
+        anyone = self.seen.get(ANYONE, np.zeros(self.watched.shape))
+        self.unknown = (anyone > sum(known, np.zeros(self.watched.shape))).astype(np.uint8)
+        midnight = start.astype("datetime64[D]")
+        since_us = (start - midnight) / MICROSECOND
+        time = int(since_us) + (self.step + 1 - self.bin_steps) * step_us
+        ordinal = int((midnight - FIRST_DAY) / np.timedelta64(1, "D")) + 1
+        self.day = ordinal + time // DAY_US
+        self.minute = time // 60_000_000 % DAY_MINUTES
+
+    def of(self, user: str) -> TracedEvidence:
+        """Return the evidence of a user, with a belief that is filled in later."""
+        seen = self.seen.get(user, np.zeros(self.watched.shape)) / self.bin_steps
+        belief = np.ones((len(self.step), self.watched.shape[1] + 1))
+        return TracedEvidence(self.day, self.minute, self.watched, seen, self.unknown, belief)
+
+    def windows(self, number: int, home: str, user: str) -> Windows:
+        """Return the windows of a user of the run."""
+        labels = self.labels
+        beliefs = self.beliefs
+        rooms = self.facts.rooms
+        own = labels["user"] == user
+        place_of = {**self.rooms, AWAY: len(self.rooms)}
+        truth = np.full(len(self.step), -1)
+        bins = (labels["step"][own] + 1) // self.bin_steps - 1
+        truth[bins] = [place_of[name] for name in labels["place"][own]]
+        stored: dict[str, F64] = {}
+        kept: I64 | None = None
+        for model in dict.fromkeys(beliefs["model"].tolist()):
+            rows = (beliefs["user"] == user) & (beliefs["model"] == model)
+            belief = beliefs["probability"][rows].reshape(-1, len(place_of)).astype(np.float64)
+            at = (beliefs["step"][rows][:: len(place_of)] + 1) // self.bin_steps - 1
+            if kept is None:
+                kept = at[truth[at] >= 0]
+            stored[model] = belief[np.isin(at, kept)]
+        assert kept is not None, "there are beliefs"
+        features = trace_evidence(np.zeros(trace_size(rooms)), rooms, self.of(user))[kept]
+        features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
+        places = self.facts.features
+        known = features.astype(np.float32)
+        return Windows(number, home, user, places, known, truth[kept], self.step[kept], stored)
+
+
+def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:
+    """Return the columns of each run as arrays; runs are in order, and each in one piece."""
+    run = table["run"].to_numpy()
+    first = np.flatnonzero(np.diff(run, prepend=-1))
+    ends = [*first[1:].tolist(), len(run)] if len(run) else []
+    columns = {name: _array(table[name]) for name in table.column_names if name != "run"}
+    return {
+        int(run[a]): {name: values[a:b] for name, values in columns.items()}
+        for a, b in zip(first.tolist(), ends, strict=True)
+    }
+
+
+def _array(column: Any) -> Any:
+    if pa.types.is_list(column.type):
+        return np.array([*column.to_pylist(), None], object)[:-1]
+    if pa.types.is_string(column.type):
+        column = column.dictionary_encode()
+    if not pa.types.is_dictionary(column.type):
+        return column.to_numpy()
+    whole = column.combine_chunks()
+    names = np.array([*whole.dictionary.to_pylist(), None], object)  # the last, at -1, is null
+    return names[whole.indices.fill_null(-1).to_numpy()]
+
+
+def joined(parts: Iterable[Windows]) -> dict[int, list[Windows]]:
+    """Return windows by their number of places."""
+    groups: dict[int, list[Windows]] = {}
+    for part in parts:
+        if len(part.truth):
+            groups.setdefault(len(part.places), []).append(part)
+    return groups

@@ -1,0 +1,230 @@
+"""How well the days of fitted personas match days of a log that were held back."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from datetime import date
+from typing import NamedTuple
+
+import numpy as np
+
+from fleet2d.kernels import I16
+from fleet2d.learning.fit.persona import FittedPersona, Model, fit_persona
+from fleet2d.learning.fit.privacy import Repeats, repeats
+from fleet2d.learning.fit.timeline import (
+    Distances,
+    LivedDay,
+    Timeline,
+    by_minute,
+    distances,
+    find_days,
+)
+from fleet2d.logs.log import LogError
+from fleet2d.routines.activity import Activity, seconds
+from fleet2d.routines.distributions import KNOTS, exponential
+from fleet2d.routines.life import Life
+from fleet2d.routines.planner import Episode, RecordedDay
+from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.determinism import Draws, stream_key
+
+# The date of the first sampled day, a Monday.
+MONDAY = date(2017, 1, 2).toordinal()
+MODELS = (
+    "the persona", "copies of whole days", "a first-order Markov chain",
+    "the days they were fitted on",
+)  # fmt: skip
+# Two distances that differ by less than this count as equal.
+EQUAL = 0.0005
+FOLDS = 3
+SAMPLED = 700  # the number of days drawn from a persona, whole weeks
+CHAIN_DAYS = 140  # the number of days drawn from the chain
+# the same where seconds are compared
+SAMPLED_BY_SECOND = 140
+CHAIN_DAYS_BY_SECOND = 7
+
+
+def sample_persona(
+    fitted: FittedPersona, timeline: Timeline, days: int, seed: int = 0, *, to_second: bool = False
+) -> tuple[I16, I16]:
+    """Return days drawn from a persona: for each minute, or second, a state and a place.
+
+    Returns:
+        Indices of `timeline.states`, and of `timeline.places`; int16 (days, 1440) each, or
+        (days, 86400) to the second.
+    """
+    life = Life(fitted.persona, seed, "fit")
+    key = stream_key(seed, "fit", "up at night")
+    places = timeline.places
+    place_of = {n: places.index(timeline.states[s].place) for n, s in fitted.states.items()}
+    states = np.zeros((days + 2) * DAY_S, np.int16)
+    rooms = np.zeros((days + 2) * DAY_S, np.int16)
+    for day in range(days + 1):  # the first night is of the day before the first
+        ordinal = MONDAY - 1 + day
+        for i, episode in enumerate(life.day(ordinal)):
+            begin, end = day * DAY_S + episode.begin, day * DAY_S + episode.end
+            states[begin:end] = fitted.states[episode.activity]
+            rooms[begin:end] = place_of[episode.activity]
+            activity = fitted.persona.activity(episode.activity)
+            if activity.fetches is not None and activity.fetches_from[0] in places:
+                place = places.index(activity.fetches_from[0])
+                for first, last in _fetches(activity, episode, Draws(key, ordinal * 1024 + i)):
+                    rooms[day * DAY_S + first : day * DAY_S + last] = place
+    states, rooms = (labels[DAY_S : (days + 1) * DAY_S] for labels in (states, rooms))
+    if to_second:
+        return states.reshape(days, -1), rooms.reshape(days, -1)
+    return by_minute(states, len(timeline.states)), by_minute(rooms, len(places))
+
+
+def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[int, int]]:
+    """Return begin and end [s] of each short trip during an activity, drawn as for residents."""
+    assert activity.fetches is not None
+    wait = exponential(seconds(activity.fetches))
+    takes = activity.fetch_takes.table()
+    times = []
+    now = episode.begin + wait.knots[draws.below(KNOTS)]
+    while now < episode.end:
+        end = now + takes.draw(draws)
+        if end < episode.end:
+            times.append((now, end))
+        now = end + wait.knots[draws.below(KNOTS)]
+    return times
+
+
+def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
+    """Return copies of whole days, drawn with replacement, int16 (days, n)."""
+    draws = Draws(stream_key(seed, "fit", "whole days"), 0)
+    return labels[[draws.below(len(labels)) for _ in range(days)]]
+
+
+def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
+    """Return days of the first-order Markov chain of some days' labels, int16 (days, n).
+
+    Its transition probabilities are the relative frequencies of the next label. The first label is
+    drawn by the frequency of the labels.
+    """
+    follows = np.zeros((count, count), np.int64)
+    known = (labels[:, :-1] >= 0) & (labels[:, 1:] >= 0)
+    np.add.at(follows, (labels[:, :-1][known], labels[:, 1:][known]), 1)
+    share = np.bincount(labels[labels >= 0], minlength=count)
+    for label in range(count):
+        if not follows[label].any():
+            follows[label] = share
+    limits: list[list[int]] = follows.cumsum(axis=1).tolist()
+    draws = Draws(stream_key(seed, "fit", "markov"), 0)
+    out = np.empty(days * labels.shape[1], np.int16)
+    at = bisect_right(share.cumsum().tolist(), draws.below(int(share.sum())))
+    for i in range(len(out)):
+        out[i] = at
+        at = bisect_right(limits[at], draws.below(limits[at][-1]))
+    return out.reshape(days, -1)
+
+
+def simulated_repeats(fitted: FittedPersona, days: int = 140, seed: int = 0) -> Repeats:
+    """Return how much of its log the simulated days of a persona repeat."""
+    life = Life(fitted.persona, seed, "fit")
+    lived = []
+    for ordinal in range(MONDAY, MONDAY + days):
+        day = life.day(ordinal)
+        names = tuple(episode.activity for episode in day)
+        lived.append(RecordedDay(tuple(e.begin for e in day), names, day[-1].end))
+    return repeats(lived, fitted.log)
+
+
+class Validation(NamedTuple):
+    """Distances to held-back days, averaged over the folds.
+
+    Attributes:
+        days: The number of days, each held back once.
+        folds: The number of parts that were held back in turn.
+        rooms: The distances of rooms by minutes, for each model of MODELS.
+        activities: The distances of activities by minutes, for each model of MODELS.
+        seconds: The distances of rooms by seconds, for each model of MODELS.
+    """
+
+    days: int
+    folds: int
+    rooms: tuple[Distances, ...]
+    activities: tuple[Distances, ...]
+    seconds: tuple[Distances, ...]
+
+    def worse_than_copying(self) -> list[str]:
+        """Return a line for each measure in which the persona is worse than days copied from a log.
+
+        The measures compare in which rooms somebody is with the days held back.
+        """
+        keys = {
+            "dwell times (KS)": "ks", "hours": "hours", "time shares": "share",
+            "transitions": "transitions",
+        }  # fmt: skip
+        return [
+            f"{name}{unit} {getattr(persona, key):.3f}, copies {getattr(copies, key):.3f}"
+            for unit, (persona, copies, *_) in (("", self.rooms), (" to the second", self.seconds))
+            for name, key in keys.items()
+            if getattr(persona, key) > getattr(copies, key) + EQUAL
+        ]
+
+
+def validate(
+    timeline: Timeline,
+    folds: int = FOLDS,
+    seed: int = 0,
+    *,
+    model: Model = "recorded",
+    private: bool = False,
+) -> Validation:
+    """Fit a persona to a part of the days and compare it with the others, for each part in turn.
+
+    With three parts, every third day is held back, so that each part has early and late days.
+
+    Raises:
+        LogError: There are too few days to hold any back.
+    """
+    days = find_days(timeline)
+    if len(days) < 3:
+        raise LogError(
+            f"the log has {len(days)} whole days, with a night before and after: three are needed"
+            " at least, to hold one back"
+        )
+    folds = min(folds, len(days))
+    by_fold = []
+    for fold in range(folds):
+        held = days[fold::folds]
+        rest = [day for day in days if day not in held]
+        fitted = fit_persona(timeline, rest, model=model, private=private)
+        by_fold.append(_fold(timeline, fitted, rest, held, seed))
+    return Validation(len(days), folds, *(_mean(found) for found in zip(*by_fold, strict=True)))
+
+
+def _fold(
+    timeline: Timeline,
+    fitted: FittedPersona,
+    rest: Sequence[LivedDay],
+    held: Sequence[LivedDay],
+    seed: int,
+) -> list[tuple[Distances, ...]]:
+    """Return how far the days of each model are from days held back.
+
+    They are compared in rooms and in activities by minutes, and in rooms by seconds.
+    """
+    states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
+    rooms_by_second = sample_persona(fitted, timeline, SAMPLED_BY_SECOND, seed, to_second=True)[1]
+    rest_days, held_days = ([day.number for day in part] for part in (rest, held))
+    places = len(timeline.places)
+    activities = len(timeline.states)
+    seconds = timeline.places_of(timeline.seconds)
+    result = []
+    for sampled, of_log, count, chain_days in (
+        (rooms, timeline.rooms, places, CHAIN_DAYS),
+        (states, timeline.minutes, activities, CHAIN_DAYS),
+        (rooms_by_second, seconds, places, CHAIN_DAYS_BY_SECOND),
+    ):
+        known = of_log[rest_days]
+        copies = sample_days(known, len(sampled), seed)
+        chain = sample_markov(known, count, chain_days, seed)
+        models = (sampled, copies, chain, known)
+        result.append(tuple(distances(of_log[held_days], other, count) for other in models))
+    return result
+
+
+def _mean(folds: Sequence[tuple[Distances, ...]]) -> tuple[Distances, ...]:
+    """Return the mean distances of each model over the folds."""
+    return tuple(Distances(*row) for row in np.mean(np.array(folds), axis=0).tolist())

@@ -1,0 +1,398 @@
+"""A run as ROS 2 messages: topics, types, frames (REP 103, REP 105) and serialized messages.
+
+Frames: `map` is the floor plan's; a robot has `NAME/odom` and `NAME/base_link`, and a user, whose
+pose is the truth, `NAME`. A body that is away from home has no transform meanwhile. Stamps are the
+local times of the run, taken as UTC, because scenarios have no time zone.
+"""
+
+import json
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from fleet2d.kernels import F64, I64, U8
+from fleet2d.live.exporters import Chunk, Records
+from fleet2d.storage.bags import ros_types
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MAP = "/map"
+TRANSFORMS = "/tf"
+STATIC = "/tf_static"
+UNKNOWN = "unknown"
+"""The class of a detected person who wasn't recognized."""
+PERSON_M = 0.4
+"""Width of the box of a detected person, whose true size no robot knows [m]."""
+_LEVELS = 20  # INFO in rcl_interfaces/msg/Log
+
+
+class Topic(NamedTuple):
+    """A topic on which a run is published.
+
+    Attributes:
+        name: Its name, such as `/astro/odom`.
+        type: The type of its messages, such as `nav_msgs/msg/Odometry`.
+        latched: Whether its last message is also delivered to later subscribers.
+    """
+
+    name: str
+    type: str
+    latched: bool = False
+
+
+class Message(NamedTuple):
+    """A message: its time [ns since 1970], topic and content (CDR, little endian)."""
+
+    time: int
+    topic: str
+    data: bytes
+
+
+class Block(NamedTuple):
+    """Messages of a topic, in order of time.
+
+    Attributes:
+        topic: The topic.
+        times: Their times [ns since 1970], int64 (n,).
+        sizes: The size of each, with a margin before it for the writer of a file, int64 (n,).
+        data: One after the other, uint8 (sum of sizes,).
+    """
+
+    topic: str
+    times: I64
+    sizes: I64
+    data: U8
+
+
+class RosMessages:
+    """The ROS 2 messages of a part of a run.
+
+    Attributes:
+        topics: The topics by name.
+        types: The library's store of message types.
+    """
+
+    def __init__(self, records: Records, margin: int = 0) -> None:
+        """Find out what topics there are.
+
+        Args:
+            records: The part of a run.
+            margin: The number of bytes that `blocks` leaves free before each message.
+
+        Raises:
+            InputError: rosbags isn't installed.
+        """
+        self.types = ros_types("ROS messages need rosbags")
+        self._records, self._margin = records, margin
+        self._templates: dict[tuple[str, ...], Template] = {}
+        self._run = records.run
+        clock = self._run.clock
+        self._start_ns = int(clock.start.replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        self._step_ns = clock.step_us * 1000
+        topics = [
+            Topic(MAP, "nav_msgs/msg/OccupancyGrid", latched=True),
+            Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage"),
+            Topic(STATIC, "tf2_msgs/msg/TFMessage", latched=True),
+            *(Topic(f"/{robot}/odom", "nav_msgs/msg/Odometry") for robot in records.robots),
+        ]
+        if "observations" in records.tables:
+            kind = "vision_msgs/msg/Detection3DArray"
+            topics += [Topic(f"/{robot}/detections", kind) for robot in records.robots]
+        tables = [name for name in records.tables if name != "observations"]
+        topics += [Topic(f"/{name}", self._encoder(name)[0]) for name in tables]
+        self.topics = {topic.name: topic for topic in topics}
+
+    def definition(self, topic: Topic) -> str:
+        """Return the definition of a topic's type and of all types in it, as ROS writes it."""
+        return str(self.types.generate_msgdef(topic.type, ros_version=2)[0])
+
+    def __iter__(self) -> Iterator[Message]:
+        """Yield all messages in order of time.
+
+        Raises:
+            ArtifactError: The run stored no key frames, or a table can't be read.
+        """
+        for blocks in self.blocks():
+            messages = []
+            for topic, times, sizes, data in blocks:
+                ends = np.cumsum(sizes)
+                content = data.tobytes()
+                places = zip(times.tolist(), (ends - sizes).tolist(), ends.tolist(), strict=True)
+                messages += [Message(t, topic, content[a + self._margin : b]) for t, a, b in places]
+            messages.sort(key=itemgetter(0))
+            yield from messages
+
+    def blocks(self) -> Iterator[list[Block]]:
+        """Yield the messages of one stretch of time after the other.
+
+        Raises:
+            ArtifactError: The run stored no key frames, or a table can't be read.
+        """
+        begin = self._time(self._records.part.first)
+        once = [(MAP, self._map(begin)), (STATIC, self._static_transforms(begin))]
+        yield [self._block(topic, [begin], [data]) for topic, data in once]
+        last: dict[str, tuple[float, float, float]] = {}
+        for chunk in self._records.chunks():
+            blocks: list[Block] = []
+            if chunk.poses:
+                blocks += self._transforms(chunk)
+                for robot in self._records.robots:
+                    blocks += self._odometry(chunk, robot, last)
+            for name, table in chunk.tables.items():
+                if name == "observations":
+                    blocks += self._detections(table)
+                else:
+                    blocks.append(self._rows(name, table.to_pylist()))
+            yield [block for block in blocks if len(block.times)]
+
+    def _block(self, topic: str, times: Sequence[int], messages: Sequence[bytes]) -> Block:
+        margin = bytes(self._margin)
+        data = np.frombuffer(bytearray(b"".join([margin + m for m in messages])), np.uint8)
+        sizes = np.array([self._margin + len(message) for message in messages], np.int64)
+        return Block(topic, np.array(times, np.int64), sizes, data)
+
+    def _time(self, step: int) -> int:
+        return self._start_ns + int(step) * self._step_ns
+
+    def _new(self, name: str, *values: Any) -> Any:
+        return self.types.types[name](*values)
+
+    def _header(self, time: int, frame: str) -> Any:
+        stamp = self._new("builtin_interfaces/msg/Time", *divmod(time, 1_000_000_000))
+        return self._new("std_msgs/msg/Header", stamp, frame)
+
+    def _data(self, message: Any) -> bytes:
+        return bytes(self.types.serialize_cdr(message, message.__msgtype__))
+
+    def _map(self, time: int) -> bytes:
+        plan = self._run.plan
+        header = self._header(time, "map")
+        lattice = plan.lattice
+        corner = self._pose(*lattice.origin, 0.0, 1.0)
+        size = lattice.cell, lattice.columns, lattice.rows
+        info = self._new("nav_msgs/msg/MapMetaData", header.stamp, *size, corner)
+        grid = np.where(plan.free, 0, 100).astype(np.int8).ravel()
+        return self._data(self._new("nav_msgs/msg/OccupancyGrid", header, info, grid))
+
+    def _pose(self, x: float, y: float, z: float, w: float) -> Any:
+        """Return the pose at (x, y) whose quaternion has a z and w."""
+        point = self._new("geometry_msgs/msg/Point", x, y, 0.0)
+        return self._new("geometry_msgs/msg/Pose", point, self._turn(z, w))
+
+    def _turn(self, z: float, w: float) -> Any:
+        return self._new("geometry_msgs/msg/Quaternion", 0.0, 0.0, z, w)
+
+    def _transform(self, time: int, frames: tuple[str, str], xyzw: Sequence[float]) -> Any:
+        x, y, z, w = xyzw
+        vector = self._new("geometry_msgs/msg/Vector3", x, y, 0.0)
+        transform = self._new("geometry_msgs/msg/Transform", vector, self._turn(z, w))
+        header = self._header(time, frames[0])
+        return self._new("geometry_msgs/msg/TransformStamped", header, frames[1], transform)
+
+    def _static_transforms(self, time: int) -> bytes:
+        """Odometry in Fleet2D doesn't drift from the map: errors of localization are in beliefs."""
+        frames = [("map", f"{robot}/odom") for robot in self._records.robots]
+        still = [self._transform(time, pair, (0.0, 0.0, 0.0, 1.0)) for pair in frames]
+        return self._data(self._new("tf2_msgs/msg/TFMessage", still))
+
+    def _frames(self, name: str) -> tuple[str, str]:
+        is_robot = name in self._records.robots
+        return (f"{name}/odom", f"{name}/base_link") if is_robot else ("map", name)
+
+    def _transforms(self, chunk: Chunk) -> Iterator[Block]:
+        """Yield a message for each time, with all bodies that are at home."""
+        names = list(chunk.poses)
+        home = np.stack([~path.away for path in chunk.poses.values()], axis=-1)
+        times = self._start_ns + chunk.poses[names[0]].step * self._step_ns
+        changes = np.flatnonzero((home[1:] != home[:-1]).any(axis=1)) + 1
+        for present in np.unique(home[[0, *changes]], axis=0):
+            at = np.flatnonzero((home == present).all(axis=1))
+            who = [name for name, is_home in zip(names, present, strict=True) if is_home]
+            template = self._template(self._transform_template, *who)
+            values = [v for name in who for v in _planar(chunk.poses[name], at)]
+            yield template.fill(TRANSFORMS, times[at], values, self._margin)
+
+    def _template(self, make: Callable[..., "Template"], *names: str) -> "Template":
+        """Return a template by its names, made at most once."""
+        key = (make.__name__, *names)
+        if key not in self._templates:
+            self._templates[key] = make(*names)
+        return self._templates[key]
+
+    def _transform_template(self, *names: str) -> "Template":
+        def message(times: Sequence[int], values: Sequence[float]) -> bytes:
+            fours = [values[4 * i : 4 * i + 4] for i in range(len(names))]
+            parts = zip(times, names, fours, strict=True)
+            transforms = [self._transform(time, self._frames(n), four) for time, n, four in parts]
+            return self._data(self._new("tf2_msgs/msg/TFMessage", transforms))
+
+        return Template(message, len(names), 4 * len(names))
+
+    def _odometry(
+        self, chunk: Chunk, robot: str, last: dict[str, tuple[float, float, float]]
+    ) -> list[Block]:
+        path = chunk.poses[robot]
+        if not len(path.x):
+            return []
+        before = last.get(robot, (path.x[0], path.y[0], path.heading[0]))
+        last[robot] = (path.x[-1], path.y[-1], path.heading[-1])
+        passed = self._records.part.every.total_seconds()
+        dx, dy = np.diff(path.x, prepend=before[0]), np.diff(path.y, prepend=before[1])
+        turned = np.diff(path.heading, prepend=before[2])
+        turned = (turned + np.pi) % (2 * np.pi) - np.pi
+        cos = np.cos(path.heading)
+        sin = np.sin(path.heading)
+        speeds = ((dx * cos + dy * sin) / passed, (dy * cos - dx * sin) / passed, turned / passed)
+        at = np.flatnonzero(~path.away)
+        stamps = self._start_ns + path.step[at] * self._step_ns
+        values = [*_planar(path, at), *(speed[at] for speed in speeds)]
+        template = self._template(self._odometry_template, robot)
+        return [template.fill(f"/{robot}/odom", stamps, values, self._margin)]
+
+    def _odometry_template(self, robot: str) -> "Template":
+        def message(times: Sequence[int], values: Sequence[float]) -> bytes:
+            x, y, z, w, forward, left, turning = values
+            pose = self._pose(x, y, z, w)
+            exact = np.zeros(36)
+            twist = self._new(
+                "geometry_msgs/msg/Twist",
+                self._new("geometry_msgs/msg/Vector3", forward, left, 0.0),
+                self._new("geometry_msgs/msg/Vector3", 0.0, 0.0, turning),
+            )
+            odom, base = self._frames(robot)
+            return self._data(
+                self._new(
+                    "nav_msgs/msg/Odometry",
+                    self._header(times[0], odom),
+                    base,
+                    self._new("geometry_msgs/msg/PoseWithCovariance", pose, exact),
+                    self._new("geometry_msgs/msg/TwistWithCovariance", twist, exact),
+                )
+            )
+
+        return Template(message, 1, 7)
+
+    def _detections(self, table: "pa.Table") -> Iterator[Block]:
+        """Yield a message for each look in which a robot perceived somebody."""
+        if not table.num_rows:
+            return
+        step, x, y = (table[name].to_numpy() for name in ("step", "x", "y"))
+        robot, robots = _codes(table["robot"])
+        user, users = _codes(table["user"])
+        users = [*users, UNKNOWN]  # the code -1
+        has_heading = "heading" in table.column_names
+        heading = np.nan_to_num(table["heading"].to_numpy()) if has_heading else np.zeros(len(x))
+        is_new = (np.diff(step, prepend=-1) != 0) | (np.diff(robot, prepend=-1) != 0)
+        first = np.flatnonzero(is_new)
+        count = np.diff(first, append=len(step))
+        for of, size in np.unique(np.stack([robot[first], count], axis=-1), axis=0).tolist():
+            looks = first[(robot[first] == of) & (count == size)]
+            rows = looks[:, None] + np.arange(size)  # (looks, people)
+            people = user[rows]
+            changes = np.flatnonzero((people[1:] != people[:-1]).any(axis=1)) + 1
+            for who in np.unique(people[[0, *changes]], axis=0):
+                at = rows[(people == who).all(axis=1)].T
+                poses = [(x[i], y[i], *_quaternion(heading[i])) for i in at]
+                template = self._template(self._detection_template, *(users[u] for u in who))
+                stamps = self._start_ns + step[at[0]] * self._step_ns
+                values = [v for pose in poses for v in pose * 2]
+                topic = f"/{robots[of]}/detections"
+                yield template.fill(topic, stamps, values, self._margin)
+
+    def _detection_template(self, *users: str) -> "Template":
+        def message(times: Sequence[int], values: Sequence[float]) -> bytes:
+            numbers = [values[8 * i : 8 * i + 8] for i in range(len(users))]
+            detections = [
+                self._detection(self._header(time, "map"), user, of_user)
+                for time, user, of_user in zip(times[1:], users, numbers, strict=True)
+            ]
+            header = self._header(times[0], "map")
+            return self._data(self._new("vision_msgs/msg/Detection3DArray", header, detections))
+
+        return Template(message, len(users) + 1, 8 * len(users))
+
+    def _detection(self, header: Any, user: str, places: Sequence[float]) -> Any:
+        """Return a detection from the numbers of its pose and of its box's centre."""
+        x, y, z, w, *centre = places
+        exact = np.zeros(36)
+        likely = self._new(
+            "vision_msgs/msg/ObjectHypothesisWithPose",
+            self._new("vision_msgs/msg/ObjectHypothesis", user, 1.0),
+            self._new("geometry_msgs/msg/PoseWithCovariance", self._pose(x, y, z, w), exact),
+        )
+        size = self._new("geometry_msgs/msg/Vector3", PERSON_M, PERSON_M, 0.0)
+        box = self._new("vision_msgs/msg/BoundingBox3D", self._pose(*centre), size)
+        return self._new("vision_msgs/msg/Detection3D", header, [likely], box, user)
+
+    def _encoder(self, table: str) -> tuple[str, Callable[[dict[str, Any]], bytes]]:
+        """Return the type of message for rows of a table, and the function that makes it."""
+        if table == "events":
+            return "rcl_interfaces/msg/Log", self.log_entry
+        return "std_msgs/msg/String", self.json_text
+
+    def _rows(self, name: str, rows: Sequence[dict[str, Any]]) -> Block:
+        _, encode = self._encoder(name)
+        times = [self._time(row["step"]) for row in rows]
+        return self._block(f"/{name}", times, [encode(row) for row in rows])
+
+    def log_entry(self, row: dict[str, Any]) -> bytes:
+        """Return an event as an entry of a log: who, what, details."""
+        detail = " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
+        stamp = self._header(self._time(row["step"]), "").stamp
+        text = f"{row['event']} {detail}".strip()
+        fields = (stamp, _LEVELS, row["entity"], text, "", row["event"], 0)
+        return self._data(self._new("rcl_interfaces/msg/Log", *fields))
+
+    def json_text(self, row: dict[str, Any]) -> bytes:
+        """Return a row of any table as JSON in a string."""
+        return self._data(self._new("std_msgs/msg/String", json.dumps(row, default=str)))
+
+
+class Template:
+    """Messages that differ only in some numbers: serialized once, then filled in as arrays."""
+
+    def __init__(
+        self, message: Callable[[Sequence[int], Sequence[float]], bytes], times: int, values: int
+    ) -> None:
+        """Serialize a message with numbers that stand nowhere else, to find their places."""
+        stamps = [(1_000_000_007 + i) * 1_000_000_000 + 999_000_001 + i for i in range(times)]
+        floats = [1.2345678901234e200 * (i + 1) for i in range(values)]
+        data = message(stamps, floats)
+        self._bytes = np.frombuffer(data, np.uint8)
+        self._stamps = [data.index(struct.pack("<iI", *divmod(s, 1_000_000_000))) for s in stamps]
+        self._floats = [data.index(struct.pack("<d", value)) for value in floats]
+
+    def fill(self, topic: str, times: I64, values: Sequence[F64], margin: int) -> Block:
+        """Return messages with other times [ns] and numbers, each an array (n,)."""
+        count = len(times)
+        size = margin + len(self._bytes)
+        filled = np.empty((count, size), np.uint8)
+        filled[:, margin:] = self._bytes
+        for part, numbers in enumerate(np.divmod(times, 1_000_000_000)):
+            for place in self._stamps:
+                at = margin + place + 4 * part
+                np.ndarray((count,), "<u4", filled, at, (size,))[:] = numbers
+        for place, numbers in zip(self._floats, values, strict=True):
+            np.ndarray((count,), "<f8", filled, margin + place, (size,))[:] = numbers
+        return Block(topic, times, np.full(count, size), filled.ravel())
+
+
+def _codes(column: "pa.ChunkedArray") -> tuple[I64, list[str]]:
+    """Return a column of words as indices of its words, -1 where there is none."""
+    words = column.combine_chunks().dictionary_encode()
+    return words.indices.fill_null(-1).to_numpy().astype(np.int64), words.dictionary.to_pylist()
+
+
+def _quaternion(heading: Any) -> tuple[Any, Any]:
+    """Return z and w of the turn about the vertical axis."""
+    return np.sin(heading / 2), np.cos(heading / 2)
+
+
+def _planar(path: Any, at: I64) -> tuple[F64, F64, F64, F64]:
+    """Return x, y, and the z and w of the quaternion, of some poses."""
+    return (path.x[at], path.y[at], *_quaternion(path.heading[at]))

@@ -1,0 +1,26 @@
+"""Viewing: pictures, films, pages, reports and notebooks of homes and runs.
+
+It is an extension of IPython, which `import fleet2d` loads in a notebook by itself.
+"""
+
+from typing import Any
+
+
+def load_ipython_extension(shell: Any) -> None:
+    """Let runs and homes that a cell ends with show themselves, in Jupyter and IPython."""
+    formatters = shell.display_formatter.formatters
+    formatters["text/html"].for_type_by_name("fleet2d.runs.run", "Run", _run_html)
+    for module, name in (("plan", "FloorPlan"), ("home", "Home")):
+        formatters["image/png"].for_type_by_name(f"fleet2d.floorplan.{module}", name, _home_png)
+
+
+def _run_html(run: Any) -> str:
+    from fleet2d.viewing.notebook import run_html
+
+    return run_html(run)
+
+
+def _home_png(home: Any) -> bytes | None:
+    from fleet2d.viewing.notebook import home_png
+
+    return home_png(home)

@@ -1,0 +1,414 @@
+"""The facts of a run that the page receives: everything except its tables."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fleet2d import __version__
+from fleet2d.artifacts.manifest import plain
+from fleet2d.artifacts.table import categories
+from fleet2d.configuration.units import micros, parse_duration
+from fleet2d.engine.simulation import Simulation, interventions_of
+from fleet2d.entities.home_object import Door
+from fleet2d.errors import ArtifactError, errors_as
+from fleet2d.floorplan.slow_area import SlowArea
+from fleet2d.kernels import I64, Bool
+from fleet2d.palette import body_color
+from fleet2d.runs.run import LAYER_PREFIX, Run
+from fleet2d.runs.verdicts import verdict_line, verdicts_of, violations_of
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import EventKind
+from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
+from fleet2d.storage.files import path_in
+from fleet2d.viewing.contract import (
+    BodyFacts,
+    CameraFacts,
+    ColumnFacts,
+    MarkFacts,
+    RunFacts,
+    SightingFacts,
+    SlowFacts,
+    TableFacts,
+    VerdictFacts,
+    WallsChange,
+)
+from fleet2d.viewing.home_facts import WallsHistory, door_facts, home_facts
+from fleet2d.viewing.story import story_of
+
+INTERVENTIONS = "interventions"
+
+
+def marks_of(run: Run) -> list[MarkFacts]:
+    """Return the marks of a run's interventions and expectations.
+
+    Raises:
+        ArtifactError: The table of violations is damaged.
+    """
+    manifest = run.manifest
+    marks = intervention_marks(manifest.get("interventions") or ())
+    verdicts = manifest.get("expectations") or {}
+    violations = violations_of(run) if verdicts else {}
+    for name, verdict in verdicts.items():
+        marks += expectation_marks(name, verdict, violations.get(name, []), manifest["steps"])
+    return marks
+
+
+def intervention_marks(records: Iterable[Mapping[str, Any]]) -> list[MarkFacts]:
+    """Return the marks of interventions, from the records of a manifest."""
+    return [
+        MarkFacts(
+            lane=INTERVENTIONS,
+            step=int(record["step"]),
+            end=int(record["step"]) + 1,
+            kind="intervention",
+            label=intervention_label(record),
+        )
+        for record in records
+    ]
+
+
+def intervention_label(record: Mapping[str, Any]) -> str:
+    """Return a short label of an intervention.
+
+    >>> intervention_label({"do": "change", "step": 4, "change": {"shut": "bath_door", "at": None}})
+    'shut bath_door'
+    >>> intervention_label({"do": "put", "step": 4, "entity": "ana", "x": 5, "by": "script.0"})
+    'put ana (script.0)'
+    """
+    parts = [value for key, value in record.items() if isinstance(value, str) and key != "by"]
+    if isinstance(change := record.get("change"), Mapping):
+        parts = next(([key, value] for key, value in change.items() if value), ["change"])
+    by = f" ({record['by']})" if record.get("by") else ""
+    return " ".join(str(part) for part in parts[:3]) + by
+
+
+def slow_floors(
+    scenario: Mapping[str, Any], records: Iterable[Mapping[str, Any]], clock: Clock
+) -> list[SlowFacts]:
+    """Return the floors that slow robots down, of a scenario and of records of interventions."""
+    areas = scenario["floorplan"].get("slows", ())
+    return slow_floors_of([*({"do": "slow", "step": 0, **a} for a in areas), *records], clock)
+
+
+def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[SlowFacts]:
+    """Return the floors that slow robots down since interventions."""
+    floors = []
+    for record in records:
+        if record["do"] != "slow":
+            continue
+        step = int(record["step"])
+        end = clock.steps
+        duration = record.get("duration")
+        if duration is not None:
+            end = min(end, step + clock.step_at_or_after(micros(parse_duration(duration))))
+        area = SlowArea(**{key: record[key] for key in SlowArea.model_fields if key in record})
+        parts = [f"robots drive at {area.speed:.0%}"] if area.speed < 1 else []
+        parts += [f"robots stop for {area.stop.total_seconds():g} s"] if area.stop else []
+        words = ", ".join(parts)
+        floors.append(SlowFacts(outline=list(area.area), words=words, step=step, end=end))
+    return floors
+
+
+def _starts_unlit(scenario: Mapping[str, Any]) -> bool:
+    """Return whether people switch lights, which are off at first then."""
+    return any(user.get("lights") for user in scenario.get("users", {}).values())
+
+
+def expectation_marks(
+    name: str, verdict: Mapping[str, Any], violations: Iterable[tuple[int, int]], steps: int
+) -> list[MarkFacts]:
+    """Return the stretches of a run in which an expectation held, or was violated.
+
+    Args:
+        name: The name of the expectation.
+        verdict: The verdict of the manifest.
+        violations: The first and last step of each violation, in order.
+        steps: The number of steps of the run.
+
+    Example:
+        >>> marks = expectation_marks("quiet", {"holds": False}, [(10, 19)], 100)
+        >>> [(mark["step"], mark["end"], mark["kind"]) for mark in marks]
+        [(0, 10, 'held'), (10, 20, 'violated'), (20, 100, 'held')]
+    """
+    label = str(verdict.get("says") or verdict.get("expectation") or name)
+    stretches: list[tuple[int, int, Literal["held", "violated", "open"]]] = []
+    begin = 0
+    for first, last in violations:
+        stretches += [(begin, first, "held"), (max(begin, first), last + 1, "violated")]
+        begin = max(begin, last + 1)
+    holds = verdict.get("holds", True)  # None: it was never put to the test
+    if not stretches and holds is False:
+        stretches.append((begin, steps, "violated"))
+    else:
+        is_open = holds is None or not verdict.get("decided", True)
+        stretches.append((begin, steps, "open" if is_open else "held"))
+    return [
+        MarkFacts(lane=name, step=step, end=end, kind=kind, label=label)
+        for step, end, kind in stretches
+        if end > step
+    ]
+
+
+JOIN_S = 6.0  # shorter gaps between sightings are no gaps in a lane
+
+
+BATCH_ROWS = 1 << 18
+
+
+def sightings_of(run: Run) -> list[SightingFacts]:
+    """Return the stretches in which each robot noticed each user, in order.
+
+    A year has ten million observations: they are read in batches, in the order of their steps.
+
+    Raises:
+        ArtifactError: The table of observations is damaged.
+    """
+    if "observations" not in run.tables:
+        return []
+    gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
+    lanes: dict[tuple[str, str], SightingFacts] = {}
+    robots: dict[str, None] = {}  # in the order in which they appear, as users
+    users: dict[str, None] = {}
+    for batch in _observations(run):
+        robot, robot_names = categories(batch["robot"])
+        user, user_names = categories(batch["user"])
+        robots |= dict.fromkeys(robot_names)
+        users |= dict.fromkeys(user_names)
+        step = batch["step"].to_numpy()
+        false = _are_false(batch)
+        names = [*user_names, ""]
+        lane = robot * len(names) + user % len(names)  # the last one is of an unknown user
+        for code in np.unique(lane).tolist():
+            key = robot_names[code // len(names)], names[code % len(names)]
+            none = SightingFacts(robot=key[0], user=key[1], first=[], last=[], false=[])
+            _extend(lanes.setdefault(key, none), step[lane == code], false[lane == code], gap)
+    order = [(robot, user) for robot in robots for user in (*users, "")]
+    return [lanes[key] for key in order if key in lanes]
+
+
+def _observations(run: Run) -> Iterator[Any]:
+    """Yield the table of observations in parts, with the columns that sightings need."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = ("step", "robot", "user", "true_user", "truth_known")
+    path = None if run.directory is None else path_in(run.directory, "observations.parquet")
+    if path is None or not path.is_file():
+        yield run.tables["observations"]
+        return
+    with errors_as(ArtifactError, f"{path} can't be read", (pa.ArrowException, OSError)):
+        file = pq.ParquetFile(path)
+        names = [name for name in columns if name in file.schema_arrow.names]
+        for batch in file.iter_batches(BATCH_ROWS, columns=names):
+            yield pa.Table.from_batches([batch])
+
+
+def _are_false(table: Any) -> Bool:
+    """Return which observations are of something else than the user that the robot took it for."""
+    import pyarrow.compute as pc
+
+    if "true_user" not in table.column_names:
+        return np.zeros(table.num_rows, np.bool_)
+    user, true_user = (pc.cast(table[name], "string") for name in ("user", "true_user"))
+    is_mistaken = pc.fill_null(pc.not_equal(user, true_user), False)
+    false: Bool = pc.or_(pc.is_null(true_user), is_mistaken).to_numpy()
+    return false & table["truth_known"].to_numpy() if "truth_known" in table.column_names else false
+
+
+def _extend(lane: SightingFacts, step: I64, false: Bool, gap: int) -> None:
+    """Add stretches of later sightings to a lane; the first one may continue its last one."""
+    order = np.argsort(step, kind="stable")
+    step = step[order]
+    false = false[order]
+    cuts = (np.diff(step) > gap) | (false[1:] != false[:-1])
+    begins = np.append(0, np.flatnonzero(cuts) + 1)
+    ends = np.append(begins[1:] - 1, len(step) - 1)
+    first, last, is_false = (each.tolist() for each in (step[begins], step[ends], false[begins]))
+    if lane["last"] and first[0] - lane["last"][-1] <= gap and is_false[0] == lane["false"][-1]:
+        lane["last"][-1] = last[0]
+        first = first[1:]
+        last = last[1:]
+        is_false = is_false[1:]
+    lane["first"] += first
+    lane["last"] += last
+    lane["false"] += is_false
+
+
+Role = Literal["log", "algorithm", "metric", "layer"]
+
+
+def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
+    """Return the facts of a run.
+
+    Raises:
+        ArtifactError: The run has no floor plan, or the plan can't be read.
+    """
+    manifest = run.manifest
+    scenario = manifest["scenario"]
+    verdicts = verdicts_of(run)
+    return RunFacts(
+        title=run_title(run),
+        status=run.status,
+        notes=list(run.notes),
+        start=manifest["start"],
+        step_us=manifest["step_us"],
+        steps=manifest["steps"],
+        first_step=0,
+        end_step=manifest["steps"],
+        seed=manifest["seed"],
+        digest=run.digest,
+        version=__version__,
+        home=home_facts(run.plan, walls.doors),
+        bodies=bodies_of(scenario, manifest["entities"]),
+        tables=[_table_facts(run, name) for name in run.tables],
+        walls=walls.changes,
+        marks=marks_of(run),
+        verdict=verdict_line(run, verdicts),
+        verdicts=[
+            VerdictFacts(name=v.name, outcome=v.outcome, says=v.says, step=v.step) for v in verdicts
+        ],
+        story=story_of(run),
+        slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
+        starts_unlit=_starts_unlit(scenario),
+        event_kinds=sorted(EventKind),
+        metrics=run.metrics,
+        scenario=scenario,
+        walks_every_s=0.0,
+    )
+
+
+def run_title(run: Run) -> str:
+    """Return the title of a run: the name of its directory, else of its scenario."""
+    if run.directory is not None:
+        return Path(run.directory).resolve().name
+    return str(run.manifest["scenario"].get("name") or "run")
+
+
+def bodies_of(scenario: Mapping[str, Any], entities: Mapping[str, Any]) -> list[BodyFacts]:
+    """Return the facts of users, then of robots."""
+    bodies = []
+    for bucket, robot in (("users", False), ("robots", True)):
+        for number, name in enumerate(entities.get(bucket, ())):
+            settings = scenario.get(bucket, {}).get(name, {})
+            cameras = {"camera": settings.get("camera"), **(settings.get("cameras") or {})}
+            color = settings.get("color")
+            bodies.append(
+                BodyFacts(
+                    name=name,
+                    robot=robot,
+                    color=color if _is_color(color) else body_color(number, robot=robot),
+                    radius=float(settings.get("radius", 0.15 if robot else 0.2)),
+                    cameras=[_camera(key, value) for key, value in cameras.items() if value],
+                    behaviors=[b.get("type", "") for b in settings.get("behaviors", ())],
+                    keys={},
+                )
+            )
+    return bodies
+
+
+def _is_color(value: object) -> bool:
+    return isinstance(value, str) and value.startswith("#") and len(value) == 7
+
+
+def _camera(name: str, camera: Mapping[str, Any]) -> CameraFacts:
+    near, far = camera.get("range", DEFAULT_RANGE_M)
+    forward, left = camera.get("offset", (0.0, 0.0))
+    pan = camera.get("pan") or {}
+    dwell = parse_duration(pan.get("dwell", "5 s"))
+    return CameraFacts(
+        name=name,
+        near=near,
+        far=far,
+        angle=math.radians(camera.get("angle_deg", DEFAULT_ANGLE_DEG)),
+        forward=forward,
+        left=left,
+        heading=math.radians(camera.get("heading_deg", 0.0)),
+        pan=[math.radians(degrees) for degrees in pan.get("headings_deg", ())],
+        pan_us=round(dwell.total_seconds() * 1e6),
+    )
+
+
+def _table_facts(run: Run, name: str) -> TableFacts:
+    description = run.manifest["tables"].get(name)
+    if description is None:  # the manifest of an unfinished run doesn't list its tables
+        description = _description_of(run, name)
+    path = None if run.directory is None else path_in(run.directory, f"{name}.parquet")
+    return TableFacts(
+        name=name,
+        rows=int(description["rows"]),
+        bytes=path.stat().st_size if path is not None and path.exists() else 0,
+        role=_role(run.manifest["scenario"], name),
+        columns=[
+            ColumnFacts(
+                name=column["name"],
+                kind=column.get("kind", ""),
+                unit=column.get("unit", ""),
+                description=column.get("description", ""),
+            )
+            for column in description["columns"]
+        ],
+    )
+
+
+def _description_of(run: Run, name: str) -> dict[str, Any]:
+    from fleet2d.artifacts.arrow import spec_of
+
+    try:
+        table = run.tables[name]
+        columns = spec_of(table.schema).columns
+    except ArtifactError:
+        return {"rows": 0, "columns": []}
+    facts = [{"name": c.name, "kind": c.kind, "unit": c.unit} for c in columns]
+    return {"rows": table.num_rows, "columns": facts}
+
+
+def _role(scenario: Mapping[str, Any], name: str) -> Role:
+    if name.startswith(LAYER_PREFIX):
+        return "layer"
+    if name in scenario.get("algorithms", {}):
+        return "algorithm"
+    return "metric" if name in scenario.get("metrics", {}) else "log"
+
+
+def live_facts(simulation: Simulation) -> RunFacts:
+    """Return what the page receives about a running simulation, which has no tables yet."""
+    scenario = plain(simulation.scenario.resolved())
+    clock = simulation.clock
+    plan = simulation.home.plan
+    objects = simulation.scenario.objects.items()
+    doors = [door_facts(name, door, plan) for name, door in objects if isinstance(door, Door)]
+    bodies = bodies_of(scenario, scenario)
+    for body in bodies:
+        for behavior in simulation.actors[body["name"]].behaviors:
+            keys = behavior.model_dump(mode="json")
+            body["keys"].setdefault(behavior.type_name, keys)
+    return RunFacts(
+        title=simulation.scenario.name or "live run",
+        status="running",
+        notes=[],
+        start=clock.start.isoformat(),
+        step_us=clock.step_us,
+        steps=clock.steps,
+        first_step=0,
+        end_step=clock.steps,
+        seed=simulation.seed,
+        digest=None,
+        version=__version__,
+        home=home_facts(plan, doors),
+        bodies=bodies,
+        tables=[],
+        walls=[WallsChange(step=0, walls=0)],
+        marks=[],
+        verdict="",
+        verdicts=[],
+        story=[],
+        slows=slow_floors(scenario, interventions_of(simulation), clock),
+        starts_unlit=_starts_unlit(scenario),
+        event_kinds=sorted(EventKind),
+        metrics={},
+        scenario=scenario,
+        walks_every_s=0.0,
+    )

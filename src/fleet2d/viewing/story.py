@@ -1,0 +1,191 @@
+"""Moments of a run that are worth a look: found by the run itself, for the page and the report."""
+
+from collections.abc import Iterator, Sequence
+from datetime import timedelta
+from itertools import pairwise
+from typing import NamedTuple
+
+from pyarrow import array, compute
+
+from fleet2d.errors import ArtifactError
+from fleet2d.runs.run import Run
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import EventKind
+from fleet2d.viewing.contract import StoryFacts
+
+KINDS = (
+    EventKind.ACCEPTED,
+    EventKind.ACTIVITY,
+    EventKind.CAME_HOME,
+    EventKind.FIND_BEGINS,
+    EventKind.FOUND,
+    EventKind.LEFT_HOME,
+    EventKind.USER_LOST,
+    EventKind.USER_SEEN,
+)
+ASLEEP = "sleep"
+EVENING_H = 20
+"""A night begins at this hour: who goes to bed at one is later than who goes at eleven."""
+
+LEAST_SLEEP = timedelta(hours=1)
+"""Who sleeps for less has a nap."""
+
+LEAST_UNSEEN = timedelta(minutes=20)
+SETTLED = 1.1
+"""A belief has settled once its error stays below the last one times this."""
+
+
+class Event(NamedTuple):
+    """A row of the table of events."""
+
+    step: int
+    entity: str
+    event: str
+    user: str | None
+    detail: str
+
+
+def story_of(run: Run) -> list[StoryFacts]:
+    """Return moments of a run in their order: firsts, lasts and longests. Empty without events."""
+    try:
+        events = _events_of(run)
+        found = [*_requests(events), *_searches(events, run.clock), *_people(run, events)]
+        found += _learning(run)
+    except ArtifactError:  # the run's notes say which table is damaged
+        return []
+    return sorted(found, key=lambda moment: moment["step"])
+
+
+def _events_of(run: Run) -> list[Event]:
+    if "events" not in run.tables:
+        return []
+    table = run.tables["events"]
+    rows = table.filter(compute.is_in(compute.cast(table["event"], "string"), array(KINDS)))
+    return [Event(*row.values()) for row in rows.select(Event._fields).to_pylist()]
+
+
+def _requests(events: Sequence[Event]) -> Iterator[StoryFacts]:
+    """Yield the first time that anybody accepted what a robot wanted."""
+    for event in events:
+        if event.event == EventKind.ACCEPTED:
+            about, _, user = event.detail.rpartition(" ")
+            words = f"{_title(user)} accepts what {_title(event.entity)} asks: {_plain(about)}"
+            yield StoryFacts(step=event.step, title="The first yes", words=words)
+            return
+
+
+def _searches(events: Sequence[Event], clock: Clock) -> Iterator[StoryFacts]:
+    """Yield the search that took longest until it found somebody."""
+    begun: dict[tuple[str, str], int] = {}
+    longest: tuple[int, Event] | None = None
+    for event in events:
+        key = event.entity, event.detail
+        if event.event == EventKind.FIND_BEGINS:
+            begun[key] = event.step
+        elif event.event == EventKind.FOUND and key in begun:
+            steps = event.step - begun.pop(key)
+            if longest is None or steps > longest[0]:
+                longest = steps, event
+    if longest is not None:
+        steps, event = longest
+        took = _duration(timedelta(microseconds=steps * clock.step_us))
+        words = f"{_title(event.entity)} finds {_title(event.detail)} after {took}"
+        yield StoryFacts(step=event.step, title="The longest search", words=words)
+
+
+def _people(run: Run, events: Sequence[Event]) -> Iterator[StoryFacts]:
+    """Yield who was out of view longest, awake and at home, and who went to bed latest."""
+    unseen: list[tuple[timedelta, int, str]] = []
+    nights: list[tuple[float, int, str]] = []
+    for user in run.manifest["entities"]["users"]:
+        unseen += _unseen(run, user, events)
+        nights += _nights(run.clock, user, events)
+    if unseen and any(event.event == EventKind.USER_SEEN for event in events):
+        lasted, step, user = max(unseen)
+        if lasted >= LEAST_UNSEEN:
+            words = f"{_title(user)} is up and at home, and out of view for {_duration(lasted)}"
+            yield StoryFacts(step=step, title="The longest out of view", words=words)
+    if len(nights) > 1:
+        _, step, user = max(nights)
+        words = f"{_title(user)} goes to bed at {run.clock.time(step):%H:%M}"
+        yield StoryFacts(step=step, title="The latest night", words=words)
+
+
+def _unseen(run: Run, user: str, events: Sequence[Event]) -> Iterator[tuple[timedelta, int, str]]:
+    """Yield how long a user was out of view, awake and at home, and since when."""
+    is_asleep = True  # until the first activity
+    is_out = False
+    seen_by = 0
+    since: int | None = None
+    for event in events:
+        if event.entity == user and event.event == EventKind.ACTIVITY:
+            is_asleep = event.detail == ASLEEP
+        elif event.entity == user and event.event in (EventKind.LEFT_HOME, EventKind.CAME_HOME):
+            is_out = event.event == EventKind.LEFT_HOME
+        elif event.user == user and event.event in (EventKind.USER_SEEN, EventKind.USER_LOST):
+            seen_by += 1 if event.event == EventKind.USER_SEEN else -1
+        else:
+            continue
+        counts = not is_asleep and not is_out and seen_by == 0
+        if counts and since is None:
+            since = event.step
+        elif not counts and since is not None:
+            steps = event.step - since
+            yield timedelta(microseconds=steps * run.clock.step_us), since, user
+            since = None
+
+
+def _nights(clock: Clock, user: str, events: Sequence[Event]) -> Iterator[tuple[float, int, str]]:
+    """Yield when a user went to bed, in hours since the evening began: once a night, to sleep."""
+    activities = [e for e in events if e.entity == user and e.event == EventKind.ACTIVITY]
+    nights = set()
+    for event, following in pairwise(activities):
+        lasts = timedelta(microseconds=(following.step - event.step) * clock.step_us)
+        since_evening = clock.time(event.step) - timedelta(hours=EVENING_H)
+        if event.detail != ASLEEP or lasts < LEAST_SLEEP or since_evening.date() in nights:
+            continue
+        nights.add(since_evening.date())
+        yield since_evening.hour + since_evening.minute / 60, event.step, user
+
+
+def _learning(run: Run) -> Iterator[StoryFacts]:
+    """Yield the moment from which the beliefs of long-term presence hardly got better."""
+    configured = run.manifest["scenario"]["metrics"]
+    name = next((name for name in configured if configured[name]["type"] == "ltp_error"), None)
+    if name is None or name not in run.tables:
+        return
+    rows = run.tables[name].select(["step", "user", "tv"]).to_pylist()
+    user = rows[-1]["user"] if rows else ""
+    errors = [(row["step"], row["tv"]) for row in rows if row["user"] == user]
+    if len(errors) < 3 or any(error is None or error != error for _, error in errors):
+        return
+    last = errors[-1][1]
+    settled = len(errors) - 1
+    while settled > 0 and errors[settled - 1][1] <= SETTLED * last:
+        settled -= 1
+    if 0 < settled < len(errors) - 1:
+        below = f"{100 * SETTLED * last:.0f} %"
+        words = f"{name} stays below {below} from here, and ends at {100 * last:.0f} %"
+        yield StoryFacts(step=errors[settled][0], title="The beliefs have settled", words=words)
+
+
+def _title(name: str) -> str:
+    return _plain(name[:1].upper() + name[1:])
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _duration(lasted: timedelta) -> str:
+    """Return a duration in words.
+
+    >>> _duration(timedelta(seconds=74)), _duration(timedelta(hours=2, minutes=5))
+    ('1 min 14 s', '2 h 5 min')
+    """
+    seconds = round(lasted.total_seconds())
+    if seconds < 60:
+        return f"{seconds} s"
+    if seconds < 3600:
+        return f"{seconds // 60} min {seconds % 60} s"
+    return f"{seconds // 3600} h {seconds % 3600 // 60} min"

@@ -1,0 +1,355 @@
+"""The child process that reads foreign files: what it survives, and what its parent says."""
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Timer
+
+import pytest
+from tests.homes.test_damaged_files import FORMATS, PGM
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.load import load_floorplan
+from fleet2d.homes.formats import apart
+from fleet2d.homes.formats.parts import PlanParts
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
+
+
+@pytest.fixture(autouse=True)
+def end_children() -> Iterator[None]:
+    yield
+    apart._stop()
+
+
+def good(folder: Path) -> Path:
+    name, content, _ = FORMATS["geojson"]
+    path = folder / name
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+def endless(folder: Path) -> Path:
+    """Write a drawing of 10 million copies, which refer to each other."""
+    pytest.importorskip("svgelements")
+    text = '<g id="a0"><rect class="wall" width="1" height="1"/></g>'
+    for number in range(1, 8):
+        copies = f'<use xlink:href="#a{number - 1}"/>' * 10
+        text += f'<g id="a{number}">{copies}</g>'
+    path = folder / "use.svg"
+    path.write_text(f'{SVG}<defs>{text}</defs><use xlink:href="#a7"/></svg>')
+    return path
+
+
+def child() -> int:
+    assert apart._child is not None
+    return apart._child.pid
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def soon(condition: Callable[[], bool]) -> bool:
+    end = time.monotonic() + 20
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return condition()
+
+
+# --- One child ----------------------------------------------------------------------------------
+
+
+def test_files_in_a_row_have_one_child(tmp_path: Path) -> None:
+    plan = load_floorplan(good(tmp_path))
+    first = child()
+
+    assert plan == load_floorplan(good(tmp_path))
+    assert first == child()
+
+
+def test_errors_of_the_reader_arrive_and_leave_the_child(tmp_path: Path) -> None:
+    path = good(tmp_path)
+    plan = load_floorplan(path)
+    first = child()
+    damaged = tmp_path / "damaged.geojson"
+    damaged.write_text('{"type": "FeatureCollection", "features": [7]}')
+
+    with pytest.raises(FloorPlanError, match=r"damaged\.geojson: features\[0\] is 7"):
+        load_floorplan(damaged)
+    assert plan == load_floorplan(path)
+    assert first == child()
+
+
+def test_bounds_in_the_environment_hold_at_the_next_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = good(tmp_path)
+    load_floorplan(path)
+    monkeypatch.setenv("FLEET2D_MAX_POLYGONS", "1")
+    with pytest.raises(FloorPlanError, match="FLEET2D_MAX_POLYGONS"):
+        load_floorplan(path)
+    monkeypatch.delenv("FLEET2D_MAX_POLYGONS")
+
+    load_floorplan(path)
+
+
+def test_threads_share_a_child(tmp_path: Path) -> None:
+    path = good(tmp_path)
+    with ThreadPoolExecutor(4) as threads:
+        plans = list(threads.map(load_floorplan, [path] * 8))
+
+    assert 1 == len(set(plans))
+
+
+def _read_in_a_fork(path: Path, pids: "multiprocessing.Queue[int]") -> None:
+    load_floorplan(path)
+    pids.put(child())
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
+    path = good(tmp_path)
+    load_floorplan(path)
+    context = multiprocessing.get_context("fork")
+    pids = context.Queue()
+    worker = context.Process(target=_read_in_a_fork, args=(path, pids), daemon=True)
+    worker.start()
+    other = pids.get(timeout=60)
+    worker.join()
+
+    assert other != child()
+    assert soon(lambda: not is_alive(other))
+    first = child()
+    load_floorplan(path)
+    assert first == child()
+
+
+@pytest.mark.slow
+def test_child_ends_with_its_parent(tmp_path: Path) -> None:
+    program = (
+        "import sys, fleet2d; from fleet2d.homes.formats import apart;"
+        "fleet2d.load_floorplan(sys.argv[1]); print(apart._child.pid, flush=True);"
+        "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    command = [sys.executable, "-c", program, str(good(tmp_path))]
+    pid = int(subprocess.run(command, stdout=subprocess.PIPE, check=False).stdout)
+
+    assert soon(lambda: not is_alive(pid))
+
+
+# --- Deaths -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("ending", "message"),
+    [
+        (signal.SIGKILL, "its reader was killed, .* try again"),
+        (signal.SIGSEGV, r"died \(SIGSEGV\)"),
+    ],
+)
+def test_child_that_dies_is_an_error_and_the_next_file_has_another(
+    tmp_path: Path, ending: signal.Signals, message: str
+) -> None:
+    path = good(tmp_path)
+    drawing = endless(tmp_path)
+    load_floorplan(path)
+    timer = Timer(0.5, os.kill, (child(), ending))
+    timer.start()
+    with pytest.raises(FloorPlanError, match=message):
+        load_floorplan(drawing)
+    timer.join()
+
+    load_floorplan(path)
+
+
+def test_dead_child_is_replaced_without_a_word(tmp_path: Path) -> None:
+    path = good(tmp_path)
+    load_floorplan(path)
+    first = child()
+    os.kill(first, signal.SIGKILL)
+    assert soon(lambda: apart._child is not None and apart._child.poll() is not None)
+
+    load_floorplan(path)
+    assert first != child()
+
+
+@pytest.mark.slow
+def test_time_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
+
+    with pytest.raises(FloorPlanError, match=r"longer to read than 1 seconds.*READ_SECONDS=2"):
+        load_floorplan(endless(tmp_path))
+
+
+@pytest.mark.slow
+def test_processor_time_ends_before_the_clock_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends: list[int] = []
+    death = apart._death
+    monkeypatch.setattr(
+        apart,
+        "_death",
+        lambda path, late, status: (ends.append(status), death(path, late, status))[1],
+    )
+    monkeypatch.setattr(apart, "PATIENCE", 20)
+    monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
+
+    with pytest.raises(FloorPlanError, match="takes longer to read than 1 seconds"):
+        load_floorplan(endless(tmp_path))
+    assert [-signal.SIGXCPU] == ends
+
+
+def test_clock_limits_what_takes_no_processor_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(apart, "PATIENCE", 0.5)
+    monkeypatch.setattr(apart, "_CODE", "import time; time.sleep(20)")
+    monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
+    begin = time.monotonic()
+
+    with pytest.raises(FloorPlanError, match="takes longer to read than 1 seconds"):
+        load_floorplan(good(tmp_path))
+    assert time.monotonic() < begin + 15
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
+def test_memory_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FLEET2D_MAX_READ_MB", "40")
+    path = tmp_path / "home.pgm"
+    path.write_bytes(b"P5\n4000 4000\n255\n" + bytes(4000 * 4000))
+
+    with pytest.raises(FloorPlanError, match="more memory to read than 40 MB"):
+        load_floorplan(path, resolution=0.05)
+    path.write_bytes(PGM)
+    load_floorplan(path, resolution=0.05)
+
+
+def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path: Path) -> None:
+    path = good(tmp_path)
+    drawing = endless(tmp_path)
+    plan = load_floorplan(path)
+    first = child()
+    timer = Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        load_floorplan(drawing)
+
+    assert plan == load_floorplan(path)
+    assert first != child()
+
+
+# --- Answers ------------------------------------------------------------------------------------
+
+PARTS = {
+    "name": "flat", "free": {"rings": [[[0, 0], [9, 0], [9, 9], [0, 9], [0, 0]]]}, "cell": 0.05,
+    "source": "", "regions_are": "none", "notes": [],
+}  # fmt: skip
+
+
+def _short(content: bytes) -> str:
+    return f"bytes({len(content)})" if content == bytes(len(content)) else repr(content)
+
+
+def answering(content: bytes, length: int | None = None) -> str:
+    """Return the program of a child that has one answer."""
+    head = (len(content) if length is None else length).to_bytes(8, "big")
+    return (
+        "import sys, pickle; pickle.load(sys.stdin.buffer);"
+        f"sys.stdout.buffer.write({head!r}); sys.stdout.buffer.write({_short(content)});"
+        "sys.stdout.flush(); sys.stdin.read()"
+    )
+
+
+def test_coordinate_beyond_all_floats_is_refused() -> None:
+    """JSON may spell infinity as a number, too, which no check of words refuses."""
+    corners = [[0, 0], [9, 0], [9, 9], [0, 9]]
+    answer = json.dumps({"value": PARTS | {"free": {"rings": [corners]}}})
+    apart._decode(answer.encode(), PlanParts)
+    with pytest.raises(ValueError, match="a coordinate is infinite"):
+        apart._decode(answer.replace("[9, 0]", "[1e999, 0]").encode(), PlanParts)
+
+
+def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apart, "_CODE", answering(json.dumps({"value": PARTS}).encode()))
+
+    assert 81 == load_floorplan(good(tmp_path)).area_m2
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"garbage",
+        b"\xff\xfe",
+        b"{}",
+        b"[]",
+        b"7",
+        b'{"value": null}',
+        b'{"failure": {"kind": "code", "text": ""}}',
+        b"[" * 100_000,
+        b'{"value": [' + b"1," * 3_100_000 + b"1]}",
+        *(
+            json.dumps({"value": PARTS | change}).encode()
+            for change in (
+                {"name": 7},
+                {"cell": "x"},
+                {"cell": float("nan")},
+                {"free": None},
+                {"free": {"rings": [[[0, 0], [1, 1]]]}},
+                {"free": {"rings": [[[0, 0], [1e999, 0], [9, 9], [0, 9]]]}},
+                {"free": {"rings": [["x"]]}},
+                {"free": {"polygons": [7]}},
+                {"objects": [{"name": "x"}]},
+                {"regions": [PARTS["free"]]},
+            )
+        ),
+    ],
+    ids=lambda answer: answer[:80].decode("latin-1"),
+)
+def test_wrong_answer_is_refused(answer: bytes) -> None:
+    with pytest.raises(apart.WRONG):
+        apart._decode(answer, PlanParts)
+
+
+def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = json.dumps({"value": PARTS}).encode()
+    apart._decode(answer, PlanParts)
+    monkeypatch.setenv("FLEET2D_MAX_JSON_VALUES", "9")
+    with pytest.raises(ValueError, match="too many values"):
+        apart._decode(answer, PlanParts)
+
+
+@pytest.mark.parametrize(
+    ("answer", "length"),
+    [(b"garbage", None), (bytes(1 << 26), 2**63)],
+    ids=["garbage", "endless"],
+)
+def test_wrong_answer_is_an_error_of_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: bytes, length: int | None
+) -> None:
+    monkeypatch.setattr(apart, "_CODE", answering(answer, length))
+    with pytest.raises(FloorPlanError, match="its reader gave no valid answer: export the file"):
+        load_floorplan(good(tmp_path))
+
+
+@pytest.mark.parametrize("length", [0, 9])
+def test_short_answer_is_that_of_a_dead_child(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, length: int
+) -> None:
+    monkeypatch.setattr(apart, "_CODE", answering(b"", length).replace("sys.stdin.read()", ""))
+
+    with pytest.raises(FloorPlanError, match=r"its reader died \(exit code 0\)"):
+        load_floorplan(good(tmp_path))

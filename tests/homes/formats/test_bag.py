@@ -1,0 +1,110 @@
+"""Maps in bags: the last grid of a topic, its frame, and what is wrong with it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fleet2d
+from fleet2d.errors import FloorPlanError
+from fleet2d.homes.formats.bag import BagMap
+
+pytest.importorskip("rosbags", reason="the extra ros is not installed")
+
+
+def write(path: Path, *grids: tuple[str, Any], resolution: float = 0.1, turn: float = 0.0) -> Path:
+    """Write a bag with maps whose lower left corner is at (-1, 2)."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    new = store.types
+    with Writer(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections: dict[str, Any] = {}
+        for number, (topic, cells) in enumerate(grids):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic, "nav_msgs/msg/OccupancyGrid", typestore=store
+                )
+            stamp = new["builtin_interfaces/msg/Time"](sec=number, nanosec=0)
+            half = turn / 2
+            pose = new["geometry_msgs/msg/Pose"](
+                new["geometry_msgs/msg/Point"](-1.0, 2.0, 0.0),
+                new["geometry_msgs/msg/Quaternion"](
+                    0.0, 0.0, float(np.sin(half)), float(np.cos(half))
+                ),
+            )
+            info = new["nav_msgs/msg/MapMetaData"](
+                stamp, resolution, cells.shape[1], cells.shape[0], pose
+            )
+            header = new["std_msgs/msg/Header"](stamp, "map")
+            message = new["nav_msgs/msg/OccupancyGrid"](header, info, cells.ravel().astype(np.int8))
+            data = store.serialize_cdr(message, "nav_msgs/msg/OccupancyGrid")
+            writer.write(connections[topic], number, data)
+    return path
+
+
+def room(width: int = 60, height: int = 40) -> Any:
+    """Return a free room with walls around it, and unknown cells outside."""
+    cells = np.full((height + 10, width + 10), -1)
+    cells[4 : height + 6, 4 : width + 6] = 100
+    cells[5 : height + 5, 5 : width + 5] = 0
+    return cells
+
+
+def test_the_last_map_is_a_home_in_the_frame_of_the_map(tmp_path: Path) -> None:
+    path = write(tmp_path / "slam", ("/map", room(10, 10)), ("/map", room()))
+
+    plan = BagMap(path=path).plan()
+
+    assert plan.area_m2 == pytest.approx(24.0, abs=0.01)
+    assert plan.free_space.bounds == pytest.approx((-0.5, 2.5, 5.5, 6.5), abs=0.01)
+    assert (
+        "/map: the last of 2 maps, 70 × 50 cells of 0.1 m, its corner at (-1.00, 2.00) m"
+        in plan.notes[-1]
+    )
+
+
+def test_a_turned_map_is_turned(tmp_path: Path) -> None:
+    path = write(tmp_path / "slam", ("/map", room()), turn=np.pi / 2)
+
+    plan = BagMap(path=path).plan()
+
+    assert plan.free_space.bounds == pytest.approx((-5.5, 2.5, -1.5, 8.5), abs=0.01)
+
+
+def test_a_run_exported_as_a_bag_is_lived_in_again(tmp_path: Path) -> None:
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
+    fleet2d.export(run, tmp_path / "home.mcap")
+
+    again = fleet2d.load_floorplan(tmp_path / "home.mcap")
+
+    assert again.area_m2 == pytest.approx(run.plan.area_m2, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("grids", "topic", "message"),
+    [
+        ([("/a", room()), ("/b", room())], None, "has several maps: select one by 'topic': /a, /b"),
+        ([("/a", room())], "/c", "has no map '/c'"),
+        ([("/map", np.full((20, 20), -1))], None, "free"),
+    ],
+)
+def test_a_bag_without_one_home_is_refused(
+    tmp_path: Path, grids: list[Any], topic: str | None, message: str
+) -> None:
+    path = write(tmp_path / "slam", *grids)
+
+    with pytest.raises(FloorPlanError, match=message):
+        BagMap(path=path, topic=topic).plan()
+
+
+def test_a_bag_without_a_map_is_refused(tmp_path: Path) -> None:
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
+    fleet2d.export(run, tmp_path / "home.mcap")
+    text = (tmp_path / "home.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(text[: len(text) // 2])
+
+    with pytest.raises(FloorPlanError, match="can't be read as a bag"):
+        fleet2d.load_floorplan(tmp_path / "cut.mcap")

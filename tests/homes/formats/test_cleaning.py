@@ -1,0 +1,123 @@
+"""Maps drawn as text: `.` free, `#` occupied, a blank unknown; a pixel is 0.1 m."""
+
+import numpy as np
+import pytest
+
+from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
+from fleet2d.kernels import label_parts
+
+
+def two_rooms(gap: str, rows: slice = slice(0, 20), thickness: int = 1) -> OccupancyMap:
+    """Two rooms of 2 m x 1.5 m, with pixels between them of which some rows are `gap`."""
+    pixels = np.full((20, 30 + thickness), ".")
+    pixels[:, 15 : 15 + thickness] = "#"
+    pixels[rows, 15 : 15 + thickness] = gap
+    return OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+
+@pytest.mark.parametrize("thickness", [1, 2])
+def test_unknown_row_between_rooms_opens_and_wall_beside_it_stays(thickness: int) -> None:
+    raw = two_rooms(" ", slice(5, 18), thickness)
+
+    opened, note = bridge_gaps(raw, 2)
+
+    assert 13 * thickness == np.count_nonzero(opened)
+    assert not (opened & raw.occupied).any()
+    assert "are open: 1" in note
+
+
+def test_gap_wider_than_the_setting_stays() -> None:
+    opened, note = bridge_gaps(two_rooms(" ", thickness=3), 2)
+
+    assert not opened.any()
+    assert note == ""
+    assert not bridge_gaps(two_rooms(" "), 0)[0].any()
+
+
+def test_shut_door_opens_and_a_wall_along_the_whole_room_stays() -> None:
+    walls = np.full((20, 33), "#")
+    walls[:, :15] = walls[:, 18:] = "."
+    walls[5:14, 15] = walls[5:14, 17] = "."  # a door of 0.9 m in a wall of 0.3 m, one pixel thick
+    door = OccupancyMap(walls == ".", walls == "#", 0.1)
+
+    assert 9 == np.count_nonzero(bridge_gaps(door, 2)[0])
+    assert not bridge_gaps(two_rooms("#"), 2)[0].any()
+
+
+def test_shut_door_that_is_thinner_than_its_wall_opens() -> None:
+    pixels = np.full((30, 32), ".")
+    pixels[:, 15:17] = "#"
+    pixels[5:14, 15] = "."  # a door of 0.9 m, one pixel thick, in a wall of two
+    raw = OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    assert np.array_equal(np.argwhere(opened), [[row, 16] for row in range(5, 14)])
+
+
+def test_wall_opens_where_a_robot_drove() -> None:
+    raw = two_rooms("#")
+    driven = np.zeros(raw.free.shape, np.bool_)
+    driven[10] = True
+
+    opened, _ = bridge_gaps(raw, 2, driven)
+
+    assert opened[10, 15]
+
+
+def test_part_too_small_to_stand_in_is_not_bridged() -> None:
+    raw = two_rooms(" ")
+    raw.free[:, 19:] = False  # 0.3 m x 2 m are left
+
+    assert not bridge_gaps(raw, 2)[0].any()
+
+
+def test_scraps_are_parts_below_the_area_but_never_the_largest() -> None:
+    raw = two_rooms("#")
+    raw.free[:, 22:] = False  # 1.2 m2 are left
+
+    assert not drop_scraps(raw, 1.0)[0].any()
+    assert 20 * 6 == np.count_nonzero(drop_scraps(raw, 1.3)[0])
+    assert 20 * 6 == np.count_nonzero(drop_scraps(raw, 100)[0])
+    assert not drop_scraps(raw, 0)[0].any()
+
+
+def turned_rooms(degrees: float, door: slice) -> OccupancyMap:
+    """Two rooms of 4 m x 3 m beside each other, turned; the wall between is 3 pixels thick, and the
+    shut door in it one to two."""
+    y, x = np.mgrid[0:130, 0:170] - np.array([65, 85])[:, None, None]
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    u, v = x * cosine + y * sine, y * cosine - x * sine
+    home, wall = (abs(u) < 41.5) & (abs(v) < 30), abs(u) < 1.5
+    in_door = (abs(u) < 0.8) & (v > door.start) & (v < door.stop)
+    free = home & ~(wall & ~((v > door.start) & (v < door.stop))) & ~in_door
+    return OccupancyMap(free, ~free, 0.1)
+
+
+@pytest.mark.parametrize("degrees", [0, 17, 33, 45])
+def test_shut_door_opens_however_the_map_is_turned(degrees: float) -> None:
+    raw = turned_rooms(degrees, slice(-5, 4))
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    assert label_parts(raw.free, False).max() == 1
+    assert label_parts(raw.free | opened, False).max() == 0
+    assert np.count_nonzero(opened) < 30
+
+
+def test_shut_door_opens_though_a_ray_joins_the_rooms() -> None:
+    raw = turned_rooms(0, slice(-5, 4))
+    raw.free[90] |= abs(np.arange(170) - 85) < 5
+
+    assert not bridge_gaps(raw, 2)[0].any()
+    assert np.count_nonzero(bridge_gaps(raw, 2, ray_width=0.3)[0]) == 8
+
+
+def test_room_behind_a_wide_shut_door_gets_a_door_in_its_middle() -> None:
+    raw = turned_rooms(0, slice(-20, 20))
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    rows = np.flatnonzero(opened.any(axis=1))
+    assert 0.7 <= (rows[-1] - rows[0] + 1) * raw.pixel <= 0.9
+    assert abs(rows.mean() - 65) < 1.5

@@ -1,0 +1,584 @@
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+from pydantic import ValidationError
+
+from fleet2d.configuration.components import lookup
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.load import load_floorplan, save_floorplan
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.homes.formats.geojson import GeoJson, geojson_document
+
+Ring = list[list[float]]
+
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE: tuple[str, dict[str, Any]] = ("flat.geojson", {
+    "type": "FeatureCollection",
+    "name": "flat",
+    "units": "m",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": {"kind": "room", "name": "Kitchen", "type": "kitchen"},
+            "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]]},
+        },
+        {
+            "type": "Feature",
+            "feature_type": "unit",
+            "properties": {"category": "lounge", "name": {"en": "Lounge"}, "level_id": "0"},
+            "geometry": {
+                "type": "MultiPolygon",
+                "coordinates": [[[[4, 0], [8, 0], [8, 3], [4, 3], [4, 0]]]],
+            },
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "door", "name": "door"},
+            "geometry": {"type": "LineString", "coordinates": [[4, 1], [4, 2]]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "wall"},
+            "geometry": {"type": "LineString", "coordinates": [[5, 1], [6, 2]]},
+        },
+        {
+            "type": "Feature",
+            "properties": {
+                "kind": "object", "type": "bed", "blocks": "path", "heading": 1,
+                "uses": [{"x": 7, "y": 2, "heading": 1}],
+            },
+            "geometry": {"type": "Point", "coordinates": [7, 2, 0]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"kind": "entrance"},
+            "geometry": {"type": "Point", "coordinates": [0, 1]},
+        },
+    ],
+})  # fmt: skip
+
+
+def read_geojson(path: Path, **settings: Any) -> FloorPlan:
+    return GeoJson.model_construct(path=path, **settings).load()
+
+
+def box(x0: float, y0: float, x1: float, y1: float) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [[[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]]]}
+
+
+def line(*points: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "LineString", "coordinates": [list(point) for point in points]}
+
+
+def point(x: float, y: float) -> dict[str, Any]:
+    return {"type": "Point", "coordinates": [x, y]}
+
+
+def feature(geometry: Any, kind: str | None = None, **properties: Any) -> dict[str, Any]:
+    all_properties = properties if kind is None else {"kind": kind, **properties}
+    return {"type": "Feature", "geometry": geometry, "properties": all_properties}
+
+
+def imdf(geometry: Any, feature_type: str, **properties: Any) -> dict[str, Any]:
+    return {**feature(geometry, **properties), "feature_type": feature_type}
+
+
+KITCHEN = feature(box(0, 0, 4, 3), "room", name="Kitchen")
+BEDROOM = feature(box(4, 0, 9, 3), "room", name="Master Bedroom")
+DOOR = feature(line((4, 1), (4, 1.9)), "door")
+
+
+def write(folder: Path, *features: Any, **members: Any) -> Path:
+    path = folder / "flat.geojson"
+    content = {"type": "FeatureCollection", "features": list(features), **members}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+def read(folder: Path, *features: Any, **options: Any) -> FloorPlan:
+    return read_geojson(write(folder, *features), **options)
+
+
+def areas(plan: FloorPlan) -> dict[str, float]:
+    return {room.name: round(room.area_m2, 2) for room in plan.rooms}
+
+
+# --- Rooms that touch -----------------------------------------------------------------------------
+
+
+def test_rooms_that_touch_have_a_wall_between_them_and_doors_lead_through(tmp_path: Path) -> None:
+    plan = read(tmp_path, KITCHEN, BEDROOM, DOOR)
+
+    wall = shapely.difference(shapely.box(3.95, 0, 4.05, 3), shapely.box(3.95, 1, 4.05, 1.9))
+    expected = shapely.difference(shapely.box(0, 0, 9, 3), wall)
+    assert shapely.symmetric_difference(expected, plan.free_space).area < 1e-6
+    assert [("Kitchen", "kitchen"), ("Master Bedroom", "bedroom")] == [
+        (room.name, room.type) for room in plan.rooms
+    ]
+    (door,) = plan.doorways
+    assert ((4.0, 1.0), (4.0, 1.9), True) == (door.start, door.end, door.leaf)
+    assert {0, 1} == set(door.rooms)
+    assert "rooms touch along 3.0 m: there are walls of 0.1 m but for doors" in plan.notes
+
+
+def test_walls_between_rooms_are_as_thick_as_the_setting_says(tmp_path: Path) -> None:
+    assert 27 - 3 * 0.2 == pytest.approx(read(tmp_path, KITCHEN, BEDROOM, wall_m=0.2).area_m2)
+    assert 27 == pytest.approx(read(tmp_path, KITCHEN, BEDROOM, wall_m=0).area_m2)
+
+
+def test_corner_where_three_rooms_meet_is_filled(tmp_path: Path) -> None:
+    hall = feature(box(0, 3, 9, 5), "room", name="Hall")
+
+    plan = read(tmp_path, KITCHEN, BEDROOM, hall)
+
+    assert shapely.box(0, 0, 3.95, 2.95).area + 4.95 * 2.95 + 9 * 1.95 == pytest.approx(
+        plan.area_m2
+    )
+    assert 3 == len(plan.polygons)
+
+
+def test_border_that_is_inexact_by_a_centimetre_is_a_wall_all_along(tmp_path: Path) -> None:
+    slanted = {
+        "type": "Polygon",
+        "coordinates": [[[4.01, 0], [9, 0], [9, 3], [3.99, 3], [4.01, 0]]],
+    }
+
+    plan = read(tmp_path, KITCHEN, feature(slanted, "room"))
+
+    assert 2 == len(plan.polygons)
+
+
+def test_room_inside_another_has_no_walls(tmp_path: Path) -> None:
+    niche = feature(box(1, 1, 2, 2), "room", name="Niche")
+
+    plan = read(tmp_path, KITCHEN, niche)
+
+    assert {"Kitchen": 11.0, "Niche": 1.0} == areas(plan)
+    assert 12 == pytest.approx(plan.area_m2)
+
+
+def test_rooms_that_touch_in_a_corner_only_stay_as_they_are(tmp_path: Path) -> None:
+    plan = read(tmp_path, KITCHEN, feature(box(4, 3, 8, 6), "room"))
+
+    assert 24 == pytest.approx(plan.area_m2)
+
+
+# --- Walls that the file draws ----------------------------------------------------------------------
+
+
+def test_gap_between_rooms_is_a_wall_and_the_passage_belongs_to_both(tmp_path: Path) -> None:
+    bath = feature(box(4.2, 0, 9, 3), "room", name="Bath")
+
+    plan = read(tmp_path, KITCHEN, bath, DOOR)
+
+    assert 12 + 4.8 * 3 + 0.2 * 0.9 == pytest.approx(plan.area_m2)
+    assert {"Kitchen": 12.09, "Bath": 14.49} == areas(plan)
+    assert (4.1, 1.0) == pytest.approx(plan.doorways[0].start)
+
+
+@pytest.mark.parametrize(
+    "door",
+    [
+        line((4, 1), (4, 1.9)),
+        line((4.3, 1), (4.3, 1.9)),
+        line((4.15, 1.9), (4.15, 1)),
+        box(4, 1, 4.3, 1.9),
+    ],
+)
+def test_door_may_be_drawn_anywhere_in_the_wall(tmp_path: Path, door: Any) -> None:
+    bath = feature(box(4.3, 0, 9, 3), "room")
+
+    plan = read(tmp_path, KITCHEN, bath, feature(door, "door"))
+
+    (doorway,) = plan.doorways
+    assert [4.15, 4.15] == pytest.approx([doorway.start[0], doorway.end[0]])
+    assert 0.9 == pytest.approx(doorway.width_m)
+    assert 12 + 4.7 * 3 + 0.3 * 0.9 == pytest.approx(plan.area_m2)
+
+
+def test_door_in_a_slanted_wall_opens_it_all_the_way(tmp_path: Path) -> None:
+    left = {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [6, 4], [0, 4], [0, 0]]]}
+    right = {"type": "Polygon", "coordinates": [[[4.2, 0], [9, 0], [9, 4], [6.2, 4], [4.2, 0]]]}
+    door = feature(line((4.9, 1.6), (5.3, 2.4)), "door")
+
+    plan = read(tmp_path, feature(left, "room"), feature(right, "room"), door)
+
+    assert 1 == len(plan.polygons)
+    assert 0.89 == pytest.approx(plan.doorways[0].width_m, abs=0.02)
+
+
+def test_walls_along_the_borders_are_the_only_ones(tmp_path: Path) -> None:
+    hall = feature(box(0, 3, 9, 5), "room", name="Hall")
+    walls = [feature(line((0, 3), (9, 3)), "wall"), feature(box(2, 4, 2.2, 5), "wall")]
+
+    plan = read(tmp_path, KITCHEN, BEDROOM, hall, *walls)
+
+    assert 45 - 9 * 0.1 - 0.2 == pytest.approx(plan.area_m2)
+    assert plan.room_at(4.0, 1.0) is not None
+
+
+def test_free_areas_are_free_and_rooms_are_their_names_then(tmp_path: Path) -> None:
+    plan = read(tmp_path, feature(box(0, 0, 9, 3), "free"), KITCHEN)
+
+    assert {"Kitchen": 12.0, "unknown_0": 15.0} == areas(plan)
+
+
+def test_walls_as_lines_need_a_thickness(tmp_path: Path) -> None:
+    plan = read(tmp_path, KITCHEN, feature(line((1, 1), (2, 1)), "wall"), wall_m=0)
+
+    assert 12 == pytest.approx(plan.area_m2)
+    assert ("walls drawn as lines: 1, ignored as wall_m is 0",) == plan.notes
+
+
+def test_opening_where_there_is_no_wall_is_a_doorway(tmp_path: Path) -> None:
+    door = feature(line((4, 0), (4, 3)), "opening", name="arch")
+
+    plan = read(tmp_path, KITCHEN, BEDROOM, door, wall_m=0)
+
+    assert [("arch", False)] == [(d.name, d.leaf) for d in plan.doorways]
+
+
+def test_door_that_leads_outside_stays_shut_and_is_the_entrance(tmp_path: Path) -> None:
+    plan = read(tmp_path, KITCHEN, feature(line((0, 1), (0, 2)), "door", name="front"))
+
+    assert (0.3, 1.5) == plan.entrance
+    assert () == plan.doorways
+    assert "the door front leads outside: it stays shut" in plan.notes
+
+
+def test_door_in_no_wall_is_ignored_with_a_note(tmp_path: Path) -> None:
+    plan = read(tmp_path, KITCHEN, feature(line((20, 1), (20, 2)), "door"))
+
+    assert ("the door features[1] is in no room's wall: ignored",) == plan.notes
+
+
+# --- What is in it ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at", [(2.0, 1.0), (0.0, 1.0), (-0.2, 1.0)])
+def test_entrance_is_inside_where_it_is_drawn_or_nearby(
+    tmp_path: Path, at: tuple[float, float]
+) -> None:
+    plan = read(tmp_path, KITCHEN, feature(point(*at), "entrance"))
+
+    assert (max(at[0], 0.1), 1.0) == plan.entrance
+
+
+def test_entrance_far_outside_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FloorPlanError, match=r"the entrance of flat at .* is not in free space"):
+        read(tmp_path, KITCHEN, feature(point(30, 1), "entrance"))
+
+
+def test_objects_and_no_go_areas_are_taken_over(tmp_path: Path) -> None:
+    bed = feature(
+        box(5, 1, 7, 2.5), "object", type="bed", blocks="path",
+        uses=[{"x": 6, "y": 2, "heading": 1.5, "posture": "lie"}],
+    )  # fmt: skip
+    sensor = feature(point(1, 1), "object", type="motion sensor", name="pir", blocks="nothing")
+    area = feature(box(0, 2, 1, 3), "no_go")
+
+    plan = read(tmp_path, KITCHEN, BEDROOM, bed, sensor, area)
+
+    assert [("bed_0", "bed"), ("pir", "motion_sensor")] == [(o.name, o.type) for o in plan.objects]
+    assert (6.0, 2.0, 1.5, "lie") == (
+        plan.objects[0].uses[0].x,
+        plan.objects[0].uses[0].y,
+        plan.objects[0].uses[0].heading,
+        plan.objects[0].uses[0].posture,
+    )
+    assert (0.95, 0.95, 1.05, 1.05) == pytest.approx(plan.objects[1].footprint.bounds)
+    assert [(0.0, 2.0, 1.0, 3.0)] == [area.bounds for area in plan.no_go]
+
+
+@pytest.mark.parametrize(
+    ("properties", "name", "kind"),
+    [
+        ({"type": "Kitchen"}, "kitchen_0", "kitchen"),
+        ({"usage": "Living Room"}, "living_room_0", "living_room"),
+        ({"name": "Bedroom 2"}, "Bedroom 2", "bedroom"),
+        ({"name": "Blue room", "category": "office"}, "Blue room", "office"),
+        ({"name": "A 101"}, "A 101", "unknown"),
+        ({"name": "A 101", "type": "yoga studio"}, "A 101", "yoga_studio"),
+        ({"name": {"de": "Küche", "en": "Kitchen"}}, "Kitchen", "kitchen"),
+        ({"type": "room", "name": "Bad"}, "Bad", "bathroom"),
+        ({"name": "  ", "type": 3}, "unknown_0", "unknown"),
+        ({"category": "restroom.female"}, "toilet_0", "toilet"),
+    ],
+)
+def test_room_has_the_type_of_its_use_else_of_its_name(
+    tmp_path: Path, properties: dict[str, Any], name: str, kind: str
+) -> None:
+    (room,) = read(tmp_path, feature(box(0, 0, 4, 3), None, **properties)).rooms
+
+    assert (name, kind) == (room.name, room.type)
+
+
+def test_rooms_of_one_name_get_numbers(tmp_path: Path) -> None:
+    plan = read(tmp_path, KITCHEN, {**BEDROOM, "properties": {"name": "Kitchen"}})
+
+    assert ["Kitchen", "Kitchen 2"] == [room.name for room in plan.rooms]
+    assert "several rooms are called Kitchen: one of them is Kitchen 2 here" in plan.notes
+
+
+def test_what_has_no_kind_is_counted_in_a_note(tmp_path: Path) -> None:
+    others = [feature(point(1, 1)), feature(line((0, 0), (1, 1))), imdf(None, "venue")]
+
+    plan = read(tmp_path, KITCHEN, *others)
+
+    assert (
+        "also in the file, without effect on the plan: Point without a kind (1),"
+        " LineString without a kind (1), venue (1)",
+    ) == plan.notes
+
+
+# --- IMDF and floors --------------------------------------------------------------------------------
+
+
+def test_imdf_units_openings_and_fixtures_are_read(tmp_path: Path) -> None:
+    door = {"type": "swinging", "automatic": False, "material": "wood"}
+    unit = {"level_id": "l0"}
+    plan = read(
+        tmp_path,
+        imdf(box(0, 0, 4, 3), "unit", category="kitchen", name=None, **unit),
+        imdf(box(4, 0, 9, 3), "unit", category="walkway", name={"en": "Aisle"}, **unit),
+        imdf(box(1, 1, 1.5, 1.5), "unit", category="column", name=None, **unit),
+        imdf(box(0, 3, 4, 9), "unit", category="opentobelow", name=None, **unit),
+        imdf(line((4, 0.5), (4, 1.5)), "opening", category="pedestrian", door=door, **unit),
+        imdf(line((4, 2), (4, 3)), "opening", category="pedestrian", door=None, **unit),
+        imdf(box(7, 1, 8, 2), "fixture", category="desk", **unit),
+        units="m",
+    )
+
+    assert [("kitchen_0", "kitchen"), ("Aisle", "hallway")] == [
+        (r.name, r.type) for r in plan.rooms
+    ]
+    assert [True, False] == [d.leaf for d in plan.doorways]
+    assert ["desk_0"] == [thing.name for thing in plan.objects]
+    assert plan.room_at(1.25, 1.25) is None
+
+
+FLOORS = (
+    imdf(box(0, 0, 9, 3), "level", ordinal=1, name={"en": "Upstairs"}),
+    imdf(box(0, 0, 9, 3), "level", ordinal=0, short_name={"en": "G"}),
+    imdf(box(0, 0, 3, 3), "unit", category="office", name={"en": "Up"}, level_id="b"),
+    imdf(box(0, 0, 4, 3), "unit", category="office", name={"en": "Down"}, level_id="a"),
+)
+FLOORS[0]["id"], FLOORS[1]["id"] = "b", "a"
+
+
+@pytest.mark.parametrize(
+    ("level", "room"),
+    [(None, "Down"), ("0", "Down"), ("G", "Down"), ("a", "Down"), ("1", "Up"), ("Upstairs", "Up")],
+)
+def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
+    plan = read(tmp_path, *FLOORS, units="m", level=level)
+
+    assert [room] == [plan_room.name for plan_room in plan.rooms]
+    other = {"Down": "G is used, not Upstairs", "Up": "Upstairs is used, not G"}[room]
+    assert (f"of its levels, {other}",) == plan.notes
+
+
+def test_floor_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FloorPlanError, match="no level '7'; its levels are: b or 1 or Upstairs, a"):
+        read(tmp_path, *FLOORS, units="m", level="7")
+
+
+# --- Units ------------------------------------------------------------------------------------------
+
+
+def on_earth(geometry: dict[str, Any], latitude: float, longitude: float) -> dict[str, Any]:
+    """Metres about a place as longitude and latitude, by WGS 84's radii of curvature."""
+    square = 1 - 0.00669437999014 * math.sin(math.radians(latitude)) ** 2
+    east = 6378137 / square**0.5 * math.cos(math.radians(latitude)) * math.radians(1)
+    north = 6378137 * (1 - 0.00669437999014) / square**1.5 * math.radians(1)
+    shape = shapely.from_geojson(json.dumps(geometry))
+    degrees = shapely.transform(shape, lambda xy: xy / (east, north) + (longitude, latitude))
+    return json.loads(shapely.to_geojson(degrees))  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude"), [(48.1, 11.6), (-33.9, 151.2), (0, 0), (69, -20)]
+)
+def test_longitude_and_latitude_become_metres(
+    tmp_path: Path, latitude: float, longitude: float
+) -> None:
+    both = [
+        {**f, "geometry": on_earth(f["geometry"], latitude, longitude)}
+        for f in (KITCHEN, BEDROOM, DOOR)
+    ]
+
+    plan = read(tmp_path, *both)
+
+    assert (-4.5, -1.5, 4.5, 1.5) == pytest.approx(plan.bounds, abs=0.002)
+    assert 27 - 0.1 * 2.1 == pytest.approx(plan.area_m2, abs=0.02)
+    assert 1 == len(plan.doorways)
+    assert any("became metres east and north of" in note for note in plan.notes)
+
+
+def test_units_can_be_set_by_the_file_and_by_the_setting(tmp_path: Path) -> None:
+    small = feature(box(0, 0, 0.3, 0.3), "room")
+    path = write(tmp_path, small, units="m")
+
+    assert 0.09 == pytest.approx(read_geojson(path).area_m2)
+    with pytest.raises(FloorPlanError, match="too large"):
+        read_geojson(path, units="degrees")
+    with pytest.raises(
+        FloorPlanError, match=r"0\.3 wide, which is small in metres and large in deg"
+    ):
+        read(tmp_path, small)
+
+
+@pytest.mark.parametrize("units", ["feet", 3, None, [1]])
+def test_unknown_units_are_refused(tmp_path: Path, units: object) -> None:
+    with pytest.raises(FloorPlanError, match="m, degrees or auto is expected"):
+        read_geojson(write(tmp_path, KITCHEN, units=units))
+
+
+def test_metres_far_from_the_origin_come_near_it(tmp_path: Path) -> None:
+    far = feature(box(691_000.5, 5_334_000, 691_004.5, 5_334_003), "room")
+
+    plan = read(tmp_path, far)
+
+    assert (0.5, 0.0, 4.5, 3.0) == pytest.approx(plan.bounds)
+    assert ("its coordinates count from (691000, 5334000) m here",) == plan.notes
+
+
+# --- Writing ----------------------------------------------------------------------------------------
+
+
+def test_plan_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
+    plan = read(
+        tmp_path, KITCHEN, BEDROOM, DOOR, feature(box(0, 2, 1, 3), "no_go"),
+        feature(point(1, 1), "entrance"), feature(box(5, 1, 6, 2), "object", type="table"),
+    )  # fmt: skip
+
+    save_floorplan(plan, tmp_path / "again.geojson")
+
+    assert plan == load_floorplan(tmp_path / "again.geojson")
+
+
+def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
+    plan = load_floorplan("family_home")
+    path = write(tmp_path)
+    path.write_text(json.dumps(geojson_document(plan)))
+
+    assert plan == load_floorplan(path)
+
+
+# --- As a component, and wrong files ----------------------------------------------------------------
+
+
+def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
+    path = write(tmp_path, *FLOORS, KITCHEN, BEDROOM)
+
+    source = GeoJson.model_validate({"path": str(path), "level": 1, "wall_m": "20 cm"})
+
+    assert GeoJson is lookup("floorplan", "geojson")
+    assert source.load() == read_geojson(path, level="1", wall_m=0.2)
+    assert source.load() != read_geojson(path)
+    with pytest.raises(ValidationError, match="units"):
+        GeoJson.model_validate({"path": str(path), "units": "feet"})
+
+
+def test_room_of_one_part_may_be_written_as_of_several(tmp_path: Path) -> None:
+    one = read_geojson(write(tmp_path, KITCHEN, BEDROOM))
+    shape = KITCHEN["geometry"]
+    several = {"type": "MultiPolygon", "coordinates": [shape["coordinates"]]}
+
+    assert one == read_geojson(write(tmp_path, KITCHEN | {"geometry": several}, BEDROOM))
+
+
+def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
+    assert 0.1 == load_floorplan(write(tmp_path, KITCHEN), 0.1).lattice.cell
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (3, r"features\[0\] is 3: a Feature is expected"),
+        (feature(None, "room"), r"features\[0\]\.geometry is null"),
+        (feature(point(1, 1), "room"), r'of a room is "Point": Polygon, MultiPolygon is expected'),
+        (feature(box(0, 0, 1, 1), "rom"), "unknown kind \"rom\": did you mean 'room'"),
+        (feature(box(0, 0, 1, 1), ["room"]), "unknown kind"),  # type: ignore[arg-type]
+        (feature({"type": "Polygon"}, "room"), "coordinates is null: a list"),
+        (feature({"type": "Polygon", "coordinates": []}, "room"), "is empty"),
+        (feature({"type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}, "room"), "2 different"),
+        (
+            feature(box(0, 0, float("nan"), 1), "room"),
+            r"\[1\] is \[NaN, 0\]: NaN is not a coordinate",
+        ),
+        (feature(box(0, 0, 10**400, 1), "room"), "is not a coordinate"),
+        (feature(box(0, 0, True, 1), "room"), "true is not a coordinate"),
+        (feature(line((1, 1), (1, 1)), "door"), "1 different points: at least 2"),
+        (feature(box(1, 1, 2, 2), "object", blocks="air"), "one of nothing, path, sight"),
+        (feature(box(1, 1, 2, 2), "object", uses=3), r"properties\.uses is 3: a list"),
+        (feature(box(1, 1, 2, 2), "object", heading="up"), "heading"),
+        ({**KITCHEN, "properties": 3}, "properties is 3"),
+    ],
+)
+def test_damaged_feature_is_refused_with_its_place(
+    tmp_path: Path, wrong: Any, message: str
+) -> None:
+    path = write(tmp_path, wrong, KITCHEN)
+
+    with pytest.raises(FloorPlanError, match=message) as caught:
+        read_geojson(path)
+
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "features[0]" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("features", "message"),
+    [
+        ([], "no room and no free space"),
+        ([DOOR], "no room and no free space"),
+        ([KITCHEN, feature(box(-1, -1, 9, 9), "wall")], "all of it is wall"),
+    ],
+)
+def test_file_without_space_is_refused(tmp_path: Path, features: Any, message: str) -> None:
+    with pytest.raises(FloorPlanError, match=message):
+        read(tmp_path, *features)
+
+
+def test_other_json_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    path.write_text('{"type": "Feature"}')
+
+    with pytest.raises(FloorPlanError, match='no GeoJSON plan: "type": "FeatureCollection"'):
+        read_geojson(path)
+
+
+def test_outline_that_crosses_itself_is_repaired_with_a_note(tmp_path: Path) -> None:
+    bow = {"type": "Polygon", "coordinates": [[[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]]}
+
+    plan = read(tmp_path, feature(bow, "room"))
+
+    assert 8 == pytest.approx(plan.area_m2, abs=0.01)
+    assert "features[0].geometry.coordinates touches or crosses itself at (2, 2)" in plan.notes[0]
+
+
+def test_glass_walls_of_imdf_are_seen_through(tmp_path: Path) -> None:
+    def unit(category: str, box: tuple[float, ...]) -> dict[str, Any]:
+        geometry = shapely.geometry.mapping(shapely.box(*box))
+        properties = {"category": category}
+        return {
+            "type": "Feature",
+            "feature_type": "unit",
+            "properties": properties,
+            "geometry": geometry,
+        }
+
+    units = [
+        unit("room", (0, 0, 4, 3)),
+        unit("office", (4.2, 0, 8, 3)),
+        unit("glass", (4, 0, 4.2, 3)),
+    ]
+    plan = load_floorplan(write(tmp_path, *units, units="m"))
+
+    assert 1 == len(plan.glass)
+    assert () == plan.doorways

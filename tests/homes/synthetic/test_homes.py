@@ -1,0 +1,229 @@
+"""Homes by seed: valid, different from each other, and the same on every machine."""
+
+import hashlib
+import json
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from tests.thorough import some
+
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.homes.synthetic.generator import (
+    MAX_CORRIDOR_SHARE,
+    House,
+    generate,
+    outline_corners,
+    outline_kind,
+)
+from fleet2d.homes.synthetic.program import SIZES, Style, Wishes
+from fleet2d.homes.synthetic.slicing import Box, boxes_overlap, inner_walls
+from fleet2d.homes.synthetic.source import Synthetic
+
+SEEDS = some(range(60), 3)
+# They change when the generator draws other homes; then stored runs can't be reproduced.
+DIGESTS = {
+    0: "d54386c96cfb23b2",
+    1: "32955f2916b507a0",
+    7: "790d7635f1cf6377",
+    12: "f1d2e03033b31163",
+    133: "2ac8a2f4349c8bd4",
+    2147483648: "b6c926f14c3804f5",
+}
+PRIVATE = {"bedroom", "bathroom", "toilet", "wardrobe"}
+
+
+@cache
+def home(seed: int, **settings: object) -> FloorPlan:
+    return Synthetic(seed=seed, **settings).load()
+
+
+def reachable_rooms(plan: FloorPlan) -> set[int]:
+    links = [door.rooms for door in plan.doorways]
+    reached = {plan.room_at(*plan.entrance).index}
+    for _ in plan.rooms:
+        reached |= {a for pair in links for a in pair if reached & set(pair)}
+    return reached
+
+
+def content(house: House) -> str:
+    """The digest of the content of a floor plan, independent of how plans are stored."""
+    gaps = [(*gap.wall, gap.low, gap.high, gap.leaf) for gap in (*house.gaps, house.front_door)]
+    kinds = [brief.kind for brief in house.briefs]
+    return hashlib.sha256(json.dumps([kinds, house.boxes, gaps]).encode()).hexdigest()[:16]
+
+
+def house_of(seed: int) -> House:
+    return generate(seed, Wishes(), Style())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_home_is_in_one_part_for_a_body_and_every_room_can_be_reached_by_doorways(
+    seed: int,
+) -> None:
+    plan = home(seed)
+    assert () == plan.notes
+    assert 1 == len(plan.polygons)
+    assert set(range(len(plan.rooms))) == reachable_rooms(plan)
+    # Free space that a disc of 0.25 m can be in stays in one part, with a piece in every room.
+    scale = plan.lattice.units_per_m
+    space = shapely.buffer(plan.polygons[0], -0.25 * scale, join_style="mitre")
+    assert "Polygon" == space.geom_type
+    for room in plan.rooms:
+        assert shapely.intersects_xy(space, *plan.lattice.to_lattice(room.anchor_xy)), room.name
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed: int) -> None:
+    plan = home(seed)
+    assert all(door.width_m >= 0.7 - 1e-9 for door in plan.doorways)
+    front = next(door for door in plan.doorways if door.name == "front_door")
+    assert 0.95 == pytest.approx(front.width_m)
+    assert front.rooms[0] == front.rooms[1] == plan.room_at(*plan.entrance).index
+    inner = [door for door in plan.doorways if door is not front]
+    assert all(door.rooms[0] != door.rooms[1] for door in inner)
+    # No route leads through a bathroom or a bedroom, except to a room that belongs to it.
+    for room in (room for room in plan.rooms if room.type in PRIVATE):
+        doors = [door for door in inner if room.index in door.rooms]
+        others = {plan.rooms[sum(d.rooms) - room.index].type for d in doors}
+        assert 1 == len(doors) or (room.type == "bedroom" and len(others - PRIVATE) <= 1)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rooms_are_of_sensible_shapes_and_the_kitchen_is_by_where_people_eat(seed: int) -> None:
+    house = house_of(seed)
+    assert not boxes_overlap(house.boxes)
+    for box in house.boxes:
+        assert min(box.clear) >= 20 * SIZES[house.briefs[box.room].kind].side
+    halls = sum(b.clear_area for b in house.boxes if house.briefs[b.room].kind == "hallway")
+    assert halls <= MAX_CORRIDOR_SHARE[1] * sum(box.clear_area for box in house.boxes)
+    plan = home(seed)
+    kinds = [{plan.rooms[i].type for i in door.rooms} for door in plan.doorways]
+    assert {"kitchen", "living_room"} in kinds or {"kitchen", "dining_room"} in kinds
+    baths = [room.area_m2 for room in plan.rooms if room.type == "bathroom"]
+    assert max(baths) < plan.room("living_room_0").area_m2
+
+
+def test_no_two_homes_are_alike() -> None:
+    digests = {home(seed).named("home").digest for seed in SEEDS}
+    assert len(SEEDS) == len(digests)
+
+
+@pytest.mark.parametrize("seed", DIGESTS)
+def test_seed_gives_the_home_that_it_gives_on_every_machine(seed: int) -> None:
+    assert DIGESTS[seed] == content(house_of(seed))
+
+
+@pytest.mark.parametrize(
+    ("area", "bedrooms", "bathrooms"),
+    [(36, 1, 1), (62, 2, 1), (90, 2, 2), (120, 3, 2), (186, 3, 2), (240, 5, 3), (300, 4, 3)],
+)
+def test_area_and_rooms_are_as_requested(area: float, bedrooms: int, bathrooms: int) -> None:
+    for seed in range(4):
+        plan = home(seed, area_m2=area, bedrooms=bedrooms, bathrooms=bathrooms)
+        types = [room.type for room in plan.rooms]
+        assert area == pytest.approx(plan.area_m2, rel=0.05)
+        assert (bedrooms, bathrooms) == (types.count("bedroom"), types.count("bathroom"))
+        assert {"living_room", "kitchen"} <= set(types)
+
+
+@pytest.mark.parametrize("outline", ["rectangle", "L", "T", "U"])
+def test_outline_is_the_requested_one(outline: str) -> None:
+    for seed in range(6):
+        house = generate(seed, Wishes(area_m2=140, bedrooms=3), Style(outline=outline))
+        assert outline == outline_kind(outline_corners(house.boxes))
+
+
+def test_widths_and_open_plan_are_as_requested() -> None:
+    for seed in range(6):
+        settings = {"area_m2": 130, "bedrooms": 3, "door_width": 0.9, "corridor_width": 1.4}
+        house = generate(seed, Wishes(130, 3), Style(None, True, 28, 18))
+        halls = [b for b in house.boxes if house.briefs[b.room].kind == "hallway"]
+        assert {28} == {min(box.clear) for box in halls}
+        plan = home(seed, open_plan=True, **settings)
+        for door in plan.doorways:
+            types = {plan.rooms[index].type for index in door.rooms}
+            if types == {"hallway", "bedroom"}:
+                assert 0.9 == pytest.approx(door.width_m)
+            if types <= {"living_room", "dining_room", "kitchen"} and door.name != "front_door":
+                assert not door.leaf
+                assert door.width_m > 1.5
+
+
+def test_other_settings_leave_the_home_of_a_seed_as_it_is_where_they_agree_with_it() -> None:
+    assert home(3).digest == home(3, area_m2=None).digest
+    assert home(3).digest != home(4).digest
+    assert home(0).digest == Synthetic().load().digest
+
+
+def test_body_walks_from_the_front_door_to_every_room() -> None:
+    for seed in range(4):
+        plan = home(seed)
+        space = Home(plan).space(0.25)
+        start = plan.lattice.to_lattice(plan.entrance).tolist()
+        for room in plan.rooms:
+            goal = plan.lattice.to_lattice(room.anchor_xy).tolist()
+            assert space.part_at(*start) == space.part_at(*goal) >= 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"area_m2": 30, "bedrooms": 8}, "30 m2 can't have 8 bedrooms"),
+        ({"area_m2": 30, "bedrooms": 8}, "30 m2 fits 1 bedroom"),
+        ({"area_m2": 40, "garage": True}, "at least"),
+        ({"area_m2": 450, "bedrooms": 1}, "more bedrooms"),
+        ({"bedrooms": 1, "bathrooms": 5}, "at most 3 bathrooms"),
+    ],
+)
+def test_contradiction_is_refused_with_what_would_fit(settings: dict, words: str) -> None:
+    with pytest.raises(FloorPlanError, match=words):
+        Synthetic(**settings).load()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"area_m2": 10}, {"bedrooms": 0}, {"door_width": 3}, {"corridor_width": 0.2}, {"seed": -1}],
+)
+def test_setting_out_of_range_is_refused(settings: dict) -> None:
+    with pytest.raises(ValueError, match=next(iter(settings))):
+        Synthetic(**settings)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("corridor_width", "300 cm", "expected a width of 0.9 m to 2 m, got 3"),
+        ("door_width", 0.1, "expected a width of 0.7 m to 1.2 m, got 0.1"),
+    ],
+)
+def test_width_out_of_range_is_refused_with_both_limits_and_the_unit(
+    key: str, value: object, message: str
+) -> None:
+    with pytest.raises(ValueError, match=rf"{key}\n *{message}"):
+        Synthetic(**{key: value})
+
+
+def test_walls_between_boxes_are_where_they_touch() -> None:
+    boxes = [Box(0, 0, 0, 40, 40), Box(1, 40, 20, 80, 60), Box(2, 0, 40, 40, 60)]
+    walls = {(wall.first, wall.second, wall.upright, *wall[3:]) for wall in inner_walls(boxes)}
+    assert {
+        (0, 1, True, 40, 20, 38),
+        (0, 2, False, 40, 0, 38),
+        (2, 1, True, 40, 40, 58),
+    } == walls
+
+
+def test_areas_spread_as_those_of_real_homes_do() -> None:
+    from fleet2d.homes.synthetic.program import Choices, settle_wishes
+
+    areas = sorted(
+        settle_wishes(Wishes(), Choices(seed, "wishes"), Style()).area_m2 for seed in range(800)
+    )
+    quartiles = np.percentile(areas, [25, 50, 75]).tolist()
+    assert [89, 141, 206] == pytest.approx(quartiles, rel=0.08)
+    assert all(low <= high for low, high in pairwise(areas))

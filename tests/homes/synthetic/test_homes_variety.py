@@ -1,0 +1,167 @@
+from functools import cache
+
+import pytest
+from tests.homes.synthetic.test_homes import PRIVATE, content
+from tests.thorough import some
+
+import fleet2d
+from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.checkup import checkup
+from fleet2d.floorplan.furnish import furnish
+from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.homes.synthetic.generator import generate
+from fleet2d.homes.synthetic.program import Style, Wishes
+from fleet2d.homes.synthetic.source import Synthetic
+
+
+def room_graph(plan: FloorPlan) -> object:
+    """Return the types of the rooms, and the pairs of types that are linked."""
+    kinds = [room.type for room in plan.rooms]
+    links = [tuple(sorted(kinds[k] for k in link.rooms)) for link in plan.room_graph]
+    return tuple(sorted(kinds)), tuple(sorted(links))
+
+
+@pytest.mark.slow
+def test_small_flats_of_one_size_differ_in_rooms_and_links() -> None:
+    usual = {room_graph(Synthetic(seed=seed, area_m2=50).load()) for seed in range(12)}
+    varied = [Synthetic(seed=seed, area_m2=50, variety=1).load() for seed in range(12)]
+
+    assert len(usual) <= 2
+    assert len({room_graph(plan) for plan in varied}) >= 6
+    assert all(40 <= plan.area_m2 <= 60 for plan in varied)
+
+
+def test_no_variety_is_the_same_home_as_without_the_key() -> None:
+    assert Synthetic(seed=5, area_m2=50).load() == Synthetic(seed=5, area_m2=50, variety=0).load()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("area", [18, 22, 26, 29.9])
+def test_studios_are_one_room_to_live_and_sleep_in_and_a_bathroom(area: float) -> None:
+    kinds = set()
+    for seed in range(6):
+        plan = Synthetic(seed=seed, area_m2=area).load()
+        (living,) = plan.rooms_of_type("bedroom")
+        third = plan.rooms[2].type
+        kinds.add(third)
+
+        assert plan.area_m2 == pytest.approx(area, rel=0.05)
+        assert ["living_room", "bathroom"] == [room.type for room in plan.rooms[:2]]
+        assert (living.type, len(plan.rooms)) == ("living_room", 3)
+        assert 1 == len(plan.rooms_of_type("kitchen"))
+        assert 1 == Home(plan).space(0.25).parts
+        assert 1 == sum(door.name == "front_door" for door in plan.doorways)
+        things = {thing.type for thing in furnish(plan).objects_in(living)}
+        assert {"bed", "single_bed"} & things
+        assert third == "kitchen" or {"stove", "sink", "fridge"} & things
+    assert kinds <= {"kitchen", "entryway"}
+    assert area < 24 or len(kinds) == 2
+
+
+def test_studio_with_a_bedroom_or_another_outline_is_refused() -> None:
+    with pytest.raises(FloorPlanError, match="20 m2 can't have 1 bedroom"):
+        Synthetic(area_m2=20, bedrooms=1).load()
+    with pytest.raises(FloorPlanError, match=r"another floorplan\.outline"):
+        Synthetic(area_m2=20, outline="U").load()
+    with pytest.raises(ValueError, match="area_m2"):
+        Synthetic(area_m2=17)
+
+
+def test_people_sleep_in_the_living_room_of_a_furnished_studio() -> None:
+    run = fleet2d.run(
+        {
+            "floorplan": {"type": "synthetic", "area_m2": 20, "seed": 2, "furnish": True},
+            "simulation": {"duration": {"days": 1}, "seed": 3},
+            "users": {"u": {"type": "routine", "persona": "works_from_home"}},
+            "metrics": {"room_share": {}},
+        }
+    )
+
+    assert run.metrics["room_share"]["u"]["living_room_0"] > 0.5
+    assert not any("bedroom" in note for note in run.notes)
+
+
+SECOND = some(range(200), 10)
+
+
+@cache
+def second(seed: int, **settings: object) -> FloorPlan:
+    return Synthetic(seed=seed, edition=2, **settings).load()
+
+
+@pytest.mark.parametrize("seed", SECOND)
+def test_home_of_edition_2_is_whole_and_no_way_leads_through_a_private_room(seed: int) -> None:
+    plan = second(seed)
+    assert () == plan.notes
+    assert 1 == Home(plan).space(0.25).parts
+    assert not checkup(plan)
+    assert {"living_room", "kitchen", "bedroom", "bathroom"} <= {
+        kind for room in plan.rooms for kind in room.labels
+    }
+    inner = [door for door in plan.doorways if door.name != "front_door"]
+    for room in plan.rooms:
+        doors = [door for door in inner if room.index in door.rooms]
+        kinds = {plan.rooms[sum(door.rooms) - room.index].type for door in doors}
+        assert doors
+        assert (
+            room.type not in PRIVATE
+            or 1 == len(doors)
+            or (room.type == "bedroom" and len(kinds - PRIVATE) <= 1)
+            or (room.type == "bathroom" and "laundry" not in kinds)
+        )
+
+
+@pytest.mark.parametrize(("area", "bedrooms", "bathrooms"), [(62, 2, 1), (140, 3, 2), (300, 5, 3)])
+def test_home_of_edition_2_has_the_area_and_rooms_that_are_requested(
+    area: float, bedrooms: int, bathrooms: int
+) -> None:
+    for seed in range(3):
+        plan = second(seed, area_m2=area, bedrooms=bedrooms, bathrooms=bathrooms)
+        kinds = [room.type for room in plan.rooms]
+
+        assert area == pytest.approx(plan.area_m2, rel=0.05)
+        assert (bedrooms, bathrooms) == (kinds.count("bedroom"), kinds.count("bathroom"))
+
+
+@pytest.mark.slow
+def test_small_flats_of_edition_2_rarely_have_the_same_rooms_and_links() -> None:
+    graphs = {room_graph(second(seed, area_m2=50, variety=1)) for seed in range(15)}
+    assert len(graphs) >= 11
+
+
+@pytest.mark.slow
+def test_large_homes_of_edition_2_are_more_compact() -> None:
+    def longest(plan: FloorPlan) -> float:
+        x0, y0, x1, y1 = plan.bounds
+        return max(x1 - x0, y1 - y0)
+
+    usual = [longest(Synthetic(seed=seed, area_m2=250).load()) for seed in range(6)]
+    compact = [longest(second(seed, area_m2=250)) for seed in range(6)]
+
+    assert sum(compact) < 0.93 * sum(usual)
+    assert max(compact) < 28
+
+
+def test_rooms_of_edition_2_are_not_all_rectangles_and_many_homes_have_no_corridor() -> None:
+    plans = [second(seed) for seed in SECOND]
+    shares = [room.area_m2 / area_of(room.bounds) for plan in plans for room in plan.rooms]
+    without = [plan for plan in plans if not plan.rooms_of_type("hallway")]
+
+    assert sum(share < 0.9 for share in shares) > 0.1 * len(shares)
+    assert 0.2 < len(without) / len(plans) < 0.9
+
+
+def area_of(bounds: tuple[float, float, float, float]) -> float:
+    x0, y0, x1, y1 = bounds
+    return (x1 - x0) * (y1 - y0)
+
+
+@pytest.mark.parametrize(
+    ("seed", "digest"),
+    [(0, "ea8f0f5bf0708c55"), (7, "e8acd52fc9a622d5"), (133, "dc367acb73d12441")],
+)
+def test_seed_of_edition_2_gives_the_home_that_it_gives_on_every_machine(
+    seed: int, digest: str
+) -> None:
+    assert digest == content(generate(seed, Wishes(), Style(edition=2)))

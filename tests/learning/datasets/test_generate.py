@@ -1,0 +1,262 @@
+"""Making data sets: the same content always, resumable, and read by other programs."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from tests.learning.datasets.small import SOURCE, make
+
+import fleet2d
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.learning.datasets.generate import _bars
+from fleet2d.learning.datasets.reader import Dataset
+from fleet2d.learning.datasets.tasks import windows
+
+
+def records(data: Dataset) -> dict[str, str]:
+    return {name: file.sha256 for name, file in data.manifest.files.items()}
+
+
+@pytest.mark.slow
+def test_tables_are_there_for_every_split(data: Dataset) -> None:
+    assert ("train", "test") == data.splits
+    runs = data.arrow("runs", "train").to_pydict()
+    assert [0, 1, 2] == runs["run"]
+    assert [0.25] * 3 == runs["days"]
+    labels = data.arrow("labels", "train").to_pydict()
+    users = sum(len(names) for names in runs["users"])
+    assert users * 360 == len(labels["place"])
+    assert {"routine", "last_seen"} == set(data.arrow("beliefs", "test")["model"].to_pylist())
+
+
+def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
+    labels = data.polars("labels", "test").collect()
+    places, following = labels["place"].to_list(), labels["next_place"].to_list()
+    steps, next_steps = labels["step"].to_list(), labels["next_step"].to_list()
+
+    for k in range(len(places) - 1):
+        if next_steps[k] is None or next_steps[k] > steps[k + 1]:
+            assert places[k] == places[k + 1]
+        elif next_steps[k + 1] != next_steps[k]:
+            assert following[k] != places[k]
+    assert following[-1] is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [2, 4])
+def test_the_content_is_the_same_for_any_number_of_workers(
+    data: Dataset, tmp_path: Path, workers: int
+) -> None:
+    assert records(data) == records(make(tmp_path / "again", workers))
+
+
+@pytest.mark.slow
+def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
+    out = tmp_path / "killed"
+    source = tmp_path / "small.json"
+    source.write_text(json.dumps(SOURCE))
+    code = (
+        "import fleet2d, json, sys;"
+        " fleet2d.dataset(json.load(open(sys.argv[1])), sys.argv[2], workers=1)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, str(source), str(out)])
+    for _ in range(2000):
+        if list((out / "unfinished").glob("*.arrow")) or process.poll() is not None:
+            break
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    with pytest.raises(InputError, match="run the same command again"):
+        fleet2d.open_dataset(out)
+    for change in ({"seed": 5}, {"runs_per_shard": 3}):
+        with pytest.raises(InputError, match="of another file"):
+            fleet2d.dataset({**SOURCE, **change}, out)
+
+    assert records(data) == records(make(out))
+    assert not (out / "unfinished").exists()
+
+
+@pytest.mark.slow
+def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
+    data: Dataset, tmp_path: Path
+) -> None:
+    out, parts = tmp_path / "damaged", tmp_path / "damaged" / "unfinished"
+    shutil.copytree(data.root, out)
+    (out / "dataset.json").unlink()
+    parts.mkdir()
+    (parts / "plan.txt").write_text(f"{data.manifest.plan} {fleet2d.__version__}")
+    files = data.manifest.files
+    whole = {
+        name: files[name].model_dump() for name in files if "train" not in name or "00001" in name
+    }
+    for record in ("train-00001", "test-00000"):
+        (parts / f"{record}.json").write_text(json.dumps(whole))
+    (parts / "train-00000.json").write_text('{"../secret": {"bytes": 0}}')
+    (parts / "000000.arrow").write_bytes(b"no table")
+    (parts / "000001.arrow").write_bytes(b"no table")
+
+    for number in range(2):
+        with pytest.raises(InputError, match=rf"00000{number}\.arrow was damaged, and is deleted"):
+            make(out)
+    (parts / "train-00000.json").write_text("[")
+
+    assert records(data) == records(make(out))
+
+
+def test_a_complete_one_is_opened_and_another_refused(data: Dataset) -> None:
+    assert records(make(data.root)) == records(data)
+    with pytest.raises(InputError, match="holds another data set"):
+        fleet2d.dataset({**SOURCE, "seed": 5}, data.root)
+
+
+def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match="not empty"):
+        make(tmp_path)
+    assert ["thesis.txt"] == [path.name for path in tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "gone"])
+def test_damaged_shards_are_found(data: Dataset, tmp_path: Path, damage: str) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    path = root / "train" / "labels-00001.parquet"
+    content = path.read_bytes()
+    if damage == "gone":
+        path.unlink()
+    else:
+        path.write_bytes(
+            content[:-100] if damage == "cut" else content[:99] + b"\0" + content[100:]
+        )
+    again = fleet2d.open_dataset(root)
+
+    assert ["train/labels-00001.parquet"] == again.verify()
+    if damage != "changed":
+        with pytest.raises(InputError, match=r"labels-00001\.parquet"):
+            again.arrow("labels", "train")
+
+
+@pytest.mark.slow
+def test_a_deleted_file_is_made_again_with_its_shard_only(data: Dataset, tmp_path: Path) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    (root / "train" / "labels-00001.parquet").unlink()
+    written = {path: path.stat().st_ino for path in root.rglob("*-00000.parquet")}
+
+    assert [] == make(root).verify()
+
+    assert written == {path: path.stat().st_ino for path in root.rglob("*-00000.parquet")}
+    assert not (root / "unfinished").exists()
+
+
+def test_a_deleted_file_of_another_version_is_not_made_again(data: Dataset, tmp_path: Path) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    manifest = json.loads((root / "dataset.json").read_text())
+    manifest["versions"]["fleet2d"] = "0.0.1"
+    (root / "dataset.json").write_text(json.dumps(manifest))
+    (root / "test" / "rooms-00000.parquet").unlink()
+
+    with pytest.raises(
+        InputError, match=r"lacks test/rooms-00000.parquet, which Fleet2D 0\.0\.1 can"
+    ):
+        make(root)
+
+
+@pytest.mark.slow
+def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(
+    data: Dataset, tmp_path: Path
+) -> None:
+    root = tmp_path / "copy"
+    shutil.copytree(data.root, root)
+    manifest = json.loads((root / "dataset.json").read_text())
+    manifest["files"]["test/rooms-00000.parquet"]["sha256"] = "0" * 64
+    (root / "dataset.json").write_text(json.dumps(manifest))
+    (root / "test" / "rooms-00000.parquet").unlink()
+
+    with pytest.raises(InputError, match="differ now from those that were written"):
+        make(root)
+
+
+def test_a_day_takes_little_room(data: Dataset) -> None:
+    """Bytes of evidence and labels for a day of one person, beside the fixed part of each file."""
+    table = data.arrow("labels", "train")
+    assert table.nbytes > 0
+    size = sum(
+        file.bytes
+        for name, file in data.manifest.files.items()
+        if name.startswith(("train/evidence", "train/labels"))
+    )
+    days = sum(data.arrow("runs", "train")["days"].to_pylist())
+    assert size / days < 32_000
+
+
+def test_the_card_says_what_is_in_it(data: Dataset) -> None:
+    card = (data.root / "README.md").read_text()
+
+    assert card.startswith("---\nlicense: cc0-1.0\n")
+    assert "| train | 3 | 0.75 | 2 |" in card
+    assert "household: " in card
+    assert (data.root / "pictures" / "place.png").stat().st_size > 1000
+
+
+def test_numbers_of_rooms_are_written_below_their_bars() -> None:
+    figure = Figure()
+    _bars(figure, {"train": {"rooms in a home": Counter({"5": 1, "14": 2})}}, "rooms in a home")
+    axes = figure.axes[0]
+    assert [label.get_ha() for label in axes.get_xticklabels()] == ["center", "center"]
+
+
+def test_workers_share_the_shards(data: Dataset) -> None:
+    whole, *shared = (
+        [part.truth.tolist() for part in windows(data, "train", worker, workers)]
+        for worker, workers in ((0, 1), (0, 2), (1, 2), (5, 6))
+    )
+
+    assert sorted(whole) == sorted(one for part in shared for one in part)
+    assert all(shared[:2])
+
+
+def test_duckdb_and_polars_read_it(data: Dataset) -> None:
+    duckdb = pytest.importorskip("duckdb")
+    pattern = str(data.root / "train" / "labels-*.parquet")
+
+    [(count,)] = duckdb.sql(f"SELECT count(*) FROM '{pattern}'").fetchall()
+
+    assert count == data.polars("labels", "train").collect().height
+
+
+@pytest.mark.parametrize(("table", "split"), [("label", "train"), ("labels", "tests")])
+def test_unknown_tables_and_splits_are_named(data: Dataset, table: str, split: str) -> None:
+    with pytest.raises(InputError, match="tables beliefs, evidence, labels, rooms, runs"):
+        data.arrow(table, split)
+
+
+@pytest.mark.slow
+def test_a_failed_run_keeps_the_others(tmp_path: Path) -> None:
+    """A household that can't live in a home: the message names the scenario, and nothing is lost."""
+    bad: dict[str, Any] = json.loads(json.dumps(SOURCE))
+    bad["vary"] = {
+        "place": {
+            "options": {"none": {"robots.astro.behaviors": [{"type": "patrol", "rooms": ["pool"]}]}}
+        }
+    }
+    with pytest.raises(Fleet2DError):
+        fleet2d.dataset(bad, tmp_path / "bad", workers=1)
+    with pytest.raises(InputError):
+        fleet2d.open_dataset(tmp_path / "bad")
+
+
+def test_steps_of_evidence_are_the_last_of_their_bins(data: Dataset) -> None:
+    steps = np.array(data.arrow("evidence", "train")["step"].to_pylist())
+    assert set((steps + 1) % 60) == {0}

@@ -1,0 +1,130 @@
+"""What a data set is drawn from: fresh people, a seed for each run, and splits that share nothing."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import InputError, ScenarioError
+from fleet2d.learning.datasets.specification import plan_dataset
+
+BASE = {"extends": "bundled:paper", "simulation": {"duration": "2 h"}}
+
+
+def split(runs: int, first: int, *households: Any) -> dict[str, Any]:
+    homes = [{"synthetic": 2, "first": first}]
+    return {"runs": runs, "homes": homes, "households": [list(h) for h in households]}
+
+
+def file(**splits: Any) -> dict[str, Any]:
+    return {"base": BASE, "splits": splits}
+
+
+def test_every_run_has_its_own_seed_and_home_in_turn() -> None:
+    plan = plan_dataset(
+        file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
+    )
+
+    runs = [*plan.runs("train"), *plan.runs("test")]
+    assert [*range(8)] == [run.number for run in runs]
+    assert 8 == len({run.seed for run in runs})
+    assert ["0", "1", "0", "1", "0", "50", "51", "50"] == [run.labels["home"] for run in runs]
+    assert ["ana", "ben"] == list(runs[-1].scenario["users"])
+    assert plan.digest == plan_dataset(plan_source(plan)).digest
+
+
+def plan_source(plan: Any) -> dict[str, Any]:
+    return file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
+
+
+def test_another_seed_draws_other_runs() -> None:
+    source = file(train=split(3, 0, ["retired"], ["student"]))
+
+    one, other = plan_dataset(source), plan_dataset({**source, "seed": 1})
+
+    seeds = [{run.seed for run in plan.runs("train")} for plan in (one, other)]
+    assert not seeds[0] & seeds[1]
+
+
+@pytest.mark.parametrize(
+    ("test", "words"),
+    [
+        (split(1, 1, ["child"]), r"train and test share 1 home\(s\): home = 1"),
+        (split(1, 9, ["student", "retired"]), r"share 1 persona\(s\): retired"),
+        (split(1, 9, [{"extends": "retired", "pace": 0.8}]), r"share 1 persona\(s\): retired"),
+        (split(1, 9, ["mine.yaml"]), r"share 1 persona\(s\): retired"),
+    ],
+)
+def test_splits_that_overlap_name_what_they_share(
+    test: dict[str, Any], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text("extends: [retired, short_stays]\n")
+    with pytest.raises(InputError, match=words):
+        plan_dataset(file(train=split(1, 0, ["retired"]), test=test))
+
+
+@pytest.mark.parametrize("name", ["../train", "", "a b", "unfinished", "pictures"])
+def test_a_split_is_named_as_its_folder_may_be(name: str) -> None:
+    with pytest.raises(InputError, match="can't be the name of a split"):
+        plan_dataset(file(**{name: split(1, 0, ["retired"])}))
+
+
+def test_a_home_is_the_same_by_any_name() -> None:
+    train, test = split(1, 0, ["retired"]), split(1, 0, ["child"])
+    test["homes"] = [{"values": [0], "key": "floorplan.seed"}]
+
+    with pytest.raises((InputError, ScenarioError)):
+        plan_dataset(file(train=train, test={**test, "homes": train["homes"]}))
+
+
+def test_axes_vary_each_run() -> None:
+    robot = {"options": {"slow": {"robots.astro.speed": 0.3}, "fast": {"robots.astro.speed": 0.8}}}
+
+    plan = plan_dataset({**file(train=split(20, 0, ["retired"])), "vary": {"robot": robot}})
+
+    drawn = {
+        run.labels["robot"]: run.scenario["robots"]["astro"]["speed"] for run in plan.runs("train")
+    }
+    assert {"slow": 0.3, "fast": 0.8} == drawn
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"splitz": {}}, "splits"),
+        ({"splits": {}}, "splits"),
+        ({"base": "bundled:papr"}, "base"),
+        ({"splits": {"train": split(1, 0, ["retird"])}}, "retired"),
+        ({"splits": {"train": split(1, 0, ["retired"] * 9)}}, "household of 9"),
+        ({"beliefs": ["routin"]}, "routine"),
+        (
+            {"splits": {"train": split(1, 0, ["retired"], ["child", "retird"])}},
+            r"train, households: child \+ retird: .*did you mean 'retired'|no persona 'retird'",
+        ),
+        (
+            {
+                "vary": {
+                    "robot": {
+                        "options": {
+                            "one": {"robots.astro.speed": 1},
+                            "two": {"robots.astro.sped": 1},
+                        }
+                    }
+                }
+            },
+            "vary.robot: robot = two: .*unknown key 'sped'",
+        ),
+        ({"vary": {"robot": {"options": {"none": {"robots.astra.speed": 1}}}}}, "astra"),
+    ],
+)
+def test_mistakes_are_named_before_the_first_run(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        plan_dataset({**file(train=split(1, 0, ["retired"])), **change})
+
+
+def test_a_million_runs_are_planned_without_being_drawn() -> None:
+    plan = plan_dataset(file(train=split(1_000_000, 0, ["retired"])))
+
+    assert 62_500 == sum(1 for _ in plan.shards())
+    assert 999_999 == plan.run("train", 999_999).number

@@ -1,0 +1,140 @@
+"""Training: right gradients, the same weights again, and fewer losses than before."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from tests.learning.datasets.small import SOURCE
+from tests.scenes import Cli
+
+from fleet2d.algorithms.presence.learned import PLACE_FEATURES, Weights, shipped_weights
+from fleet2d.errors import InputError
+from fleet2d.kernels import TRACE_FEATURES
+from fleet2d.learning.datasets import training
+from fleet2d.learning.datasets.reader import Dataset
+from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, predict, train
+from fleet2d.learning.datasets.windows import Windows
+
+
+def random_windows(seed: int, places: int = 4, count: int = 300) -> Windows:
+    """People who are where the first feature is largest, and a model that doesn't know."""
+    random = np.random.default_rng(seed)
+    features = random.normal(size=(count, places, TRACE_FEATURES)).astype(np.float32)
+    features[..., -1] = np.log(1 / places)
+    truth = features[..., 0].argmax(axis=1)
+    belief = {"routine": np.full((count, places), 1 / places)}
+    facts = np.zeros((places, PLACE_FEATURES))  # say nothing of a place
+    return Windows(seed, "home", "ana", facts, features, truth, np.arange(count), belief)
+
+
+def loss(weights: Weights, windows: Windows) -> float:
+    belief = predict(weights, windows)[np.arange(len(windows.truth)), windows.truth]
+    return float(-np.log(np.maximum(belief, 1e-6)).mean())
+
+
+def test_gradients_equal_differences() -> None:
+    random = np.random.default_rng(1)
+    [batch] = training._batches([random_windows(1, count=7)], 7)
+    batch = training.WindowBatch(*(np.asarray(part, float) for part in batch[:2]), batch.truth)
+    values = {k: random.normal(size=v.shape) for k, v in training._initial(random, 3).items()}
+    _, gradient = training._gradient(values, batch)
+
+    for name, value in values.items():
+        for at in [tuple(random.integers(0, n) for n in value.shape) for _ in range(5)]:
+            near = []
+            for shift in (-1e-6, 1e-6):
+                moved = {k: v.copy() for k, v in values.items()}
+                moved[name][at] += shift
+                near.append(training._gradient(moved, batch)[0])
+            assert gradient[name][at] == pytest.approx((near[1] - near[0]) / 2e-6, abs=1e-5)
+
+
+def test_what_can_be_learned_is_learned() -> None:
+    seen, unseen = random_windows(1), random_windows(2)
+    settings = TrainingSettings(hidden=8, epochs=30, batch=64, trust=1.0)
+
+    weights = train([seen, random_windows(3, places=7)], [unseen], settings)
+
+    assert loss(weights, unseen) < 0.6 * np.log(4)
+
+
+def test_the_same_seed_gives_the_same_weights() -> None:
+    settings = TrainingSettings(hidden=4, epochs=2)
+    one, other = (train([random_windows(1)], settings=settings) for _ in range(2))
+
+    assert np.array_equal(one.network.first, other.network.first)
+
+
+def test_untrained_weights_leave_the_belief_as_it_is() -> None:
+    windows = random_windows(1)
+    weights = train([windows], settings=TrainingSettings(epochs=1, rate=0.0))
+
+    assert np.abs(predict(weights, windows) - windows.beliefs["routine"]).max() < 1e-6
+
+
+def test_fine_tuning_helps_and_stays_near() -> None:
+    start = train([random_windows(1)], settings=TrainingSettings(hidden=8, epochs=10, batch=64))
+    home = random_windows(5)
+
+    tuned = fine_tune(start, [home])
+
+    assert loss(tuned, home) < loss(start, home)
+    change = np.abs(tuned.network.second - start.network.second).mean()
+    assert change < 0.1 * np.abs(start.network.second).mean()
+
+
+def test_nothing_to_train_on_is_an_error() -> None:
+    with pytest.raises(InputError, match="no windows"):
+        train([])
+
+
+def test_a_data_set_trains_weights_that_a_run_uses(
+    tmp_path: Path, data: Dataset, fleet2d: Cli
+) -> None:
+    folder = str(data.root)
+    own, tuned = tmp_path / "own.npz", tmp_path / "tuned.npz"
+
+    code, out, err = fleet2d(
+        "train", "rtp", f"--on={folder}", f"--out={own}", "--epochs=2", "--hidden=4"
+    )
+    assert (0, "epoch 2" in err) == (code, True), err
+    assert "windows" in out
+    assert Weights.read(own).network.bias.shape == (4,)
+
+    code, _, err = fleet2d("train", "rtp", "--from=learned", f"--on={folder}", f"--out={tuned}")
+    assert 0 == code, err
+    assert Weights.read(tuned).network.bias.shape == shipped_weights().network.bias.shape
+
+    code, out, err = fleet2d("dataset", "score", folder, f"--weights={tuned}")
+    assert 0 == code, err
+    for word in ("rtp (", "tuned.npz ", "next_room (", "time_to_return (", "activity (", "ltp ("):
+        assert word in out
+
+
+def test_the_file_of_a_data_set_is_made_and_the_weights_compared_with_the_shipped(
+    tmp_path: Path, data: Dataset, fleet2d: Cli
+) -> None:
+    """The data set is there already, beside the weights, so it is opened."""
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(SOURCE))
+    shutil.copytree(data.root, tmp_path / "learned_data")
+    options = (f"--on={tmp_path / 'small.yaml'}", f"--out={tmp_path / 'learned.npz'}")
+
+    code, out, err = fleet2d("train", "rtp", *options, "--epochs=1", "--hidden=4")
+
+    assert 0 == code, err
+    assert "learned_data: train 3, test 1 runs" in out
+    [line] = [line for line in out.splitlines() if line.startswith("  log_loss  ")]
+    assert ["routine", "last_seen", "learned", "learned.npz"] == line.split()[1::2]
+
+
+def test_weights_that_could_not_be_written_are_refused_before_training(
+    data: Dataset, tmp_path: Path, fleet2d: Cli
+) -> None:
+    code, _, err = fleet2d(
+        "train", "rtp", "--on", str(data.root), "--out", str(tmp_path / "x/own.npz")
+    )
+
+    assert code == 2
+    assert err == f"error: --out {tmp_path}/x/own.npz: there is no folder {tmp_path}/x\n"

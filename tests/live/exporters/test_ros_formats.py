@@ -1,0 +1,291 @@
+"""What ROS's own libraries read from exported files is what the run stored."""
+
+import json
+import signal
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.live.exporters.worlds import END, FIRST, day, part, poses, rows
+from tests.scenes import process
+
+from fleet2d.errors import RunDirectoryError
+from fleet2d.live.exporters.bags import export_mcap, export_rosbag2
+
+pytest.importorskip("rosbags", reason="the extra ros is not installed")
+BEGIN_NS = 1_767_571_200 * 1_000_000_000  # 2026-01-05T00:00, taken as UTC
+Messages = dict[str, list[tuple[int, Any]]]
+
+
+@pytest.fixture(scope="module")
+def from_mcap(tmp_path_factory: pytest.TempPathFactory) -> Messages:
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    path = tmp_path_factory.mktemp("mcap") / "day.mcap"
+    export_mcap(day(), path, part())
+    messages: Messages = defaultdict(list)
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            messages[channel.topic].append((message.log_time, decoded))
+    return messages
+
+
+def test_statistics_of_a_file_are_in_the_order_of_its_channels(tmp_path: Path) -> None:
+    """Their order was that of a set of names, another one in each process."""
+    from mcap.reader import make_reader
+
+    path = tmp_path / "day.mcap"
+    export_mcap(day(), path, part())
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    channels = list(summary.statistics.channel_message_counts)
+    assert sorted(channels) == channels
+
+
+@pytest.fixture(scope="module")
+def from_bag(tmp_path_factory: pytest.TempPathFactory) -> Messages:
+    from rosbags.highlevel import AnyReader
+
+    path = tmp_path_factory.mktemp("bag") / "day"
+    export_rosbag2(day(), path, part())
+    messages: Messages = defaultdict(list)
+    with AnyReader([path]) as reader:
+        for connection, time, data in reader.messages():
+            decoded = reader.deserialize(data, connection.msgtype)
+            messages[connection.topic].append((time, decoded))
+    return messages
+
+
+@pytest.fixture(params=["mcap", "rosbag2"])
+def messages(request: pytest.FixtureRequest, from_mcap: Messages, from_bag: Messages) -> Messages:
+    return from_mcap if request.param == "mcap" else from_bag
+
+
+def step_of(stamp: Any) -> float:
+    """The step of a stamp of a message; a step is a second."""
+    return stamp.sec + stamp.nanosec / 1e9 - BEGIN_NS / 1e9
+
+
+def heading_of(rotation: Any) -> float:
+    assert 0 == rotation.x == rotation.y
+    return float(2 * np.arctan2(rotation.z, rotation.w))
+
+
+def assert_poses(expected: Any, found: Any) -> None:
+    """Compare steps, places and headings, the latter up to a whole turn."""
+    expected, found = np.array(expected), np.array(found)
+    assert expected.shape == found.shape
+    np.testing.assert_array_equal(expected[:, :3], found[:, :3])
+    turned = (expected[:, 3] - found[:, 3] + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(0, turned, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "frames"),
+    [
+        ("ana", ("map", "ana")),
+        ("ben", ("map", "ben")),
+        ("astro", ("astro/odom", "astro/base_link")),
+    ],
+)
+def test_transforms_are_the_poses_at_home(
+    messages: Messages, name: str, frames: tuple[str, str]
+) -> None:
+    found = []
+    for time, message in messages["/tf"]:
+        for one in message.transforms:
+            if (one.header.frame_id, one.child_frame_id) == frames:
+                place = one.transform.translation
+                assert (time - BEGIN_NS) / 1e9 == step_of(one.header.stamp)
+                found.append(
+                    (
+                        step_of(one.header.stamp),
+                        place.x,
+                        place.y,
+                        heading_of(one.transform.rotation),
+                    )
+                )
+
+    assert found
+    assert_poses(poses(name), found)
+    everywhere = (END - FIRST) // 30
+    assert (name == "astro") == (len(found) == everywhere)  # who is away has no transform
+
+
+def test_frames_form_a_tree_from_the_map(messages: Messages) -> None:
+    ((_, still),) = messages["/tf_static"]
+
+    pairs = {(one.header.frame_id, one.child_frame_id) for one in still.transforms}
+    assert {("map", "astro/odom")} == pairs
+
+
+def test_odometry_has_the_poses_and_the_speeds_between_them(messages: Messages) -> None:
+    found, speeds = [], []
+    for _, message in messages["/astro/odom"]:
+        assert ("astro/odom", "astro/base_link") == (
+            message.header.frame_id,
+            message.child_frame_id,
+        )
+        place = message.pose.pose.position
+        heading = heading_of(message.pose.pose.orientation)
+        found.append((step_of(message.header.stamp), place.x, place.y, heading))
+        speeds.append((message.twist.twist.linear.x, message.twist.twist.linear.y))
+
+    assert_poses(poses("astro"), found)
+    moved = np.hypot(*np.diff(np.array(found)[:, 1:3], axis=0).T)
+    np.testing.assert_allclose(moved / 30, np.hypot(*np.array(speeds)[1:].T), atol=1e-12)
+
+
+def test_map_has_the_free_cells_of_the_plan_at_their_places(messages: Messages) -> None:
+    ((_, grid),) = messages["/map"]
+
+    plan = day().plan
+    free = np.array(grid.data).reshape(grid.info.height, grid.info.width) == 0
+    np.testing.assert_array_equal(plan.free, free)
+    assert plan.lattice.cell == pytest.approx(grid.info.resolution)
+    corner = grid.info.origin.position
+    assert plan.lattice.origin == (corner.x, corner.y)
+    for room in plan.rooms:
+        x, y = room.anchor_xy
+        row = int((y - corner.y) / grid.info.resolution)
+        column = int((x - corner.x) / grid.info.resolution)
+        assert free[row, column], room.name
+
+
+def test_detections_are_the_observations(messages: Messages) -> None:
+    found = []
+    for _, message in messages["/astro/detections"]:
+        for one in message.detections:
+            (likely,) = one.results
+            place = likely.pose.pose.position
+            assert (place.x, place.y) == (one.bbox.center.position.x, one.bbox.center.position.y)
+            heading = heading_of(likely.pose.pose.orientation)
+            found.append(
+                (
+                    step_of(message.header.stamp),
+                    likely.hypothesis.class_id,
+                    place.x,
+                    place.y,
+                    heading,
+                )
+            )
+
+    expected = [
+        (row["step"], row["user"] or "unknown", row["x"], row["y"], row["heading"])
+        for row in rows("observations")
+    ]
+    assert {"ana", "unknown"} <= {who for _, who, *_ in found}
+    by = sorted(expected), sorted(found)
+    assert [row[:4] for row in by[0]] == [row[:4] for row in by[1]]
+    assert_poses([(0, 0, 0, row[4]) for row in by[0]], [(0, 0, 0, row[4]) for row in by[1]])
+
+
+def test_events_and_beliefs_are_the_rows_of_the_tables(messages: Messages) -> None:
+    events = [(step_of(e.stamp), e.name, e.function) for _, e in messages["/events"]]
+    beliefs = [json.loads(message.data) for _, message in messages["/ltp"]]
+
+    assert [(row["step"], row["entity"], row["event"]) for row in rows("events")] == events
+    assert [(row["room"], row["share"]) for row in rows("ltp")] == [
+        (row["room"], row["share"]) for row in beliefs
+    ]
+
+
+def test_messages_are_in_order_of_time(messages: Messages) -> None:
+    for topic, these in messages.items():
+        times = [time for time, _ in these]
+        assert sorted(times) == times, topic
+
+
+def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path: Path) -> None:
+    """Readers without an index find the messages in order, too."""
+    from mcap.reader import make_reader
+
+    path = tmp_path / "day.mcap"
+    said = export_mcap(day(), path, part())
+
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        names = {channel.id: channel.topic for channel in summary.channels.values()}
+        stored = [(c.topic, m) for _, c, m in reader.iter_messages(log_time_order=False)]
+        noon = BEGIN_NS + (FIRST + END) // 2 * 1_000_000_000
+        later = list(reader.iter_messages(topics=["/tf"], starting_at=noon))
+    times = [message.log_time for _, message in stored]
+    assert said.startswith(f"{len(stored):,} messages")
+    assert times == sorted(times)
+    assert (times[0], times[-1]) == (
+        summary.statistics.message_start_time,
+        summary.statistics.message_end_time,
+    )
+    for number, count in summary.statistics.channel_message_counts.items():
+        own = [message.sequence for topic, message in stored if topic == names[number]]
+        assert own == list(range(count))
+    expected = [m.log_time for topic, m in stored if topic == "/tf" and m.log_time >= noon]
+    assert [message.log_time for _, _, message in later] == expected
+
+
+def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path: Path) -> None:
+    line = export_mcap(day(), tmp_path / "day.mcap", part())
+
+    layout = json.loads((tmp_path / "day.layout.json").read_text())
+    assert "day.layout.json" in line
+    topics = layout["configById"]["3D!home"]["topics"]
+    assert {"/map", "/astro/odom", "/astro/detections"} == set(topics)
+
+
+@pytest.mark.parametrize(("export", "name"), [(export_mcap, "d.mcap"), (export_rosbag2, "d")])
+def test_place_that_can_not_be_written_is_named(
+    export: Callable[..., str], name: str, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(RunDirectoryError, match=f"{name} can't be written"):
+        export(day(), tmp_path / "file" / name, part())
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rosbags.rosbag2 import Writer
+from fleet2d.live.exporters.bags import export_rosbag2
+from tests.live.exporters.worlds import day, part
+
+written = []
+write = Writer.write
+
+def write_some(*arguments):
+    written.append(0)
+    if len(written) == 1000:
+        os.kill(os.getpid(), signal.SIGKILL)
+    write(*arguments)
+
+Writer.write = write_some
+export_rosbag2(day(), Path(sys.argv[1]), part())
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_export_leaves_no_bag_and_the_same_command_makes_it(tmp_path: Path) -> None:
+    """Half of a bag stayed, and the same command refused to replace it."""
+    from rosbags.highlevel import AnyReader
+
+    path = tmp_path / "bag"
+    killed = process("-c", KILLED, str(path))
+    assert -signal.SIGKILL == killed.returncode
+    assert ["bag.partial"] == [entry.name for entry in tmp_path.iterdir()]
+
+    export_rosbag2(day(), path, part())
+
+    assert ["bag"] == [entry.name for entry in tmp_path.iterdir()]
+    with AnyReader([path]) as reader:
+        assert reader.message_count > 1000
+    with pytest.raises(RunDirectoryError, match="bag exists: name another folder"):
+        export_rosbag2(day(), path, part())

@@ -1,0 +1,61 @@
+"""CSV, JSON Lines and GeoJSON have the poses and the rows that the run stored."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+from shapely.geometry import LineString, Point
+from tests.live.exporters.worlds import NAMES, day, part, poses, rows
+
+from fleet2d.live.exporters.texts import export_csv, export_geojson, export_jsonl
+
+
+def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
+    export_csv(day(), tmp_path / "day.csv", part())
+
+    table = pd.read_csv(tmp_path / "day.csv", parse_dates=["time"], float_precision="round_trip")
+    assert table["step"].is_monotonic_increasing
+    for name in NAMES:
+        home = table[(table["entity"] == name) & ~table["away"]]
+        found = home[["step", "x", "y", "heading"]].itertuples(index=False, name=None)
+        assert poses(name) == list(found)
+    away = table[table["away"]]
+    assert {"ana", "ben"} == set(away["entity"])
+    assert away[["x", "y", "room"]].isna().all(axis=None)
+    assert pd.Timestamp("2026-01-05 06:00") == table["time"].min()
+
+
+def test_json_lines_have_all_records_in_order_of_time(tmp_path: Path) -> None:
+    export_jsonl(day(), tmp_path / "day.jsonl", part())
+
+    lines = [json.loads(line) for line in (tmp_path / "day.jsonl").read_text().splitlines()]
+    assert sorted(line["step"] for line in lines) == [line["step"] for line in lines]
+    for name in NAMES:
+        found = [one for one in lines if one["record"] == "pose" and one["entity"] == name]
+        keys = ("step", "x", "y", "heading")
+        assert poses(name) == [tuple(p[key] for key in keys) for p in found if not p["away"]]
+    for table in ("events", "observations", "ltp"):
+        found = [dict(line) for line in lines if line["record"] == table]
+        expected = [{k: v for k, v in row.items() if v is not None} for row in rows(table)]
+        for one in found:
+            del one["record"]
+        assert [row | {"time": row["time"].isoformat()} for row in expected] == found
+
+
+def test_geojson_has_the_home_the_ways_and_the_events(tmp_path: Path) -> None:
+    path = tmp_path / "day.geojson"
+    export_geojson(day(), path, part())
+
+    features = json.loads(path.read_text())["features"]
+    ways = [f for f in features if f["properties"]["kind"] == "way"]
+    seen = {point for f in ways for point in map(tuple, f["geometry"]["coordinates"])}
+    walked = {(round(x, 4), round(y, 4)) for name in NAMES for _, x, y, _ in poses(name)}
+    assert seen <= walked
+    assert all(LineString(f["geometry"]["coordinates"]).length > 0 for f in ways)
+    events = [f for f in features if f["properties"]["kind"] == "event"]
+    assert len(rows("events")) == len(events)
+    free = [f for f in features if f["properties"]["kind"] == "free"]
+    assert free
+    places = [Point(f["geometry"]["coordinates"]) for f in events if f["geometry"]]
+    assert places
+    assert all(day().plan.room_at(place.x, place.y) is not None for place in places)

@@ -1,0 +1,94 @@
+"""Furniture, doorways and areas to keep out of are drawn where they are."""
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import shapely
+from matplotlib.colors import to_rgb
+from tests.viewing.pictures.test_floorplan import pixels, words
+
+from fleet2d.floorplan.checkup import checkup
+from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
+from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
+from fleet2d.floorplan.rooms.doorways import DoorLine
+from fleet2d.viewing.pictures.floorplan import FILL_COLORS, SYMBOLS, draw_checkup, draw_floorplan
+
+BOX = shapely.box(0, 0, 8, 6)
+
+
+def home(**parts: object) -> FloorPlan:
+    return FloorPlan.build("home", BOX, [LabelledRegion(("bedroom",), BOX)], **parts)  # type: ignore[arg-type]
+
+
+def test_furniture_is_filled_by_what_it_blocks() -> None:
+    things = [
+        stand_furniture("table", (2.0, 4.0), size=(2.0, 1.0)),
+        stand_furniture("fridge", (6.0, 4.0), size=(0.7, 0.7)),
+    ]
+    table, fridge = pixels(home(objects=things), (2.7, 4.2), (6.2, 3.9), names=False)
+
+    assert np.allclose(to_rgb(FILL_COLORS["path"]), table, atol=0.02)
+    assert np.allclose(to_rgb(FILL_COLORS["sight"]), fridge, atol=0.02)
+
+
+def test_what_blocks_nothing_is_seen_through() -> None:
+    empty, rug = home(), home(objects=[stand_furniture("rug", (2.0, 4.0))])
+
+    assert pixels(empty, (2.0, 4.0), names=False) == pixels(rug, (2.0, 4.0), names=False)
+
+
+def test_door_is_drawn_at_its_line_and_its_swing() -> None:
+    wall = shapely.box(3.9, 0, 4.1, 2).union(shapely.box(3.9, 3, 4.1, 6))
+    free = BOX.difference(wall)
+    shut, gap = (
+        FloorPlan.build("two", free, doorways=[DoorLine((4, 2), (4, 3), leaf=leaf)])
+        for leaf in (True, False)
+    )
+    # The leaf stands open to the left of the line from jamb to jamb.
+    jamb, left = np.array(shut.doorways[0].start), np.array([-0.5, 0.0])
+    leaf = tuple(jamb + left)
+    assert pixels(shut, leaf, names=False) != pixels(gap, leaf, names=False)
+
+
+def test_every_symbol_is_of_a_type_and_inside_its_footprint() -> None:
+    assert set(SYMBOLS) <= set(FURNITURE)
+    for shapes in SYMBOLS.values():
+        for shape in shapes:
+            assert len(shape) in (3, 4)
+            assert all(abs(number) <= 0.5 for number in shape)
+
+
+def test_names_of_rooms_keep_off_the_furniture() -> None:
+    plan = home(objects=[stand_furniture("wardrobe", (4.0, 3.0), size=(4.0, 4.0))])
+
+    assert "wardrobe" in words(plan)
+    assert any("bedroom_0" in text for text in words(plan))
+
+
+def test_check_up_is_drawn_with_numbers_and_sentences(tmp_path: Path) -> None:
+    shed = shapely.box(10, 0, 13, 3)
+    plan = FloorPlan.build(
+        "home",
+        shapely.union_all([BOX, shed]),
+        [LabelledRegion(("bedroom",), BOX), LabelledRegion(("storage",), shed)],
+        no_go=[shapely.box(1, 1, 2, 2)],
+    )
+    first, second = tmp_path / "a.svg", tmp_path / "b.svg"
+    with mpl.rc_context({"svg.fonttype": "none"}):
+        for path in (first, second):
+            draw_checkup(plan, checkup(plan), path)
+
+    assert first.read_bytes() == second.read_bytes()
+    draw_checkup(plan, [], tmp_path / "none.png")
+    draw_floorplan(plan, tmp_path / "plan.png")
+    assert (tmp_path / "none.png").read_bytes() != (tmp_path / "plan.png").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a"])
+def test_check_up_in_another_format_is_refused(name: str, tmp_path: Path) -> None:
+    from fleet2d.errors import InputError
+
+    with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
+        draw_checkup(home(), [], tmp_path / name)

@@ -1,0 +1,102 @@
+"""Pictures of layers: colours where there is something, the same bytes twice, clear errors."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from tests.scenes import flat_path, run, scenario
+from tests.thorough import some
+
+import fleet2d
+from fleet2d.errors import ArtifactError, InputError
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.viewing.pictures.floorplan import floorplan_axes
+from fleet2d.viewing.pictures.layers import draw_layer, layer_on_axes
+
+STARTS = {".png": b"\x89PNG", ".svg": b"<?xml"}
+
+
+@pytest.fixture(scope="module")
+def layer_run() -> Any:
+    content = scenario("3 min", robots={"astro": {"type": "patrol"}})
+    content["floorplan"]["layers"] = {
+        "explored": {"every": "1 min"},
+        "last_seen": {},
+        "dust": {"unit": "g"},
+    }
+    return run(content)
+
+
+def colors(plan: FloorPlan, values: Any, *places: tuple[float, float]) -> list[tuple[float, ...]]:
+    """Draw a layer, or none, and return the colours at places [m]."""
+    figure = Figure(figsize=(8, 8), dpi=100)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
+    floorplan_axes(plan, axes, names=False, title=False)
+    if values is not None:
+        layer_on_axes(plan, values, axes)
+    canvas.draw()
+    image = np.asarray(canvas.buffer_rgba())[::-1, :, :3] / 255
+    at = axes.transData.transform(np.array(places)).astype(int)
+    return [tuple(image[y, x].round(3).tolist()) for x, y in at]
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.int64, np.float64])
+def test_only_cells_with_a_value_are_coloured(dtype: Any) -> None:
+    plan = fleet2d.load_floorplan(flat_path())
+    values = np.full(plan.free.shape, {"b": 0, "i": -1, "f": np.nan}[np.dtype(dtype).kind]).astype(
+        dtype
+    )
+    kitchen = plan.room_of_cell == plan.room("kitchen_0").index
+    values[kitchen] = 1
+    places = ((7.0, 1.0), (1.0, 2.5), (-0.05, 2.0))
+
+    empty, drawn = colors(plan, None, *places), colors(plan, values, *places)
+
+    assert empty[0] != drawn[0]
+    assert empty[1:] == drawn[1:]
+
+
+def test_larger_values_have_another_colour() -> None:
+    plan = fleet2d.load_floorplan(flat_path())
+    values = np.zeros(plan.free.shape)
+    values[:, : values.shape[1] // 2] = 4.5
+
+    left, right = colors(plan, values, (1.0, 2.5), (7.0, 1.0))
+
+    assert left != right
+
+
+@pytest.mark.slow
+def test_png_and_svg_are_written_the_same_twice(layer_run: Any, tmp_path: Path) -> None:
+    cases = [
+        (name, ending)
+        for name in ("dust", "explored.astro", "last_seen.astro")
+        for ending in STARTS
+    ]
+    for name, ending in some(cases, 3):
+        first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+        draw_layer(layer_run, name, first)
+        draw_layer(layer_run, name, second)
+        assert first.read_bytes().startswith(STARTS[ending])
+        assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_layer_of_another_step_is_another_picture(layer_run: Any, tmp_path: Path) -> None:
+    draw_layer(layer_run, "explored.astro", tmp_path / "early.svg", 59)
+    draw_layer(layer_run, "explored.astro", tmp_path / "late.svg")
+    assert (tmp_path / "early.svg").read_bytes() != (tmp_path / "late.svg").read_bytes()
+    assert b"after step 59" not in (tmp_path / "late.svg").read_bytes()
+
+
+def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run: Any, tmp_path: Path) -> None:
+    with pytest.raises(ArtifactError, match="stored no layer 'mud'"):
+        draw_layer(layer_run, "mud", tmp_path / "a.png")
+    with pytest.raises(ArtifactError, match="not stored at step 60"):
+        draw_layer(layer_run, "explored.astro", tmp_path / "a.png", 60)
+    with pytest.raises(InputError, match=r"not as '\.gif'"):
+        draw_layer(layer_run, "dust", tmp_path / "a.gif")
+    assert [] == list(tmp_path.iterdir())

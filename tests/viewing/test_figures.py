@@ -1,0 +1,194 @@
+"""Pictures of moments and stretches, films, reports: written completely, in the requested format."""
+
+from pathlib import Path
+
+import pytest
+from tests.scenes import Cli, scenario
+
+import fleet2d
+from fleet2d.engine.simulation import evidence_of
+from fleet2d.errors import InputError
+from fleet2d.viewing.figures import draw_failure, draw_moment, draw_stretch
+from fleet2d.viewing.film import write_film
+from fleet2d.viewing.report import write_report
+from fleet2d.viewing.stage import Stage
+
+MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".gif": b"GIF8", ".webp": b"RIFF"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
+def test_moment_is_drawn_in_each_format(run_dir: Path, tmp_path: Path, ending: str) -> None:
+    target = tmp_path / f"moment{ending}"
+    draw_moment(fleet2d.open_run(run_dir), 20_000, target)
+    assert target.read_bytes().startswith(MAGIC[ending])
+
+
+@pytest.mark.slow
+def test_same_moment_gives_the_same_bytes_and_another_others(run_dir: Path, tmp_path: Path) -> None:
+    run = fleet2d.open_run(run_dir)
+    contents = []
+    for number, step in enumerate((25_000, 25_000, 30_000)):
+        target = tmp_path / f"{number}.png"
+        draw_moment(run, step, target)
+        contents.append(target.read_bytes())
+    assert contents[0] == contents[1] != contents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["life", "heat", "strip"])
+def test_stretch_is_drawn_as_each_figure(run_dir: Path, tmp_path: Path, kind: str) -> None:
+    target = tmp_path / f"{kind}.png"
+    draw_stretch(fleet2d.open_run(run_dir), 3600, 20_000, target, kind)  # type: ignore[arg-type]
+    assert target.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("step", [-1, 32_400])
+def test_step_outside_the_run_is_refused(run_dir: Path, tmp_path: Path, step: int) -> None:
+    with pytest.raises(InputError, match="its last is 32399"):
+        draw_moment(fleet2d.open_run(run_dir), step, tmp_path / "x.png")
+
+
+def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
+    from datetime import timedelta
+
+    from matplotlib.figure import Figure
+
+    run = fleet2d.open_run(run_dir)
+    stage = Stage(run, 0, 32_400, figure=Figure())
+    stage.show(25_321)
+    path = run.path("astro", timedelta(seconds=1))
+    *_, discs, _, name = stage.body_artists
+    disc = discs.get_paths()[-1].get_extents()
+    assert "astro" == name.get_text()
+    assert (path.x[25_321], path.y[25_321]) == pytest.approx((disc.p0 + disc.p1) / 2)
+
+
+@pytest.mark.parametrize("ending", [".gif", ".webp"])
+def test_film_of_pictures_is_written(run_dir: Path, tmp_path: Path, ending: str) -> None:
+    target = tmp_path / f"film{ending}"
+    frames = write_film(fleet2d.open_run(run_dir), target, 24_000, 25_000, speed=600, height=240)
+    assert frames > 2
+    assert target.read_bytes().startswith(MAGIC[ending])
+    assert [target] == list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir: Path, tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="PyAV is not installed")
+    target = tmp_path / "film.mp4"
+    write_film(fleet2d.open_run(run_dir), target, 0, 7200, speed=600, height=240)
+    with av.open(str(target)) as film:
+        assert 12.0 == pytest.approx(film.duration / 1e6, abs=0.5)
+        frames = sum(1 for _ in film.decode(video=0))
+    assert frames < 12 * 25
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("film.avi", {}, r"\.mp4, \.gif or \.webp"),
+        ("film.mp4", {"speed": 0}, "--speed"),
+        ("film.mp4", {"height": 7}, "--height"),
+    ],
+)
+def test_impossible_film_is_refused(
+    run_dir: Path, tmp_path: Path, name: str, options: dict[str, float], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        write_film(fleet2d.open_run(run_dir), tmp_path / name, 0, 100, **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def report(run_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The report of a run with a note that looks like a script."""
+    run = fleet2d.open_run(run_dir)
+    run.notes.append("<script>alert(1)</script>")
+    target = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(run, target)
+    return target.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, report: str) -> None:
+    run, text = fleet2d.open_run(run_dir), report
+    for words in (
+        str(run.digest),
+        "fleet2d verify",
+        "--again",
+        "bath_door",
+        "sightings · ana",
+        "<img",
+    ):
+        assert words in text
+    assert 3 == text.count("<img")
+    assert '<iframe title="Timeline" sandbox="allow-scripts"' in text
+
+
+@pytest.mark.slow
+def test_report_begins_with_what_is_violated(tmp_path: Path) -> None:
+    changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
+    run = fleet2d.run("bundled:paper", *changes, seed=4)
+    write_report(run, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    verdict = text.index("<b>\u2717 1 of 1 expectation violated: still at Mon 05 Jan 00:00:0")
+    assert text.index("<h1>") < verdict < text.index('<th scope="row">status')
+
+
+def test_report_without_expectations_or_with_a_note_is_calm(report: str) -> None:
+    assert "border-left" not in report.partition("<h2>Timeline")[0]
+    assert "expectation" not in report.partition("<h2>Metrics")[0]
+
+
+def test_report_escapes_what_a_scenario_names(report: str) -> None:
+    assert "<script>" not in report
+    assert "alert(1)" in report
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--at", "noon"], "day 3 18:30"),
+        (["--at", "day 1 03:00", "--layer", "dust"], "one picture at a time"),
+        (["--from", "day 1 05:00", "--to", "day 1 04:00"], "is not before"),
+        (["--fov", "1,1,0"], "for a floor plan"),
+    ],
+)
+def test_show_refuses_what_is_no_picture(
+    fleet2d: Cli, run_dir: Path, words: list[str], message: str
+) -> None:
+    code, _, err = fleet2d("show", run_dir, *words)
+    assert 2 == code
+    assert message in err
+
+
+def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path: Path) -> None:
+    content = scenario(
+        "5 min",
+        users={"ana": {"type": "meander"}},
+        robots={"astro": {"type": "patrol", "dwell": "10 s"}},
+        expect={
+            "off": "never(distance(astro, ana) < 3 m and room(astro) in [kitchen, living_room])"
+        },
+    )
+    simulation = fleet2d.Simulation(content)
+    run = simulation.run()
+    verdict = simulation.verdicts()["off"]
+    evidence = evidence_of(simulation, "off")
+    assert verdict.worst is not None
+    draw_failure(run, verdict.worst.worst, tmp_path / "whole.svg", str(verdict), evidence)
+    draw_failure(run, verdict.worst.worst, tmp_path / "plain.svg", str(verdict), None)
+    whole, plain = ((tmp_path / f"{name}.svg").read_text() for name in ("whole", "plain"))
+
+    assert {"kitchen", "living_room"} == evidence.places - {"ana"}
+    assert (("astro", "ana"),) == evidence.distances
+    distance, room = evidence.signals
+    assert ('distance("astro", "ana")', "m", 3.0) == (distance.text, distance.unit, distance.limit)
+    assert set(room.trace.value.tolist()) <= {0.0, 1.0}
+    gap = distance.trace.at(verdict.worst.worst)
+    assert f"{gap:.2f} m" in whole
+    for text in ("off is violated", f"step {verdict.worst.worst}"):
+        assert text in whole
+        assert text in plain
+    assert "seconds from the failure" in whole
+    assert "seconds from the failure" not in plain

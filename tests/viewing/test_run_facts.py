@@ -1,0 +1,112 @@
+"""What the timeline marks covers the run, and says what the manifest and the table say."""
+
+import itertools
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fleet2d
+from fleet2d.runs.run import Tables
+from fleet2d.runtime.clock import Clock
+from fleet2d.viewing import run_facts
+from fleet2d.viewing.run_facts import (
+    expectation_marks,
+    intervention_marks,
+    marks_of,
+    sightings_of,
+    slow_floors,
+)
+
+STEPS = 1000
+
+
+@given(st.lists(st.tuples(st.integers(0, STEPS - 1), st.integers(0, 50)), max_size=8))
+def test_stretches_of_an_expectation_tile_the_run(starts: list[tuple[int, int]]) -> None:
+    violations = sorted((first, min(STEPS - 1, first + length)) for first, length in starts)
+    marks = expectation_marks("quiet", {"holds": not violations}, violations, STEPS)
+    assert 0 == marks[0]["step"]
+    assert STEPS == marks[-1]["end"]
+    assert all(mark["end"] == following["step"] for mark, following in itertools.pairwise(marks))
+    violated = {
+        step
+        for mark in marks
+        if mark["kind"] == "violated"
+        for step in range(mark["step"], mark["end"])
+    }
+    assert {step for first, last in violations for step in range(first, last + 1)} == violated
+
+
+@pytest.mark.parametrize(
+    ("verdict", "kind"),
+    [
+        ({"holds": True, "decided": True}, "held"),
+        ({"holds": True, "decided": False}, "open"),
+        ({"holds": False, "decided": True}, "violated"),
+        ({"holds": None, "decided": True}, "open"),
+    ],
+)
+def test_expectation_without_violations_is_what_its_verdict_says(
+    verdict: dict[str, bool | None], kind: str
+) -> None:
+    (mark,) = expectation_marks("found", verdict, [], STEPS)
+    assert (0, STEPS, kind) == (mark["step"], mark["end"], mark["kind"])
+
+
+def test_marks_come_from_manifest_and_table() -> None:
+    import pyarrow as pa
+
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
+    table = pa.table({"step": [5], "expectation": ["quiet"], "last_step": [9]})
+    run.tables = Tables(["violations"], {"violations": table}.__getitem__)
+    run.manifest["expectations"] = {"quiet": {"holds": False, "says": "quiet is violated"}}
+    run.manifest["interventions"] = [{"do": "replan", "step": 3, "entity": "astro"}]
+    assert [
+        ("interventions", 3, 4, "intervention", "replan astro"),
+        ("quiet", 0, 5, "held", "quiet is violated"),
+        ("quiet", 5, 10, "violated", "quiet is violated"),
+        ("quiet", 10, 60, "held", "quiet is violated"),
+    ] == [
+        tuple(mark[key] for key in ("lane", "step", "end", "kind", "label"))
+        for mark in marks_of(run)
+    ]
+
+
+def test_interventions_of_a_script_say_so() -> None:
+    (mark,) = intervention_marks([{"do": "shut", "step": 7, "door": "bath_door", "by": "script.0"}])
+    assert ("interventions", 7, 8, "shut bath_door (script.0)") == (
+        mark["lane"],
+        mark["step"],
+        mark["end"],
+        mark["label"],
+    )
+
+
+def test_slow_floors_last_as_long_as_they_were_put() -> None:
+    clock = Clock(datetime(2026, 1, 5), 1_000_000, 3600)
+    area = [[1.0, 1.0], [3.0, 1.0], [3.0, 3.0]]
+    scenario = {"floorplan": {"slows": [{"area": area, "stop": "2 s"}]}}
+    records = [
+        {"do": "put", "step": 5, "entity": "ana"},
+        {"do": "slow", "step": 60, "area": area, "speed": 0.5, "duration": "10 min"},
+        {"do": "slow", "step": 3500, "area": area, "speed": 0.25, "stop": "1 s", "duration": "1 h"},
+    ]
+    assert [
+        (0, 3600, "robots stop for 2 s"),
+        (60, 660, "robots drive at 50%"),
+        (3500, 3600, "robots drive at 25%, robots stop for 1 s"),
+    ] == [(f["step"], f["end"], f["words"]) for f in slow_floors(scenario, records, clock)]
+
+
+def test_sightings_are_the_same_however_they_are_read(
+    run_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = sightings_of(fleet2d.open_run(run_dir))
+    monkeypatch.setattr(run_facts, "BATCH_ROWS", 7)
+    assert whole == sightings_of(fleet2d.open_run(run_dir))
+    run = fleet2d.open_run(run_dir)
+    run.directory = None  # as a run in memory
+    assert whole == sightings_of(run)
+    assert sum(len(lane["first"]) for lane in whole) > 5
