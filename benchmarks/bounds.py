@@ -109,7 +109,7 @@ def least(do: Callable[[], object], times: int, *, imported: bool = False) -> fl
     With `imported` a scenario is read first, so that loading modules isn't counted.
     """
     if imported:
-        from fleet2d.scenario.model import load_scenario
+        from fleet2d.scenario.load import load_scenario
 
         load_scenario("bundled:paper")
     found = []

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.scenario.compose import compose
-from fleet2d.studies.executors import SerialExecutor
+from fleet2d.studies.executors import Crew, SerialExecutor
 from fleet2d.testing.search import FailureSearch, TryJob, read_space
 
 FOLDER = Path(__file__).parent
@@ -43,7 +43,7 @@ EXPECTED = "at_end(output(clearance.metres) > 0)"
 def found(fault: str, budget: int, seed: int, *, is_guided: bool) -> int | None:
     """Return at which try a fault is found; None within the budget."""
     search = FailureSearch(job(fault), budget, seed=seed, is_guided=is_guided)
-    failure = search.run(SerialExecutor())
+    failure = search.run(Crew(SerialExecutor()))
     assert not search.errors, search.errors
     return None if failure is None else failure.number
 

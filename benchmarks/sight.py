@@ -190,10 +190,12 @@ def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[An
 def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
     """Measure and compare what finds the cells in view of a pose."""
     from fleet2d.kernels import cells_in_view
+    from fleet2d.sight import fov
     from fleet2d.sight.fov import Flashlight, LineOfSight
 
+    fov.MEMORY_BYTES = 500e6
     grid, reach = (home.plan.lattice.rows, home.plan.lattice.columns), reach_in(home)
-    flashlight, line = Flashlight(memory_mb=500), LineOfSight()
+    flashlight, line = Flashlight(), LineOfSight()
     fill = best(lambda: [cells_in_view(home.walls, *pose, reach, *grid) for pose in poses])
     kept = best(lambda: [flashlight.cells(home, *pose, reach) for pose in poses])
     some = poses[:20]

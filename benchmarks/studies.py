@@ -14,52 +14,44 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Generator
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
 from fleet2d.configuration.documents import read_document
-from fleet2d.studies.driver import StudyJob, check_study, run_study
-from fleet2d.studies.executors import (
-    Event,
-    Executor,
-    FinishedTask,
-    LocalExecutor,
-    SerialExecutor,
-    TaskSchedule,
-    WorkerJob,
-    WorkerTask,
-)
+from fleet2d.studies.driver import check_study, run_study
+from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor, WorkerTask
 from fleet2d.studies.reader import open_study
-from fleet2d.studies.records import VariantRecord, record_of
+from fleet2d.studies.results import VariantResult, result_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
 HOUR = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
 
 
-class InstantExecutor:
+class InstantExecutor(SerialExecutor):
     """Returns results without simulating: what is left is the driver."""
 
-    workers = 1
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        """Yield a record of usual size for each task; making it is the work of a worker."""
+    def __init__(self) -> None:
+        """Make a result of usual size; making it is the work of a worker."""
         numbers = {f"metric_{i}.ana.value": 0.1 * i for i in range(30)}
         outcome = VariantOutcome("complete", "0" * 64, numbers, {}, {"total": 0.03})
-        header = record_of(WorkerTask(0, 0, ""), outcome).header
-        while (task := tasks.take(self)) is not None:
-            if isinstance(job, StudyJob):
-                own = {"number": task.number, "identity": task.identity}
-                yield FinishedTask(task, VariantRecord({**header, **own}), 1)
-            else:  # set-ups
-                yield FinishedTask(task, "", 1)
+        self._row = result_of(WorkerTask(0, 0, ""), outcome).row
+
+    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return a result for each task, or that its set-up has no problem."""
+        content, tasks, _ = args
+        if b"StudyJob" not in content:
+            return super().submit(lambda: [""] * len(tasks))
+        own = ({"variant": task.number, "identity": task.identity} for task in tasks)
+        return super().submit(lambda: [VariantResult({**self._row, **each}) for each in own])
 
 
-def run(study: Any, folder: Path, executor: Executor) -> float:
+def run(study: Any, folder: Path, executor: Executor, workers: int = 1) -> float:
     """Run a study; return the wall time [s]."""
     start_s = time.perf_counter()
-    run_study(check_study(study), folder, executor)
+    with executor:
+        run_study(check_study(study), folder, Crew(executor, workers))
     return time.perf_counter() - start_s
 
 
@@ -78,7 +70,7 @@ def speedup(folder: Path, days: int = 5, seeds: int = 40) -> None:
     """Print how much faster two workers are than one, their start included."""
     base = {**HOUR, "simulation": {"duration": {"days": days}}}
     study = {"base": base, "axes": {"robots.astro.speed": [0.3, 0.6]}, "replicates": seeds}
-    seconds = {n: run(study, folder / f"workers{n}", LocalExecutor(n)) for n in (1, 2)}
+    seconds = {n: run(study, folder / f"workers{n}", LocalExecutor(n), n) for n in (1, 2)}
     print(
         f"{2 * seeds} variants of {days} days: {seconds[1]:.1f} s by 1 worker, {seconds[2]:.1f} s"
         f" by 2: {seconds[1] / seconds[2]:.2f} times"
@@ -149,7 +141,7 @@ def months(folder: Path, workers: int, *, small: bool = False) -> None:
         file["axes"]["home"]["synthetic"] = 2
         people = file["axes"]["person"]["options"]
         file["axes"]["person"]["options"] = {"office": people["office"]}
-    seconds = run(file, folder / "months", LocalExecutor(workers))
+    seconds = run(file, folder / "months", LocalExecutor(workers), workers)
     counts = open_study(folder / "months").counts
     print(
         f"the paper's {counts.total} variants by {workers} workers:"

@@ -25,7 +25,7 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.logs.layout import read_log
 from fleet2d.logs.layout import read_log as read_detections
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 
 SMALL = {
     "VALUES": 20_000, "FILE_BYTES": 1_000_000, "LEARNED_BYTES": 1 << 20, "TABLE_BYTES": 1 << 20,

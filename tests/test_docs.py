@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from fleet2d.cli.__main__ import app
 from fleet2d.engine.simulation import Simulation
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

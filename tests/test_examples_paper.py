@@ -35,7 +35,7 @@ from matplotlib.container import BarContainer
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.errors import ComponentError, FloorPlanError, InputError
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.specification import read_specification
 

@@ -17,7 +17,7 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.inputs import input_path, open_input, resolved, sha256_of_file, within
 from fleet2d.learning.fit.perception import read_detections
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 
 BASE = "extends: bundled:paper\nsimulation: {duration: 1 min}\n"
 

@@ -23,9 +23,10 @@ ROOT = Path(__file__).parents[1]
 SOURCE = Path(fleet2d.__file__).parent
 LIMBS = limbs()
 REGISTRY = """
-from fleet2d.configuration.components import PACKAGES, components
+from fleet2d.configuration.built_in import COMPONENTS
+from fleet2d.configuration.components import components
 
-for kind in PACKAGES:
+for kind in COMPONENTS:
     components(kind)
 """
 OF_THE_HEART = (

@@ -8,13 +8,22 @@ import pytest
 
 import fleet2d
 
-ROOT = Path(fleet2d.__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("name", fleet2d.__all__)
 def test_every_public_name_can_be_imported(name: str) -> None:
     assert getattr(fleet2d, name) is not None
     assert name in dir(fleet2d)
+
+
+def test_stub_has_the_public_names_with_their_modules() -> None:
+    stub = Path(fleet2d.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    imports = re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)
+
+    assert sorted([name for _, name in imports] + ["__version__"]) == fleet2d.__all__
+    for module, name in imports:
+        assert getattr(import_module(module), name) is getattr(fleet2d, name)
 
 
 def test_unknown_name_is_an_attribute_error() -> None:

@@ -31,7 +31,8 @@ from fleet2d.errors import ArtifactError, Fleet2DError, InputError, ScenarioErro
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import Camera
 from fleet2d.storage.files import is_disk_full, write_atomically
 

@@ -3,7 +3,7 @@
     python tools/mutate.py --number 100 --seed 1 > mutants.jsonl
 
 Modules are chosen evenly by their size, a kind of change and its place by chance. Each mutant runs
-the tests that mirror its module, or else those that name it, until one fails.
+the tests that mirror its module, and then those that name it, until one fails.
 """
 
 import argparse
@@ -115,22 +115,23 @@ def mutant(source: str, generator: random.Random) -> tuple[str, str, int]:
 
 
 def tests_of(module: Path) -> list[str]:
-    """Return the files of tests that mirror a module, or else those that name it."""
+    """Return the files of tests that mirror a module, and then those that name it.
+
+    Where there are neither, they are those that name its package.
+    """
     within = module.relative_to(SOURCE / "fleet2d")
     mirrors = sorted((ROOT / "tests" / within.parent).glob(f"test_{within.stem}*.py"))
-    if mirrors:
-        return [str(path) for path in mirrors]
     name = ".".join(("fleet2d", *within.with_suffix("").parts)).removesuffix(".__init__")
     package, _, stem = name.rpartition(".")
-    for words in ((name, f"from {package} import {stem}"), (package,)):
-        named = [
-            str(path)
-            for path in sorted((ROOT / "tests").rglob("test_*.py"))
-            if any(word in path.read_text(encoding="utf-8") for word in words)
-        ]
-        if named:
-            return named[:8]
-    return []
+    found = mirrors + files_with(name, f"from {package} import {stem}")
+    return [str(path) for path in dict.fromkeys(found or files_with(package))]
+
+
+def files_with(*words: str) -> list[Path]:
+    """Return at most eight files of tests that contain one of some words."""
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    texts = ((path, path.read_text(encoding="utf-8")) for path in files)
+    return [path for path, text in texts if any(word in text for word in words)][:8]
 
 
 def run_tests(module: Path, text: str, tests: list[str], seconds: float) -> tuple[str, str]:

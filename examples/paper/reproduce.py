@@ -40,7 +40,7 @@ from fleet2d.metrics.rtp_score import ALL, GAPS
 from fleet2d.options import Workers
 from fleet2d.runtime.clock import HOUR_S
 from fleet2d.studies.answers import group_means
-from fleet2d.studies.api import make_executor, study
+from fleet2d.studies.api import ExecutorName, study
 from fleet2d.studies.executors import cores
 from fleet2d.studies.figures import COLORS, DARK, draw_interaction
 from fleet2d.studies.progress import progress_bar
@@ -155,8 +155,10 @@ def run_months(name: str, options: PaperOptions) -> Study:
     """
     content = study_content(name, *options.size(name))
     folder = options.folder / name
-    executor = make_executor("serial" if options.workers == 1 else "local", options.workers)
-    months = study(content, folder, executor=executor, fail_fast=True, changed="redo")
+    executor: ExecutorName = "serial" if options.workers == 1 else "local"
+    months = study(
+        content, folder, workers=options.workers, executor=executor, fail_fast=True, changed="redo"
+    )
     if months.counts.failed:
         raise ComponentError(f"a month failed: {months.failures['error'][0]}")
     return months

@@ -14,6 +14,7 @@ namespace fleet2d {
 // People, their evidence, and what is known before it.
 template <int W>
 struct Group {
+    i64 people;  // those of the lanes after them aren't recorded
     std::array<StayModel, W> models;
     std::array<Stretches, W> stretches;
     View<const bool, 2> in_view;            // (views, rooms) whether something of the room is in view

@@ -1,7 +1,6 @@
 #include "coverage.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <stdexcept>
 
 #include "visible_cells.hpp"
@@ -9,7 +8,7 @@
 namespace fleet2d {
 namespace {
 
-constexpr i64 FAR_AWAY = i64{1} << 40;  // lattice units: nobody who is further out sees a home
+constexpr i64 FARTHEST_BODY = i64{1} << 40;  // lattice units: nobody who is further out sees a home
 
 // The key of a pose in the cache.
 struct Stance {
@@ -53,17 +52,30 @@ View<T> cells_of(View<T, 2> grid, const Span& span) {
     return grid[span.row].slice(span.first, span.last + 1);
 }
 
-// One past the last of the equal numbers from index `first` on; four are compared at a time.
-i64 end_of_run(View<const i16> numbers, i64 first) {
-    const u64 same = static_cast<u16>(numbers[first]) * u64{0x0001000100010001};
-    i64 end = first + 1;
-    for (u64 four; end + 4 <= numbers.size(); end += 4) {
-        std::memcpy(&four, &numbers[end], sizeof four);
-        if (four != same) break;
+// Where the runs of equal numbers in the rows of a grid end; each row is looked through when it is first needed.
+class RunEnds {
+public:
+    explicit RunEnds(View<const i16, 2> grid)
+        : grid_(grid), ends_(Array<i32, 2>::empty(grid.shape)), known_(Array<bool>::zeros({grid.size()})) {}
+
+    // (columns,) one past the last number of the run that each belongs to.
+    View<const i32> of(i64 row) {
+        const View<i32> ends = ends_.view()[row];
+        if (known_.view()[row]) return ends;
+        known_.view()[row] = true;
+        const View<const i16> numbers = grid_[row];
+        for (i64 i = numbers.size() - 1; i >= 0; --i) {
+            const bool goes_on = i + 1 < numbers.size() && numbers[i] == numbers[i + 1];
+            ends[i] = goes_on ? ends[i + 1] : static_cast<i32>(i + 1);
+        }
+        return ends;
     }
-    while (end < numbers.size() && numbers[end] == numbers[first]) ++end;
-    return end;
-}
+
+private:
+    View<const i16, 2> grid_;
+    Array<i32, 2> ends_;
+    Array<bool> known_;
+};
 
 // Add cells of one patch, -1 for none.
 void count_cells(i64 patch, i64 count, View<i32> cells) {
@@ -81,7 +93,7 @@ public:
     // The cells that one camera shows from a pose of the robot; valid until the next call.
     const std::vector<Span>& of(i64 camera, View<const i64> pose, i64 step) {
         const Lenses& lenses = setup_.lenses;
-        const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FAR_AWAY, FAR_AWAY); };
+        const auto clamped = [](i64 coordinate) { return std::clamp(coordinate, -FARTHEST_BODY, FARTHEST_BODY); };
         const Pose robot{clamped(pose[0]), clamped(pose[1]), pose[2] & (TURN - 1)};
         return finder_.cells_in_view(
             camera_pose(lenses, camera, robot, step * setup_.step_us),
@@ -111,7 +123,7 @@ void settle_coverage(const CoverageSetup& setup, const PoseCache& cache, View<i6
 class CoverageRecorder {
 public:
     CoverageRecorder(const CoverageSetup& setup, const PoseCache& cache, const CoverageRecord& record)
-        : setup_(setup), cache_(cache), record_(record), cells_(setup) {}
+        : setup_(setup), cache_(cache), record_(record), cells_(setup), run_ends_(setup.patch_of_cell) {}
 
     void record(const Window& window, i64 body, i64 first, i64 end);
 
@@ -133,6 +145,7 @@ private:
     const PoseCache& cache_;
     const CoverageRecord& record_;
     CameraCells cells_;
+    RunEnds run_ends_;
     Stance held_{};
     i64 slot_ = -1;  // of the held pose; -1 for none
     i64 looks_ = 0;  // that aren't added yet
@@ -174,14 +187,15 @@ void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
         for (i64& first : cells_of(record_.first, span)) first = first == NEVER ? step : first;
     }
     if (record_.keeps_last()) std::ranges::fill(cells_of(record_.last, span), step);
-    const View<const i16> patches = cells_of(setup_.patch_of_cell, span);
     if (setup_.cameras() == 1) {
-        for (i64 i = 0, end = 0; i < patches.size(); i = end) {  // neighbours mostly belong to one patch
-            end = end_of_run(patches, i);
-            count_cells(patches[i], end - i, cells);
+        const View<const i32> ends = run_ends_.of(span.row);
+        for (i64 column = span.first, end = 0; column <= span.last; column = end) {
+            end = std::min(i64{ends[column]}, i64{span.last} + 1);
+            count_cells(setup_.patch_of_cell(span.row, column), end - column, cells);
         }
         return;
     }
+    const View<const i16> patches = cells_of(setup_.patch_of_cell, span);
     const View<i64> counted = cells_of(record_.counted, span);
     for (i64 i = 0; i < patches.size(); ++i) {
         if (counted[i] == step) continue;  // another camera shows it, too

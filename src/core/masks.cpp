@@ -55,7 +55,7 @@ i64 follow_ring(View<u8, 2> sides, GridCell corner, Array<i32, 2>& corners, i64 
 }
 
 // Runs of the pixels of a mask in its rows, and which of them are connected.
-class Runs {
+class PixelRuns {
 public:
     struct Run {
         i64 row, begin, end;
@@ -105,7 +105,7 @@ private:
 Array<i32, 2> label_parts(View<const bool, 2> mask, bool diagonal) {
     const auto [rows, columns] = mask.shape;
     const i64 reach = diagonal ? 1 : 0;
-    Runs runs;
+    PixelRuns runs;
     std::size_t below = 0;  // the first run of the row below that may touch the next one
     for (i64 row = 0; row < rows; ++row) {
         const std::size_t first = runs.size();

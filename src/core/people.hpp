@@ -87,12 +87,13 @@ PeoplePlaces follow_people(const PeopleModel& model, const DayEvidence& day, i64
 PeopleSmoothed smooth_people(const PeopleModel& model, const DayEvidence& day, i64 longest, View<const f64, 3> prior,
                              View<const f64, 3> future, const PeopleMoments& moments);
 
-// Call `work(filtered, first)` for groups of people from `first` on; `filtered` is memory for a group of that size.
+// Call `work(filtered, first)` for groups of people from `first` on; `filtered` is memory for a group of that size. The
+// last group may lack people: if it is more than half full, that is quicker than smaller groups.
 template <class Work>
 void in_groups(i64 people, Work work) {
     i64 first = 0;
     const auto go_on = [&]<int W>(Filtered<W> filtered) {
-        for (; widest() >= W && first + W <= people; first += W) work(filtered, first);
+        for (; widest() >= W && 2 * (people - first) > W; first += W) work(filtered, first);
     };
     go_on(Filtered<8>());
     go_on(Filtered<4>());
@@ -120,13 +121,18 @@ struct SharedViews {
         : views(views_), in_view(rooms_in_view(layout, views_)), unknown(Array<i64>::filled({layout.patches()}, -1)) {}
 };
 
+// The person of a lane: the last one, too, stands in for those that a group lacks.
+inline i64 person_of(i64 lane, i64 first, i64 people) { return std::min(first + lane, people - 1); }
+
 // The group of people from `first` on; `now` as in Group.
 template <int W>
 Group<W> group_of(const PeopleModel& model, const std::vector<OwnedStretches>& stretches, const SharedViews& shared,
                   i64 first, const std::array<Array<f64, 3>, W>& now) {
-    const auto number = [first](i64 lane) { return static_cast<std::size_t>(first + lane); };
-    return {for_lanes<W>([&](i64 lane) { return model.of(first + lane); }),
-            for_lanes<W>([&](i64 lane) { return stretches[number(lane)].of(shared.views); }), shared.in_view.view(),
+    const auto of = [&](i64 lane) { return person_of(lane, first, model.size()); };
+    return {std::min(model.size() - first, i64{W}),
+            for_lanes<W>([&](i64 lane) { return model.of(of(lane)); }),
+            for_lanes<W>([&](i64 lane) { return stretches[static_cast<std::size_t>(of(lane))].of(shared.views); }),
+            shared.in_view.view(),
             for_lanes<W>([&](i64 lane) { return now[static_cast<std::size_t>(lane)].view(); }),
             for_lanes<W>([&](i64) { return shared.unknown.view(); })};
 }

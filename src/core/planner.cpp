@@ -9,7 +9,7 @@ namespace {
 
 constexpr i64 MILLION = 1'000'000;
 constexpr int ORDERS = 5;  // drawn before a job is left out
-constexpr i64 ANY = std::numeric_limits<i64>::max();
+constexpr i64 UNBOUNDED = std::numeric_limits<i64>::max();
 
 class Planner {
 public:
@@ -46,7 +46,7 @@ public:
             if (!chosen_[i] || (own.follows() && !comes_after)) continue;
             Draft draft{true, wake_, own.place, 0};
             if (own.starts) {
-                draft.preferred = own.starts->draw(draws_, ANY);
+                draft.preferred = own.starts->draw(draws_, UNBOUNDED);
             } else if (own.place > 0) {
                 draft.preferred = bed - own.takes.middle();
             } else if (comes_after) {

@@ -348,7 +348,7 @@ void smooth_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     for (i64 t = count - 1; t >= 0; --t) backward.step(t, places);
     for (std::size_t lane = 0; lane < W; ++lane) {
         backward.set_ahead(ends[lane].ahead, lane);
-        backward.moments().add_to(ends[lane].moments, lane);
+        if (static_cast<i64>(lane) < group.people) backward.moments().add_to(ends[lane].moments, lane);
     }
 }
 
@@ -363,7 +363,7 @@ Smoothed smooth(const StayModel& model, const Stretches& stretches, View<const f
     Smoothed result{Array<f64, 2>::zeros({count, model.rooms()}), Array<f64, 2>::empty({stages, patches}),
                     Array<f64, 2>::empty({stages, patches})};
     Filtered<1> filtered;
-    smooth_group<1>({{model}, {stretches}, in_view, {now}, {shown}}, filtered, {result.places.view()},
+    smooth_group<1>({1, {model}, {stretches}, in_view, {now}, {shown}}, filtered, {result.places.view()},
                     {Ends{future, result.end, result.ahead, moments}});
     return result;
 }
@@ -376,11 +376,12 @@ PeopleSmoothed smooth_people(const PeopleModel& model, const DayEvidence& day, i
     if (model.size() == 0) return result;
     const SharedViews shared(model.of(0), day.views);
     in_groups(model.size(), [&]<int W>(Filtered<W>& filtered, i64 first) {
-        const auto now = for_lanes<W>([&](i64 lane) { return all_hidden(prior[first + lane]); });
+        const auto of = [&](i64 lane) { return person_of(lane, first, model.size()); };
+        const auto now = for_lanes<W>([&](i64 lane) { return all_hidden(prior[of(lane)]); });
         const Group<W> group = group_of<W>(model, stretches, shared, first, now);
-        const auto places = for_lanes<W>([&](i64 lane) { return result.where.of(first + lane); });
+        const auto places = for_lanes<W>([&](i64 lane) { return result.where.of(of(lane)); });
         const auto ends = for_lanes<W>([&](i64 lane) {
-            const i64 person = first + lane;
+            const i64 person = of(lane);
             return Ends{future[person], result.end[person], result.ahead[person], moments.of(person)};
         });
         side_by_side<W>([&] { smooth_group<W>(group, filtered, places, ends); });

@@ -39,7 +39,7 @@ void follow_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     Steps<W> steps(group);
     ForwardPass<W> pass(group, steps, filtered);
     for (i64 t = 0; t < count; ++t) pass.step(t);
-    for (std::size_t lane = 0; lane < W; ++lane) {
+    for (std::size_t lane = 0; lane < static_cast<std::size_t>(group.people); ++lane) {
         for (i64 t = 0; t < places[lane].size(); ++t) {
             const View<const Lanes<W>> mass = filtered.mass[t + 1];
             const View<f64> row = places[lane][t];
@@ -61,7 +61,7 @@ Array<f64, 2> follow(const StayModel& model, const Stretches& stretches, View<f6
     const Array<bool, 2> in_view = rooms_in_view(model, stretches.views);
     auto places = Array<f64, 2>::zeros({count, model.rooms()});
     Filtered<1> filtered;
-    follow_group<1>({{model}, {stretches}, in_view, {now}, {shown}}, filtered, {places.view()}, {now});
+    follow_group<1>({1, {model}, {stretches}, in_view, {now}, {shown}}, filtered, {places.view()}, {now});
     const View<const u8> last = stretches.shown(count - 1);
     std::copy(last.begin(), last.end(), shown.begin());
     return places;
@@ -171,12 +171,13 @@ PeoplePlaces follow_people(const PeopleModel& model, const DayEvidence& day, i64
     if (model.size() == 0) return result;
     const SharedViews shared(model.of(0), day.views);
     in_groups(model.size(), [&]<int W>(Filtered<W>& filtered, i64 first) {
-        auto states = for_lanes<W>([&](i64 lane) { return all_hidden(now[first + lane]); });
+        const auto of = [&](i64 lane) { return person_of(lane, first, model.size()); };
+        auto states = for_lanes<W>([&](i64 lane) { return all_hidden(now[of(lane)]); });
         const Group<W> group = group_of<W>(model, stretches, shared, first, states);
-        const auto places = for_lanes<W>([&](i64 lane) { return result.of(first + lane); });
+        const auto places = for_lanes<W>([&](i64 lane) { return result.of(of(lane)); });
         const auto after = for_lanes<W>([&](i64 lane) { return states[static_cast<std::size_t>(lane)].view(); });
         side_by_side<W>([&] { follow_group<W>(group, filtered, places, after); });
-        for (std::size_t lane = 0; lane < W; ++lane) {
+        for (std::size_t lane = 0; lane < static_cast<std::size_t>(group.people); ++lane) {
             const View<f64, 2> after = now[first + static_cast<i64>(lane)];
             for (i64 stage = 0; stage < after.size(); ++stage) {
                 for (i64 p = 0; p < after.shape[1]; ++p) {

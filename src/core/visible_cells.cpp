@@ -110,19 +110,19 @@ struct VisibleRows {
 };
 
 // A piece of the visible region, seen from the eye.
-struct Piece {
+struct VisiblePiece {
     Point right, left;  // vectors from the eye to the vertices on its borders
     Point wall;         // where its wall begins
     Point along;        // the vector along the wall
 };
 
-Piece opposite(const Piece& p) {
+VisiblePiece opposite(const VisiblePiece& p) {
     return {{-p.right.x, -p.right.y}, {-p.left.x, -p.left.y}, {-p.wall.x, -p.wall.y}, {-p.along.x, -p.along.y}};
 }
 
 // A row that no cell of a piece is above, and at most one row more than needed. The highest point of a piece is
 // the eye, or where a border meets the wall.
-i64 highest_row(const Piece& piece, i64 eye_x, i64 eye_y, i64 centre) {
+i64 highest_row(const VisiblePiece& piece, i64 eye_x, i64 eye_y, i64 centre) {
     const Point along = piece.along;
     const auto across = static_cast<f64>(along.x * (piece.wall.y - eye_y) - along.y * (piece.wall.x - eye_x));
     const auto height_at = [&](const Point& border) {
@@ -166,7 +166,7 @@ public:
         if (window_.low[eye_row_] <= column && column <= window_.high[eye_row_]) add(eye_row_, column, column);
     }
 
-    void fill(const Piece& piece) {
+    void fill(const VisiblePiece& piece) {
         if (piece.right.y > 0 || piece.left.y > 0) fill_above<1>(piece);
         if (piece.right.y < 0 || piece.left.y < 0) fill_above<-1>(opposite(piece));
         if (at_row_) {
@@ -218,7 +218,7 @@ private:
     // Add the cells of a piece in the rows above the eye (sign 1), or below it (-1). Below, everything is turned
     // by half a turn about the origin, the piece too.
     template <i64 sign>
-    void fill_above(const Piece& piece) {
+    void fill_above(const VisiblePiece& piece) {
         constexpr i64 centre = sign * CELL_CENTRE;
         const i64 eye_x = sign * x_, eye_y = sign * y_;
         const i64 lowest = sign > 0 ? window_.first_row : -window_.last_row;
@@ -261,7 +261,7 @@ private:
 
     // Add the cells of a piece in the row through the eye, to the right of it (sign 1) or to the left (-1).
     template <i64 sign>
-    void fill_row_of_eye(const Piece& piece) {
+    void fill_row_of_eye(const VisiblePiece& piece) {
         if (!(sign * piece.right.y <= 0 && 0 < sign * piece.left.y)) return;
         // In turned coordinates, along +x.
         constexpr i64 centre = sign * CELL_CENTRE;
@@ -287,7 +287,7 @@ private:
 };
 
 // Whether a piece lies beside a half plane through the eye: its left border isn't part of it, the right one is.
-bool is_beside(const Piece& piece, const HalfPlane& plane) {
+bool is_beside(const VisiblePiece& piece, const HalfPlane& plane) {
     return plane.a * piece.right.x + plane.b * piece.right.y < 0 &&
            plane.a * piece.left.x + plane.b * piece.left.y <= 0;
 }
@@ -333,10 +333,10 @@ const std::vector<Span>& CellFinder::cells_in_view(Pose camera, const Reach& rea
         filler.fill_eye();
         for (i64 i = 0; i < pieces.count(); ++i) {
             const WallLine wall = wall_line(mesh_, pieces.wall[i]);
-            const Piece piece{towards_vertex(mesh_, pieces.right[i], x, y),
-                              towards_vertex(mesh_, pieces.left(i), x, y),
-                              wall.start,
-                              {wall.end.x - wall.start.x, wall.end.y - wall.start.y}};
+            const VisiblePiece piece{towards_vertex(mesh_, pieces.right[i], x, y),
+                                     towards_vertex(mesh_, pieces.left(i), x, y),
+                                     wall.start,
+                                     {wall.end.x - wall.start.x, wall.end.y - wall.start.y}};
             if (!is_beside(piece, from_right) && !is_beside(piece, to_left)) filler.fill(piece);
         }
         filler.close();

@@ -2,7 +2,6 @@ from fleet2d.algorithms.algorithm import Algorithm as Algorithm
 from fleet2d.algorithms.algorithm import Present as Present
 from fleet2d.algorithms.algorithm import RoomDistribution as RoomDistribution
 from fleet2d.algorithms.history import History as History
-from fleet2d.configuration.components import register as register
 from fleet2d.configuration.units import Duration as Duration
 from fleet2d.configuration.units import InputPath as InputPath
 from fleet2d.configuration.units import Length as Length
@@ -39,8 +38,8 @@ from fleet2d.live.exporters import export as export
 from fleet2d.metrics.metric import Metric as Metric
 from fleet2d.runs.run import Run as Run
 from fleet2d.runs.run import open_run as open_run
+from fleet2d.scenario.load import load_scenario as load_scenario
 from fleet2d.scenario.model import Scenario as Scenario
-from fleet2d.scenario.model import load_scenario as load_scenario
 from fleet2d.sight.fov import FieldOfView as FieldOfView
 from fleet2d.sight.fov import VisibleRegion as VisibleRegion
 from fleet2d.sight.perception_error import CameraSightings as CameraSightings

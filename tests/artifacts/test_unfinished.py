@@ -5,13 +5,16 @@ import os
 import random
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from tests.thorough import examples
 
+from fleet2d.artifacts.arrow import schema_of, spec_of
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.artifacts.unfinished import (
@@ -291,9 +294,12 @@ def test_two_tables_of_one_name_are_refused(tmp_path: Path) -> None:
     path = directory / FOLDER / JOURNAL_NAME
 
     def rename(frames: list[Frame]) -> None:
-        for kind, description, _ in frames:
+        for at, (kind, description, schema) in enumerate(frames):
             if kind == "table":
-                description["name"] = "every_kind"
+                renamed = replace(
+                    spec_of(pa.ipc.read_schema(pa.py_buffer(schema))), name="every_kind"
+                )
+                frames[at] = kind, description, schema_of(renamed).serialize().to_pybytes()
 
     with_frames(path, rename)
     with pytest.raises(ArtifactError, match=r"journal is damaged \(two tables have the name"):

@@ -19,7 +19,8 @@ from tests.scenes import Cli, every_step, everything, flat_path, fleet2d_process
 
 import fleet2d as package
 from fleet2d.cli import main
-from fleet2d.configuration import components
+from fleet2d.configuration.built_in import COMPONENTS
+from fleet2d.configuration.components import components
 from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.compose import bundled_path
 
@@ -256,12 +257,13 @@ def test_what_is_wrong_does_not_fit_the_schema(
 def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components")
     assert 0 == code
-    for kind in components.PACKAGES:
-        result = components.components(kind)
-        for name, cls in result.items():
+    for kind in COMPONENTS:
+        for name, cls in components(kind).items():
             assert f"{kind}: {name}" in out
             for field in cls.model_fields:
                 assert re.search(rf"^ +{field}:", out, re.MULTILINE), (name, field)
+    assert "    and the keys of Behavior, BeliefBehavior\n" in out
+    assert "shared: Behavior\n" in out
     for word in ("long_term_presence or ltp", "[deg", "dwell", "5 min"):
         assert word in out
 
@@ -270,8 +272,8 @@ def test_components_as_json_are_a_list(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("components", "--json")
     assert 0 == code
     listed = {(entry["kind"], entry["type"]) for entry in json.loads(out)}
-    types = {(kind, name) for kind in components.PACKAGES for name in components.components(kind)}
-    assert types == {entry for entry in listed if entry[0] in components.PACKAGES}
+    types = {(kind, name) for kind in COMPONENTS for name in components(kind)}
+    assert types == {entry for entry in listed if entry[0] in COMPONENTS}
     assert {("behavior", "schedule"), ("floorplan", "bundled"), ("metric", "distance")} <= listed
     assert {("presence_estimator", "fremen"), ("presence_model", "hmm")} <= listed
 

@@ -34,7 +34,7 @@ class Absent:
 sys.meta_path.insert(0, Absent())
 """
 """A `sitecustomize` that hides modules from a process and from the children that it starts."""
-OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun", "mlflow-skinny": "mlflow"}
+OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun"}
 """Modules whose names aren't those of their packages."""
 TOOLS = ("test", "browser", "page", "lint", "docs", "build", "cluster")
 
@@ -111,13 +111,13 @@ LACKING = [
     ("export run run.mcap", "", "ros"),
     ("export run bag", "", "ros"),
     ("export run run.rrd", "", "rerun"),
-    ("study report st", "", "viz"),
+    ("study run study.yaml --out plain-study", "", "study"),
+    ("study status st", "", "study"),
+    ("study report st", "matplotlib", "viz"),
     ("study report st", "polars", "polars|study"),
-    ("study track st --to mlflow", "", "mlflow"),
-    ("study track st --to wandb", "", "wandb"),
-    ("study run study.yaml --out ray --executor ray", "", "ray"),
-    ("study run study.yaml --out slurm --executor slurm", "", "slurm"),
-    ("study tune tune.yaml --out tuned", "", "tune"),
+    ("study run study.yaml --out ray --executor ray", "ray", "ray"),
+    ("study run study.yaml --out slurm --executor slurm", "submitit", "slurm"),
+    ("study tune tune.yaml --out tuned", "optuna", "tune"),
     ("dataset score data --picture forecasts.png", "", "viz"),
     ("live home.yaml --with ws://127.0.0.1:0 --speed 0", "", "live"),
     ("live home.yaml --with rosbridge://127.0.0.1:9 --speed 0", "", "rosbridge"),
@@ -152,7 +152,6 @@ def test_a_command_says_in_one_line_what_to_install(
 PLAIN = (
     "run home.yaml --out plain", "validate home.yaml", "test home.yaml",
     "verify run", "verify run --again", "export run run.csv", "export run run.html", "components",
-    "study run study.yaml --out plain-study --workers 1", "study status st", "study rerun st 0",
     "dataset make people.yaml --out plain-data --workers 1", "dataset score data",
     "train rtp --on data --out weights.npz --epochs 1",
     "live home.yaml --with udp://127.0.0.1:0 --speed 0",

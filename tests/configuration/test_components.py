@@ -13,7 +13,7 @@ import pytest
 from pydantic import Field, PydanticUserError, TypeAdapter, ValidationError
 from tests.own_errors import Missed
 
-from fleet2d.configuration import components as module
+from fleet2d.configuration.built_in import COMPONENTS
 from fleet2d.configuration.components import (
     Component,
     OneOf,
@@ -21,8 +21,8 @@ from fleet2d.configuration.components import (
     ShortForm,
     base_of,
     components,
+    kind_at,
     lookup,
-    register,
     split_short_form,
 )
 from fleet2d.configuration.importing import import_class
@@ -53,16 +53,17 @@ class Fan(Gadget):
 class Shelf(Settings):
     """Holds gadgets."""
 
-    top: Annotated[Component, OneOf("gadget")]
-    others: tuple[Annotated[Component, OneOf("gadget")], ...] = ()
+    top: OneOf[Gadget]
+    others: tuple[OneOf[Gadget], ...] = ()
 
 
 @pytest.fixture(autouse=True)
 def gadgets(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(module, "_REGISTRY", {})
-    monkeypatch.setattr(module, "_ALIASES", {})
-    register("gadget", "lamp", aliases=("light",))(Lamp)
-    register("gadget", "fan")(Fan)
+    names = {"lamp": Lamp, "light": Lamp, "fan": Fan}
+    paths = {name: f"{__name__}:{cls.__name__}" for name, cls in names.items()}
+    monkeypatch.setitem(COMPONENTS, "gadget", paths)
+    for name in ("fan", "lamp"):
+        monkeypatch.setattr(names[name], "type_name", name)
     yield
     sys.modules.pop("own", None)
     sys.modules.pop("helpers", None)
@@ -135,15 +136,26 @@ def test_lookup_of_an_unknown_name_lists_what_exists() -> None:
         lookup("gadget", "lmap")
 
 
-@pytest.mark.parametrize("name", ["lamp", "light"])
-def test_register_refuses_a_taken_name(name: str) -> None:
-    with pytest.raises(ValueError, match="named"):
-        register("gadget", name)(Fan)
+@pytest.mark.parametrize("kind", COMPONENTS)
+def test_every_class_of_the_table_is_of_its_kind_and_knows_its_name(kind: str) -> None:
+    types = components(kind)
+
+    assert all(cls.kind == kind for cls in types.values())
+    assert all(lookup(kind, name) is types[cls.type_name] for name, cls in types.items())
+    assert {lookup(kind, name).type_name for name in COMPONENTS[kind]} <= set(types)
 
 
-def test_register_refuses_another_kind() -> None:
-    with pytest.raises(ValueError, match="can't be a metric"):
-        register("metric", "lamp")(Lamp)
+def test_class_of_a_plugin_that_nobody_looked_up_is_dumped_by_its_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = f"{__name__}:Lamp"
+    entry = EntryPoint("torch", path, "fleet2d.gadget")
+    monkeypatch.setattr(Lamp, "type_name", path)
+    monkeypatch.setattr(
+        "fleet2d.configuration.components._plugins", lambda kind: EntryPoints([entry])
+    )
+
+    assert "torch" == Shelf(top=Lamp()).model_dump()["top"]["type"]
 
 
 def test_base_is_the_class_that_declares_the_kind() -> None:
@@ -325,10 +337,38 @@ class Body(Settings):
     """What an entity looks like to the short form."""
 
     radius: Length = 0.2
-    behaviors: tuple[Annotated[Component, OneOf("gadget")], ...] = ()
+    behaviors: tuple[OneOf[Gadget], ...] = ()
 
 
 SHORT = Annotated[Body, ShortForm()]
+
+
+class House(Settings):
+    """Has gadgets in every form of a field."""
+
+    shelves: dict[str, Shelf]
+    bodies: dict[str, SHORT]
+    spare: OneOf[Gadget] | None = None
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("spare", "gadget"),
+        ("spare.cell", None),
+        ("shelves.a", None),
+        ("shelves.a.top", "gadget"),
+        ("shelves.a.others", None),
+        ("shelves.a.others.0", "gadget"),
+        ("shelves.a.unknown", None),
+        ("bodies.b", "gadget"),
+        ("bodies.b.behaviors.1", "gadget"),
+        ("bodies.b.radius", None),
+        ("nothing.at.all", None),
+    ],
+)
+def test_kind_at_a_path_is_that_of_the_field(path: str, kind: str | None) -> None:
+    assert kind == kind_at(House, path.split("."))
 
 
 @pytest.mark.parametrize(
@@ -383,7 +423,9 @@ def test_file_beside_the_scenario_takes_no_plugin_s_place(
 
 def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.MonkeyPatch) -> None:
     entry = EntryPoint("fox", "no_such_package.foxes:Fox", "fleet2d.gadget")
-    monkeypatch.setattr(module, "_plugins", lambda kind: EntryPoints([entry]))
+    monkeypatch.setattr(
+        "fleet2d.configuration.components._plugins", lambda kind: EntryPoints([entry])
+    )
 
     assert ["fan", "lamp"] == list(components("gadget"))
     with pytest.raises(ScenarioError, match="there is no gadget 'fox'"):

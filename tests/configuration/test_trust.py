@@ -20,6 +20,7 @@ from fleet2d.configuration.trust import (
     running_code,
     stored_code,
 )
+from fleet2d.engine.interrupt import Interruptions
 from fleet2d.entities.plan import data_of
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.interventions import Decide
@@ -218,7 +219,9 @@ def half_a_run(name: str) -> package.Simulation:
         Decide("astro", data_of(simulation.plan("astro").stay().interrupt_on("home_empty")))
     )
     simulation.advance(200)
-    waits = simulation._state.interruptions._held
+    interruptions = simulation._state.find(Interruptions)
+    assert interruptions is not None
+    waits = interruptions._held
     waits[next(iter(waits))[0], name] = False
     return simulation
 

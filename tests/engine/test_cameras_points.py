@@ -13,6 +13,7 @@ from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import U64, Bool, Lenses, PoseBlock, Poses, Reach
+from fleet2d.sight import fov
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
 from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
 
@@ -99,7 +100,9 @@ def test_run_by_a_shared_file_is_the_same(tmp_path: Any) -> None:
     assert 1 == len(list(tmp_path.iterdir()))
 
 
-def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells() -> None:
+def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     users = {name: {"start": room} for name, room in (("ana", "kitchen"), ("ben", "living_room"))}
     robots = {
         "astro": {"type": "patrol", "dwell": "5 s"},
@@ -109,8 +112,9 @@ def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells() -
     expected = stored_without_scenario(content)
 
     assert len(table(run(content), "observations")["step"]) > 50
-    for memory_mb in (64, 0.01):
-        method = {"type": "flashlight", "memory_mb": memory_mb}
+    for memory_bytes in (64e6, 10e3):
+        monkeypatch.setattr(fov, "MEMORY_BYTES", memory_bytes)
+        method = {"type": "flashlight"}
         assert expected == stored_without_scenario({**content, "sight": {"method": method}})
 
 

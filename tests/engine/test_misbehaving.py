@@ -335,7 +335,7 @@ class Writes(Metric):
     """Looks for arrays of the history and the home that it may change."""
 
     needs = frozenset({"evidence", "exposure"})
-    writable: list[str] = []  # noqa: RUF012 - of the whole test
+    writable: list[str] = []
 
     def update(self, history: Any, state: Any) -> None:
         given = {

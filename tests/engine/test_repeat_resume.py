@@ -173,6 +173,7 @@ def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path: Path, name: str) 
         ("rows", [[0, 1, 2, 3]], r"plan: rows\.0"),
         ("rows", [], "can't be followed"),
         ("rows", [[0, -5, 0, 0, 0]], "should be in the home"),
+        ("rows", [[0, 12257, 19200, 0, 0]], "should be in the home"),  # above it, but as wide
         ("rows", [[10**9, 12257, 7521, 0, 0]], "the first at 0 us or before"),
         ("rows", [[0, 12257, 7521, 0, 7]], "away must be 0 or 1"),
         ("walk", [1, 2], "plan: walk"),

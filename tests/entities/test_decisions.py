@@ -12,7 +12,8 @@ import fleet2d
 from fleet2d import Behavior, Plan, Situation
 from fleet2d.entities.behavior import holds, parse_span
 from fleet2d.errors import InputError
-from fleet2d.interventions import Replan
+from fleet2d.interventions import Put, Release, Replan, Send
+from fleet2d.interventions.intervention import Intervention
 
 OWN = __name__
 
@@ -150,6 +151,17 @@ def test_replanning_asks_everybody_anew() -> None:
     simulation.do(Replan("astro"))
     simulation.advance(60)
     assert simulation.actors["astro"].behaviors[0].decisions == [0, 60]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "act", [Put("astro", "bedroom"), Send("astro", "kitchen"), Release("astro"), Replan("astro")]
+)
+def test_who_is_put_elsewhere_or_ordered_decides_at_once(act: Intervention) -> None:
+    simulation = fleet2d.Simulation(home_with([IDLE], "10 min", QUIET))
+    simulation.advance(60)
+    simulation.do(act)
+    simulation.advance(1)
+    assert 60 == simulation.actors["astro"].planned_at  # type: ignore[attr-defined]
 
 
 MONDAY = datetime(2026, 1, 5)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from fleet2d.configuration import components
+from fleet2d.configuration.built_in import COMPONENTS
 from fleet2d.configuration.units import Text
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import advise_type, format_of_file, is_floorplan, load_floorplan
@@ -107,9 +107,9 @@ def test_format_is_recognized_by_the_ending_that_it_declares(
         def load(self) -> FloorPlan:
             return load_floorplan(self.path.read_text(), self.cell)
 
-    components.components("floorplan")
-    kinds = components._REGISTRY["floorplan"]
-    monkeypatch.setitem(components._REGISTRY, "floorplan", {**kinds, "drawn": Drawn})
+    monkeypatch.setitem(COMPONENTS["floorplan"], "drawn", "tests.homes:Drawn")
+    monkeypatch.setattr("tests.homes.Drawn", Drawn, raising=False)
+    monkeypatch.setattr(Drawn, "type_name", "drawn")
     file = tmp_path / "mine.HOME"
     file.write_text("synthetic:7")
 

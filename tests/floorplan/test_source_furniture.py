@@ -9,7 +9,7 @@ from fleet2d.errors import FloorPlanError, ScenarioError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.native import Bundled
 from fleet2d.floorplan.source import Furnishing
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 
 RUG = {"type": "rug", "at": [12.0, 2.0], "size": [1.2, 1.2]}
 

@@ -28,10 +28,10 @@ from fleet2d.learning.fit.perception import read_detections
 from fleet2d.live.messages import parse_message
 from fleet2d.logs.layout import read_log
 from fleet2d.routines.persona import BUNDLED as PERSONAS
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.specification import read_specification
 
-RUN = Path(__file__).parents[1] / "fixtures" / "runs" / "v2"
+RUN = Path(__file__).parents[1] / "fixtures" / "run"
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ def test_scenario_is_refused_within_seconds(tmp_path: Path, name: str) -> None:
 
 def test_a_household_is_read_once_for_all_its_members(tmp_path: Path) -> None:
     """It was read and validated for each of them, which took a minute for some hundreds."""
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     names = [f"u{i}" for i in range(20)]
     (tmp_path / "own.yaml").write_text("extends: retired\npace: 0.9\n")
@@ -118,7 +118,7 @@ def test_a_household_is_read_once_for_all_its_members(tmp_path: Path) -> None:
 def test_a_household_has_a_bound(tmp_path: Path) -> None:
     """Each member is stored with all others in the manifest: 2,500 were too many to read again."""
     from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     members = "".join(f"  u{i}: retired\n" for i in range(101))
     (tmp_path / "house.yaml").write_text(f"members:\n{members}")
@@ -140,7 +140,7 @@ def persona_files(folder: Path, n: int) -> None:
 def test_a_persona_extends_a_bounded_number_of_files(tmp_path: Path, persona: str) -> None:
     """Files that extend the next one twice were read for hours, 2,000 names for 9 s."""
     from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     persona_files(tmp_path, 40)
     text = f"{BASE}users: {{ana: {{type: routine, persona: {persona}}}}}\n"
@@ -164,7 +164,7 @@ def house(folder: Path, members: int) -> Path:
 def test_personas_of_a_household_count_for_each_member(tmp_path: Path) -> None:
     """A household of 100 had a manifest of 284 MB, which nothing could read; 24 of them, 20 GB."""
     from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     assert 20 == len(load_scenario(house(tmp_path, 20)).users) - 1  # and ana
     with pytest.raises(ScenarioError, match=r"FLEET2D_MAX_PERSONA_VALUES=\d+ in the") as caught:
@@ -175,7 +175,7 @@ def test_personas_of_a_household_count_for_each_member(tmp_path: Path) -> None:
 def test_long_texts_of_personas_count_for_each_user(tmp_path: Path) -> None:
     """A text is stored for each user: 60 MB for 2,499 of them were 150 GB of a manifest."""
     from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     (tmp_path / "own.yaml").write_text(f"extends: retired\nabout: {'x' * 10_000_000}\n")
     users = "".join(f"  u{i}: {{type: routine, persona: own.yaml}}\n" for i in range(20))

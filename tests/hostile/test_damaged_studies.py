@@ -22,10 +22,9 @@ from tests.thorough import THOROUGH, some
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-RECORD, RESULTS, TABLE = (
-    "parts/000001.json", "results/000001.parquet", "tables/room_share/000001.parquet",
-)  # fmt: skip
-JSON = ("study.json", RECORD)
+RESULTS = "results/000001.parquet"
+TABLE = "tables/room_share/000001-*.parquet"
+JSON = ("study.json",)
 PLAN = "plan.parquet"
 PARQUET = (PLAN, "scenarios.parquet", "variants.parquet", RESULTS, TABLE)
 COMPARE = [{"metric": "sightings.ana", "against": {SPEED: 0.3}}]
@@ -82,6 +81,12 @@ def _with_number(table: pa.Table, number: int) -> pa.Table:
     return table.set_column(column, "variant", pa.array(numbers, pa.int32()))
 
 
+def _forge(path: Path, files: Any) -> None:
+    """Write results that name other files of tables."""
+    metadata = {"fleet2d.tables": json.dumps(files)}
+    pq.write_table(pq.read_table(path).replace_schema_metadata(metadata), path)
+
+
 def _change_table(path: Path, change: Callable[[pa.Table], pa.Table]) -> None:
     pq.write_table(change(pq.read_table(path)), path)
 
@@ -109,9 +114,8 @@ CASES: list[tuple[str, str, Damage]] = [
         for value in VALUES
     ),
     *(
-        (RECORD, f"{key}={value!r}", lambda p, k=key, v=value: _set_value(p, k, v))
-        for key in ("number", "variants", "files")
-        for value in VALUES
+        (RESULTS, f"tables={value!r}", lambda p, v=value: _forge(p, v))
+        for value in (*VALUES, {"room_share": None}, {"room_share": "\x1b[2J"})
     ),
     *(
         (file, name, lambda p, c=change: _change_table(p, c))
@@ -125,7 +129,7 @@ CASES: list[tuple[str, str, Damage]] = [
             lambda p, n=number: _change_table(p, lambda table: _with_number(table, n)),
         )
         for file in (PLAN, RESULTS)
-        for number in (-5, 2**31 - 1)  # the latter took 2 GB, and the former another's place
+        for number in (-5, 2**31 - 1)  # the former took another's place
     ),
 ]  # type: ignore[misc]
 
@@ -155,7 +159,7 @@ def test_commands_say_in_one_line_what_is_damaged(
     study: Path, tmp_path: Path, fleet2d: Cli, number: int
 ) -> None:
     file, _, damage = CASES[number]
-    damage(study / file)
+    damage(next(study.glob(file)))
     # A report takes a second: of alike cases only some are reported.
     commands = COMMANDS if THOROUGH or number % 77 == 0 else COMMANDS[:2]
     for command, *arguments in commands:
@@ -175,7 +179,7 @@ OF_ITS_PLAN = [n for n, case in enumerate(CASES) if case[0] == PLAN and case[1] 
 @pytest.mark.parametrize("number", sorted({*some(range(1, len(CASES)), 11), *OF_ITS_PLAN[3:5]}))
 def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number: int) -> None:
     file, _, damage = CASES[number]
-    damage(study / file)
+    damage(next(study.glob(file)))
     Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
     code, out, err = fleet2d(
         "study", "run", "study.yaml", "--executor", "serial", "--quiet", "--out", str(study)
@@ -191,8 +195,7 @@ def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number:
         ("study.json", "columns=[]", "report"),
         (RESULTS, "all null", "status"),
         (RESULTS, "number -5", "status"),
-        (RESULTS, f"number {2**31 - 1}", "status"),
-        (PLAN, f"number {2**31 - 1}", "status"),
+        (PLAN, "number -5", "status"),
     ],
 )
 def test_a_contradiction_within_a_file_is_named(
@@ -210,20 +213,14 @@ def test_a_contradiction_within_a_file_is_named(
 # --- Names and links ------------------------------------------------------------------------------
 
 
-def _forge(study: Path, name: str) -> None:
-    record = json.loads((study / RECORD).read_text())
-    record["files"][0]["name"] = name
-    (study / RECORD).write_text(json.dumps(record))
-
-
 @pytest.mark.parametrize(
     "name", ["../precious", "/precious", "study.json", "results/../../precious"]
 )
-def test_a_forged_record_deletes_nothing(study: Path, fleet2d: Cli, name: str) -> None:
+def test_forged_names_of_files_delete_nothing(study: Path, fleet2d: Cli, name: str) -> None:
     """A record that named `../x` or an absolute path had that file deleted by `study run`."""
     precious = study.parent / "precious"
     precious.write_text("keep")
-    _forge(study, str(precious) if name.startswith("/") else name)
+    _forge(study / RESULTS, {"room_share": str(precious) if name.startswith("/") else name})
     Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
     arguments = ("--executor", "serial", "--quiet", "--out", str(study))
     code, _, err = fleet2d("study", "run", "study.yaml", *arguments)
@@ -232,9 +229,9 @@ def test_a_forged_record_deletes_nothing(study: Path, fleet2d: Cli, name: str) -
     assert (study / "study.json").exists()
 
 
-@pytest.mark.parametrize("link", ["partial", "study.json.partial", "parts", "lock"])
+@pytest.mark.parametrize("link", ["results", "study.json.partial", "tables", "lock"])
 def test_nothing_is_written_through_a_link(study: Path, fleet2d: Cli, link: str) -> None:
-    """`partial` as a link to a folder had its files deleted, `study.json.partial` its target."""
+    """`study.json.partial` as a link had its target overwritten."""
     outside = study.parent / "outside"
     outside.mkdir()
     (outside / "precious").write_text("keep")

@@ -158,15 +158,17 @@ def test_a_manifest_that_contradicts_the_tables_is_noticed(
 
 
 def test_a_manifest_without_its_seal_is_not_verified(run: Path, fleet2d: Cli) -> None:
-    """Without the field `seal`, a forged run passed as one of an older version of the format."""
     path = run / "manifest.json"
     content = json.loads(path.read_text())
-    del content["seal"]
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps({**content, "seal": None}))
     assert ["manifest.json: seal"] == differing(run)
     code, out, err = fleet2d("verify", run)
     assert (1, "") == (code, out)
     assert "manifest.json: seal is missing\n" == err
+    del content["seal"]
+    path.write_text(json.dumps(content))
+    with pytest.raises(RunDirectoryError, match="it lacks seal"):
+        verify_run(run)
 
 
 def test_all_that_is_not_part_of_the_run_is_listed(run: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from tests.scenes import scenario
 
 from fleet2d.errors import ScenarioError
 from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 
 MONDAY = datetime(2026, 1, 5)
 HOUR, MINUTE = timedelta(hours=1), timedelta(minutes=1)

@@ -181,13 +181,24 @@ NAMED_TUPLES = {
 }
 
 
+def members_declared_in(core: str, name: str) -> tuple[str, ...]:
+    """The members of a struct of the core, in the order of their declaration."""
+    content = re.search(rf"struct {name}(?: : [\w:, ]+)? \{{\n(.*?)\n\}};", core, re.S)
+    assert content is not None
+    lines = re.sub(r" *//[^\n]*", "", content[1]).splitlines()
+    declared = [line for line in lines if re.match(r"    \w", line) and "(" not in line]
+    names = [re.sub(r"^ *(?:const )?[\w:]+(?:<[^;]*>)? ", "", line) for line in declared]
+    return tuple(re.match(r" *(\w+)", name)[1] for line in names for name in line.split(","))  # type: ignore[index]
+
+
 def test_named_tuples_have_the_members_of_their_structs_in_order() -> None:
     """Tuples become structs by position, so two fields in another order would be taken for each other."""
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "src" / "core").rglob("*.[ch]pp")]
+    core = "\n".join(texts)
     members = {}
-    for path in (ROOT / "src" / "core" / "python").iterdir():
-        text = path.read_text(encoding="utf-8")
-        for match in re.finditer(r"members_of<(\w+)> =\s*std::tuple\((.*?)\);", text, re.S):
-            members[match[1]] = tuple(re.findall(r"::(\w+)", match[2]))
+    for name, count in re.findall(r"members_of<(\w+)> = (\d+);", core):
+        members[name] = members_declared_in(core, name)
+        assert len(members[name]) == int(count)
     del members["Chains"]  # plain tuples of the probabilities, bins and offsets of `PeoplePlaces`
     fields = {
         name: value._fields for name, value in vars(kernels).items() if hasattr(value, "_fields")

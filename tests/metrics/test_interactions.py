@@ -59,16 +59,16 @@ def test_bad_times_count_by_activity_and_annoy() -> None:
 
 
 def test_annoyance_and_burden_fade_between_the_prompts_of_a_run() -> None:
-    months = {"type": "fading", "annoyed_by": 1, "annoyance_lasts": "30 min", "burden_over": "1 h"}
+    months = {"type": "fading", "annoyed_by": 1, "annoyance_lasts": "30 min"}
     person = ana() | {"answers": Scripted(outcomes=("accepted",), months=months)}
     pill = PILL | {"at": [], "every": "1 h", "within": "50 min"}
     _, run = measured(users={"ana": person}, interactions={"pill": pill})
     rows = table(run, "interactions")
     (hours,) = np.diff(rows["asked_at"]) / 3600
 
-    # Each prompt adds 0.5 to annoyance, as she is available with even odds, and 24 to the burden.
+    # Each prompt adds 0.5 to annoyance, as she is available with even odds, and 1/7 to the burden.
     assert [0.5, 0.5 + 0.5 * 0.25**hours] == pytest.approx(rows["annoyance"].tolist())
-    assert [24, 24 + 24 * np.exp(-hours)] == pytest.approx(rows["burden"].tolist())
+    assert [1 / 7, (1 + np.exp(-hours / 168)) / 7] == pytest.approx(rows["burden"].tolist())
 
 
 def test_waking_somebody_is_counted() -> None:

@@ -3,7 +3,7 @@
 from fleet2d.metrics.bodies import Distance
 from fleet2d.metrics.interactions import Interactions
 from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.results import Row, block_of
+from fleet2d.metrics.results import ResultRow, block_of
 
 
 def test_people_are_columns_and_measures_rows() -> None:
@@ -11,9 +11,9 @@ def test_people_are_columns_and_measures_rows() -> None:
 
     block = block_of("requests", Interactions, {"astro": astro})
 
-    kept = Row("kept", ["50.0 %", "100.0 %"], "share of requests")
-    wanted = Row("wanted", ["2", "30"], "requests")
-    assert [Row("requests", ["astro · ana", "astro · ben"], ""), kept, wanted] == block.rows
+    kept = ResultRow("kept", ["50.0 %", "100.0 %"], "share of requests")
+    wanted = ResultRow("wanted", ["2", "30"], "requests")
+    assert [ResultRow("requests", ["astro · ana", "astro · ben"], ""), kept, wanted] == block.rows
     assert 0 == block.hidden
 
 
@@ -38,8 +38,8 @@ def test_subjects_alone_stand_in_one_row() -> None:
     block = block_of("distance", Distance, {"ana": 743.2, "astro": 1095.3})
 
     assert [
-        Row("distance", ["ana", "astro"], ""),
-        Row("", ["743", "1,095"], "m a day"),
+        ResultRow("distance", ["ana", "astro"], ""),
+        ResultRow("", ["743", "1,095"], "m a day"),
     ] == block.rows
 
 
@@ -47,7 +47,7 @@ def test_more_subjects_than_columns_are_rows() -> None:
     block = block_of("distance", Distance, {f"user{i}": float(i) for i in range(7)})
 
     assert 8 == len(block.rows)
-    assert Row("user3", ["3"], "") == block.rows[4]
+    assert ResultRow("user3", ["3"], "") == block.rows[4]
 
 
 def test_measures_without_a_subject_are_rows() -> None:

@@ -89,3 +89,12 @@ def test_rows_of_all_periods_add_up_to_the_observations(stored: Run) -> None:
 
 def test_results_do_not_depend_on_the_period(stored: Run) -> None:
     assert stored.metrics["detections"] == run(content("7 min")).metrics["detections"]
+
+
+def test_without_users_nothing_is_stored() -> None:
+    scene = content()
+    scene["users"] = {}
+    scene["robots"] = {"sharp": scene["robots"]["sharp"]}
+    stored = run(scene)
+    assert {"sharp": {}} == stored.metrics["detections"]
+    assert "detections" not in stored.tables

@@ -2,12 +2,13 @@
 
 from datetime import timedelta
 from importlib.metadata import EntryPoints
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import pytest
 
 from fleet2d.configuration import components
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.built_in import COMPONENTS
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import Duration, InputPath, Length, Share
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.drive import Differential
@@ -63,7 +64,7 @@ class Count(Computation):
 class Smooth(Computation):
     """Smooths another algorithm."""
 
-    inner: Annotated[Component, OneOf("algorithm")]
+    inner: OneOf[Computation]
 
 
 class Tally(Component):
@@ -73,21 +74,23 @@ class Tally(Component):
     of: str
 
 
+STAND_INS: dict[str, dict[str, type[Component]]] = {
+    "sight": {"line_of_sight": LineOfSight},  # defaults that every scenario has
+    "drive": {"differential": Differential},
+    "floorplan": {"houseexpo": File, "he": File, "empty": Empty},
+    "behavior": {"drift": Drift, "tour": Tour},
+    "algorithm": {"count": Count, "smooth": Smooth},
+    "metric": {"tally": Tally},
+}
+
+
 @pytest.fixture
 def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the stand-ins be all the components that there are."""
-    for kind in components.PACKAGES:
-        components.components(kind)  # a built-in imported later would register among the stand-ins
-    monkeypatch.setattr(components, "_REGISTRY", {})
-    monkeypatch.setattr(components, "_ALIASES", {})
-    monkeypatch.setattr(components, "_COMPLETE", set(components.PACKAGES))
     monkeypatch.setattr(components, "_plugins", lambda kind: EntryPoints())
-    register("sight", "line_of_sight")(LineOfSight)  # defaults that every scenario has
-    register("drive", "differential")(Differential)
-    register("floorplan", "houseexpo", aliases=("he",))(File)
-    register("floorplan", "empty")(Empty)
-    register("behavior", "drift")(Drift)
-    register("behavior", "tour")(Tour)
-    register("algorithm", "count")(Count)
-    register("algorithm", "smooth")(Smooth)
-    register("metric", "tally")(Tally)
+    for kind in COMPONENTS:
+        types = STAND_INS.get(kind, {})
+        paths = {name: f"{cls.__module__}:{cls.__qualname__}" for name, cls in types.items()}
+        monkeypatch.setitem(COMPONENTS, kind, paths)
+        for name in reversed(types):  # of two names of a class the first is its own
+            monkeypatch.setattr(types[name], "type_name", name)

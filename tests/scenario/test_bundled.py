@@ -9,7 +9,7 @@ from jsonschema.protocols import Validator
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.compose import BUNDLED, ENTRIES
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.schema import schema
 
 EXAMPLES = sorted(

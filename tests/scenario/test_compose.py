@@ -5,9 +5,11 @@ from typing import Any
 
 import pytest
 
+from fleet2d.configuration.components import kind_at
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario import compose as compose_module
-from fleet2d.scenario.compose import compose, slot_kind
+from fleet2d.scenario.compose import compose
+from fleet2d.scenario.model import Scenario
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
 
@@ -265,8 +267,12 @@ def test_override_adds_an_entry_that_it_declares(overrides: list[str], entry: ob
         ("robots.astro.behaviors", None),
         ("algorithms.ltp", "algorithm"),
         ("metrics.error", "metric"),
+        ("sight.method", "sight"),
+        ("robots.astro.perceives", "evidence_source"),
+        ("robots.astro.cameras.top.perception.errors.outliers", "perception_error"),
+        ("users.ana.answers", "answers"),
         ("simulation", None),
     ],
 )
-def test_slot_kind(path: str, kind: str | None) -> None:
-    assert kind == slot_kind(tuple(path.split(".")))
+def test_kind_of_a_component_is_that_of_its_place(path: str, kind: str | None) -> None:
+    assert kind == kind_at(Scenario, path.split("."))

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from fleet2d.errors import ScenarioError
-from fleet2d.scenario.model import Scenario, SimulationSettings, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario, SimulationSettings
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
 

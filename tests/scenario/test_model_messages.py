@@ -11,7 +11,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
-from fleet2d.scenario.model import describe, explain
+from fleet2d.scenario.load import describe, explain
 
 
 class Inner(Settings):

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from fleet2d.entities.behavior import Behavior
 from fleet2d.scenario.schema import ComponentDescription, describe_components, schema
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
@@ -52,7 +51,28 @@ def test_component_that_holds_its_own_kind_refers_to_it(written: dict[str, Any])
 def test_every_reference_of_the_schema_resolves(written: dict[str, Any]) -> None:
     references = json.dumps(written).split('"#/$defs/')[1:]
 
-    assert {text.partition('"')[0] for text in references} <= set(written["$defs"])
+    for reference in {text.partition('"')[0] for text in references}:
+        place = written["$defs"]
+        for key in reference.split("/"):
+            place = place[key]
+
+
+def test_keys_that_types_inherit_are_described_once() -> None:
+    described = {(d.kind, d.type): d for d in describe_components()}
+
+    for name in ("drift", "tour"):
+        assert ("Behavior",) == described["behavior", name].shares
+    assert {"when": "hours", "cooldown": "duration [s]", "preempts": "true | false"} == {
+        f.name: f.type for f in described["shared", "Behavior"].fields
+    }
+    assert ("BodySettings", "Entity") == described["scenario", "Robot"].shares
+
+
+def test_schema_refers_to_inherited_keys(written: dict[str, Any]) -> None:
+    properties = written["$defs"]["Tour"]["properties"]
+
+    assert {"$ref": "#/$defs/Behavior/properties/when"} == properties["when"]
+    assert "The hours" in written["$defs"]["Behavior"]["properties"]["when"]["description"]
 
 
 def test_components_are_described_with_units_and_defaults() -> None:
@@ -62,13 +82,13 @@ def test_components_are_described_with_units_and_defaults() -> None:
 
     assert ("he",) == plan.aliases
     assert "A plan in a file." == plan.summary
-    assert [("cell", "length [m]", "0.05"), ("path", "path", None), ("border", "whole number", "4")
-            ] == [(f.name, f.type, f.default) for f in plan.fields]  # fmt: skip
-    own = [f for f in tour.fields if f.name not in Behavior.model_fields]
-    assert [("stops", "list of text", "[]"), ("dwell", "duration [s]", "1 min")] == [
-        (f.name, f.type, f.default) for f in own
+    assert [("path", "path", None), ("border", "whole number", "4")] == [
+        (f.name, f.type, f.default) for f in plan.fields
     ]
-    assert {"when": "hours", "cooldown": "duration [s]", "preempts": "true | false"} == {
-        f.name: f.type for f in tour.fields if f not in own
-    }
+    assert [("cell", "length [m]", "0.05")] == [
+        (f.name, f.type, f.default) for f in described["shared", "Plan"].fields
+    ]
+    assert [("stops", "list of text", "[]"), ("dwell", "duration [s]", "1 min")] == [
+        (f.name, f.type, f.default) for f in tour.fields
+    ]
     assert all(isinstance(d, ComponentDescription) for d in described.values())

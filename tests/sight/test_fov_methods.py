@@ -17,6 +17,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels import SUB, Bool, Reach
+from fleet2d.sight import fov
 from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
 
 POINTS = 300
@@ -89,12 +90,18 @@ def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home, tmp_
             assert np.array_equal(in_view, flashlight.sees(home, *pose, reach, nearby))
 
 
-def test_flashlight_stays_within_its_memory_and_gives_the_same_results(home: Home) -> None:
-    small, large = Flashlight(memory_mb=0.01), Flashlight()
+def test_flashlight_stays_within_its_memory_and_gives_the_same_results(
+    home: Home, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = Flashlight()
+    large = Flashlight()
     poses = some_poses(home, 60)
     reach = some_reaches()[0]
     for pose in (*poses, *poses[:5]):
-        assert np.array_equal(small.cells(home, *pose, reach), large.cells(home, *pose, reach))
+        expected = large.cells(home, *pose, reach)
+        with monkeypatch.context() as limited:
+            limited.setattr(fov, "MEMORY_BYTES", 10_000)
+            assert np.array_equal(expected, small.cells(home, *pose, reach))
         assert small.cache_size[1] <= 10_000
     assert 1 <= small.cache_size[0] < large.cache_size[0] <= len(set(poses))
 
@@ -160,9 +167,8 @@ def test_damaged_file_is_an_error_that_tells_what_to_do(
         ({"type": "visibility_polygon", "path": "here"}, "give 'path'"),
         ({"type": "visibility_polygon", "precompute": "al"}, "visited"),
         ({"type": "visibility_polygon", "keep": 0}, "keep"),
-        ({"type": "flashlight", "memory_mb": 0}, "memory_mb"),
         ({"type": "flash_light"}, "did you mean 'flashlight'"),
-        ({"type": "flashlight", "keep": 4}, "memory_mb"),
+        ({"type": "flashlight", "keep": 4}, "keep"),
     ],
 )
 def test_wrong_method_is_an_error_that_names_the_key(settings: dict[str, Any], why: str) -> None:

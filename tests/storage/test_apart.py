@@ -353,7 +353,11 @@ def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch
         apart._decode(changed(), FloorPlan)
 
 
-@pytest.mark.parametrize(("answer", "length"), [(b"garbage", None), (bytes(1 << 26), 2**63)])
+@pytest.mark.parametrize(
+    ("answer", "length"),
+    [(b"garbage", None), (bytes(1 << 26), 2**63)],
+    ids=["garbage", "endless"],
+)
 def test_wrong_answer_is_an_error_of_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: bytes, length: int | None
 ) -> None:

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from tests.scenes import scenario
 
 from fleet2d.studies.directory import Counts
 from fleet2d.studies.driver import check_study, run_study
-from fleet2d.studies.executors import Executor, SerialExecutor
+from fleet2d.studies.executors import Crew, SerialExecutor
 from fleet2d.studies.reader import Study, open_study
 
 SPEED = "robots.astro.speed"
@@ -33,18 +34,42 @@ def small(**keys: Any) -> dict[str, Any]:
     return {"base": base(), "axes": {SPEED: [0.3, 0.6]}, "replicates": 3, **keys}
 
 
+class CountingExecutor(SerialExecutor):
+    """Runs up to a number of tasks in this process, and is then interrupted.
+
+    Attributes:
+        tasks: The tasks that it ran.
+    """
+
+    def __init__(self, most: int = 1000) -> None:
+        self.most = most
+        self.tasks: list[Any] = []
+
+    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if len(self.tasks) == self.most:
+            raise KeyboardInterrupt
+        self.tasks.append(args[1][0])
+        return super().submit(function, *args, **kwargs)
+
+    @property
+    def ran(self) -> list[int]:
+        """The numbers of the tasks that it ran."""
+        return [task.number for task in self.tasks]
+
+
 def run(
-    study: Any, folder: Path, executor: Executor | None = None, **options: Any
+    study: Any, folder: Path, executor: Executor | None = None, workers: int = 1, **options: Any
 ) -> tuple[Counts, Study]:
-    """Run a study in this process, and open it."""
-    counts = run_study(check_study(study), folder, executor or SerialExecutor(), **options)
+    """Run a study in this process, one variant at a time, and open it."""
+    crew = Crew(executor or SerialExecutor(), workers, batch_s=0.0)
+    with crew.executor:
+        counts = run_study(check_study(study), folder, crew, **options)
     return counts, open_study(folder)
 
 
 def digests(study: Study) -> list[str]:
     """The digests of all variants, in order."""
-    column: list[str] = study.arrow_variants.column("digest").to_pylist()
-    return column
+    return study.variants["digest"].to_list()
 
 
 def optional(name: str) -> Any:

@@ -1,21 +1,22 @@
 """Studies and maps from Python."""
 
+import multiprocessing
 import os
 import subprocess
 import sys
-from collections.abc import Generator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import pytest
 from tests.scenes import OWN
-from tests.studies.scenes import SPEED, base, small
+from tests.studies.scenes import SPEED, CountingExecutor, base, small
 
 import fleet2d
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.studies.api import default_location, make_executor, map_runs
-from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule
+from fleet2d.studies.api import default_location, map_runs
+from fleet2d.studies.executors import LocalExecutor
 
 SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
 
@@ -119,13 +120,19 @@ def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
 
 
 def test_a_worker_that_holds_too_much_memory_is_replaced() -> None:
-    executor = LocalExecutor(1, memory_mb=1.0)
-    assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
+    with LocalExecutor(1, memory_mb=1.0) as executor:
+        assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
+
+
+@pytest.mark.slow
+def test_the_process_pool_of_python_runs_scenarios() -> None:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
+        assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
 
 
 def test_an_unknown_executor_is_refused() -> None:
     with pytest.raises(InputError, match="give local, ray, slurm or serial"):
-        make_executor("cloud")  # type: ignore[arg-type]
+        map_runs(seed_of, SEEDED, executor="cloud")  # type: ignore[arg-type]
 
 
 def test_a_study_is_stored_by_its_name() -> None:
@@ -133,15 +140,10 @@ def test_a_study_is_stored_by_its_name() -> None:
 
 
 def test_runs_in_one_home_follow_each_other_and_results_keep_their_order() -> None:
-    class Noting(SerialExecutor):
-        order: ClassVar[list[int]] = []
-
-        def run(self, job: Any, tasks: TaskSchedule) -> Generator[Event]:
-            for event in super().run(job, tasks):
-                self.order.append(event.task.index)
-                yield event
-
+    noting = CountingExecutor()
     homes = [{"type": "synthetic", "seed": home} for home in (1, 2, 1, 2)]
     scenarios = [{**one, "floorplan": home} for one, home in zip(SEEDED, homes, strict=True)]
-    assert [0, 1, 2, 3] == map_runs(seed_of, scenarios, executor=Noting())
-    assert [0, 2, 1, 3] == Noting.order
+    order: list[int] = []
+    results = map_runs(seed_of, scenarios, workers=1, executor=noting, on_result=order.append)
+    assert [0, 1, 2, 3] == results
+    assert [0, 2, 1, 3] == order

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from tests.studies.scenes import base, digests, optional, run, small
 
-from fleet2d.studies import api
+from fleet2d.studies.cluster_executors import RayExecutor
 from fleet2d.studies.driver import Observer
-from fleet2d.studies.records import VariantRecord
+from fleet2d.studies.results import VariantResult
 
 ray = optional("ray")
 pytestmark = [
@@ -33,14 +33,13 @@ def cluster() -> Iterator[Any]:
 
 
 class KillsANode(Observer):
-    """Kills a node of a cluster as soon as workers on both nodes are at work."""
+    """Kills a node of a cluster while workers on both nodes are at work."""
 
-    def __init__(self, cluster: Any, executor: Any) -> None:
-        self.cluster, self.executor, self.has_killed = cluster, executor, False
+    def __init__(self, cluster: Any) -> None:
+        self.cluster, self.has_killed = cluster, False
 
-    def on_result(self, record: VariantRecord) -> None:
-        at_work = sum(bool(actor.tasks) for actor in self.executor._crew)
-        if at_work == 2 and not self.has_killed:
+    def on_result(self, result: VariantResult) -> None:
+        if not self.has_killed:
             self.has_killed = True
             self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)
 
@@ -51,10 +50,10 @@ def test_a_node_that_dies_loses_only_what_it_ran(
     # Runs take longer than a node takes to die: one that had just finished would lose nothing.
     study = small(base=base("4 days"), replicates=5)
     monkeypatch.setenv("RAY_ADDRESS", cluster.address)
-    executor = api.make_executor("ray")
-    assert 2 == executor.workers
-    observer = KillsANode(cluster, executor)
-    counts, killed = run(study, tmp_path / "killed", executor, observer=observer)
+    executor = RayExecutor()
+    assert 2 == executor.cores
+    observer = KillsANode(cluster)
+    counts, killed = run(study, tmp_path / "killed", executor, 3, observer=observer)
     assert (10, 0) == (counts.complete, counts.failed)
     assert observer.has_killed
     _, undisturbed = run(study, tmp_path / "undisturbed")

@@ -1,5 +1,6 @@
 """Array jobs, run by submitit in processes of this machine: results, failures, and who is cancelled."""
 
+import itertools
 import os
 import shutil
 import signal
@@ -17,7 +18,7 @@ from fleet2d.errors import InputError
 from fleet2d.studies import cluster_executors
 from fleet2d.studies.cluster_executors import SlurmExecutor
 from fleet2d.studies.command import slurm_parameters
-from fleet2d.studies.executors import FinishedTask, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
 
 optional("submitit")
 pytestmark = [
@@ -35,8 +36,9 @@ def executor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SlurmExecutor:
     return SlurmExecutor(2, folder=tmp_path / "jobs", cluster="local")
 
 
-def tasks(count: int) -> TaskSchedule:
-    return TaskSchedule(WorkerTask(i, i, "") for i in range(count))
+def ends_of(executor: SlurmExecutor, job: Any, count: int, workers: int = 2) -> list[TaskEnd]:
+    queue = TaskQueue(WorkerTask(number, number, "") for number in range(count))
+    return list(itertools.chain.from_iterable(run_tasks(Crew(executor, workers), job, queue)))
 
 
 @dataclass
@@ -65,36 +67,38 @@ def test_a_study_of_array_jobs_has_the_results_of_one_here(
 
 
 def test_tasks_of_a_job_that_dies_are_run_again(executor: SlurmExecutor, tmp_path: Path) -> None:
-    executor.workers = 1
-    events = list(executor.run(Square(tmp_path, dies_once=2), tasks(8)))
-    assert all(isinstance(event, FinishedTask) for event in events)
-    payloads: dict[int, Any] = {e.task.number: getattr(e, "payload", None) for e in events}
-    assert {i: i**2 for i in range(8)} == payloads
+    ends = ends_of(executor, Square(tmp_path, dies_once=2), 8, workers=1)
+    assert {i: i**2 for i in range(8)} == {end.task.number: end.payload for end in ends}
 
 
 def test_a_task_whose_job_always_dies_is_lost_and_the_others_are_not(
     executor: SlurmExecutor, tmp_path: Path
 ) -> None:
-    events = list(executor.run(Square(tmp_path, dies_always=1), tasks(3)))
-    (lost,) = (event for event in events if isinstance(event, LostTask))
+    ends = ends_of(executor, Square(tmp_path, dies_always=1), 3)
+    (lost,) = (end for end in ends if end.loss is not None)
     assert (1, 3) == (lost.task.number, lost.attempts)
-    assert "in each of 3 attempts" in lost.reason
-    assert {0, 2} == {event.task.number for event in events if isinstance(event, FinishedTask)}
+    assert "in each of 3 attempts" in lost.loss
+    assert {0: 0, 1: None, 2: 4} == {end.task.number: end.payload for end in ends}
 
 
 def test_results_are_read_from_a_folder_that_nobody_knew_before(tmp_path: Path) -> None:
     """They are pickles: in a folder that somebody sent, some could wait for the number of a job."""
     one, other = (SlurmExecutor(1, folder=tmp_path, cluster="local") for _ in range(2))
-    folders = {Path(each._executor.folder) for each in (one, other)}
+    folders = {Path(each._submitit.folder) for each in (one, other)}
     assert 2 == len(folders)
     assert {tmp_path} == {folder.parent for folder in folders}
     assert not any(path for folder in folders for path in folder.glob("*"))
 
 
 def test_closing_cancels_what_runs(executor: SlurmExecutor, tmp_path: Path) -> None:
-    events = executor.run(Square(tmp_path), tasks(3))
-    next(events)
-    events.close()
+    future = executor.submit(time.sleep, 60)
+    while not executor._jobs:
+        time.sleep(0.01)
+    (job,) = executor._jobs
+    executor.shutdown()
+    with pytest.raises(Exception, match=r"."):
+        future.result(timeout=30)
+    assert job.done()
 
 
 def test_parameters_are_read_and_wrong_ones_refused(tmp_path: Path) -> None:
@@ -117,29 +121,27 @@ def test_a_job_that_left_the_queue_without_results_is_lost(
     executor: SlurmExecutor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without accounting, submitit would wait for it for ever."""
-    monkeypatch.setattr(cluster_executors, "_queued_jobs", lambda cluster: set[str]())
+    monkeypatch.setattr(cluster_executors, "_is_queued", lambda *_: False)
     monkeypatch.setattr(cluster_executors, "GRACE_S", 0.0)
-    (event,) = executor.run(Square(tmp_path), tasks(1))
-    assert isinstance(event, LostTask)
-    assert "left the queue without results" in event.reason
+    (end,) = ends_of(executor, Square(tmp_path), 1)
+    assert end.loss is not None
+    assert "left the queue without results" in end.loss
 
 
 def test_a_job_with_results_counts_whatever_the_queue_says(
     executor: SlurmExecutor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster_executors, "_queued_jobs", lambda cluster: set[str]())
-    (event,) = executor.run(Square(tmp_path), tasks(1))
-    assert isinstance(event, FinishedTask)
+    monkeypatch.setattr(cluster_executors, "_is_queued", lambda *_: False)
+    (end,) = ends_of(executor, Square(tmp_path), 1)
+    assert end.loss is None
 
 
-def test_jobs_of_arrays_and_of_their_own_are_found_in_the_queue(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_jobs_are_found_in_the_queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     squeue = tmp_path / "squeue"
-    squeue.write_text("#!/bin/sh\nprintf '12_3\\n13_N/A\\n'\n")
+    squeue.write_text("#!/bin/sh\nprintf '12\\n13\\n'\n")
     squeue.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    assert {"12_3", "13"} == cluster_executors._queued_jobs("slurm")
+    assert {"12", "13"} == cluster_executors._queued_jobs(-1)
 
 
 @dataclass
@@ -191,9 +193,7 @@ def test_tasks_of_a_killed_job_or_node_of_slurm_are_run_again(
 
     killer = threading.Thread(target=wait_and_kill, daemon=True)
     killer.start()
-    events = list(executor.run(SlowSquare(tmp_path), tasks(6)))
+    ends = ends_of(executor, SlowSquare(tmp_path), 6)
     killer.join()
-    assert {i: i**2 for i in range(6)} == {
-        e.task.number: getattr(e, "payload", None) for e in events
-    }
-    assert 2 == max(event.attempts for event in events)
+    assert {i: i**2 for i in range(6)} == {end.task.number: end.payload for end in ends}
+    assert 2 == max(end.attempts for end in ends)

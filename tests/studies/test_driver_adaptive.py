@@ -97,7 +97,7 @@ def test_rounds_that_a_study_did_not_need_are_not_called_new(
 def test_workers_in_processes_decide_the_same(tmp_path: Path) -> None:
     content = study(width=1e9)
     _, serial = run(content, tmp_path / "serial")
-    _, local = run(content, tmp_path / "local", LocalExecutor(2))
+    _, local = run(content, tmp_path / "local", LocalExecutor(2), 2)
     assert digests(serial) == digests(local)
 
 

@@ -18,7 +18,7 @@ from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import Observer
 from fleet2d.studies.executors import cores
 from fleet2d.studies.reader import open_study
-from fleet2d.studies.records import VariantRecord
+from fleet2d.studies.results import VariantResult
 
 KILLS = int(os.environ.get("FLEET2D_KILLS", "50" if THOROUGH else "8"))
 ROOT = Path(__file__).parents[2]
@@ -33,7 +33,7 @@ class Dies(Observer):
     def __init__(self, variants: int) -> None:
         self.remaining = variants
 
-    def on_result(self, record: VariantRecord) -> None:
+    def on_result(self, result: VariantResult) -> None:
         self.remaining -= 1
         if not self.remaining:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -95,7 +95,8 @@ def start(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
 
 
 def workers_of(process: "subprocess.Popen[bytes]") -> list[int]:
-    pids = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    files = Path(f"/proc/{process.pid}/task").glob("*/children")  # a thread starts each
+    pids = [pid for file in files for pid in file.read_text().split()]
     commands = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids}
     return [pid for pid, command in commands.items() if b"spawn_main" in command]
 
@@ -109,9 +110,9 @@ def is_running(pid: int) -> bool:
 
 
 def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]") -> None:
-    journal = folder / "studies/study/journal-000001.bin"
+    results = folder / "studies/study/results/000001.parquet"
     deadline = time.monotonic() + 120
-    while not (journal.exists() and journal.stat().st_size > 2000):
+    while not results.exists():
         assert process.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.02)

@@ -1,52 +1,110 @@
-"""Executors: a home has one worker, all are busy to the end, and dead ones are replaced."""
+"""Tasks on executors: those of a home go together, and those of dead workers are run again."""
 
+import itertools
 import os
 import signal
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.studies.scenes import CountingExecutor
 
-from fleet2d.errors import InputError
-from fleet2d.studies.executors import FinishedTask, LocalExecutor, TaskSchedule, WorkerTask
-
-
-def schedule(homes: str) -> TaskSchedule:
-    return TaskSchedule(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
-
-
-def homes_of(tasks: TaskSchedule, *workers: str) -> list[str]:
-    homes = []
-    for worker in workers:
-        task = tasks.take(worker)
-        homes.append("-" if task is None else task.home)
-    return homes
+from fleet2d.errors import ComponentError, InputError
+from fleet2d.studies.executors import (
+    Crew,
+    LocalExecutor,
+    SerialExecutor,
+    TaskEnd,
+    TaskQueue,
+    WorkerTask,
+    run_tasks,
+)
 
 
-def test_a_worker_stays_with_a_home() -> None:
-    assert ["a", "b", "a", "b", "a"] == homes_of(schedule("ababab"), "x", "y", "x", "y", "x")
+def queue(homes: str) -> TaskQueue:
+    return TaskQueue(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
 
 
-def test_a_worker_without_a_home_helps_with_the_largest() -> None:
-    assert ["a", "a", "a", "-"] == homes_of(schedule("aaa"), "x", "y", "x", "y")
+def homes_of(tasks: TaskQueue, workers: int) -> list[str]:
+    calls = []
+    while tasks:
+        calls.append("".join(task.home for task in tasks.take(workers)))
+    return calls
+
+
+def ends_of(crew: Crew, job: Any, homes: str) -> list[TaskEnd]:
+    with crew.executor:
+        return list(itertools.chain.from_iterable(run_tasks(crew, job, queue(homes))))
+
+
+def test_a_worker_gets_the_tasks_of_a_home_together_and_the_last_home_is_shared() -> None:
+    assert ["aaa", "bbb", "cc", "c"] == homes_of(queue("abcabcabc"), workers=2)
+
+
+def test_tasks_of_one_home_are_shared_among_workers() -> None:
+    assert ["aaaa", "aa", "a", "a"] == homes_of(queue("a" * 8), workers=2)
 
 
 def test_what_a_dead_worker_held_is_next() -> None:
-    tasks = schedule("ab")
-    task = tasks.take("x")
-    assert task is not None
-    tasks.leave("x")
-    tasks.put_back(task)
-    assert 2 == len(tasks)
-    assert ["a", "b", "-"] == homes_of(tasks, "y", "y", "y")
+    tasks = queue("ab")
+    tasks.put_back(tasks.take(1))
+    assert ["a", "b"] == homes_of(tasks, workers=1)
 
 
-def test_an_empty_schedule_is_false() -> None:
-    tasks = schedule("a")
-    assert tasks
-    homes_of(tasks, "x")
-    assert not tasks
+def test_results_come_after_a_while_and_the_rest_is_run_then() -> None:
+    executor = CountingExecutor()
+    ends = ends_of(Crew(executor, batch_s=0.0), str, "aab")
+    assert ([0, 1, 2], 3) == (executor.ran, len(ends))
+    together = CountingExecutor()
+    ends_of(Crew(together, batch_s=60.0), str, "aab")
+    assert [0, 2] == together.ran  # the first of each call
+
+
+def test_an_executor_of_ones_own_runs_tasks() -> None:
+    with ThreadPoolExecutor(2) as threads:
+        ends = run_tasks(Crew(threads, 2), number_of, queue("aab"))
+        assert {0, 1, 2} == {end.payload for end in itertools.chain.from_iterable(ends)}
+        assert 4 == threads.submit(pow, 2, 2).result()  # it stays open
+
+
+def test_a_task_that_fails_each_time_is_lost_and_the_others_are_not() -> None:
+    ends = ends_of(Crew(SerialAsElsewhere()), fails_at_1, "aaa")
+    assert {0: 0, 1: None, 2: 2} == {end.task.number: end.payload for end in ends}
+    (loss,) = (end for end in ends if end.loss is not None)
+    assert (3, "number 1 in each of 3 attempts") == (loss.attempts, loss.loss)
+
+
+def test_a_broken_executor_is_told() -> None:
+    class Broken(SerialExecutor):
+        def submit(self, *args: Any, **kwargs: Any) -> Any:
+            raise BrokenExecutor("a process died")
+
+    with pytest.raises(ComponentError, match=r"broken: a process died; with a new one the same"):
+        ends_of(Crew(Broken()), str, "a")
+
+
+class SerialAsElsewhere(SerialExecutor):
+    """Puts errors into futures, as other executors do."""
+
+    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        try:
+            return super().submit(function, *args, **kwargs)
+        except ValueError as error:
+            future: Future[Any] = Future()
+            future.set_exception(error)
+            return future
+
+
+def number_of(task: WorkerTask) -> int:
+    return task.number
+
+
+def fails_at_1(task: WorkerTask) -> int:
+    if task.number == 1:
+        raise ValueError("number 1")
+    return task.number
 
 
 # --- Worker processes ------------------------------------------------------------------------------
@@ -81,23 +139,21 @@ class CannotBeLoaded:
 def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path: Path) -> None:
     """A `concurrent.futures.ProcessPoolExecutor` waits for ever for such a worker."""
     job = DiesWhileSending(tmp_path / "mark")
-    events = list(LocalExecutor(1).run(job, schedule("aa")))
-    assert [2, 1] == [event.attempts for event in events]
-    assert all(isinstance(event, FinishedTask) for event in events)
+    ends = ends_of(Crew(LocalExecutor(1)), job, "ab")
+    assert [2, 1] == [end.attempts for end in ends]
+    assert all(len(end.payload) == 1_000_000 for end in ends)
 
 
 def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback() -> None:
     job: Any = CannotBeLoaded()
     with pytest.raises(InputError, match=r"can't be set up(.|\n)*'no job'"):
-        list(LocalExecutor(1).run(job, schedule("a")))
+        ends_of(Crew(LocalExecutor(1)), job, "a")
 
 
 @pytest.mark.slow
-def test_a_worker_with_much_memory_is_replaced_between_two_tasks() -> None:
-    events = list(LocalExecutor(1, memory_mb=1.0).run(pid_of, schedule("aaa")))
-    pids = [event.payload for event in events if isinstance(event, FinishedTask)]
-    assert 3 > len(set(pids)) > 1  # each had two tasks at once
-    assert 3 == len(pids)
+def test_a_worker_with_much_memory_is_replaced_between_two_calls() -> None:
+    ends = ends_of(Crew(LocalExecutor(1, memory_mb=1.0)), pid_of, "abc")
+    assert 3 == len({end.payload for end in ends})
 
 
 def pid_of(task: WorkerTask) -> int:

@@ -7,7 +7,7 @@ import pytest
 from tests.studies.scenes import SPEED, base
 
 from fleet2d.errors import ScenarioError
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.specification import Specification, read_specification
 
 

@@ -1,34 +1,20 @@
 """Where studies lie: folders, and an S3 server on this machine."""
 
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
 import pyarrow.fs as pafs
 import pytest
-from tests.studies.scenes import digests, optional, run, small
+from tests.studies.scenes import CountingExecutor, digests, optional, run, small
 
 from fleet2d.errors import ArtifactError, RunDirectoryError
-from fleet2d.studies import driver
 from fleet2d.studies.directory import StudyDirectory
-from fleet2d.studies.executors import Event, SerialExecutor, TaskSchedule, WorkerJob
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.storage import Storage
 
 ROWS = small(keep={"tables": ["room_share"]})
-
-
-class Interrupted(SerialExecutor):
-    """Ends after two tasks."""
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        for number, event in enumerate(super().run(job, tasks)):
-            if number == 2:
-                raise KeyboardInterrupt
-            yield event
 
 
 @pytest.fixture(scope="module")
@@ -68,19 +54,16 @@ def test_a_study_on_s3_is_the_same_as_in_a_folder(location: str, tmp_path: Path)
 
 def test_a_study_on_s3_goes_on_where_it_was_interrupted(location: str, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
-        run(ROWS, location, Interrupted())  # type: ignore[arg-type]
+        run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
     assert 2 == open_study(location).counts.complete
     _, remote = run(ROWS, location)  # type: ignore[arg-type]
     _, local = run(ROWS, tmp_path / "study")
     assert digests(local) == digests(remote)
 
 
-def test_what_is_on_s3_is_there_for_another_machine(
-    location: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(driver, "PART_S_REMOTE", 0.0)  # each result becomes a part at once
+def test_what_is_on_s3_is_there_for_another_machine(location: str, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
-        run(ROWS, location, Interrupted())  # type: ignore[arg-type]
+        run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
     shutil.rmtree(tmp_path / "cache")
     assert 2 == open_study(location).counts.complete
 
@@ -132,29 +115,3 @@ def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
     storage.delete("a/b.txt")
     storage.delete("a/b.txt")
     assert (None, []) == (storage.size("a/b.txt"), storage.names("a"))
-
-
-def test_tables_of_any_length_are_read_in_little_memory_and_few_groups(tmp_path: Path) -> None:
-    """Ten million variants took 1.2 GB: the whole plan while it was read, 5 kB a column and group.
-
-    Reading kept all groups of a file in memory, and each 5,000 rows were a group of their own.
-    """
-    storage, random = Storage(tmp_path), np.random.default_rng(0)
-    numbers = [pa.table({"number": random.random(1000)}) for _ in range(1000)]
-    storage.write_batches("numbers.parquet", iter(numbers), tmp_path)
-    assert len(storage.row_groups("numbers.parquet")) < 100
-    before, most, rows = pa.total_allocated_bytes(), 0, 0
-    for table in storage.read_batches("numbers.parquet", ["number"]):
-        assert table.equals(
-            pa.concat_tables(numbers[rows // 1000 :][:6]).slice(rows % 1000, len(table))
-        )
-        most, rows = max(most, pa.total_allocated_bytes() - before), rows + len(table)
-    assert 1_000_000 == rows
-    assert most < 3_000_000  # of 8 MB
-
-
-def test_a_table_without_rows_is_read_as_one(tmp_path: Path) -> None:
-    storage = Storage(tmp_path)
-    empty = pa.table({"number": pa.array([], pa.float64())})
-    storage.write_batches("empty.parquet", iter([empty]), tmp_path)
-    assert [empty] == list(storage.read_batches("empty.parquet"))

@@ -1,23 +1,20 @@
 """Tuning: what is searched, on what, that it goes on where it stopped, and how it is judged."""
 
-from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studies.scenes import SPEED, base, small
+from tests.studies.scenes import SPEED, CountingExecutor, base, small
 from tests.thorough import THOROUGH, some
 
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
 from fleet2d.studies.axes import Parameter
 from fleet2d.studies.driver import check_study
-from fleet2d.studies.executors import Event, LocalExecutor, SerialExecutor, TaskSchedule, WorkerJob
+from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor
 from fleet2d.studies.simulator import StagedRun
-from fleet2d.studies.specification import TuneSettings
 from fleet2d.studies.tuning import (
     TRIALS,
     TrialJob,
-    TrialSchedule,
     TrialTask,
     TuneResult,
     tune,
@@ -27,20 +24,8 @@ pytest.importorskip("optuna")
 pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 
 
-class Spy(SerialExecutor):
-    """Remembers tasks, and is interrupted after some."""
-
-    def __init__(self, most: int = 1000) -> None:
-        self.most, self.tasks = most, list[Any]()
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        if isinstance(job, TrialJob):
-            self.design = job.design
-        for event in super().run(job, tasks):
-            if len(self.tasks) == self.most:
-                raise KeyboardInterrupt
-            self.tasks.append(event.task)
-            yield event
+class Spy(CountingExecutor):
+    """Remembers trials, and is interrupted after some tasks."""
 
     @property
     def trials(self) -> list[TrialTask]:
@@ -70,7 +55,16 @@ def search(**keys: Any) -> dict[str, Any]:
 
 def tuned(tmp_path: Path, executor: Any = None, **keys: Any) -> TuneResult:
     options = {name: keys.pop(name) for name in ("changed", "storage") if name in keys}
-    return tune(search(**keys), tmp_path / "tune", executor or SerialExecutor(), **options)
+    workers = keys.pop("workers", 1)
+    return tuned_study(search(**keys), tmp_path / "tune", executor, workers, **options)
+
+
+def tuned_study(
+    study: Any, folder: Path, executor: Any = None, workers: int = 1, **options: Any
+) -> TuneResult:
+    crew = Crew(executor or SerialExecutor(), workers, batch_s=0.0)
+    with crew.executor:
+        return tune(study, folder, crew, **options)
 
 
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
@@ -138,26 +132,6 @@ def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
     assert minute_1 != minute_2
 
 
-def test_a_variant_goes_on_with_the_worker_that_keeps_it() -> None:
-    optuna = pytest.importorskip("optuna")
-    study = optuna.create_study(pruner=optuna.pruners.NopPruner())
-    settings = TuneSettings.model_validate(search(trials=1, prune_at=["1 min"])["tune"])
-    schedule = TrialSchedule(study, settings, [(0, "home"), (1, "home")])
-    task_a, task_b = schedule.take("one"), schedule.take("two")
-    assert isinstance(task_a, TrialTask)
-    assert isinstance(task_b, TrialTask)
-    assert schedule.take("one") is None
-    schedule.finish(task_a, [1.0], None)
-    schedule.finish(task_b, [1.0], None)
-    next_tasks = schedule.take("two"), schedule.take("one")
-    assert [task_b.index, task_a.index] == [task.index for task in next_tasks if task]
-    schedule.put_back(next_tasks[1])  # type: ignore[arg-type]
-    schedule.leave("one")
-    task = schedule.take("two")
-    assert task is not None
-    assert task_a.index == task.index
-
-
 def test_several_objectives_end_in_several_settings(tmp_path: Path) -> None:
     objectives = {"distance.astro": "maximize", "sightings.ana": "maximize"}
     result = tuned(tmp_path, objectives=objectives)
@@ -186,7 +160,8 @@ def test_trials_are_the_same_with_any_number_of_workers(tmp_path: Path) -> None:
     """Each worker that became free asked for a trial, so that their number decided on it."""
     keys = {"trials": 6, "batch": 3, "prune_at": ["1 min", "2 min"]}
     tuned(tmp_path / "one", SerialExecutor(), **keys)
-    tuned(tmp_path / "several", LocalExecutor(3 if THOROUGH else 2), **keys)
+    workers = 3 if THOROUGH else 2
+    tuned(tmp_path / "several", LocalExecutor(workers), workers=workers, **keys)
     assert parameters(tmp_path / "one") == parameters(tmp_path / "several")
 
 
@@ -217,12 +192,13 @@ def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change
     tuned(tmp_path, first, trials=2)
     other = {**search(trials=2, **settings), **keys}
     with pytest.raises(RunDirectoryError, match=f"{message}.*--changed redo"):
-        tune(other, tmp_path / "tune", SerialExecutor())
+        tuned_study(other, tmp_path / "tune")
     spy = Spy()
-    result = tune(other, tmp_path / "tune", spy, changed="redo")
+    result = tuned_study(other, tmp_path / "tune", spy, changed="redo")
     assert 2 == result.trials["complete"] + result.trials["pruned"]
     assert 2 == len({task.trial for task in spy.trials})
-    trained = {spy.design.parameters(task.index)["radius"] for task in spy.trials}
+    design = check_study(other).plan.design
+    trained = {design.parameters(task.index)["radius"] for task in spy.trials}
     assert not trained & set(result.held_out.variants["radius"])
     # The old trials are still there, under a name of their own.
     again = Spy()
@@ -254,7 +230,7 @@ def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Pa
         "key": "robots.astro.dwell", "values": ["1 s", "2 s"], "when": {"radius": 0.1},
     }  # fmt: skip
     with pytest.raises(ScenarioError, match="doesn't apply to all variants"):
-        tune(study, tmp_path / "tune", SerialExecutor())
+        tuned_study(study, tmp_path / "tune")
 
 
 @pytest.mark.slow
@@ -315,7 +291,7 @@ def test_wrong_searches_are_refused(tmp_path: Path, keys: dict[str, Any], messag
 
 def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="has no section `tune`"):
-        tune(small(), tmp_path, SerialExecutor())
+        tuned_study(small(), tmp_path)
 
 
 def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> None:
@@ -341,9 +317,7 @@ def test_a_copy_of_a_home_is_not_held_out_of_a_search_on_the_home(tmp_path: Path
     study = search(held_out={"home": ["second"]})
     study["axes"] = {"home": {"floorplans": [str(path) for path in paths]}}
     with pytest.raises(ScenarioError, match="the same but for the names of files"):
-        tune(study, tmp_path / "tune", SerialExecutor())
+        tuned_study(study, tmp_path / "tune")
     assert not (tmp_path / "tune").exists()
     study["axes"]["home"]["floorplans"] = [str(path) for path in paths[1:]]
-    assert (
-        1 == tune(study, tmp_path / "tune", SerialExecutor()).held_out.variants["home"].n_unique()
-    )
+    assert 1 == tuned_study(study, tmp_path / "tune").held_out.variants["home"].n_unique()

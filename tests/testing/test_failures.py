@@ -1,6 +1,7 @@
 """Smaller versions of a failing run: each fails in the same way, for the same reason."""
 
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,7 +9,7 @@ from tests.scenes import AGENDA, OWN, scenario
 
 from fleet2d.interventions import Call, Put, ShutDoor
 from fleet2d.testing.claim import Variant
-from fleet2d.testing.failures import FailingCase, Shrinker
+from fleet2d.testing.failures import FailingCase, Shrinker, describe_trial
 from fleet2d.testing.trials import MISSED, Body, Trial, run_trial
 
 AGENDAS = {"type": "schedule", "days": AGENDA, "rest": "living_room"}
@@ -16,7 +17,7 @@ CAMERA = {"range": [0.3, 4], "angle_deg": 108}
 
 
 def flat(duration: str = "20 min", **sections: Any) -> Variant:
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     content = scenario(
         duration,
@@ -138,3 +139,27 @@ def test_what_must_come_by_the_end_keeps_its_time() -> None:
 
     assert case is not None
     assert late.scenario.simulation.duration == case.variant.scenario.simulation.duration
+
+
+@pytest.mark.parametrize("fails_once", [True, False])
+def test_a_report_says_when_the_failure_does_not_come_again(
+    fails_once: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[Any, ...]] = []
+    monkeypatch.setattr("fleet2d.viewer.figures.draw_failure", lambda *rest: drawn.append(rest))
+    runs: list[Trial] = []
+
+    def body(trial: Trial) -> None:
+        runs.append(trial)
+        sign = "==" if len(runs) == 1 or not fails_once else "!="
+        trial.expect(f"always(room(ana) {sign} storage)", name="stays")
+
+    failing = run_trial(flat("1 min"), body)
+    report = "\n".join(describe_trial(failing, body, tmp_path, 0, "again"))
+
+    assert fails_once == ("it didn't fail again" in report)
+    ((_, step, _, text, evidence),) = drawn
+    (failure,) = failing.failures
+    assert (failing.failing_step, failure.text) == (step, text)
+    assert failure.evidence is not None
+    assert failure.evidence is evidence

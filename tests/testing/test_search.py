@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import fleet2d
 from fleet2d.errors import Fleet2DError, InputError
-from fleet2d.studies.executors import SerialExecutor
+from fleet2d.studies.executors import Crew, SerialExecutor
 from fleet2d.testing import command
 from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
@@ -59,7 +59,8 @@ def falsify(*arguments: str) -> Any:
 
 @pytest.mark.slow
 def test_the_resulting_scenario_fails(folder: Path) -> None:
-    done = falsify("flat.yaml", "--over", OVER, "--budget", "30", "--out", "found.yaml")
+    arguments = ("--over", OVER, "--budget", "30", "--seed", "1", "--out", "found.yaml")
+    done = falsify("flat.yaml", *arguments)
     assert 1 == done.exit_code, done.output
     assert "comes is violated" in done.output
     assert "written: found.yaml" in done.output
@@ -79,6 +80,28 @@ def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
     assert (1, "") == (done.exit_code, done.output)
     failing = fleet2d.load_scenario("falsified.yaml")
     assert failing.robots["astro"].speed < 0.3
+
+
+def test_a_search_needs_an_axis() -> None:
+    with pytest.raises(InputError, match="nothing to search over"):
+        read_space({})
+
+
+def test_a_test_that_holds_when_it_is_repeated_is_refused(folder: Path) -> None:
+    (folder / "test_once.py").write_text(
+        "from pathlib import Path\n"
+        "from fleet2d.testing import trial\n"
+        "@trial('flat.yaml')\n"
+        "def test_once(trial):\n"
+        "    known = Path('known').exists()\n"
+        "    Path('known').touch()\n"
+        "    assert known\n"
+    )
+    done = falsify("test_once.py::test_once", "--over", OVER, "--budget", "1")
+
+    assert isinstance(done.exception, InputError)
+    assert "failed at try 1, but holds when that try is repeated" in str(done.exception)
+    assert not (folder / "falsified.yaml").exists()
 
 
 @pytest.mark.slow
@@ -139,10 +162,10 @@ def test_a_planted_fault_is_detected_that_random_search_misses(
 
     job = benchmark.job("load and slope")
     guided, blind = (FailureSearch(job, 110, seed=1, is_guided=guided) for guided in (True, False))
-    failure = guided.run(SerialExecutor())
+    failure = guided.run(Crew(SerialExecutor()))
     assert failure is not None
     assert job.run(failure.point, failure.seed).margin < 0
-    assert blind.run(SerialExecutor()) is None
+    assert blind.run(Crew(SerialExecutor())) is None
     assert 110 == blind.tries
     sys.modules.pop("falsify")
 

@@ -17,7 +17,8 @@ from fleet2d.configuration.documents import read_document
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.meander import Meander
 from fleet2d.errors import ArtifactError, FloorPlanError, InputError, ScenarioError
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 
 PLAN = "658e5214673c7a4e25b458e56bdb6144.json"
 OLD = """\

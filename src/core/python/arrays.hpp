@@ -169,12 +169,53 @@ nb::handle handed_over(Array<T, N>&& values) noexcept {
     return array;
 }
 
-// The members of a struct that comes from Python as a named tuple, in the tuple's order: a std::tuple of pointers.
+// The number of members of a struct that comes from Python as a named tuple, whose fields they are in their order.
 template <class S>
-inline constexpr auto members_of = nullptr;
+inline constexpr std::size_t members_of = 0;
 
 template <class S>
-concept ComesAsNamedTuple = !std::is_null_pointer_v<std::remove_const_t<decltype(members_of<S>)>>;
+concept ComesAsNamedTuple = members_of<S> != 0;
+
+// References to all members of such a struct.
+template <ComesAsNamedTuple S>
+constexpr auto references_to(S& values) {
+    if constexpr (members_of<S> == 2) {
+        auto& [a, b] = values;
+        return std::tie(a, b);
+    }
+    if constexpr (members_of<S> == 3) {
+        auto& [a, b, c] = values;
+        return std::tie(a, b, c);
+    }
+    if constexpr (members_of<S> == 4) {
+        auto& [a, b, c, d] = values;
+        return std::tie(a, b, c, d);
+    }
+    if constexpr (members_of<S> == 5) {
+        auto& [a, b, c, d, e] = values;
+        return std::tie(a, b, c, d, e);
+    }
+    if constexpr (members_of<S> == 6) {
+        auto& [a, b, c, d, e, f] = values;
+        return std::tie(a, b, c, d, e, f);
+    }
+    if constexpr (members_of<S> == 7) {
+        auto& [a, b, c, d, e, f, g] = values;
+        return std::tie(a, b, c, d, e, f, g);
+    }
+    if constexpr (members_of<S> == 8) {
+        auto& [a, b, c, d, e, f, g, h] = values;
+        return std::tie(a, b, c, d, e, f, g, h);
+    }
+    if constexpr (members_of<S> == 10) {
+        auto& [a, b, c, d, e, f, g, h, i, j] = values;
+        return std::tie(a, b, c, d, e, f, g, h, i, j);
+    }
+    if constexpr (members_of<S> == 18) {
+        auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r] = values;
+        return std::tie(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r);
+    }
+}
 
 template <class T>
 inline constexpr bool is_view = false;
@@ -184,13 +225,6 @@ inline constexpr bool is_view<View<T, N>> = true;
 // What refers to memory of Python, or to a copy that its caster owns.
 template <class T>
 concept Borrows = is_view<T> || ComesAsNamedTuple<T>;
-
-template <class M>
-struct Member;
-template <class S, class T>
-struct Member<T S::*> {
-    using Type = T;
-};
 
 }  // namespace border
 }  // namespace fleet2d
@@ -262,11 +296,10 @@ template <class S>
 struct type_caster<S> {
     NB_TYPE_CASTER(S, const_name("tuple[typing.Any, ...]"))
 
-    static constexpr auto members = fleet2d::border::members_of<S>;
-    static constexpr std::size_t count = std::tuple_size_v<decltype(members)>;
+    static constexpr std::size_t count = fleet2d::border::members_of<S>;
     template <class... M>
-    static std::tuple<make_caster<typename fleet2d::border::Member<M>::Type>...> casters_of(std::tuple<M...>);
-    decltype(casters_of(members)) casters;  // they own what had to be copied
+    static std::tuple<make_caster<M>...> casters_of(std::tuple<M&...>);
+    decltype(casters_of(fleet2d::border::references_to(std::declval<S&>()))) casters;  // they own what had to be copied
 
     bool from_python(handle source, uint32_t flags, cleanup_list* cleanup) noexcept {
         if (!PyTuple_Check(source.ptr()) || PyTuple_Size(source.ptr()) != static_cast<Py_ssize_t>(count)) return false;
@@ -277,11 +310,10 @@ struct type_caster<S> {
 
     template <std::size_t K>
     bool read(handle source, uint32_t flags, cleanup_list* cleanup) noexcept {
-        constexpr auto member = std::get<K>(members);
-        using T = typename fleet2d::border::Member<std::remove_const_t<decltype(member)>>::Type;
+        auto& member = std::get<K>(fleet2d::border::references_to(value));
         auto& caster = std::get<K>(casters);
         if (!caster.from_python(PyTuple_GetItem(source.ptr(), K), flags, cleanup)) return false;
-        value.*member = static_cast<T&>(caster);
+        member = static_cast<std::remove_reference_t<decltype(member)>&>(caster);
         return true;
     }
 };

@@ -6,9 +6,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<BatteryState> =
-    std::tuple(&BatteryState::level, &BatteryState::since_us, &BatteryState::driving, &BatteryState::standing,
-               &BatteryState::charging, &BatteryState::charger_x, &BatteryState::charger_y, &BatteryState::is_broken);
+inline constexpr std::size_t border::members_of<BatteryState> = 8;
 
 namespace {
 

@@ -9,22 +9,17 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<PoseCache> = std::tuple(
-    &PoseCache::pose, &PoseCache::last, &PoseCache::settled, &PoseCache::cells, &PoseCache::shown, &PoseCache::used);
+inline constexpr std::size_t border::members_of<PoseCache> = 6;
 
 template <>
-inline constexpr auto border::members_of<CoverageRecord> =
-    std::tuple(&CoverageRecord::first, &CoverageRecord::last, &CoverageRecord::exposure, &CoverageRecord::counted,
-               &CoverageRecord::binned, &CoverageRecord::peak);
+inline constexpr std::size_t border::members_of<CoverageRecord> = 6;
 
 template <>
-inline constexpr auto border::members_of<CoverageSetup> =
-    std::tuple(&CoverageSetup::walls, &CoverageSetup::lenses, &CoverageSetup::patch_of_cell, &CoverageSetup::step_us,
-               &CoverageSetup::every, &CoverageSetup::bin_steps);
+inline constexpr std::size_t border::members_of<CoverageSetup> = 6;
 
 namespace {
 
-constexpr i64 LONGEST = i64{1} << 40;  // every, bin_steps: steps
+constexpr i64 LARGEST = i64{1} << 40;  // steps, or lattice units
 
 void check_watched(const CoverageSetup& setup) {
     check_lenses(setup.lenses);
@@ -33,7 +28,7 @@ void check_watched(const CoverageSetup& setup) {
             {setup.lenses.near_squared[camera], setup.lenses.far_squared[camera], setup.lenses.half_angle[camera]});
     }
     require(setup.step_us > 0, "step_us must be above 0");
-    require(0 < setup.every && setup.every <= LONGEST && 0 < setup.bin_steps && setup.bin_steps <= LONGEST,
+    require(0 < setup.every && setup.every <= LARGEST && 0 < setup.bin_steps && setup.bin_steps <= LARGEST,
             "every and bin_steps must be in 1 to 2**40");
 }
 
@@ -64,7 +59,7 @@ void check_steps(const CoverageSetup& setup, const Window& window, i64 body, i64
                  const CoverageRecord& record) {
     require(0 <= body && body < window.bodies(), "there is no such body");
     require(window.first <= first && first <= end && end <= window.end, "the steps must lie within the window");
-    require(all_in_range(window.x, -LONGEST, LONGEST) && all_in_range(window.y, -LONGEST, LONGEST),
+    require(all_in_range(window.x, -LARGEST, LARGEST) && all_in_range(window.y, -LARGEST, LARGEST),
             "bodies must be within 2**40 lattice units");
     require(0 <= first && end < LATEST / setup.step_us, "first must be a step, 0 or more");
     if (!record.keeps_bins() || first == end) return;

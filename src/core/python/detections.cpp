@@ -16,16 +16,11 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<SightMemory> = std::tuple(
-    &SightMemory::noticed, &SightMemory::seen, &SightMemory::about, &SightMemory::backlog, &SightMemory::waiting);
+inline constexpr std::size_t border::members_of<SightMemory> = 5;
 template <>
-inline constexpr auto border::members_of<DetectionRule> =
-    std::tuple(&DetectionRule::patience, &DetectionRule::step_us, &DetectionRule::start_us, &DetectionRule::burst,
-               &DetectionRule::stop_lost, &DetectionRule::stop_seen);
+inline constexpr std::size_t border::members_of<DetectionRule> = 6;
 template <>
-inline constexpr auto border::members_of<Heights> =
-    std::tuple(&Heights::eyes, &Heights::points, &Heights::tops, &Heights::corners, &Heights::start, &Heights::boxes,
-               &Heights::top);
+inline constexpr std::size_t border::members_of<Heights> = 7;
 
 namespace {
 

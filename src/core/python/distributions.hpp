@@ -10,6 +10,9 @@ namespace fleet2d {
 
 inline constexpr i64 LONGEST_TIME = i64{1} << 36;  // s: products with fractions of a position fit in 64 bits
 inline constexpr i64 MAX_DRAWN = i64{1} << 31;     // bounds of draws are below it
+inline constexpr i64 LATEST_TIME = i64{1} << 20;   // s since midnight: else a day might have events by the million
+
+using Numbers = std::vector<i64>;
 
 // Quantiles, the least and the largest value, and the positions of these among the quantiles.
 using DistributionRow = std::tuple<std::vector<i64>, i64, i64, i64, i64>;

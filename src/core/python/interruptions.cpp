@@ -3,16 +3,15 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
+#include "distributions.hpp"
 #include "random.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
 namespace {
 
-constexpr i64 LONGEST = i64{1} << 40;  // s
-constexpr i64 LATEST = i64{1} << 20;   // s since midnight: else a day might have needs by the million
+constexpr i64 LONGEST_STEP = i64{1} << 40;  // s
 
-using Numbers = std::vector<i64>;
 using StepRow = std::tuple<i64, i64, Numbers>;
 using Chances = std::tuple<i64, i64, i64, i64>;
 using NeedRow = std::tuple<std::vector<StepRow>, Numbers, std::optional<Numbers>, Chances, i64,
@@ -49,7 +48,7 @@ struct Reader {
     }
     static Quantiles quantiles(const Numbers& numbers) {
         require(numbers.size() == std::size_t{1} << QUANTILE_BITS, "quantiles must be 256");
-        require(std::all_of(numbers.begin(), numbers.end(), [](i64 time) { return 1 <= time && time < LONGEST; }),
+        require(std::all_of(numbers.begin(), numbers.end(), [](i64 time) { return 1 <= time && time < LONGEST_STEP; }),
                 "quantiles must be 1 to 2**40 s");
         return numbers;
     }
@@ -73,8 +72,8 @@ struct Reader {
         for (const StepRow& each : steps) need.steps.push_back(step(each));
         if (asleep) need.asleep = quantiles(*asleep);
         if (hours) need.hours = {hours->first, hours->second};
-        require(0 <= patience && patience < LONGEST, "patience must be 0 to 2**40 s");
-        require(!hours || (0 <= hours->first && hours->first < LONGEST), "hours must begin at 0 to 2**40 s");
+        require(0 <= patience && patience < LONGEST_STEP, "patience must be 0 to 2**40 s");
+        require(!hours || (0 <= hours->first && hours->first < LONGEST_STEP), "hours must begin at 0 to 2**40 s");
         return need;
     }
     Errand errand(const ErrandRow& row) const {
@@ -101,7 +100,7 @@ std::vector<PartRow> interrupted(const OwnedRules& self, StepDraws& draws, const
     std::vector<PlannedEpisode> planned;
     for (const auto& [activity, begin, end, room] : day) {
         require(0 <= activity && activity < static_cast<i64>(self.rules.away.size()), "there is no such activity");
-        require(-LATEST < begin && begin <= end && end < LATEST,
+        require(-LATEST_TIME < begin && begin <= end && end < LATEST_TIME,
                 "episodes must be within 2**20 s of midnight, and end after they begin");
         planned.push_back({activity, begin, end, room});
     }

@@ -48,7 +48,7 @@ Returns:
             "walk",
             [](Legs& self, i64 time, i64 heading, View<const i64, 2> route, f64 speed, f64 turn_rate) {
                 require(route.size() > 0 && route.shape[1] == 2, "route must be (n, 2), one point or more");
-                require(all_in_range(route, -FARTHEST_POINT, FARTHEST_POINT), "route must be within 2**29 of 0");
+                require(all_in_range(route, -FARTHEST_POSE, FARTHEST_POSE), "route must be within 2**29 of 0");
                 check_rates(speed, turn_rate);
                 return plain(self.walk(checked(time, 0, 0, heading, 0), route, speed, turn_rate));
             },

@@ -7,7 +7,7 @@
 namespace fleet2d {
 namespace {
 
-constexpr i64 REACH = 1 << 26;  // see within_radius
+constexpr i64 FARTHEST_SIGHT = 1 << 26;  // see within_radius
 
 void check_camera(const Lenses& lenses, i64 camera) {
     check_lenses(lenses);
@@ -34,7 +34,7 @@ void bind_lens(nb::module_& m) {
         "hides",
         [](i64 px, i64 py, i64 bx, i64 by, i64 radius) {
             for (const i64 value : {px, py, bx, by})
-                require(-REACH <= value && value <= REACH, "points must be nearer");
+                require(-FARTHEST_SIGHT <= value && value <= FARTHEST_SIGHT, "points must be nearer");
             require(0 < radius && radius < FATTEST, "radius must be in 1 to 2**17 - 1");
             return hides(px, py, bx, by, radius);
         },

@@ -7,10 +7,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Lenses> = std::tuple(
-    &Lenses::near_squared, &Lenses::far_squared, &Lenses::half_angle, &Lenses::chance, &Lenses::moves, &Lenses::forward,
-    &Lenses::left, &Lenses::heading, &Lenses::pans, &Lenses::pan_count, &Lenses::pan_us, &Lenses::period,
-    &Lenses::latency, &Lenses::errs, &Lenses::points, &Lenses::bodies, &Lenses::reach, &Lenses::widest);
+inline constexpr std::size_t border::members_of<Lenses> = 18;
 
 // All arrays must be of one set of cameras (and users).
 inline void check_lenses(const Lenses& lenses) {

@@ -47,7 +47,7 @@ auto arrays_of(nb::handle self) {
 }
 
 template <auto Member>
-auto read_only() {
+auto array_of_mesh() {
     return [](nb::handle self) { return border::borrowed(nb::cast<const OwnedMesh&>(self).mesh().*Member, self); };
 }
 
@@ -74,14 +74,14 @@ Args:
 Raises:
     ValueError: An array has another shape, or a number in it is none of a vertex or triangle.)")
         .def(nb::init<Vertices, Triangles, Triangles>(), "vertices"_a, "triangles"_a, "neighbors"_a)
-        .def_prop_ro("vertices", read_only<&Mesh::vertices>(), "int64 (n, 2), lattice units, sorted by (x, y).")
-        .def_prop_ro("triangles", read_only<&Mesh::triangles>(),
+        .def_prop_ro("vertices", array_of_mesh<&Mesh::vertices>(), "int64 (n, 2), lattice units, sorted by (x, y).")
+        .def_prop_ro("triangles", array_of_mesh<&Mesh::triangles>(),
                      "int32 (t, 3), numbers of vertices, counter-clockwise.")
-        .def_prop_ro("neighbors", read_only<&Mesh::neighbors>(),
+        .def_prop_ro("neighbors", array_of_mesh<&Mesh::neighbors>(),
                      "int32 (t, 3), the triangle across edge k (vertex k to vertex k + 1), -1 for a wall.")
-        .def_prop_ro("bucket_start", read_only<&Mesh::bucket_start>(),
+        .def_prop_ro("bucket_start", array_of_mesh<&Mesh::bucket_start>(),
                      "int32 (rows * columns + 1,), where each square bucket begins in `bucket_triangles`.")
-        .def_prop_ro("bucket_triangles", read_only<&Mesh::bucket_triangles>(),
+        .def_prop_ro("bucket_triangles", array_of_mesh<&Mesh::bucket_triangles>(),
                      "int32, the triangles that overlap each square bucket, ascending.")
         .def_prop_ro(
             "bucket_columns", [](const OwnedMesh& self) { return self.mesh().bucket_columns; },

@@ -8,15 +8,12 @@ namespace fleet2d {
 
 // The named tuples of `fleet2d.kernels`.
 template <>
-inline constexpr auto border::members_of<Breakpoints> =
-    std::tuple(&Breakpoints::time, &Breakpoints::x, &Breakpoints::y, &Breakpoints::heading, &Breakpoints::away);
+inline constexpr std::size_t border::members_of<Breakpoints> = 5;
 
 template <>
-inline constexpr auto border::members_of<PosesToFill> =
-    std::tuple(&PosesToFill::x, &PosesToFill::y, &PosesToFill::heading, &PosesToFill::away);
+inline constexpr std::size_t border::members_of<PosesToFill> = 4;
 
 template <>
-inline constexpr auto border::members_of<WalkRule> =
-    std::tuple(&WalkRule::key, &WalkRule::stride, &WalkRule::sway, &WalkRule::turn_limit, &WalkRule::stays);
+inline constexpr std::size_t border::members_of<WalkRule> = 5;
 
 }  // namespace fleet2d

@@ -6,19 +6,13 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<PeopleModel> =
-    std::tuple(&PeopleModel::stay, &PeopleModel::follow, &PeopleModel::spread, &PeopleModel::restless,
-               &PeopleModel::first, &PeopleModel::detection);
+inline constexpr std::size_t border::members_of<PeopleModel> = 6;
 
 template <>
-inline constexpr auto border::members_of<DayEvidence> =
-    std::tuple(&DayEvidence::minute, &DayEvidence::view, &DayEvidence::views, &DayEvidence::user, &DayEvidence::bin,
-               &DayEvidence::patch, &DayEvidence::steps);
+inline constexpr std::size_t border::members_of<DayEvidence> = 7;
 
 template <>
-inline constexpr auto border::members_of<PeopleMoments> =
-    std::tuple(&PeopleMoments::time, &PeopleMoments::exits, &PeopleMoments::arrivals, &PeopleMoments::moves,
-               &PeopleMoments::rests);
+inline constexpr std::size_t border::members_of<PeopleMoments> = 5;
 
 namespace {
 

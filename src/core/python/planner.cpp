@@ -9,13 +9,11 @@
 namespace fleet2d {
 namespace {
 
-constexpr i64 NEVER = i64{1} << 41;   // s
-constexpr i64 LATEST = i64{1} << 20;  // s since midnight
+constexpr i64 LATEST_END = i64{1} << 41;  // s
 
-using Numbers = std::vector<i64>;
 using JobRow = std::tuple<i64, std::optional<DistributionRow>, DistributionRow, i64, Numbers, i64, bool, i64>;
 using PastimeRow = std::tuple<i64, i64, DistributionRow, i64, i64>;
-using EpisodeRow = std::tuple<i64, i64, i64, i64, i64>;
+using PlannedRow = std::tuple<i64, i64, i64, i64, i64>;
 using RoomLists = std::vector<Numbers>;
 
 // A plan as the core has it, and what it was made of.
@@ -26,7 +24,7 @@ struct OwnedPlan {
 
 Job job_of(const JobRow& row, i64 number) {
     const auto& [activity, starts, takes, until, after, chance, needed, place] = row;
-    require(-NEVER < until && until < NEVER, "jobs must end within 2**41 s");
+    require(-LATEST_END < until && until < LATEST_END, "jobs must end within 2**41 s");
     for (const i64 before : after) require(0 <= before && before < number, "jobs must come after earlier ones");
     Job job{activity, std::nullopt, distribution_of(takes), until, after, chance, needed, place};
     require(job.takes.shortest >= 0, "jobs must take 0 s or more");
@@ -48,7 +46,7 @@ OwnedPlan plan_of(DistributionRow sleep, i64 min_sleep, std::vector<JobRow> jobs
                   i64 rest, i64 asleep) {
     DayPlan plan{distribution_of(sleep), min_sleep, {}, {}, rest, asleep};
     require(0 <= min_sleep && is_time(min_sleep), "min_sleep must be 0 to 2**36 s");
-    require(static_cast<i64>(jobs.size()) < LATEST, "jobs must be fewer than 2**20");
+    require(static_cast<i64>(jobs.size()) < LATEST_TIME, "jobs must be fewer than 2**20");
     for (const JobRow& row : jobs) plan.jobs.push_back(job_of(row, static_cast<i64>(plan.jobs.size())));
     i64 weights = 0;
     for (const PastimeRow& row : pastimes) {
@@ -60,7 +58,7 @@ OwnedPlan plan_of(DistributionRow sleep, i64 min_sleep, std::vector<JobRow> jobs
 }
 
 void check_day(i64 wake, i64 next_wake) {
-    require(-LATEST < wake && wake < LATEST && -LATEST < next_wake && next_wake < LATEST,
+    require(-LATEST_TIME < wake && wake < LATEST_TIME && -LATEST_TIME < next_wake && next_wake < LATEST_TIME,
             "a day must be within 2**20 s of midnight");
 }
 
@@ -75,7 +73,7 @@ void bind_planner(nb::module_& m) {
         .def(
             "add",
             [](RoomUse& self, i64 room, i64 begin, i64 end) {
-                require(-NEVER < begin && begin <= end && end < NEVER,
+                require(-LATEST_END < begin && begin <= end && end < LATEST_END,
                         "a use must end after it begins, within 2**41 s");
                 self.add(room, begin, end);
             },
@@ -84,8 +82,9 @@ void bind_planner(nb::module_& m) {
             "free",
             [](const RoomUse& self, const Numbers& rooms, i64 begin, i64 latest, i64 shortest,
                i64 end_by) -> std::optional<std::tuple<i64, i64, i64>> {
-                require(std::max({std::abs(begin), std::abs(latest), std::abs(shortest), std::abs(end_by)}) < NEVER,
-                        "times must be within 2**41 s");
+                require(
+                    std::max({std::abs(begin), std::abs(latest), std::abs(shortest), std::abs(end_by)}) < LATEST_END,
+                    "times must be within 2**41 s");
                 const std::optional<FreeSlot> slot = self.free(rooms, begin, latest, shortest, end_by);
                 if (!slot) return std::nullopt;
                 return std::tuple(slot->begin, slot->end, slot->room);
@@ -130,7 +129,7 @@ Args:
                 check_day(wake, next_wake);
                 require(!use || rooms.size() == self.plan.jobs.size(), "rooms must be those of each job");
                 const auto access = use ? std::optional<PrivateRooms>({*use, rooms}) : std::nullopt;
-                std::vector<EpisodeRow> rows;
+                std::vector<PlannedRow> rows;
                 for (const Episode& each : plan_day(self.plan, draws, wake, next_wake, access ? &*access : nullptr)) {
                     rows.emplace_back(each.activity, each.begin, each.end, each.job, each.room);
                 }

@@ -7,7 +7,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Poses> = std::tuple(&Poses::x, &Poses::y, &Poses::heading, &Poses::away);
+inline constexpr std::size_t border::members_of<Poses> = 4;
 
 inline void check_poses(const Poses& poses) {
     const i64 steps = poses.x.size();

@@ -6,9 +6,9 @@
 namespace fleet2d {
 namespace {
 
-using Numbers = View<const i32>;
+using Indices = View<const i32>;
 
-Region checked_region(const Mesh& mesh, i64 x, i64 y, Numbers right, Numbers wall) {
+Region checked_region(const Mesh& mesh, i64 x, i64 y, Indices right, Indices wall) {
     require(right.size() == wall.size(), "right and wall must have one length, that of the pieces");
     require(all_in_range(right, 0, mesh.vertex_count()), "right must hold numbers of vertices");
     require(all_in_range(wall, 0, 3 * mesh.triangle_count()), "wall must hold edges, 3 * triangle + k");
@@ -56,7 +56,7 @@ Returns:
     edge, 3 * triangle + k, at which each piece ends; empty for an eye outside or on a wall.)");
     m.def(
         "region_contains",
-        [](const Mesh& mesh, i64 x, i64 y, Numbers right, Numbers wall, i64 px, i64 py) {
+        [](const Mesh& mesh, i64 x, i64 y, Indices right, Indices wall, i64 px, i64 py) {
             return region_contains(mesh, checked_region(mesh, x, y, right, wall), px, py);
         },
         "mesh"_a, "x"_a, "y"_a, "right"_a, "wall"_a, "px"_a, "py"_a,
@@ -72,7 +72,7 @@ Args:
     py: The point, lattice units.)");
     m.def(
         "region_contains_points",
-        [](const Mesh& mesh, i64 x, i64 y, Numbers right, Numbers wall, View<const i64, 2> points) {
+        [](const Mesh& mesh, i64 x, i64 y, Indices right, Indices wall, View<const i64, 2> points) {
             require(points.shape[1] == 2, "points must be (n, 2)");
             const Region region = checked_region(mesh, x, y, right, wall);
             auto inside = Array<bool>::empty({points.size()});
@@ -111,7 +111,7 @@ Returns:
     `right[start[i]:start[i + 1]]` and `wall[start[i]:start[i + 1]]`, as from `visible_region`.)");
     m.def(
         "region_outline",
-        [](const Mesh& mesh, i64 x, i64 y, Numbers right, Numbers wall) {
+        [](const Mesh& mesh, i64 x, i64 y, Indices right, Indices wall) {
             Outline outline = region_outline(mesh, checked_region(mesh, x, y, right, wall));
             return std::tuple(std::move(outline.corners), outline.area);
         },

@@ -20,7 +20,6 @@ constexpr i64 LONGEST_STINT = i64{1} << 38;  // us: else there might be small mo
 constexpr i64 MAX_POSTURES = 128;
 constexpr u64 MAX_MOVES = 3;
 
-using Numbers = std::vector<i64>;
 using PlaceRow = std::tuple<i64, i64, i64>;
 using LastRow = std::tuple<i64, std::optional<PlaceRow>, std::optional<PlaceRow>>;
 using NoteRow = std::tuple<i64, i64, i64>;

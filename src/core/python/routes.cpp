@@ -7,8 +7,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Corners> =
-    std::tuple(&Corners::vertex, &Corners::before, &Corners::after, &Corners::simple);
+inline constexpr std::size_t border::members_of<Corners> = 4;
 
 Routes::Routes(nb::handle_t<OwnedMesh> mesh, const Corners& corners)
     : owner_(nb::borrow(mesh)), mesh_(nb::cast<const OwnedMesh&>(mesh).mesh()) {
@@ -43,7 +42,7 @@ std::optional<Array<i64, 2>> find(Routes& self, i64 ax, i64 ay, i64 bx, i64 by) 
 }
 
 template <auto Member>
-auto read_only() {
+auto array_of_graph() {
     return [](nb::handle_t<Routes> self) {
         return border::borrowed((nb::cast<const Routes&>(self).graph().*Member).view(), self);
     };
@@ -68,10 +67,10 @@ Ties go to the corner that is lower by (x, y), so the path depends on the walls 
 
 Returns:
     None where there is no way, or an end isn't strictly inside the space.)")
-        .def_prop_ro("leg_start", read_only<&RouteGraph::leg_start>(),
+        .def_prop_ro("leg_start", array_of_graph<&RouteGraph::leg_start>(),
                      "int32 (corners + 1,), where the legs from each corner begin in `leg_end`.")
-        .def_prop_ro("leg_end", read_only<&RouteGraph::leg_end>(), "int32 (legs,), the corner that each leads to.")
-        .def_prop_ro("leg_length", read_only<&RouteGraph::leg_length>(), "float64 (legs,) [lattice units].")
+        .def_prop_ro("leg_end", array_of_graph<&RouteGraph::leg_end>(), "int32 (legs,), the corner that each leads to.")
+        .def_prop_ro("leg_length", array_of_graph<&RouteGraph::leg_length>(), "float64 (legs,) [lattice units].")
         .def("__getstate__", &state_of, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
         .def("__setstate__", [](Routes& self, std::tuple<nb::handle_t<OwnedMesh>, Corners> state) {
             new (&self) Routes(std::get<0>(state), std::get<1>(state));

@@ -8,8 +8,8 @@ namespace {
 
 using Pair = std::tuple<Array<i64>, Array<f64>>;
 
-constexpr i64 REACH = i64{1} << 28;    // lattice units: products of differences stay inside 64 bits
-constexpr i64 LONGEST = i64{1} << 60;  // steps
+constexpr i64 FARTHEST_SIGNAL = i64{1} << 28;  // lattice units: products of differences stay inside 64 bits
+constexpr i64 LONGEST_RUN = i64{1} << 60;      // steps
 
 Pair arrays_of(const OwnedStretched& signal) {
     const auto size = static_cast<i64>(signal.start.size());
@@ -18,7 +18,8 @@ Pair arrays_of(const OwnedStretched& signal) {
 
 void check_body(const Window& window, i64 body) {
     require(0 <= body && body < window.bodies(), "there is no such body");
-    require(all_in_range(window.x, -REACH, REACH) && all_in_range(window.y, -REACH, REACH),
+    require(all_in_range(window.x, -FARTHEST_SIGNAL, FARTHEST_SIGNAL) &&
+                all_in_range(window.y, -FARTHEST_SIGNAL, FARTHEST_SIGNAL),
             "bodies must be within 2**28 lattice units");
 }
 
@@ -27,7 +28,7 @@ void check_stretches(View<const i64> start, i64 size, i64 end) {
     bool ascend = true;
     for (i64 i = 1; i < start.size(); ++i) ascend &= start[i - 1] < start[i];
     require(ascend && (start.size() == 0 || start[start.size() - 1] < end), "start must ascend, and lie before end");
-    require(all_in_range(start, -LONGEST, LONGEST) && end <= LONGEST, "steps must be within 2**60");
+    require(all_in_range(start, -LONGEST_RUN, LONGEST_RUN) && end <= LONGEST_RUN, "steps must be within 2**60");
 }
 
 bool are_numbers(View<const f64> values) {
@@ -61,7 +62,7 @@ Returns:
         "distances_to_shape",
         [](const Window& window, i64 body, View<const i64, 2> edges) {
             check_body(window, body);
-            require(edges.shape[1] == 4 && all_in_range(edges, -REACH, REACH),
+            require(edges.shape[1] == 4 && all_in_range(edges, -FARTHEST_SIGNAL, FARTHEST_SIGNAL),
                     "edges must be (n, 4), within 2**28 lattice units");
             return arrays_of(distances_to_shape(window, body, edges));
         },
@@ -81,7 +82,7 @@ Returns:
         [](const Window& window, i64 body, View<const i64> before) {
             check_body(window, body);
             require(before.size() == 0 || before.size() == 3, "before must be (x, y, away), or empty");
-            require(before.size() == 0 || all_in_range(before, -REACH, REACH),
+            require(before.size() == 0 || all_in_range(before, -FARTHEST_SIGNAL, FARTHEST_SIGNAL),
                     "bodies must be within 2**28 lattice units");
             return arrays_of(speeds(window, body, before));
         },
@@ -99,7 +100,8 @@ Returns:
         "sliding_max",
         [](View<const i64> start, View<const f64> value, i64 end, i64 low, i64 high, f64 before, f64 after) {
             check_stretches(start, value.size(), end);
-            require(-LONGEST <= low && low <= high && high <= LONGEST, "low must be high at most, both within 2**60");
+            require(-LONGEST_RUN <= low && low <= high && high <= LONGEST_RUN,
+                    "low must be high at most, both within 2**60");
             require(are_numbers(value) && before == before && after == after, "values must be numbers");
             return arrays_of(sliding_max({start, value, end}, low, high, before, after));
         },
@@ -120,7 +122,7 @@ Returns:
     m.def(
         "until",
         [](View<const i64> start, View<const f64> hold, View<const f64> goal, f64 after) {
-            check_stretches(start, hold.size(), LONGEST);
+            check_stretches(start, hold.size(), LONGEST_RUN);
             require(goal.size() == hold.size(), "hold and goal must have one length");
             require(are_numbers(hold) && are_numbers(goal) && after == after, "values must be numbers");
             return arrays_of(until(start, hold, goal, after));

@@ -6,8 +6,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Moments> =
-    std::tuple(&Moments::time, &Moments::exits, &Moments::arrivals, &Moments::moves, &Moments::rests);
+inline constexpr std::size_t border::members_of<Moments> = 5;
 
 void bind_smoothing(nb::module_& m) {
     m.def(

@@ -7,13 +7,10 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Stretches> = std::tuple(
-    &Stretches::bins, &Stretches::view, &Stretches::views, &Stretches::begin, &Stretches::patch, &Stretches::share);
+inline constexpr std::size_t border::members_of<Stretches> = 6;
 
 template <>
-inline constexpr auto border::members_of<StayModel> =
-    std::tuple(&StayModel::stay, &StayModel::follow, &StayModel::spread, &StayModel::restless, &StayModel::first,
-               &StayModel::detection);
+inline constexpr std::size_t border::members_of<StayModel> = 6;
 
 // All arrays must be of one person.
 inline void check_model(const StayModel& model) {

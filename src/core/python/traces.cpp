@@ -6,16 +6,13 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<TracedRooms> = std::tuple(&TracedRooms::share, &TracedRooms::distance);
+inline constexpr std::size_t border::members_of<TracedRooms> = 2;
 
 template <>
-inline constexpr auto border::members_of<TracedEvidence> =
-    std::tuple(&TracedEvidence::day, &TracedEvidence::minute, &TracedEvidence::watched, &TracedEvidence::seen,
-               &TracedEvidence::unknown, &TracedEvidence::belief);
+inline constexpr std::size_t border::members_of<TracedEvidence> = 6;
 
 template <>
-inline constexpr auto border::members_of<PlaceNetwork> = std::tuple(
-    &PlaceNetwork::first, &PlaceNetwork::second, &PlaceNetwork::context, &PlaceNetwork::bias, &PlaceNetwork::score);
+inline constexpr std::size_t border::members_of<PlaceNetwork> = 5;
 
 namespace {
 

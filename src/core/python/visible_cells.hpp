@@ -7,8 +7,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr auto border::members_of<Reach> =
-    std::tuple(&Reach::near_squared, &Reach::far_squared, &Reach::half_angle);
+inline constexpr std::size_t border::members_of<Reach> = 3;
 
 inline void check_reach(const Reach& reach) {
     constexpr i64 limit = i64{1} << 52;

@@ -1,1 +1,1 @@
-"""What learns during a run: the base of algorithms, their history and their output."""
+"""Algorithms, which learn during a run: their base, their history and their output."""

@@ -367,10 +367,10 @@ class Algorithm(Component):
         1800.0
     """
 
-    kind: ClassVar[str] = "algorithm"
+    kind = "algorithm"
     # How far before its period it reads the history; timedelta.max: all of it.
     looks_back: ClassVar[timedelta] = timedelta(0)
-    # What has to be computed for it: evidence, exposure, explored, first_seen, last_seen …
+    # The data that it needs computed: evidence, exposure, explored, first_seen, last_seen …
     needs: ClassVar[Set[str]] = frozenset()
 
     period: PositiveDuration = timedelta(hours=1)
@@ -421,7 +421,7 @@ class Algorithm(Component):
         """
 
     def check_sources(self, sources: "Mapping[str, Algorithm]") -> None:
-        """Refuse algorithms in `reads` whose output it can't use; called before the run begins.
+        """Refuse algorithms in `reads` with unusable outputs; called before the run begins.
 
         Args:
             sources: Those algorithms, by name.

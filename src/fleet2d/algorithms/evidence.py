@@ -1,4 +1,4 @@
-"""Evidence: what robots watched, and where they perceived users, by rooms and by patches of rooms.
+"""Evidence: views of robots, and sightings of users in them, by rooms and by patches of rooms.
 
 Rows of observations are counted by user, bin and patch; with the share of each patch in view, these
 counts are what algorithms learn presence from.
@@ -209,7 +209,7 @@ class SightingCounts(NamedTuple):
 
     @property
     def unknown(self) -> Bool:
-        """Whether somebody was perceived who wasn't recognized as a user: bool (bins, places).
+        """Whether an unknown person, not recognized as a user, was perceived: bool (bins, places).
 
         True where somebody was perceived at more steps than all users were recognized, added up;
         nowhere without users, where everybody is the same person.
@@ -253,7 +253,7 @@ class PatchEvidence(NamedTuple):
 
 @dataclass(frozen=True)
 class Evidence:
-    """What robots watched, and where they perceived users, in bins of equal length.
+    """Views of robots, and sightings of users in them, in bins of equal length.
 
     Looks at which nobody was perceived are evidence, too: they distinguish a user who is somewhere
     else from one in a room that no robot looked at.

@@ -1,9 +1,9 @@
 """Algorithms for other programs: evidence as a table, a program that is asked, recorded output."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -13,7 +13,6 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Algorithm, Present, RoomDistribution
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import ANYONE, Presence
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PositiveDuration, micros
@@ -24,7 +23,7 @@ from fleet2d.logs.tables import LogTable
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.program import ExternalProgram
 
-# What ends an Arrow IPC stream: no further message.
+# The end of an Arrow IPC stream: no further message.
 END_OF_STREAM = b"\xff\xff\xff\xff\0\0\0\0"
 
 NAMES = {
@@ -36,7 +35,6 @@ NAMES = {
 """The names that a column may have, if the user gives none."""
 
 
-@register("algorithm", "process")
 class Process(Algorithm):
     """An algorithm in another process, of any language.
 
@@ -62,7 +60,7 @@ class Process(Algorithm):
 
     @property
     def needs(self) -> frozenset[str]:  # type: ignore[override]
-        """What has to be computed for it."""
+        """The data that have to be computed for it."""
         return frozenset({"evidence"} & set(self.sends))
 
     def start(self, home: Home) -> None:
@@ -170,9 +168,8 @@ def _poses(history: History, state: Present) -> dict[str, bytes]:
 _TABLES = {"observations": _observations, "evidence": _evidence, "poses": _poses}
 
 
-@register("algorithm", "replay")
 class ReplayedOutput(Algorithm, LogKeys):
-    """Put out what an algorithm believed according to a table: shares of rooms at some times.
+    """Put out the beliefs of an algorithm from a table: shares of rooms at some times.
 
     A table of a stored run, such as its `ltp.parquet`, is one; shares are given at home, so rows of
     `away` are left out. At each update the newest shares count that aren't later; before the first
@@ -251,9 +248,8 @@ class ReplayedOutput(Algorithm, LogKeys):
         return None if row < 0 else RoomDistribution(self._shares[row])
 
 
-@register("algorithm", "evidence_table")
 class EvidenceTable(Algorithm):
-    """What robots looked at, and whom they perceived there, as rows of a table.
+    """The views of robots, and the people perceived in them, as rows of a table.
 
     There is a row of `anyone` for each bin (a minute, or a step where that is longer) and each room
     that was in view, or in which somebody was perceived; and one more for each user who was
@@ -265,7 +261,7 @@ class EvidenceTable(Algorithm):
     view, averaged over the bin; `seen`, the steps at which the user was perceived there.
     """
 
-    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+    needs = frozenset({"evidence"})
 
     def start(self, home: Home) -> None:
         """Keep the names and the kinds of rooms."""

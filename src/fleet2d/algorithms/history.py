@@ -1,4 +1,4 @@
-"""Histories: what happened in a stretch of steps, as algorithms and metrics may know it.
+"""Histories: stretches of steps of a run, as algorithms and metrics may know them.
 
 They read the log of the run: poses, observations and events, as far back as components may look.
 """
@@ -41,7 +41,7 @@ from fleet2d.kernels import (
     rooms_at,
     sum_moves,
 )
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import DAY_S, Clock
 from fleet2d.runtime.events import HOME, Event, EventKind
 
 
@@ -197,7 +197,7 @@ class Motions(Protocol):
 
 
 class PoseBelief(Protocol):
-    """Protocol of what a robot believes of its poses."""
+    """Protocol of a robot's beliefs about its own poses."""
 
     def believed(self, runs: Window) -> Window:
         """Return the poses that it believes it has, given the true ones."""
@@ -332,7 +332,7 @@ class Log:
         self._exposures[step] = exposure
 
     def expose_bins(self, bins: I64) -> None:
-        """Store what each robot has had in view in the next bins: int64 (n, robots, 2, patches).
+        """Store the cells in view of each robot in the next bins: int64 (n, robots, 2, patches).
 
         Entry 0 is the number of cells of each patch in view, summed over the steps of the bin;
         entry 1 the maximum over them.
@@ -451,9 +451,14 @@ class History:
         """Return the number of steps."""
         return self.end - self.first
 
+    @property
+    def days(self) -> float:
+        """How long its steps last [days]."""
+        return len(self) * self.step_s / DAY_S
+
     @cached_property
     def observations(self) -> Observations:
-        """What the robots perceived."""
+        """The sightings of the robots."""
         return self.log.observations(self.first, self.end)
 
     @cached_property
@@ -484,7 +489,7 @@ class History:
 
     @cached_property
     def answers(self) -> list[AnswerRecord]:
-        """How people answered robots, and what it made of them; for metrics only.
+        """The answers of people to robots, and the attitudes after them; for metrics only.
 
         Raises:
             ComponentError: The component is an algorithm.
@@ -504,7 +509,7 @@ class History:
 
     @cached_property
     def wanted(self) -> list[Wanted]:
-        """What robots wanted of people."""
+        """The requests of robots to people."""
         return [record for record in self.log.wanted if self.first <= record.step < self.end]
 
     @cached_property
@@ -532,7 +537,7 @@ class History:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What robots watched, and which users they perceived there, minute by minute.
+        """The views of robots, and the users they perceived there, minute by minute.
 
         Raises:
             ComponentError: The component's class has no needs = {"evidence"}, or its period is no

@@ -1,4 +1,4 @@
-"""Observations: what robots perceived of people and their activities, and the truth behind it."""
+"""Observations: sightings of people and their activities by robots, and the truth behind them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -219,7 +219,7 @@ def frozen(value: Any) -> Any:
 
 
 class Observations:
-    """What the robots perceived, in order of step and robot; all arrays of one length.
+    """The sightings of robots, in order of step and robot; all arrays of one length.
 
     `step` is when it became known. Users, robots and rooms are indices into the scenario's users
     and robots and the home's rooms. Errors aren't marked: a user may be mistaken for another, or

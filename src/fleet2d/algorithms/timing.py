@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Algorithm, Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
@@ -63,7 +63,7 @@ class TimingPolicy(Component):
         ...         return np.zeros((24, self.rooms))
     """
 
-    kind: ClassVar[str] = "timing_policy"
+    kind = "timing_policy"
 
     def start(self, rooms: int) -> None:
         """Begin without experience in a home with a number of rooms."""
@@ -113,7 +113,6 @@ class TimingChances:
         }
 
 
-@register("algorithm", "timing")
 class TimingAlgorithm(Algorithm):
     """Learn from answers when and where a person welcomes an interaction.
 
@@ -124,7 +123,7 @@ class TimingAlgorithm(Algorithm):
         policy: What it learns, and how it explores.
     """
 
-    policy: Annotated["TimingPolicy", OneOf("timing_policy")]
+    policy: OneOf[TimingPolicy]
     period: PositiveDuration = timedelta(hours=1)
 
     def start(self, home: Home) -> None:
@@ -134,11 +133,11 @@ class TimingAlgorithm(Algorithm):
         self.worth: dict[str, float] = {}  # of each interaction
 
     def remember(self) -> Mapping[str, Any]:
-        """Refuse: what it has learned belongs to a home and its people."""
+        """Return nothing: its learned state belongs to a home and its people."""
         return {}
 
     def recall(self, learned: Mapping[str, Any]) -> None:
-        """Refuse to restore what another run has learned.
+        """Refuse the learned state of another run.
 
         Raises:
             ComponentError: Always.
@@ -200,7 +199,6 @@ def _logistic(values: F64) -> F64:
     return np.array([logistic(value) for value in values.ravel().tolist()]).reshape(values.shape)
 
 
-@register("timing_policy", "fixed_times")
 class FixedTimes(TimingPolicy):
     """Address people in some hours, in any room.
 
@@ -217,7 +215,6 @@ class FixedTimes(TimingPolicy):
         return chances
 
 
-@register("timing_policy", "logistic")
 class LogisticTiming(TimingPolicy):
     """Ask where the probability of a yes, by logistic regression, is high enough.
 
@@ -258,7 +255,6 @@ class LogisticTiming(TimingPolicy):
         return np.where(chance >= self.ask_at, 1.0, self.explore)
 
 
-@register("timing_policy", "thompson")
 class ThompsonTiming(TimingPolicy):
     """Ask with the probability that a yes is likelier than usual, given the answers so far.
 
@@ -307,7 +303,6 @@ class ThompsonTiming(TimingPolicy):
         return above.clip(self.min_chance, 1.0)
 
 
-@register("timing_policy", "two_stage")
 class TwoStageTiming(TimingPolicy):
     """Ask with the probability that a question is worth more than it costs, by Thompson's rule.
 

@@ -246,9 +246,7 @@ def time_problem(start: str, step_us: int, steps: int) -> str:
 
 
 FORMAT = 2
-"""Version of the layout of run directories; a reader refuses a later one."""
-SEALED_FORMAT = 2
-"""The first version whose runs have a seal."""
+"""Version of the layout of run directories; a reader refuses others."""
 
 FILE_NAME = "manifest.json"
 FLOORPLAN_NAME = "floorplan.json"
@@ -348,7 +346,7 @@ class Seal(Record):
 
 
 class Manifest(BaseModel):
-    """The content of `manifest.json`. A field that a later version adds has a default.
+    """The content of `manifest.json`.
 
     A field is declared below, with the mark `VARIES` if it differs between repetitions of a run;
     the simulation sets it before the first step or after the last one.
@@ -373,7 +371,7 @@ class Manifest(BaseModel):
         interventions: All interventions from outside, in order.
         expectations: The verdict on each expectation, by name; see `Verdict.content`.
         resumed: The steps at which it was resumed after it had ended early.
-        seal: Digests of the whole run; None until the run is closed, and in format 1.
+        seal: Digests of the whole run; None until the run is closed.
 
     Example:
         >>> Manifest(seed=4).seed
@@ -382,7 +380,7 @@ class Manifest(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
-    format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
+    format: Annotated[int, Field(ge=FORMAT, le=FORMAT)] = FORMAT
     status: Status = "running"
     scenario: dict[str, Any] = {}
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
@@ -476,9 +474,9 @@ class Manifest(BaseModel):
         if content["format"] > FORMAT:
             raise RunDirectoryError(
                 f"{path} was written by a later Fleet2D (format {content['format']}, this one "
-                f"reads up to {FORMAT}): update Fleet2D"
+                f"reads {FORMAT}): update Fleet2D"
             )
-        if missing := sorted(_REQUIRED - content.keys()):
+        if missing := sorted(cls.model_fields.keys() - content.keys()):
             raise _damaged(path, f"it lacks {', '.join(missing)}")
         try:
             manifest = cls.model_validate(content)
@@ -490,15 +488,6 @@ class Manifest(BaseModel):
         if manifest.scenario and reason:
             raise _damaged(path, reason)
         return manifest
-
-
-# The fields of format 1, which every manifest has; those added since may be absent.
-_REQUIRED = frozenset(
-    {
-        "digest", "entities", "format", "inputs", "metrics", "notes", "scenario", "seed",
-        "simulated_s", "start", "status", "step_us", "steps", "tables", "versions", "wall_s",
-    }
-)  # fmt: skip
 
 
 def json_of(path: Path, text: bytes) -> Any:

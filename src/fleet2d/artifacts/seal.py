@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,6 @@ from fleet2d.artifacts.manifest import (
     FILE_NAME,
     FLOORPLAN_NAME,
     LEARNED_NAME,
-    SEALED_FORMAT,
     FileRecord,
     Manifest,
     Seal,
@@ -138,18 +137,16 @@ class Verification:
     Attributes:
         differing: How files and fields of the manifest differ from what was stored, by name.
         foreign: Files in the directory that are not part of the run.
-        notes: Remarks about what could not be compared.
-        digest: The seal's digest; None for a run that has none.
+        digest: The seal's digest; None if the run has no seal.
     """
 
     differing: dict[str, str]
     foreign: list[str]
-    notes: list[str] = field(default_factory=list)
-    digest: str | None = None
+    digest: str | None
 
     @property
     def same(self) -> bool:
-        """Whether everything that could be compared equals what was stored."""
+        """Whether everything equals what was stored."""
         return not self.differing
 
 
@@ -193,7 +190,7 @@ def verify_run(directory: Path | str) -> Verification:
             " compare with; `fleet2d resume` continues the run"
         )
     with os_errors_as(ArtifactError, f"{root} can't be read"):
-        differing, notes = _differing_parts(root, manifest)
+        differing = _differing_parts(root, manifest)
         for name, table in manifest.tables.items():
             file = f"{name}.parquet"
             entry = f"{FILE_NAME}: tables.{name}"
@@ -204,7 +201,7 @@ def verify_run(directory: Path | str) -> Verification:
             differing.setdefault(f"{FILE_NAME}: digest", "is not that of the tables")
         foreign = foreign_files(root, manifest)
     digest = None if manifest.seal is None else manifest.seal.digest
-    return Verification(differing, foreign, notes, digest)
+    return Verification(differing, foreign, digest)
 
 
 def foreign_files(root: Path, manifest: Manifest) -> list[str]:
@@ -248,23 +245,18 @@ def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
     return {n: sha256_of(part, ordered=n.startswith("scenario")) for n, part in parts.items()}
 
 
-def _differing_parts(root: Path, manifest: Manifest) -> tuple[dict[str, str], list[str]]:
-    """Return how files and fields differ from their seal, and remarks about what has none."""
-    if manifest.seal is not None:
-        differing = _differing_fields(root, manifest.seal)
-        for name, record in manifest.seal.files.items():
-            if difference := _difference(root, name, record):
-                differing[name] = difference
-        for name in manifest.tables:
-            if f"{name}.parquet" not in manifest.seal.files:
-                differing[f"{name}.parquet"] = "is not covered by the seal"
-        return differing, []
-    if manifest.format >= SEALED_FORMAT:
-        return {f"{FILE_NAME}: seal": "is missing"}, []
-    return {}, [
-        f"{root} has no seal (format {manifest.format}): the content of its tables was compared,"
-        " not its metrics, floor plan, learned state and the rest of the manifest"
-    ]
+def _differing_parts(root: Path, manifest: Manifest) -> dict[str, str]:
+    """Return how files and fields differ from their seal."""
+    if manifest.seal is None:
+        return {f"{FILE_NAME}: seal": "is missing"}
+    differing = _differing_fields(root, manifest.seal)
+    for name, record in manifest.seal.files.items():
+        if difference := _difference(root, name, record):
+            differing[name] = difference
+    for name in manifest.tables:
+        if f"{name}.parquet" not in manifest.seal.files:
+            differing[f"{name}.parquet"] = "is not covered by the seal"
+    return differing
 
 
 def _differing_fields(root: Path, seal: Seal) -> dict[str, str]:

@@ -1,8 +1,8 @@
 """An unfinished run: its rows in a journal, its checkpoint, and the right to write in its folder.
 
 The folder `unfinished` in a run directory exists until the run is complete. In the journal, a frame
-`table` describes a table, `rows` holds rows of a table, and `commit` ends the frames that belong
-together: readers ignore what follows the last commit.
+`table` holds the Arrow schema of a table, `rows` holds rows of one, and `commit` ends the frames
+that belong together: readers ignore what follows the last commit.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import json
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -53,7 +53,7 @@ CHECKPOINT_NAME = "checkpoint"
 LOCK_NAME = "run.lock"
 # Journals are read where they were written: numbers are in the byte order of the machine.
 JOURNAL = JournalFormat(
-    f"fleet2d journal 3 {sys.byteorder}\n".encode(), ("table", "rows", "commit")
+    f"fleet2d journal 4 {sys.byteorder}\n".encode(), ("table", "rows", "commit")
 )
 
 # How often the journal is flushed to the disk [s]: so much is lost in a power cut, at most. A crash
@@ -117,7 +117,7 @@ def last_commit(path: Path) -> Commit | None:
     with _damage_of(path):
         for frame in read_frames(path, JOURNAL):
             if frame.kind == "table":
-                names.append(_spec_of(frame.description).name)
+                names.append(_spec_of(frame.content).name)
             if frame.kind == "commit":
                 step, rows = frame.description
                 commit = Commit(int(step), dict(zip(names, map(int, rows), strict=True)), frame.end)
@@ -141,7 +141,7 @@ def read_rows(path: Path, end: int) -> Iterator[LoggedRows]:
             if frame.end > end:
                 break
             if frame.kind == "table":
-                specs.append(_spec_of(frame.description))
+                specs.append(_spec_of(frame.content))
                 if specs[-1].name in [spec.name for spec in specs[:-1]]:
                     raise ValueError(f"two tables have the name {specs[-1].name}")
                 words.append(new_dictionaries(specs[-1]))
@@ -160,19 +160,17 @@ def _damage_of(path: Path) -> Iterator[None]:
     """Name the file if a frame with a right checksum has a wrong content."""
     try:
         yield
-    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, IndexError, OSError, TypeError, ValueError) as error:
         raise ArtifactError(f"{path} is damaged ({error}): run the scenario again") from error
 
 
-def _spec_of(description: Mapping[str, Any]) -> TableSpec:
-    parts = description["columns"]
-    columns = [Column(**{**part, "categories": tuple(part["categories"])}) for part in parts]
-    spec = TableSpec(description["name"], tuple(columns), description["description"])
-    for column in columns:
-        texts = column.name, column.unit, column.description, *column.categories, spec.description
-        if not all(isinstance(text, str) for text in texts):
-            raise TypeError(f"a column is described by {texts}")
-    return spec
+def _spec_of(schema: bytes) -> TableSpec:
+    """Return the table that a serialized Arrow schema describes."""
+    import pyarrow as pa
+
+    from fleet2d.artifacts.arrow import spec_of
+
+    return spec_of(pa.ipc.read_schema(pa.py_buffer(schema)))
 
 
 def _chunk_of(spec: TableSpec, rows: int, content: bytes, words: dict[str, Dictionary]) -> Chunk:
@@ -393,8 +391,10 @@ class UnfinishedRun:
         """
         table = self._tables.get(spec.name)
         if table is None:
+            from fleet2d.artifacts.arrow import schema_of
+
             table = self._tables[spec.name] = _LoggedTable(len(self._tables))
-            self.journal.add("table", _to_json(asdict(spec)))
+            self.journal.add("table", "{}", schema_of(spec).serialize().to_pybytes())
         added_words = {}
         for name, dictionary in words.items():
             known = table.words.get(name, 0)

@@ -144,6 +144,8 @@ def components(
             typer.echo(f"    {field.name}: {field.type} {default}")
             if field.description:
                 typer.echo(f"        {field.description}")
+        if component.shares:
+            typer.echo(f"    and the keys of {', '.join(component.shares)}")
         typer.echo("")
 
 

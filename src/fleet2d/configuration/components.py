@@ -1,4 +1,4 @@
-"""Components: the parts of a scenario, and how they are declared, registered and looked up.
+"""Components: the parts of a scenario, and how they are declared and looked up.
 
 A component is one class whose typed fields are its configuration. Its kind (floorplan, behavior,
 algorithm, metric) is declared by the base class of all components of that kind::
@@ -6,22 +6,32 @@ algorithm, metric) is declared by the base class of all components of that kind:
     class Algorithm(Component):
         kind: ClassVar[str] = "algorithm"
 
-    @register("algorithm", "ltp.likelihood")
     class Likelihood(Algorithm):
         period: Duration = timedelta(hours=1)
 
-A component in a module below its kind's package needs no import anywhere else.
+Its name is in the table of `fleet2d.configuration.built_in`; an installed package has a table of
+its own, the group of entry points `fleet2d.KIND`.
 """
 
 import importlib.util
 import inspect
-import pkgutil
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sized
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from types import UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Self,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 from pydantic import (
     BaseModel,
@@ -39,6 +49,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from fleet2d.bounds import ENTRIES, ITEMS, Bound, one_line
+from fleet2d.configuration.built_in import COMPONENTS
 from fleet2d.configuration.importing import BrokenModule, class_path, import_class
 from fleet2d.configuration.problems import (
     Location,
@@ -201,8 +212,26 @@ def _name_as_type(entries: Any) -> Any:
 CheckNames = BeforeValidator(_check_names)
 """Declares that the keys of a mapping are names of entries."""
 
-NameAsType = BeforeValidator(_name_as_type)
-"""Declares that an entry without a `type` is of the type of its name."""
+
+class NameAsType:
+    """Declares that an entry without a `type` is of the type of its name."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Add the types before ``source`` is validated."""
+        return core_schema.no_info_before_validator_function(_name_as_type, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return the schema of the mapping, whose entries may be untyped."""
+        result = handler(schema)
+        untyped = {"type": "object", "not": {"required": ["type"]}}
+        return {
+            **result,
+            "additionalProperties": {"anyOf": [result["additionalProperties"], untyped]},
+        }
 
 
 def split_short_form(data: Any, body_fields: Iterable[str]) -> Any:
@@ -252,33 +281,10 @@ class ShortForm:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Return a mark with the body's keys, for `fleet2d.scenario.schema` to add short forms."""
+        """Return a mark for `fleet2d.scenario.schema` to add short forms."""
         long = handler(schema)
-        body = dict(handler.resolve_ref_schema(long)["properties"])
-        kind = body.pop("behaviors")["items"]["x-kind"]
-        return {"anyOf": [long], "x-short-form": {"kind": kind, "body": body}}
-
-
-PACKAGES = {
-    "floorplan": "fleet2d.floorplan",
-    "behavior": "fleet2d.entities",
-    "drive": "fleet2d.entities.drive",
-    "evidence_source": "fleet2d.entities",
-    "object": "fleet2d.entities",
-    "algorithm": "fleet2d.algorithms",
-    "presence_estimator": "fleet2d.algorithms.presence",
-    "presence_model": "fleet2d.algorithms.presence",
-    "metric": "fleet2d.metrics",
-    "interrupt": "fleet2d.engine.interrupt",
-    "sight": "fleet2d.sight",
-    "perception_error": "fleet2d.sight",
-    "intervention": "fleet2d.interventions",
-    "answers": "fleet2d.interactions",
-    "answer_part": "fleet2d.interactions",
-    "attitude": "fleet2d.interactions",
-    "timing_policy": "fleet2d.algorithms.timing",
-}
-"""Where the built-in components of each kind live."""
+        behaviors = handler.resolve_ref_schema(long)["properties"]["behaviors"]
+        return {"anyOf": [long], "x-short-form": behaviors["items"]["x-kind"]}
 
 
 class Settings(DescribedModel):
@@ -360,6 +366,12 @@ def _example(cls: type[Settings], key: str) -> str:
     return f"[{', '.join(f'{value:g}' for value in values)}]"
 
 
+_NAMES: dict[str, str] = {}
+for _types in COMPONENTS.values():
+    for _name, _path in _types.items():
+        _NAMES.setdefault(_path, _name)
+
+
 class Component(Settings):
     """A part of a scenario that a ``type`` selects.
 
@@ -378,9 +390,10 @@ class Component(Settings):
     type_name: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Set the type name to the path of the class, until it is registered under a name."""
+        """Set the type name: that of a table, else the path of the class."""
         super().__init_subclass__(**kwargs)
-        cls.type_name = class_path(cls)
+        path = class_path(cls)
+        cls.type_name = _NAMES.get(path, path)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
@@ -411,41 +424,8 @@ def _names_of(cls: type[Component]) -> tuple[frozenset[str], frozenset[str]]:
     return frozenset(fixed), frozenset(cls.__private_attributes__)
 
 
-C = TypeVar("C", bound=type[Component])
-
-_REGISTRY: dict[str, dict[str, type[Component]]] = {}
-_ALIASES: dict[str, dict[str, str]] = {}
-_COMPLETE: set[str] = set()  # kinds whose built-in modules have all been imported
-
-
-def register(kind: str, name: str, *, aliases: Iterable[str] = ()) -> Callable[[C], C]:
-    """Register a component class as ``type: name``.
-
-    Raises:
-        ValueError: the name or an alias is taken, or the class is of another kind.
-    """
-
-    def decorate(cls: C) -> C:
-        if cls.kind != kind:
-            raise ValueError(
-                f"{cls.__qualname__} can't be a {kind}: derive it from the base class that "
-                f"declares `kind: ClassVar[str] = {kind!r}`"
-            )
-        classes = _REGISTRY.setdefault(kind, {})
-        names = _ALIASES.setdefault(kind, {})
-        for word in (name, *aliases):
-            if word in classes or word in names:
-                raise ValueError(f"there is a {kind} named {word!r} already")
-        classes[name] = cls
-        names.update(dict.fromkeys(aliases, name))
-        cls.type_name = name
-        return cls
-
-    return decorate
-
-
 def lookup(kind: str, name: str) -> type[Component]:
-    """Return a component class by its name, an alias, its entry point or 'package.module:Class'.
+    """Return a component class by its name in a table, or by its path 'package.module:Class'.
 
     Modules named in a scenario are searched in the scenario's own folder first, then among the
     installed ones. 'folder/package.module:Class' names the folder.
@@ -455,18 +435,16 @@ def lookup(kind: str, name: str) -> type[Component]:
     """
     if ":" in name:
         return _check_class(kind, name, import_class(name))
-    if (cls := _registered(kind, name)) is not None:
-        return cls
-    _import_builtins(kind, name)
-    if (cls := _registered(kind, name)) is not None:
-        return cls
+    path = COMPONENTS.get(kind, {}).get(name)
+    if path is not None:
+        return _built_in(path)
     for entry in _plugins(kind).select(name=name):
         if _is_there(entry):
             cls = _check_class(kind, name, import_class(entry.value, is_plugin=True))
             cls.type_name = name
             return cls
-    known = sorted(components(kind))
-    near = did_you_mean(name, [*known, *_ALIASES.get(kind, ())])
+    known = components(kind)
+    near = did_you_mean(name, [*known, *COMPONENTS.get(kind, ())])
     raise ScenarioError(
         f"there is no {kind.replace('_', ' ')} {name!r}{near} There are:"
         f" {', '.join(known) or 'none'}; your own is written 'package.module:Class'"
@@ -474,10 +452,16 @@ def lookup(kind: str, name: str) -> type[Component]:
 
 
 def components(kind: str) -> dict[str, type[Component]]:
-    """Return every component of a kind, registered or from an entry point, by name, sorted."""
-    _import_builtins(kind)
+    """Return every component of a kind, built in or from an entry point, by name, sorted."""
+    types = {cls.type_name: cls for cls in map(_built_in, COMPONENTS.get(kind, {}).values())}
     plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind) if _is_there(e)}
-    return dict(sorted((plugins | _REGISTRY.get(kind, {})).items()))
+    return dict(sorted((plugins | types).items()))
+
+
+@cache
+def _built_in(path: str) -> type[Component]:
+    module, _, name = path.partition(":")
+    return getattr(importlib.import_module(module), name)
 
 
 @cache
@@ -486,6 +470,15 @@ def _plugins(kind: str) -> "EntryPoints":
     from importlib.metadata import entry_points  # slow to import, and seldom used
 
     return entry_points(group=f"fleet2d.{kind}")
+
+
+def _name_of(cls: type[Component]) -> str:
+    """Return the name of a class in a table, else its path."""
+    if ":" in cls.type_name and "/" not in cls.type_name:  # maybe one that was unpickled
+        for entry in _plugins(cls.kind):
+            if entry.value == cls.type_name:
+                cls.type_name = entry.name
+    return cls.type_name
 
 
 def _is_there(entry: "EntryPoint") -> bool:
@@ -497,39 +490,14 @@ def _is_there(entry: "EntryPoint") -> bool:
 
 
 def aliases(kind: str, name: str) -> tuple[str, ...]:
-    """Return the other names of a registered component."""
-    return tuple(sorted(a for a, n in _ALIASES.get(kind, {}).items() if n == name))
+    """Return the other names of a built-in component."""
+    types = COMPONENTS.get(kind, {})
+    return tuple(word for word in types if word != name and types[word] == types.get(name))
 
 
 def base_of(cls: type[Component]) -> type[Component]:
     """Return the base class that declares the component's kind; its fields fit every type."""
     return next((base for base in reversed(cls.__mro__) if vars(base).get("kind")), Component)
-
-
-def _registered(kind: str, name: str) -> type[Component] | None:
-    return _REGISTRY.get(kind, {}).get(_ALIASES.get(kind, {}).get(name, name))
-
-
-def _import_builtins(kind: str, name: str | None = None) -> None:
-    """Import a kind's modules, or, if one registers ``name``, only that one."""
-    if kind in _COMPLETE or kind not in PACKAGES:
-        return
-    package = importlib.import_module(PACKAGES[kind])
-    folders = getattr(package, "__path__", [])  # a module has all components of its kind
-    modules = sorted(m.name for m in pkgutil.walk_packages(folders, f"{package.__name__}."))
-    if name:
-        # Most types stand in the file of their name, which is read first.
-        for module in sorted(modules, key=lambda m: not name.startswith(m.rpartition(".")[2])):
-            spec = importlib.util.find_spec(module)
-            get_source = getattr(spec and spec.loader, "get_source", str)  # also of an archive
-            source = get_source(module) or ""
-            if re.search(rf'^@register\("{kind}", .*"{re.escape(name)}"', source, re.MULTILINE):
-                importlib.import_module(module)
-                if _registered(kind, name):
-                    return
-    for module in modules:
-        importlib.import_module(module)
-    _COMPLETE.add(kind)
 
 
 def _check_class(kind: str, name: str, cls: object) -> type[Component]:
@@ -572,19 +540,10 @@ class Codec:
 
 
 @dataclass(frozen=True)
-class OneOf(Codec):
-    """Declares a field for any component of a kind: ``Annotated[Component, OneOf("metric")]``.
-
-    Its input is a mapping with ``type``, the bare name of a type, or an instance; it dumps to the
-    mapping.
-
-    Attributes:
-        kind: The kind.
-        by_name: Whether its name in a mapping stands for a type that is left out; see `NameAsType`.
-    """
+class _Typed(Codec):
+    """Declares a field for any component of a kind, which its ``type`` selects."""
 
     kind: str
-    by_name: bool = False
 
     def validate(self, value: Any, info: ValidationInfo) -> Component:
         """Return the component that a mapping describes."""
@@ -624,10 +583,53 @@ class OneOf(Codec):
             exclude_defaults=info.exclude_defaults,
             exclude_unset=info.exclude_unset,
         )
-        return {"type": value.type_name, **fields}
+        return {"type": _name_of(type(value)), **fields}
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Return a mark that `fleet2d.scenario.schema` replaces by all types of the kind."""
-        return {"x-kind": self.kind} | ({"x-by-name": True} if self.by_name else {})
+        return {"x-kind": self.kind}
+
+
+if TYPE_CHECKING:
+    OneOf = Annotated[T, _Typed("")]
+else:
+
+    class OneOf:
+        """A field for any component of the kind of a class: ``OneOf[Metric]``.
+
+        Its input is a mapping with ``type``, the bare name of a type, or an instance; it dumps to
+        the mapping.
+        """
+
+        def __class_getitem__(cls, base: type[Component]) -> Any:
+            """Return the annotation of a field."""
+            return Annotated[base, _Typed(base.kind)]
+
+
+def kind_at(form: Any, keys: Sequence[str], marks: Sequence[object] = ()) -> str | None:
+    """Return the kind of component that is configured at a path, None if there is none.
+
+    Args:
+        form: What the path begins in: settings, or the annotation of a field.
+        keys: The path. What a component has within depends on its type: there are none there.
+        marks: What else declares the field.
+    """
+    if get_origin(form) is Annotated:
+        inner, *more = get_args(form)
+        return kind_at(inner, keys, more)
+    for mark in marks:
+        if isinstance(mark, _Typed):
+            return None if keys else mark.kind
+        if isinstance(mark, ShortForm) and not keys:
+            return kind_at(form, ("behaviors", "0"))
+    if isinstance(form, type) and issubclass(form, Settings):
+        field = form.model_fields.get(keys[0]) if keys else None
+        return field and kind_at(field.annotation, keys[1:], field.metadata)
+    forms = get_args(form)
+    if get_origin(form) in (Union, UnionType):
+        return next(filter(None, (kind_at(option, keys) for option in forms)), None)
+    if get_origin(form) is tuple and keys:
+        return kind_at(forms[0], keys[1:])
+    return kind_at(forms[1], keys[1:]) if get_origin(form) is dict and keys else None

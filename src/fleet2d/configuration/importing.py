@@ -23,7 +23,7 @@ from fleet2d.configuration.code_files import (
     with_imports,
 )
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.configuration.trust import check_may_run, files_to_run, may_run_code
+from fleet2d.configuration.trust import check_may_import
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import ScenarioError, may_be_ctrl_c, text_of
 
@@ -58,8 +58,8 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
     folder = (folder_of(name) / parent).resolve()
     if not is_class_path(name):
         raise ScenarioError(f"can't import {name!r}: write module:Class or folder/module:Class")
-    if not (is_plugin or may_run_code()):
-        check_may_run(name, files_to_run(folder, module_name))
+    if not is_plugin:
+        check_may_import(name, folder, module_name)
     is_file = bool(parent) or name.rpartition(":")[0].endswith(".py")
     if is_file and source_of(folder, module_name) is None:
         raise ScenarioError(

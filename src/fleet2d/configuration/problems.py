@@ -51,7 +51,7 @@ def unknown_key(key: object, known: Iterable[str]) -> "PydanticCustomError":
         {
             "key": one_line(repr(key)),
             "hint": did_you_mean(key, names),
-            "names": ", ".join(names),
+            "names": ", ".join(names) or "none",
             "known": names,
         },
     )

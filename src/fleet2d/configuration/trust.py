@@ -99,6 +99,21 @@ def check_may_run(name: str, code: Iterable[object]) -> None:
         raise ScenarioError(f"{name!r} would run {each}, which is not trusted: it hasn't run")
 
 
+def check_may_import(name: str, folder: Path, module: str) -> None:
+    """Refuse to import a module while no code may run, unless it is loaded already.
+
+    Args:
+        name: What names it, for the message.
+        folder: The folder in which it is searched first.
+        module: Its dotted name.
+
+    Raises:
+        ScenarioError: It may not run.
+    """
+    if not may_run_code():
+        check_may_run(name, files_to_run(folder, module))
+
+
 def content_of_run(manifest: Mapping[str, Any]) -> dict[str, Any]:
     """Return the scenario of a manifest with what was done to the run, for `code_of`."""
     return {**manifest["scenario"], "interventions": manifest.get("interventions", [])}

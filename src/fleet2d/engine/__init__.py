@@ -1,1 +1,1 @@
-"""The run itself: clock, random streams, spans, the loop, and what it stores."""
+"""The run itself: clock, random streams, spans, the loop, and its tables."""

@@ -1,17 +1,28 @@
-"""The basis of a run: what its parts share, what follows its bodies, its components and files."""
+"""The basis of a run: the parts that all share, the watchers of bodies, components and files."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, ValuesView
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+    Set,
+    ValuesView,
+)
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, Self, TypeVar
 
 from pydantic import BaseModel
 
+from fleet2d.algorithms.history import SensorRow
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.manifest import Manifest, input_record
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.importing import source_files
-from fleet2d.entities.behavior import SightEvent
+from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import RunDirectoryError, blame
@@ -19,6 +30,9 @@ from fleet2d.floorplan.home import Home
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
+
+if TYPE_CHECKING:
+    from fleet2d.expectations.signals import Outputs, Results
 
 T = TypeVar("T")
 
@@ -31,7 +45,7 @@ class ImmutableRows(list[T]):
 
 
 class PlannedNote(NamedTuple):
-    """What a plan has at a step: a question or a call, by its text.
+    """A note of a plan at a step: a question or a call, by its text.
 
     Attributes:
         step: The step.
@@ -59,9 +73,20 @@ class Watcher:
 
     Attributes:
         next_step: The first step that it has not processed.
+        awaited: Kinds of events that end a span, whatever plans wait for.
+        steered: Rows of the bodies whose plans it may replace at any step.
+        files: The files that it has read.
     """
 
     next_step: int = 0
+    awaited: Set[str] = frozenset()
+    steered: Collection[int] = ()
+    files: Sequence[Path] = ()
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether there is anything in the run for it to follow."""
+        return True
 
     @property
     def waits(self) -> bool:
@@ -85,10 +110,43 @@ class Watcher:
         """
         return ()
 
+    # Decisions
+
+    def looks(self, row: int, step: int) -> bool:
+        """Return whether a body that it steers is asked for a decision at a step."""
+        return False
+
+    def evasion(self, bodies: Bodies, now: Situation) -> Callable[[], None] | None:
+        """Return what lets a body that it steers follow another plan; None: it may go on."""
+        return None
+
+    def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
+        """Hear that the plan of a body is replaced at a step."""
+
+    def listen(self, row: int) -> None:
+        """Hear that a body may wait for other events from now on."""
+
+    def begin_plan(self, actor: DecidingActor) -> None:
+        """Hear that a body begins a plan."""
+
+    # What becomes of a run
+
+    def settle(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
+        """Take in what was observed up to step `end` - 1, in which the home doesn't change.
+
+        Args:
+            end: One past the last step.
+            observations: The observations of robots.
+            readings: The readings of sensors.
+        """
+
+    def learn(self, outputs: "Outputs", results: "Results") -> None:
+        """Take in new outputs of algorithms, and new results of metrics."""
+
 
 @dataclass(frozen=True)
 class Basis:
-    """What the parts of a run are made from.
+    """The scenario, home and bodies from which the parts of a run are made.
 
     Attributes:
         scenario: The scenario.
@@ -148,7 +206,7 @@ def input_files(scenario: Scenario) -> list[Path]:
 
 
 def changed_inputs(manifest: Manifest) -> list[str]:
-    """Return the files that a run read and whose content has changed since.
+    """Return the input files of a run that have changed since.
 
     Raises:
         RunDirectoryError: One is missing, or is not a file.

@@ -1,4 +1,4 @@
-"""The cameras of a body in a run: their memory from span to span, and what they perceive.
+"""The cameras of a body in a run: their memory from span to span, and their sightings.
 
 The look is compiled. Here are its tables, the effect of interventions on them, and methods of sight
 that are written in Python.
@@ -84,7 +84,7 @@ UNSEEN = SightingTable.of_rows(np.zeros((0, len(SightingColumn)), np.int64))
 
 
 class SightSetup(NamedTuple):
-    """What the cameras of all bodies of a run share.
+    """The settings that the cameras of all bodies of a run share.
 
     Attributes:
         actors: All bodies, users first.
@@ -173,7 +173,7 @@ class Cameras(Watcher):
             yield from ((c, each) for each in self.disturbances if each.is_of(name))
 
     def _forced(self) -> I64:
-        """Return what each body in view is perceived as, (cameras, bodies); see About.FORCED."""
+        """Return the forced identity of each body in view, (cameras, bodies); see About.FORCED."""
         index = {other.name: u for u, other in enumerate(self.others)} | {"": -1}
         forced = np.zeros((len(self.names), len(self.others)), np.int64)
         for c, disturbance in self._disturbed():

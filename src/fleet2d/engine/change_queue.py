@@ -45,7 +45,7 @@ def switch(home: Home, rooms: Sequence[int], step: int, *, is_on: bool) -> list[
 
 
 class PeopleSwitches:
-    """What people with `lights` do: each is in one room, or asleep or away.
+    """The switches of people with `lights`: each is in one room, or asleep or away.
 
     All lights are off at first. Who enters a room within the own hours, gets up there, or is there
     when the hours begin, has the light on; who leaves it or lies down switches it off, unless
@@ -87,7 +87,7 @@ class PeopleSwitches:
                 begin = span.next_begin(begin)
         return steps
 
-    def see_to(self, row: int, actor: Actor, step: int) -> list[Event]:
+    def switch_lights(self, row: int, actor: Actor, step: int) -> list[Event]:
         """Let a body switch lights where it is at a step; return the events."""
         if isinstance(actor, DecidingActor) and isinstance(actor.order, StandStill):
             return []
@@ -246,7 +246,7 @@ class ChangeQueue:
         self._put(DueChange(step, change, by))
 
     def expect(self, row: int, actor: Actor) -> None:
-        """Schedule what a body does on its way to doors and lights, after it has a new plan."""
+        """Schedule the doors and lights that a body uses on its way, after it has a new plan."""
         for step in self._switches.steps(row, actor):
             self._put(DueChange(step, None, actor.name, opens_for=(row, actor.planned_at)))
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
@@ -260,7 +260,7 @@ class ChangeQueue:
                 self._put(DueChange(step, None, actor.name, door, plan, moment))
 
     def make(self, step: int) -> list[Event]:
-        """Make all changes that are due at a step; bodies whose way they block replan.
+        """Make all changes that are due at a step; bodies with a blocked way replan.
 
         Raises:
             ComponentError: A request of an algorithm or a script is impossible.
@@ -272,7 +272,7 @@ class ChangeQueue:
                 events += self._make_change(due, due.change, step)
             elif due.door < 0 and due.opens_for is not None:
                 row = due.opens_for[0]
-                events += self._switches.see_to(row, self._actors[row], step)
+                events += self._switches.switch_lights(row, self._actors[row], step)
             elif due.opens_for is not None:
                 events += self._open_for(due, step)
             else:
@@ -373,7 +373,7 @@ class ChangeQueue:
         return False
 
     def _stop(self, step: int, shape: F64 | None, actors: Sequence[Actor] | None = None) -> None:
-        """Make bodies replan whose way is blocked, or that walk at random along the walls."""
+        """Make bodies replan that have a blocked way, or walk at random along the walls."""
         units = self.home.plan.lattice.units_per_m
         for actor in self._actors if actors is None else actors:
             if not isinstance(actor.motion, Track):

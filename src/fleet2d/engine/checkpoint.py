@@ -99,7 +99,7 @@ class Checkpoint:
 
 
 def _fixed_part(manifest: Manifest, like: Manifest | None = None) -> tuple[object, ...]:
-    """Return what doesn't change in the manifest while a run goes on.
+    """Return the fields of the manifest that don't change while a run goes on.
 
     Args:
         manifest: The manifest.
@@ -225,7 +225,7 @@ class CheckpointWriter:
     def update_manifest(self, state: State) -> None:
         """Update the interventions and the inputs in the manifest."""
         manifest = self._store.manifest
-        has_inputs = manifest.add_inputs(state.interruptions.files)
+        has_inputs = manifest.add_inputs([file for each in state.watchers for file in each.files])
         records = state.interventions.records
         if has_inputs or len(records) != len(manifest.interventions):
             manifest.interventions = records

@@ -7,8 +7,9 @@ give way keep clear of people: a person is in the way if the next move would bri
 and within its distance; for a robot that goes round people, if the bodies would touch.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import timedelta
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -59,11 +60,7 @@ Places = tuple[I64, I64, I64 | U8]
 
 
 class BlockedWays(Watcher):
-    """The bodies of a run that block each other's way.
-
-    Attributes:
-        rows: Their rows among the bodies; empty if bodies don't block each other.
-    """
+    """The bodies of a run that block each other's way; it steers all of them."""
 
     def __init__(self, basis: Basis) -> None:
         """Keep track of bodies if `simulation.people_block` says how long one waits for another."""
@@ -74,19 +71,24 @@ class BlockedWays(Watcher):
         self._radii = np.array([actor.entity.radius for actor in self._actors])
         self._waits = [Wait()] * len(self._actors)
         self._passes = [Pass()] * len(self._actors)
-        self.rows = range(0 if patience is None else len(self._actors))
+        self.steered = range(0 if patience is None else len(self._actors))
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether bodies block each other."""
+        return bool(self.steered)
 
     @property
     def waits(self) -> bool:
         """Whether bodies block each other."""
-        return len(self.rows) > 0
+        return self.is_needed
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a body has to decide: not the first of the span."""
         first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
         places = block.x, block.y, block.away
-        for row in self.rows:
+        for row in self.steered:
             meeting = self._first_meeting(places, row, first, np.arange(1, end - first))
             end = end if meeting is None else first + meeting[0]
         return end
@@ -99,6 +101,15 @@ class BlockedWays(Watcher):
         x, y, _, away = bodies.poses(np.array([step, step + 1])).T
         meeting = self._first_meeting((x, y, away), row, step, np.array([0]))
         return None if meeting is None else meeting[1]
+
+    def evasion(self, bodies: Bodies, now: Situation) -> Callable[[], None] | None:
+        """Let a body wait for another one in its way, or go round it."""
+        row = now.actor.row
+        if (other := self.in_way(bodies, row)) is None:
+            return None
+        if (plan := self.plan(now, other)) is None:
+            return None
+        return partial(self._actors[row].follow_instead, plan, now)
 
     def plan(self, now: Situation, other: int) -> Plan | None:
         """Return a plan to wait for another body, or to go round it; None to squeeze past."""
@@ -113,7 +124,7 @@ class BlockedWays(Watcher):
         step_us = actor.clock.step_us
         wait = self._waits[row]
         since = wait.since if wait.until == step else step
-        # Of two who wait for each other, the later one in the scenario waits twice as long.
+        # Of two bodies that wait for each other, the later one in the scenario waits twice as long.
         is_later = other < row and self._avoids(other, row, step)
         patience_us = self._patience_us * (2 if is_later else 1)
         if (step - since) * step_us < patience_us:
@@ -207,11 +218,17 @@ class Clearance(Watcher):
         self._users = users
         polite = [r for r in robots if getattr(r.entity, "gives_way", None) is not None]
         self.robots = {robot.row: robot for robot in polite if users}
+        self.steered = list(self.robots)
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether any robot gives way."""
+        return bool(self.robots)
 
     @property
     def waits(self) -> bool:
         """Whether any robot gives way."""
-        return bool(self.robots)
+        return self.is_needed
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a robot has to decide: not the first of the span."""
@@ -243,6 +260,14 @@ class Clearance(Watcher):
         if waiting is None or waiting.look_from(step) != step:
             return False
         return not waiting.surroundings.is_unchanged_since(self.surroundings(self.robots[row]))
+
+    def evasion(self, bodies: Bodies, now: Situation) -> Callable[[], None] | None:
+        """Let a robot give way to the person at whom it would drive next."""
+        row = now.actor.row
+        if (person := self.in_way(bodies, row)) is None:
+            return None
+        robot = self.robots[row]
+        return partial(robot.give_way, now, person.name, self.surroundings(robot))
 
     def in_way(self, bodies: Bodies, row: int) -> DecidingActor | None:
         """Return the person at whom a robot would drive next, if people stay where they are."""

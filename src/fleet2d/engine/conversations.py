@@ -4,7 +4,7 @@ All of it follows from the poses and plans alone, step by step, so it doesn't de
 span ends with each question and answer, and where the robot's plan waits for requests to come up.
 """
 
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -61,7 +61,6 @@ class Conversations(Watcher):
         attitudes: The attitude of each user to each robot: truth, by their rows.
         log: How people answered: truth, for metrics.
         wanted: The requests that came up, for metrics.
-        awaited: Kinds of events that end a span, whatever plans wait for.
     """
 
     def __init__(self, basis: Basis, interventions: InterventionQueue) -> None:
@@ -77,7 +76,6 @@ class Conversations(Watcher):
         self.attitudes: dict[tuple[int, int], AttitudeState] = {}
         self.log: list[AnswerRecord] = []
         self.wanted: list[Wanted] = []
-        self.awaited: Set[str] = frozenset()
         self._interventions = interventions
         self._activity: dict[int, str] = {}  # of each user before the present plan
         self._questions: list[PlannedNote] = []  # at the ends of plans that were replaced
@@ -114,14 +112,17 @@ class Conversations(Watcher):
                     self._initiators.append((user, row))
 
     @property
-    def waits(self) -> bool:
+    def is_needed(self) -> bool:
         """Whether any robot wants something of people."""
         return bool(self.queues)
 
+    @property
+    def waits(self) -> bool:
+        """Whether any robot wants something of people."""
+        return self.is_needed
+
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
-        """Record what a plan that is replaced at a step has done until then."""
-        if not self.queues:
-            return
+        """Record the completed part of a plan that is replaced at a step."""
         if row < self.users:
             self._activity[row] = self._activity_at(row, step)
         elif row in self.queues:
@@ -168,7 +169,7 @@ class Conversations(Watcher):
         first = self.next_step
         self.next_step = end
         self._last = []
-        if not self.queues or end == first:
+        if end == first:
             return ()
         events = [
             Event(at, self.actors[row].name, EventKind.OPPORTUNITY, text)
@@ -204,7 +205,7 @@ class Conversations(Watcher):
         return events
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Yield the robots whose plans wait for what was said, or for a request that came up."""
+        """Yield the robots with plans that wait for an answer, or for a request that came up."""
         for row, event in self._last:
             if event.event in self.actors[row].plan.interrupts:
                 yield row, event
@@ -215,7 +216,7 @@ class Conversations(Watcher):
         self._last.append((row, SightEvent(event, text, x, y)))
 
     def _ask(self, question: PlannedNote, block: PoseBlock) -> None:
-        """Let the person who is addressed notice the robot, and draw the answer."""
+        """Let the addressed person notice the robot, and draw the answer."""
         name, _, meant = question.text.rpartition(" ")
         interaction = self.queues[question.row].interactions.get(name)
         user = self._addressed(question.row, meant, block)
@@ -317,7 +318,7 @@ class Conversations(Watcher):
         return None if room is None else room.index
 
     def _activity_at(self, row: int, step: int) -> str:
-        """Return what a user does at a step of the present plan; empty if that is unknown."""
+        """Return the activity of a user at a step of the present plan; empty if it is unknown."""
         actor = self.actors[row]
         time_us = step * actor.clock.step_us
         for note in reversed(actor.plan.notes):
@@ -347,7 +348,7 @@ class Conversations(Watcher):
         return [event, Event(step, event.entity, EventKind.TOLD, where)]
 
     def _whereabouts(self, about: int, user: int, block: PoseBlock) -> str:
-        """Return what a person knows of where another is: away, the room if the same, or home."""
+        """Return the whereabouts of one person to another: away, their common room, or home."""
         if block.away[about, 0]:
             return "away"
         room = self._room(about, block)
@@ -358,7 +359,7 @@ class Conversations(Watcher):
     def _obey(
         self, row: int, user: int, outcome: Outcome, text: str, step: int, bodies: Bodies
     ) -> Event:
-        """Let a robot keep to what a person has said at a step; return the event."""
+        """Let a robot obey a person's answer at a step; return the event."""
         robot = self.actors[row]
         answers = self.answers[user]
         room = self._room(row, bodies.block(step, step + 1))
@@ -383,7 +384,7 @@ class Conversations(Watcher):
             self._interventions.follow(off, step, by)
 
     def _end_bans(self, step: int) -> list[Event]:
-        """Let robots into the rooms whose bans are over at a step."""
+        """End the bans of rooms that are over at a step."""
         ended = [ban for ban in self._bans if ban[0] <= step]
         self._bans = [ban for ban in self._bans if ban[0] > step]
         events = []

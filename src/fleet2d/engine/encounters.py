@@ -18,7 +18,7 @@ from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I64, Bool, PoseBlock, line_of_sight, locate
 from fleet2d.runtime.events import Event, EventKind
 
-# The squared distance of a person who can't be met: larger than any home [lattice units²].
+# The squared distance of a person out of reach: larger than any home [lattice units²].
 FAR = 1 << 50
 LYING = POSTURES.index("lie")
 STANDING = POSTURES.index("stand")
@@ -163,14 +163,18 @@ class Encounters(Watcher):
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []
 
     @property
-    def waits(self) -> bool:
+    def is_needed(self) -> bool:
         """Whether any person reacts to robots."""
         return bool(self.pairs)
 
+    @property
+    def waits(self) -> bool:
+        """Whether any person reacts to robots."""
+        return self.is_needed
+
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Record the calls at `step` of a robot's plan that is replaced."""
-        if self.pairs:
-            self._calls += [call for call in notes_of(actor, EventKind.CALLS) if call.step == step]
+        self._calls += [call for call in notes_of(actor, EventKind.CALLS) if call.step == step]
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first encounter, `end` if there is none."""

@@ -11,13 +11,13 @@ from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import STEP, TIME, Column
 from fleet2d.configuration.units import MICROSECOND
+from fleet2d.engine.basis import Watcher
 from fleet2d.engine.intervention_queue import InterventionQueue, possible_details, possible_events
-from fleet2d.engine.learners import Learners
 from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import Expectation, RunSignals
-from fleet2d.expectations.signals import Gauge, MeasuredRun, Scene, SignalBlock
+from fleet2d.expectations.signals import Gauge, MeasuredRun, Outputs, Results, Scene, SignalBlock
 from fleet2d.expectations.verdict import (
     Verdict,
     VerdictEvidence,
@@ -26,7 +26,6 @@ from fleet2d.expectations.verdict import (
     is_decided,
     verdict_of,
 )
-from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 
@@ -49,7 +48,7 @@ class ActiveExpectation(NamedTuple):
     notes: tuple[str, ...]
 
 
-class RunExpectations:
+class RunExpectations(Watcher):
     """The expectations of a run, and the gauges that measure their signals.
 
     Attributes:
@@ -57,11 +56,16 @@ class RunExpectations:
     """
 
     def __init__(
-        self, scenario: Scenario, run: MeasuredRun, sensors: Sensors, queue: InterventionQueue
+        self,
+        scenario: Scenario,
+        run: MeasuredRun,
+        sensors: Sensors | None,
+        queue: InterventionQueue,
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
         self._run, self.actors, self.bodies, self.clock = run, run.actors, run.bodies, run.clock
         self._scenario, self._sensors, self._queue = scenario, sensors, queue
+        self._sensor_names = [] if sensors is None else sensors.names
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []
 
@@ -90,7 +94,8 @@ class RunExpectations:
         expectation.check(scene)
         if name in self.entries:
             raise InputError(f"{name!r} is expected already: give this another name")
-        self._run.first, self._run.sensors_on = first, self._sensors.on
+        self._run.first = first
+        self._run.sensors_on = {} if self._sensors is None else self._sensors.on
         for signal in expectation.measures():
             if str(signal) not in self._gauges:
                 self._gauges[str(signal)] = Gauge(signal, self._run)
@@ -111,14 +116,14 @@ class RunExpectations:
             "rooms": rooms,
             "places": [*rooms, *(item.name for item in home.plan.objects)],
             "doors": self._run.doors,
-            "sensors": self._sensors.names,
+            "sensors": self._sensor_names,
             "algorithms": list(self._scenario.algorithms),
             "metrics": list(self._scenario.metrics),
         }
         return Scene(
             names,
             {name: [o.name for o in c.others] for name, c in self._run.cameras.items()},
-            possible_events(users, robots, home, self._run.doors, self._sensors.names),
+            possible_events(users, robots, home, self._run.doors, self._sensor_names),
             possible_details(users, robots, self._queue.acts),
             home.plan.bounds,
             (clock.steps - since) * clock.step_us * MICROSECOND,
@@ -128,7 +133,7 @@ class RunExpectations:
     # Measuring
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Collect events until `take` measures their steps."""
+        """Collect events until `settle` measures their steps."""
         self._events += events
 
     def begin_plan(self, actor: DecidingActor) -> None:
@@ -136,25 +141,14 @@ class RunExpectations:
         for gauge in self._gauges.values():
             gauge.signal.begin_plan(actor, gauge)
 
-    def learned(self, step: int, learners: Learners) -> None:
-        """Note the outputs of algorithms and the results of metrics before a step."""
-        results = {
-            learner.name: learner.component.result
-            for learner in learners.all
-            if isinstance(learner.component, Metric) and learner.since == step
-        }
+    def learn(self, outputs: Outputs, results: Results) -> None:
+        """Note the outputs of algorithms and the results of metrics."""
         for gauge in self._gauges.values():
-            gauge.signal.learn(learners.fresh, results, gauge)
+            gauge.signal.learn(outputs, results, gauge)
 
-    def take(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
-        """Measure the signals up to step `end` - 1, in which the home doesn't change.
-
-        Args:
-            end: One past the last step.
-            observations: The observations of robots.
-            readings: The readings of sensors.
-        """
-        names = self._sensors.names
+    def settle(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
+        """Measure the signals up to step `end` - 1; see `Watcher.settle`."""
+        names = self._sensor_names
         rest = [e for e in self._events if e.step >= end]
         states = [(row.step, names[row.sensor], row.on) for row in readings]
         events = sorted((e for e in self._events if e.step < end), key=lambda e: (e.step, e.rank))
@@ -168,7 +162,7 @@ class RunExpectations:
     # Judging
 
     def verdicts(self, *, ended: bool) -> dict[str, Verdict]:
-        """Return the present verdicts on what has begun, by name.
+        """Return the present verdicts on the expectations that have begun, by name.
 
         Args:
             ended: Whether the run is over.
@@ -191,7 +185,7 @@ class RunExpectations:
         )
 
     def evidence(self, name: str) -> VerdictEvidence:
-        """Return what an expectation is about, with its signals so far."""
+        """Return the subjects of an expectation, with its signals so far."""
         entry = self.entries[name]
         return evidence_of(entry.expectation, self._signals(entry, ended=True))
 

@@ -1,4 +1,4 @@
-"""Heights of cameras, bodies and furniture: who stands behind a sofa is seen by the head."""
+"""Heights of cameras, bodies and furniture: of a person behind a sofa one sees the head."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -17,10 +17,10 @@ from fleet2d.sight.camera import Camera
 # the other points of a body are, in turn.
 HEAD = 15 / 16
 AROUND = (3 / 4, 1 / 2, 1 / 4)
-# How high a seat is [m], and how far those who sit rise above it, as a share of their height.
+# The height of a seat [m], and of a sitting person above it, as a share of the body's height.
 SEAT_M = 0.45
 SITTING = 0.52
-# How far those who lie rise above what they lie on [m].
+# The height of a lying person above the furniture [m].
 LYING_M = 0.25
 # Furniture whose back is as high as it is, with a seat before it, and the depth of the back [m].
 WITH_BACK = {"sofa", "armchair"}
@@ -80,7 +80,7 @@ def _stacked(home: Home) -> tuple[I64, I64, I64, I64]:
 
 
 def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
-    """Yield the parts of a piece of furniture that hide what is low: outline and height [m].
+    """Yield the parts of a piece of furniture that hide low things: outline and height [m].
 
     Outlines are int64 (corners, 2) [lattice units]. What stands on legs hides nobody, and what
     blocks sight is a wall already.

@@ -7,11 +7,11 @@ first of them, and the body decides right after it.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, cast
+from typing import cast
 
 import numpy as np
 
-from fleet2d.configuration.components import Component, lookup, register
+from fleet2d.configuration.components import Component, lookup
 from fleet2d.configuration.importing import source_files
 from fleet2d.engine.basis import Basis, Watcher
 from fleet2d.entities.behavior import Actor, SightEvent
@@ -53,7 +53,7 @@ class Interrupt(Component):
     no keys, and whether it holds must follow from the arguments of `holds` alone.
     """
 
-    kind: ClassVar[str] = "interrupt"
+    kind = "interrupt"
 
     def holds(self, span: SpanView) -> Bool:
         """Return at which steps of a span the condition holds, bool (steps,)."""
@@ -90,7 +90,7 @@ class Interruptions(Watcher):
         """Whether a plan waits for an interrupt."""
         return bool(self._held)
 
-    def expect(self, row: int) -> None:
+    def listen(self, row: int) -> None:
         """Wait for the interrupts that the present plan of a body names, and for no others."""
         names = self._actors[row].plan.interrupts - WATCHED_EVENTS
         if not names and not self._held:
@@ -162,7 +162,6 @@ def _checked(name: str, holds: Bool, steps: int) -> Bool:
     return holds
 
 
-@register("interrupt", "home_empty")
 class HomeEmpty(Interrupt):
     """The last person has left the home, as a robot may learn from everyone's phones."""
 
@@ -171,7 +170,6 @@ class HomeEmpty(Interrupt):
         return (span.poses.away[: span.users] != 0).all(axis=0)
 
 
-@register("interrupt", "home_occupied")
 class HomeOccupied(Interrupt):
     """Somebody has come home to an empty home, as a robot may learn from everyone's phones."""
 

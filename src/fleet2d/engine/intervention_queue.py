@@ -29,7 +29,7 @@ from fleet2d.runtime.events import KINDS, Event, EventKind
 # those of the script and from outside.
 ENDS, FOLLOWS, SCRIPT, OUTSIDE = range(4)
 FOLLOWED = "another intervention"
-"""What the manifest names as the origin of those that follow from others."""
+"""The origin, in the manifest, of interventions that follow from others."""
 
 # Events of every person: an order can cause them if no behavior does.
 PERSON_EVENTS = frozenset(
@@ -47,14 +47,14 @@ HOME_EVENTS = frozenset(
     {EventKind.MOVED, EventKind.ROOM_CHANGED, EventKind.LIGHT_ON, EventKind.LIGHT_OFF}
 )
 SENSOR_EVENTS = frozenset({EventKind.SENSOR})
-# Events whose detail names a user, or a robot.
+# Events with the name of a user, or of a robot, as their detail.
 ABOUT_USERS = (
     EventKind.USER_SEEN, EventKind.USER_LOST, EventKind.FIND_BEGINS, EventKind.FOUND,
     EventKind.GAVE_UP, EventKind.NOT_AT_HOME, EventKind.FOLLOWS, EventKind.LOST,
     EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER,
 )  # fmt: skip
 ABOUT_ROBOTS = (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST)
-# Events whose detail is what a robot wants of whom.
+# Events with an interaction and a person as their detail.
 OF_REQUESTS = (
     EventKind.DUE, EventKind.EXPIRED, EventKind.ASKS, EventKind.ACCEPTED, EventKind.DECLINED,
     EventKind.DEFERRED, EventKind.IGNORED, EventKind.MISTAKEN, EventKind.DELIVERED,
@@ -154,7 +154,7 @@ class InterventionQueue:
         insort(self._queue, due, key=lambda due: due[:3])
 
     def follow(self, act: Intervention, step: int, by: str = FOLLOWED) -> None:
-        """Schedule what follows from another intervention, before all that is due at that step.
+        """Schedule a consequence of another intervention, before all that is due at that step.
 
         Args:
             act: What follows.
@@ -169,14 +169,14 @@ class InterventionQueue:
         return self._queue[0].step if self._queue else None
 
     def take(self, step: int) -> Iterator[DueIntervention]:
-        """Yield what is due by a step, in order, and schedule the end of what begins."""
+        """Yield the interventions that are due by a step, in order, and schedule their ends."""
         while self._queue and self._queue[0].step <= step:
             due = self._queue.pop(0)
             if isinstance(due.act, Lasting):
                 if due.ends:
                     self.forget(due.act)
                 else:
-                    # A copy: what happens at each event begins again before it has ended.
+                    # A copy, since it may begin again before it has ended.
                     act = due.act.model_copy()
                     self.lasting.append(act)
                     due = due._replace(act=act)
@@ -224,7 +224,7 @@ class InterventionQueue:
         return frozenset(w.trigger.event for w in self.waiting if not w.is_over)
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Schedule what waits for one of these events at the step after it, or later by its delay.
+        """Schedule entries that wait for one of these events: at the step after it, or later.
 
         Of several such events at one step, only the first counts.
         """

@@ -1,4 +1,4 @@
-"""The layers of a run: those of what robots have seen, and when each layer is stored."""
+"""The layers of a run: the cells that robots have seen, and the times of storing layers."""
 
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
@@ -213,7 +213,7 @@ NEEDS = ("evidence", "exposure", *SEEN_LAYERS)
 
 
 def add_layers(home: Home, source: FloorPlanSource) -> None:
-    """Add the layers of a scenario to a home, except those of what robots have seen."""
+    """Add the layers of a scenario to a home, except those of seen cells."""
     layers = dict(source.layers)
     costs = layers.pop(COSTMAP, None)
     if source.costmap is not None or costs is not None:
@@ -227,7 +227,7 @@ def add_layers(home: Home, source: FloorPlanSource) -> None:
 
 
 class LayerBook:
-    """The layers of a run: it records what robots have seen, and stores layers at their times.
+    """The layers of a run: it records the cells that robots see, and stores layers at their times.
 
     Attributes:
         areas: The area that each robot with a camera has seen; empty if no component needs it.
@@ -357,7 +357,7 @@ class LayerBook:
 
 @dataclass(frozen=True)
 class _Cells:
-    """The values of a layer of what a robot has seen, computed when they are read."""
+    """The values of a layer of seen cells, computed when they are read."""
 
     area: SeenArea
     name: str

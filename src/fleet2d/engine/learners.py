@@ -2,7 +2,7 @@
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -107,6 +107,14 @@ class Learners:
         self._show_outputs()
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 
+    def results_at(self, step: int) -> dict[str, Callable[[], Any]]:
+        """Return how to read the results of the metrics that were updated at a step, by name."""
+        return {
+            learner.name: learner.component.result
+            for learner in self.all
+            if isinstance(learner.component, Metric) and learner.since == step
+        }
+
     def _show_outputs(self) -> None:
         """Set the outputs that behaviors read, after some have changed."""
         self.readable_outputs = Outputs(self._as_read(self.outputs), self.known)
@@ -146,7 +154,7 @@ class Learners:
     def _start(
         self, path: str, origin: Algorithm | Metric, learned: Path | None
     ) -> Algorithm | Metric:
-        """Return a started copy of an algorithm or a metric, with what a file holds."""
+        """Return a started copy of an algorithm or a metric, with the learned state of a file."""
         component = origin.model_copy(deep=True)
         with blame(path, None):
             component.start(self.home)
@@ -214,7 +222,7 @@ class Learners:
         ]
 
     def remember(self, directory: Path) -> list[str]:
-        """Write what each algorithm has learned to a file of its own; return notes on failures."""
+        """Write the learned state of each algorithm to its own file; return notes on failures."""
         notes = []
         for learner in self.all:
             if isinstance(learner.component, Algorithm):

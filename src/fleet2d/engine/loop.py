@@ -18,6 +18,7 @@ from typing import Any
 
 from fleet2d.algorithms.history import Log
 from fleet2d.configuration.trust import may_run_code, running_code
+from fleet2d.engine.basis import Watcher
 from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
@@ -89,36 +90,26 @@ def change_home(state: State, span: Span) -> None:
 
 
 def decide(state: State, span: Span) -> None:
-    """Ask bodies that have no plan left, and robots about to hit a person, for a decision."""
+    """Ask bodies that have no plan left, and those about to hit another one, for a decision."""
     step = span.first
-    clearance = state.clearance
-    blocking = state.blocking
     for row in _asked(state, step):
         actor = state.actors[row]
-        if clearance.looks(row, step):
+        if any(watcher.looks(row, step) for watcher in state.steering):
             state.bodies.ask_at[row] = step
-        due = bool(state.bodies.ask_at[row] <= step)
-        in_way = None
-        if due:
+        begins = bool(state.bodies.ask_at[row] <= step)
+        if begins:
             situation = state.situation(row, step)
             state.pending.pop(row, None)
-            due = not actor.keeps_plan(situation)
-            state.interruptions.expect(row)  # for other events, if other behaviors listen now
-        if due:
+            begins = not actor.keeps_plan(situation)
+            for watcher in state.watchers:
+                watcher.listen(row)  # for other events, if other behaviors listen now
+        if begins:
             state.end_plan(row, step)
             actor.decide(situation)
             _follow_plan(state, row)
-        if row in clearance.robots:
-            in_way = clearance.in_way(state.bodies, row)
-        if in_way is not None:
-            if not due:
-                state.end_plan(row, step)
-            situation = Situation(actor, step, (), state.learners.readable_outputs)
-            actor.give_way(situation, in_way.name, clearance.surroundings(actor))
-            _follow_plan(state, row)
-        begins = due or in_way is not None
-        if row in blocking.rows:
-            begins |= _yield_to_bodies(state, row, step, begins=begins)
+        for watcher in state.steering:
+            if row in watcher.steered:
+                begins |= _evade(state, watcher, row, step, begins=begins)
         if begins:
             state.changes.expect(row, actor)
             state.begin_plan(row, step)
@@ -127,9 +118,9 @@ def decide(state: State, span: Span) -> None:
 def _asked(state: State, step: int) -> Sequence[int]:
     """Return the rows of the bodies that may begin a plan at a step, in order."""
     rows = state.bodies.due(step)
-    giving_way = state.clearance.robots
-    blocking = state.blocking.rows
-    return sorted({*rows, *giving_way, *blocking}) if giving_way or blocking else rows
+    if not state.steering:
+        return rows
+    return sorted({*rows, *(row for watcher in state.steering for row in watcher.steered)})
 
 
 def _follow_plan(state: State, row: int) -> None:
@@ -139,25 +130,23 @@ def _follow_plan(state: State, row: int) -> None:
     state.bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
 
 
-def _yield_to_bodies(state: State, row: int, step: int, *, begins: bool) -> bool:
-    """Let a body wait for another one in its way, or go round it; return whether it does.
+def _evade(state: State, watcher: Watcher, row: int, step: int, *, begins: bool) -> bool:
+    """Let a body keep clear of another one in its way; return whether it does.
 
     Args:
         state: The state.
+        watcher: What steers the body.
         row: The row of the body.
         step: The present step.
         begins: Whether it begins a new plan at this step.
     """
-    actor = state.actors[row]
-    blocking = state.blocking
-    if (other := blocking.in_way(state.bodies, row)) is None:
-        return False
-    situation = Situation(actor, step, (), state.learners.readable_outputs)
-    if (plan := blocking.plan(situation, other)) is None:
+    now = Situation(state.actors[row], step, (), state.learners.readable_outputs)
+    evade = watcher.evasion(state.bodies, now)
+    if evade is None:
         return False
     if not begins:
         state.end_plan(row, step)
-    actor.follow_instead(plan, situation)
+    evade()
     _follow_plan(state, row)
     return True
 
@@ -220,8 +209,9 @@ def _update(state: State, log: Log, end: int) -> None:
     if learners.next_due() == end or any(event.event in awaited for event in events):
         state.count_looks()
         learners.update(end, log, events)
-        if state.expectations is not None:
-            state.expectations.learned(end, learners)
+        results = learners.results_at(end)
+        for watcher in state.watchers:
+            watcher.learn(learners.fresh, results)
         for name, output in learners.fresh.items():
             if isinstance(output, HomeChanges) and name not in learners.replaced:
                 for change in output.changes:

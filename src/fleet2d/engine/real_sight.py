@@ -19,7 +19,7 @@ MAX_AHEAD = 1 << 12
 
 
 class RealSight(Cameras):
-    """The cameras of a robot that perceives what a source of evidence has.
+    """The cameras of a robot that perceives the sightings of a source of evidence.
 
     The cameras say what it watched; whom it perceived is the source's, or also the source's.
     """
@@ -39,7 +39,7 @@ class RealSight(Cameras):
         self.notes = self.source.notes
 
     def receive(self, step: int, sightings: Sequence[FalseSighting]) -> None:
-        """Take in what a real robot perceived at a step that it has not looked at."""
+        """Take in the perceptions of a real robot at a step that it has not looked at."""
         source = self.source
         lattice = self.owner.home.plan.lattice
         assert isinstance(source, LiveDetections)

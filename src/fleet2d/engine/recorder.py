@@ -5,7 +5,7 @@ depend on the spans of a run.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate
 from typing import Any
@@ -36,13 +36,12 @@ from fleet2d.engine.trajectories import (
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I8, I32, NOBODY, UNKNOWN_TRUTH
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
-from fleet2d.scenario.model import Scenario
 
 # Descriptions of columns.
 ANY_ENTITY = "what did it, or what it happened to; none: the home itself"
 TRUTH_KNOWN = "whether it is known who was there: not for what real robots perceived"
 ACTIVITY_SAID = "what the user does, if a behavior says so"
-# Events whose detail is a user, who has a column of their own.
+# Events with a user as their detail, which is stored in a column of its own.
 USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
 # Rows that are collected before they are stored: so many, or more with many bodies.
 MAX_ROWS = 1 << 16
@@ -61,7 +60,7 @@ class Recorder:
     Attributes:
         activities: The activities of users so far.
         wall_s: Wall time of storing [s].
-        keeps_none: Whether rows are stored at once, for those who listen to them.
+        flushes_every_span: Whether rows are stored at once, for those who listen to them.
     """
 
     def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
@@ -109,28 +108,31 @@ class Recorder:
         self._count = 0  # observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
         self.wall_s = 0.0
-        self.keeps_none = False
-        self._tables = self._drains(scenario)
-        for name, drain in self._tables.items():
-            self.store.add_table(TableSpec(name, tuple(drain())))
-
-    def _drains(self, scenario: Scenario) -> dict[str, Callable[[], Columns]]:
-        """Return what makes the rows of each table of the run, and forgets them."""
+        self.flushes_every_span = False
         settings = scenario.artifacts
-        drains = {}
-        if settings.trajectories != "off":
-            drains["trajectories"] = self._samples.drain
-        if settings.key_frames:
-            drains["key_frames"] = self._keys.drain
-        if settings.observations and scenario.users and scenario.robots:
-            drains["observations"] = self._drain_observations
-        if settings.events:
-            drains["events"] = self._drain_events
-        if settings.decisions:
-            drains["decisions"] = self._drain_decisions
-        if self._sensors.names:
-            drains["sensors"] = self._drain_readings
-        return drains
+        is_stored = {
+            "trajectories": settings.trajectories != "off",
+            "key_frames": settings.key_frames,
+            "observations": settings.observations and scenario.users and scenario.robots,
+            "events": settings.events,
+            "decisions": settings.decisions,
+            "sensors": sensors.names,
+        }
+        self._tables = [name for name, is_on in is_stored.items() if is_on]
+        for name in self._tables:
+            self.store.add_table(TableSpec(name, tuple(self._drain(name))))
+
+    def _drain(self, table: str) -> Columns:
+        """Return and remove the collected rows of a table."""
+        drains = {
+            "trajectories": self._samples.drain,
+            "key_frames": self._keys.drain,
+            "observations": self._drain_observations,
+            "events": self._drain_events,
+            "decisions": self._drain_decisions,
+            "sensors": self._drain_readings,
+        }
+        return drains[table]()
 
     def before_plan(self, row: int, step: int) -> None:
         """Collect the end of the plan that is replaced at `step`."""
@@ -182,7 +184,7 @@ class Recorder:
         self._count += len(readings)
         count = self._count + self._samples.count + self._keys.count
         count += len(self._events) + len(self._decisions)
-        if count > self._most or self.keeps_none:
+        if count > self._most or self.flushes_every_span:
             self.drain()
 
     def end(self, step: int, rows: int) -> None:
@@ -197,8 +199,8 @@ class Recorder:
     def drain(self) -> None:
         """Append all collected rows to the store."""
         began = time.perf_counter()
-        for name, drain in self._tables.items():
-            self.store.add_rows(name, drain())
+        for name in self._tables:
+            self.store.add_rows(name, self._drain(name))
         while self._observations:
             self.store.add_rows("observations", self._drain_observations())
         self._count = 0
@@ -282,7 +284,7 @@ class Recorder:
         return columns | {Column("detail", "string"): details}
 
     def _drain_decisions(self) -> Columns:
-        # Who gives way at the step of its decision decides twice: the last one counts.
+        # A body that gives way at the step of its decision decides twice: the last one counts.
         last = {entry[:2]: entry for entry in self._decisions}
         self._decisions = []
         entries = [last[key] for key in sorted(last)]
@@ -333,7 +335,7 @@ def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
 
 
 def _true(column: Column) -> Column:
-    """Return the column of what a perceived value was in truth."""
+    """Return the column of the true value behind a perceived one."""
     return replace(column, name=f"true_{column.name}", nullable=True)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import filecmp
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
@@ -25,10 +25,10 @@ from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import Run, open_run
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import path_in, refuse_links
 
-# What begins the note about the messages of a live run, which its repetition doesn't get.
+# The beginning of the note about the messages of a live run, which its repetition doesn't get.
 LIVE = "live: "
 # Fields that are compared in another way, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
@@ -94,14 +94,13 @@ def _reproduce(old: Run, root: Path) -> Reproduction:
     seal = verify_run(root)
     changes = seal.differing.items()
     causes += [f"{name} in {root} {change} after the run" for name, change in changes]
-    causes += seal.notes
     causes += [f"{name} in {root} is not part of the run" for name in seal.foreign]
     with tempfile.TemporaryDirectory() as folder:
         new = _simulation(content, Path(folder) / "run").run()
         causes += _other_versions(content["versions"], new.manifest["versions"])
         differing = {_short(name) for name in seal.differing}
         differing |= set(_tables(content["tables"], new.manifest["tables"]))
-        differing |= set(_fields(content, new.manifest, manifest.model_fields_set))
+        differing |= set(_fields(content, new.manifest))
         differing |= set(_files(root, Path(folder) / "run"))
     return Reproduction(old.digest, new.digest, sorted(differing), causes)
 
@@ -258,13 +257,10 @@ def _tables(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return [name for name in old.keys() | new.keys() if old.get(name) != new.get(name)]
 
 
-def _fields(old: Mapping[str, Any], new: Mapping[str, Any], stored: Iterable[str]) -> list[str]:
-    """Return the fields of two manifests that differ and shouldn't.
-
-    An older version of Fleet2D stored fewer fields: only those are compared.
-    """
+def _fields(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Return the fields of two manifests that differ and shouldn't."""
     fields = []
-    for name in sorted(set(stored) - _COMPARED_APART - set(Manifest.varying())):
+    for name in sorted(old.keys() - _COMPARED_APART - set(Manifest.varying())):
         before, after = old.get(name), new.get(name)
         if before == after:
             continue
@@ -279,12 +275,12 @@ def _fields(old: Mapping[str, Any], new: Mapping[str, Any], stored: Iterable[str
 
 
 def _repeatable(notes: list[str]) -> list[str]:
-    """Return the notes that depend neither on the speed of a machine nor on what arrived live."""
+    """Return the notes that depend neither on the speed of a machine nor on live messages."""
     return [note for note in notes if not note.startswith((SLOW, LIVE, NO_CHECKPOINT))]
 
 
 def _files(old: Path, new: Path) -> list[str]:
-    """Return the files beside the tables whose bytes differ: the plan, and what was learned."""
+    """Return the files beside the tables whose bytes differ: the plan, and learned states."""
     names = {FLOORPLAN_NAME}
     for root in (old, new):
         names |= {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}

@@ -47,7 +47,6 @@ class Sensors(Watcher):
         rooms: The room in the readings of each sensor.
         words: The words of each sensor for its two states, on and off.
         stuck: The faults from outside, by name.
-        awaited: Whether an algorithm waits for readings.
     """
 
     def __init__(self, basis: Basis, doors: Sequence[str]) -> None:
@@ -55,7 +54,6 @@ class Sensors(Watcher):
         step_us = basis.clock.step_us
         self.home, self.users = home, basis.bodies.users
         self.stuck: dict[str, SensorFault] = {}
-        self.awaited = False
         self._readings: list[tuple[int, SensorReading]] = []  # not collected yet
         self.sensors: dict[str, Sensor] = {}
         for name, item in basis.scenario.objects.items():
@@ -78,7 +76,7 @@ class Sensors(Watcher):
 
     @property
     def notes(self) -> list[str]:
-        """What is to be said about the tables of replayed sensors."""
+        """Remarks on the tables of replayed sensors."""
         notes = {name: getattr(sensor, "notes", ()) for name, sensor in self.sensors.items()}
         return [f"objects.{name}: {note}" for name in notes for note in notes[name]]
 
@@ -88,9 +86,14 @@ class Sensors(Watcher):
         return {name: state.on for name, state in self._states.items()}
 
     @property
+    def is_needed(self) -> bool:
+        """Whether there are sensors."""
+        return bool(self.sensors)
+
+    @property
     def waits(self) -> bool:
         """Whether readings end a span."""
-        return self.awaited and bool(self.sensors)
+        return EventKind.SENSOR in self.awaited
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first in which a sensor reports something."""
@@ -108,7 +111,7 @@ class Sensors(Watcher):
         """Read the sensors; `collect` returns the readings."""
         first = self.next_step
         self.next_step = end
-        if not self.sensors or first == end:
+        if first == end:
             return ()
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
@@ -151,8 +154,6 @@ class Sensors(Watcher):
 
     def take_events(self, events: Sequence[Event]) -> None:
         """Record the activities of users, for the readings."""
-        if not self.sensors:
-            return
         for event in events:
             if event.event == EventKind.ACTIVITY and event.entity in self._activities:
                 self._activities[event.entity].append((event.step, event.detail))

@@ -59,17 +59,23 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     conversations = Conversations(basis, interventions)
     log = _log(basis, cameras, recorder, conversations) if learners.all else None
     names = [*(actor.name for actor in basis.actors), *scenario.objects]
+    watchers = [
+        Clearance(basis.users, basis.robots),
+        BlockedWays(basis),
+        *user_cameras,
+        *cameras,
+        Encounters(basis.users, basis.robots),
+        conversations,
+        Interruptions(basis),
+        sensors,
+        *layers.areas,
+    ]
     state = State(
         bodies=basis.bodies,
         actors=basis.actors,
         home=basis.home,
         changes=changes,
-        clearance=Clearance(basis.users, basis.robots),
-        blocking=BlockedWays(basis),
-        encounters=Encounters(basis.users, basis.robots),
-        conversations=conversations,
-        interruptions=Interruptions(basis),
-        sensors=sensors,
+        watchers=[watcher for watcher in watchers if watcher.is_needed],
         user_cameras=user_cameras,
         cameras=cameras,
         layers=layers,
@@ -85,7 +91,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         group.owner.in_view = InView(state, group)
     _remember(state, basis)
     state.wait_for(state.requested)
-    # What waits for an event comes last: the event may be one that another entry causes.
+    # Entries that wait for an event come last: another entry may cause the event.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
         errors = PlacementError, ScenarioError
@@ -130,7 +136,7 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
 
 
 def _cameras_of(row: int, shared: SightSetup) -> Cameras:
-    """Return the cameras of one body, or what it perceives in place of their view."""
+    """Return the cameras of one body, or its source of perceptions in their place."""
     if (source := getattr(shared.actors[row].entity, "perceives", None)) is None:
         return Cameras(row, shared)
     from fleet2d.engine.real_sight import RealSight  # few runs need it

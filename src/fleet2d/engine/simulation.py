@@ -35,6 +35,7 @@ from fleet2d.engine.basis import input_files
 from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
+from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.setup import set_up
 from fleet2d.engine.snapshot import (
     Constants,
@@ -59,7 +60,8 @@ from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.runtime.memory import free_bodies, rare_collections
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
@@ -177,17 +179,18 @@ class Simulation:
 
     @property
     def notes(self) -> list[str]:
-        """What is odd in the floor plan or won't work in it, and about bodies and their sources."""
+        """Oddities of the floor plan and its flaws, and remarks on bodies and their sources."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
         wrong = (f"wrong: {text}" for text in flaws_of(self))
-        sensors = self._state.sensors.notes
+        of_sensors = self._state.find(Sensors)
+        sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
         return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
 
     @property
     def _unused_heights(self) -> Iterator[str]:
-        """What says how high something is, while heights don't matter."""
+        """Remarks on heights that have no effect."""
         for actor in () if self.scenario.sight.heights else self._state.actors:
             eyes = actor.entity.eyes
             only = ["camera"] if "camera" in eyes else [f"cameras.{name}" for name in eyes]
@@ -216,9 +219,11 @@ class Simulation:
             name: {"open": i not in self.home.shut, "locked": i in self.home.locked}
             for i, name in enumerate(self._state.changes.names)
         }
-        if self._state.sensors.names:
-            self._state.settle(self.step)
-        return bodies | doors | {name: {"on": on} for name, on in self._state.sensors.on.items()}
+        sensors = self._state.find(Sensors)
+        if sensors is None:
+            return bodies | doors
+        self._state.settle(self.step)
+        return bodies | doors | {name: {"on": on} for name, on in sensors.on.items()}
 
     @property
     def actors(self) -> dict[str, DecidingActor]:
@@ -232,7 +237,7 @@ class Simulation:
 
     @property
     def algorithms(self) -> dict[str, Algorithm]:
-        """The algorithms in the run, by name: configuration, and what they have learned."""
+        """The algorithms in the run, by name: configuration and learned state."""
         pairs = ((each.name, each.component) for each in self._state.learners.all)
         return {name: component for name, component in pairs if isinstance(component, Algorithm)}
 
@@ -296,7 +301,7 @@ class Simulation:
             4
         """
         self._store.row_listeners.append(function)
-        self._state.recorder.keeps_none = True
+        self._state.recorder.flushes_every_span = True
 
     def _event_kinds(self) -> frozenset[str]:
         """Return the kinds of events that may happen in this run."""
@@ -845,7 +850,7 @@ class Simulation:
         manifest.steps = self.step
         manifest.simulated_s = simulated_s
         manifest.metrics, manifest.wall_s = dict(results), self._wall_s
-        manifest.add_inputs(self._state.interruptions.files)
+        manifest.add_inputs([file for each in self._state.watchers for file in each.files])
         manifest.interventions = queue.done if self.done else queue.records
         speedup = pace.speedup_until(simulated_s) if pace else 0.0
         if pace and speedup < 0.98 * pace.speedup:
@@ -956,7 +961,7 @@ def catch_up(simulation: Simulation, interventions: Sequence[Mapping[str, Any]])
 
 
 def flaws_of(simulation: Simulation) -> Sequence[str]:
-    """Return what will not work in a home from a file; other homes have been checked."""
+    """Return the flaws of a home from a file; other homes have been checked."""
     if not simulation.scenario.floorplan.files():
         return ()
     home = simulation.home
@@ -1022,7 +1027,7 @@ def run_until_asked(simulation: Simulation, *names: str) -> list[str]:
 
 
 def situation_of(simulation: Simulation, name: str) -> Situation:
-    """Return what the behaviors of a body know when they are asked at the present step.
+    """Return the situation in which the behaviors of a body decide at the present step.
 
     Raises:
         ScenarioError: There is no such body.
@@ -1042,7 +1047,7 @@ def perceived_s(simulation: Simulation, robot: str) -> float:
 
 
 def evidence_of(simulation: Simulation, name: str) -> "VerdictEvidence":
-    """Return the signals of an expectation so far, and what it is about, for pictures."""
+    """Return the signals of an expectation so far, and its subjects, for pictures."""
     assert simulation._state.expectations is not None
     return simulation._state.expectations.evidence(name)
 
@@ -1053,7 +1058,9 @@ def has_to_choose(state: State, row: int, step: int) -> bool:
     policy: Any = actor.behaviors[0]
     if policy.given is not None:
         return False
-    if state.bodies.ask_at[row] > step and not state.clearance.looks(row, step):
+    if state.bodies.ask_at[row] > step and not any(
+        watcher.looks(row, step) for watcher in state.steering
+    ):
         return False
     now = state.situation(row, step)
     return actor.asks_first(now) and policy.asks(now)

@@ -56,7 +56,7 @@ _SHARED = frozenset(
         *(datetime, timedelta, *_DTYPES),
     }
 )
-# What is copied by `copy.copy`, as its parts never change.
+# Types that are copied by `copy.copy`, as their parts never change.
 _COPIED = frozenset({ImmutableRows, RecentEvents, Timelines})
 _SHARED_NAMES = frozenset(
     {
@@ -192,7 +192,7 @@ class _SnapshotParts:
             self._flush()
 
     def finish(self) -> None:
-        """Write what remains, and the signature of everything."""
+        """Write the remaining bytes, and the signature of everything."""
         self._seal.update(self._buffer)
         self._buffer += self._seal.hexdigest().encode()
         self._flush()
@@ -255,7 +255,7 @@ def shared_object(number: int) -> object:
 
 
 class _StateCopier(pickle.Pickler):
-    """Leaves out what a copy shares, and the content of arrays.
+    """Leaves out shared objects, and the content of arrays.
 
     Attributes:
         shared: The shared objects; in the copy each is a call of `shared_object`.
@@ -282,7 +282,7 @@ class _StateCopier(pickle.Pickler):
 
 
 class _CopyReader(pickle.Unpickler):
-    """Reads what a `_StateCopier` wrote."""
+    """Reads the output of a `_StateCopier`."""
 
     def __init__(self, file: BinaryIO, shared: list[object], arrays: Iterable[Any]) -> None:
         super().__init__(file, buffers=arrays)

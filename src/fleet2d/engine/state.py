@@ -5,20 +5,16 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import chain, islice, takewhile
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from fleet2d.algorithms.history import Log
+from fleet2d.algorithms.history import Log, SensorRow
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
 from fleet2d.engine.basis import Watcher
 from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.change_queue import ChangeQueue
-from fleet2d.engine.collisions import BlockedWays, Clearance
-from fleet2d.engine.conversations import Conversations
-from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.interrupt import Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
@@ -36,6 +32,8 @@ if TYPE_CHECKING:
     from fleet2d.engine.expectations import RunExpectations
     from fleet2d.entities.robots.policy import SightingMemory
     from fleet2d.expectations.expectation import Expectation
+
+W = TypeVar("W", bound=Watcher)
 
 # The maximum number of steps that watchers process together: fewer if there are many bodies.
 MAX_STEPS = 1 << 16
@@ -183,9 +181,8 @@ class State:
         actors: Behaviors, plans and batteries of the same bodies.
         home: The present home: doors, furniture, rooms, layers.
         changes: The changes of the home.
-        watchers: All followers of the bodies, in their order.
-        clearance, blocking, encounters, conversations, interruptions, sensors: Some of the
-            watchers.
+        watchers: All followers of the bodies that the run needs, in their order.
+        steering: Those of them that may replace plans at any step.
         user_cameras: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
@@ -202,7 +199,7 @@ class State:
         requested: Event kinds that end a span because a caller waits for them.
         awaited: Event kinds that end a span: `requested`, and those that interventions and
             listeners wait for.
-        expectations: The expectations of the run; None if there are none.
+        expectations: The watcher of the run's expectations; None if there are none.
         notes_emitted: Number of notes of each body's present plan that have happened.
         capacity: The maximum number of steps that watchers process together.
     """
@@ -211,12 +208,7 @@ class State:
     actors: list[DecidingActor]
     home: Home
     changes: ChangeQueue
-    clearance: Clearance
-    blocking: BlockedWays
-    encounters: Encounters
-    conversations: Conversations
-    interruptions: Interruptions
-    sensors: Sensors
+    watchers: list[Watcher]
     user_cameras: list[Cameras]
     cameras: list[Cameras]
     layers: LayerBook
@@ -235,20 +227,22 @@ class State:
     expectations: "RunExpectations | None" = None
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
-    watchers: list[Watcher] = field(init=False)
+    steering: list[Watcher] = field(init=False)
     _situation: Situation | None = None  # the newest one
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what follows from the rest."""
+        """Leave out the situation, which follows from the rest."""
         return {**self.__dict__, "_situation": None}
 
     def __post_init__(self) -> None:
         """Begin without notes."""
         self.notes_emitted = [0] * len(self.actors)
         self.capacity = capacity_of(len(self.actors))
-        cameras = [*self.user_cameras, *self.cameras]
-        others = self.encounters, self.conversations, self.interruptions, self.sensors
-        self.watchers = [self.clearance, self.blocking, *cameras, *others, *self.layers.areas]
+        self.steering = [watcher for watcher in self.watchers if watcher.steered]
+
+    def find(self, kind: type[W]) -> W | None:
+        """Return the watcher of a kind; None if the run needs none."""
+        return next((watcher for watcher in self.watchers if isinstance(watcher, kind)), None)
 
     # Decisions of scripts
 
@@ -258,10 +252,8 @@ class State:
         self.requested, self.awaited = kinds, kinds | self.interventions.kinds | listened
         self.events.awaited = self.awaited
         awaited = self.awaited | self.learners.awaited
-        for cameras in [*self.user_cameras, *self.cameras]:
-            cameras.awaited = awaited
-        self.conversations.awaited = awaited
-        self.sensors.awaited = EventKind.SENSOR in awaited
+        for watcher in self.watchers:
+            watcher.awaited = awaited
 
     def expect(self, scenario: Scenario, name: str, expectation: "Expectation", since: int) -> None:
         """Add an expectation that is judged from a step on; see `RunExpectations.add`."""
@@ -271,24 +263,27 @@ class State:
 
         if self.expectations is None:
             cameras = {c.owner.name: c for c in [*self.user_cameras, *self.cameras]}
+            sensors = self.find(Sensors)
             run = MeasuredRun(
                 self.actors,
                 self.bodies,
                 self.home,
                 self.changes.clock,
                 doors=self.changes.names,
-                sensors_on=self.sensors.on,
+                sensors_on={} if sensors is None else sensors.on,
                 cameras=cameras,
                 activities=self.recorder.activities,
             )
-            self.expectations = RunExpectations(scenario, run, self.sensors, self.interventions)
+            self.expectations = RunExpectations(scenario, run, sensors, self.interventions)
+            self.expectations.next_step = self.settled
+            self.watchers.append(self.expectations)
             self.events.sinks.append(self.expectations)
         self.expectations.add(name, expectation, since, self.settled)
 
     # Decisions
 
     def situation(self, row: int, step: int) -> Situation:
-        """Return what a body knows at a step; the same object, as long as it knows the same."""
+        """Return the situation of a body at a step; the same object while nothing in it changes."""
         actor = self.actors[row]
         events = tuple(self.pending.get(row, ()))
         now = self._situation
@@ -302,17 +297,17 @@ class State:
         """Record the plan of a body up to the step at which it is replaced."""
         self.events.emit(self._due_notes(row, step))
         self.recorder.before_plan(row, step)
-        self.encounters.before_plan(row, self.actors[row], step)
-        self.conversations.before_plan(row, self.actors[row], step)
+        for watcher in self.watchers:
+            watcher.before_plan(row, self.actors[row], step)
 
     def begin_plan(self, row: int, step: int) -> None:
         """Record the beginning of a body's new plan."""
         self.notes_emitted[row] = 0
         self.events.emit(self._due_notes(row, step))
         self.recorder.after_plan(row, step)
-        self.interruptions.expect(row)
-        if self.expectations is not None:
-            self.expectations.begin_plan(self.actors[row])
+        for watcher in self.watchers:
+            watcher.listen(row)
+            watcher.begin_plan(self.actors[row])
 
     def _due_notes(self, row: int, step: int) -> Sequence[Event]:
         """Return the notes of a body's plan up to a step, once, as events."""
@@ -367,21 +362,27 @@ class State:
         for watcher in self.watchers:
             self.take(watcher, end)
         observations = self._observations()
-        readings = self.sensors.collect()
-        if readings:
-            events = self.sensors.events_of(readings)
-            self.events.keep(events)
-            if EventKind.SENSOR in self.awaited:
-                self.interventions.take_events(events)
+        readings = self._readings()
         self.recorder.take(first, end, observations, readings)
-        if self.expectations is not None:
-            self.expectations.take(end, observations, readings)
+        for watcher in self.watchers:
+            watcher.settle(end, observations, readings)
         if self.log is not None:
             self.log.observe(observations)
             self.log.readings += readings
         self.settled = end
         if self.log is None:
             self.bodies.forget(end)
+
+    def _readings(self) -> Sequence[SensorRow]:
+        """Return the readings of sensors since the last call, and pass them on as events."""
+        sensors = self.find(Sensors)
+        readings = () if sensors is None else sensors.collect()
+        if sensors is not None and readings:
+            events = sensors.events_of(readings)
+            self.events.keep(events)
+            if EventKind.SENSOR in self.awaited:
+                self.interventions.take_events(events)
+        return readings
 
     def count_looks(self) -> None:
         """Add the counts of the cameras up to the present step to the log, for metrics."""
@@ -422,7 +423,7 @@ class InView:
 
 @dataclass(frozen=True)
 class Recall:
-    """What a robot remembers of its sightings up to the present step, for its behaviors."""
+    """The memory of a robot's sightings up to the present step, for its behaviors."""
 
     state: State
     cameras: Cameras | None

@@ -21,6 +21,7 @@ from fleet2d.engine.intervention_queue import (
     possible_events,
     read_record,
 )
+from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose
 from fleet2d.entities.decisions import Arbiter, DecidingActor
@@ -49,7 +50,8 @@ class EngineWorld:
         self._state, self.step = state, step
         self.home, self.clock = state.home, state.changes.clock
         self.doors: Sequence[str] = state.changes.names
-        self.sensors: Mapping[str, Sensor] = state.sensors.sensors
+        sensors = state.find(Sensors)
+        self.sensors: Mapping[str, Sensor] = {} if sensors is None else sensors.sensors
         self.algorithms: Sequence[str] = state.learners.known
 
     @cached_property
@@ -78,7 +80,7 @@ class EngineWorld:
             act.end(self)
 
     def keeps_truth(self, robot: str) -> bool:
-        """Whether the run stores the truth beside what a robot perceives."""
+        """Whether the run stores the truth beside the sightings of a robot."""
         return any(c.owner.name == robot and c.errs for c in self._state.cameras)
 
     def disturb(self, robot: str, disturbances: Sequence[Disturbance]) -> None:
@@ -106,12 +108,14 @@ class EngineWorld:
     def stick(self, sensor: str, says: SensorFault | None) -> None:
         """Set the fault of a sensor from the present step on; None: it works."""
         self._state.settle(self.step)
-        self._state.sensors.stuck.pop(sensor, None)
+        sensors = self._state.find(Sensors)
+        assert sensors is not None
+        sensors.stuck.pop(sensor, None)
         if says is not None:
-            self._state.sensors.stuck[sensor] = says
+            sensors.stuck[sensor] = says
 
     def reset(self, algorithm: str, learned: Path | None) -> None:
-        """Restart an algorithm with nothing learned, or with what a file holds."""
+        """Restart an algorithm with nothing learned, or with the learned state of a file."""
         self._state.learners.reset(algorithm, learned)
 
     def replace(self, algorithm: str, output: object) -> None:

@@ -278,7 +278,7 @@ class Situation:
         at_x, at_y = lattice.point_at((x, y))
         if actor.space.part_at(at_x, at_y) != actor.part:
             near = actor.space.nearest(at_x, at_y, actor.part)
-            at_x, at_y = near or (actor.state.x, actor.state.y)
+            at_x, at_y = near or actor.state.position
         return lattice.xy_of(at_x, at_y)
 
     def random(self, purpose: str) -> Draws:
@@ -316,7 +316,7 @@ class Behavior(Component):
         ('office', 'kitchen')
     """
 
-    kind: ClassVar[str] = "behavior"
+    kind = "behavior"
     # Whether, after an interruption by a behavior before it, it resumes the rest of its plan.
     resumes: ClassVar[bool] = False
     # Layers of what its robot has seen that it reads: explored, first_seen, last_seen …

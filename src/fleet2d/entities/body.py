@@ -28,6 +28,7 @@ from fleet2d.entities.place import (
 )
 from fleet2d.errors import ComponentError, FloorPlanError, PlacementError, ScenarioError, blame
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.slow_area import SlowRegion
@@ -52,6 +53,11 @@ class Pose(NamedTuple):
     y: int
     heading: int
     away: int
+
+    @property
+    def position(self) -> LatticePoint:
+        """Where the body is [lattice]."""
+        return self.x, self.y
 
 
 # Makes a pose from a tuple of its fields without calling Python code, as a run has many.
@@ -269,7 +275,7 @@ class PlaceAt(NamedTuple):
     y: int
     heading: int
     posture: Posture
-    approach: tuple[int, int]
+    approach: LatticePoint
 
 
 Arrangement = tuple[int, int, frozenset[int]]
@@ -395,7 +401,7 @@ class Body:
     def _present_part(self) -> int:
         """Return the part of a changed space that it is in, or nearest to."""
         space = self._space[1]
-        position = (self.state.x, self.state.y)
+        position = self.state.position
         x, y = self.home.approach_of(position) or position
         part = space.part_at(x, y)
         return part if part >= 0 else space.part_near(x, y)
@@ -418,7 +424,7 @@ class Body:
         return self.home.slows if self.entity.minds_floor else ()
 
     @property
-    def way_out(self) -> tuple[int, int]:
+    def way_out(self) -> LatticePoint:
         """The lattice point where it leaves the home."""
         return self.home.way_out(self.space, self.part)
 
@@ -449,7 +455,7 @@ class Body:
         self._places[2][name, place] = at
         return at
 
-    def step_off(self, x: int, y: int) -> tuple[int, int] | None:
+    def step_off(self, x: int, y: int) -> LatticePoint | None:
         """Return where it steps off the object on which it is at a lattice point; None: nowhere."""
         approach = self.home.approach_of((x, y))
         # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
@@ -520,7 +526,7 @@ class Body:
 
     def find(
         self, place: RoomChoice | Point | str | Iterable[object], time_us: int, purpose: str
-    ) -> tuple[int, int]:
+    ) -> LatticePoint:
         """Return the lattice point of a place: the point itself, or a spot drawn in the room.
 
         Of several rooms of a kind, a body uses one for the whole run; of ``any`` room, it draws one
@@ -541,12 +547,12 @@ class Body:
         room = (draws if name == ANY else habit).choice(rooms)
         return self._spot_of(self.space.cells(room.index, self.part), draws)
 
-    def _spot_of(self, cells: I64, draws: Draws) -> tuple[int, int]:
+    def _spot_of(self, cells: I64, draws: Draws) -> LatticePoint:
         """Return the centre of one of some cells (row, column), drawn at random."""
         row, column = cells[draws.below(len(cells))].tolist()
         return self.home.plan.lattice.cell_centre(row, column)
 
-    def find_anywhere(self, place: Any, time_us: int, purpose: str) -> tuple[int, int]:
+    def find_anywhere(self, place: Any, time_us: int, purpose: str) -> LatticePoint:
         """Return the lattice point of a place to put the body at; no way has to lead there.
 
         Raises:
@@ -566,7 +572,7 @@ class Body:
             raise self._is_not_free(target, space.nearest(x, y))  # type: ignore[arg-type]
         return x, y
 
-    def middle(self, room: Room) -> tuple[int, int]:
+    def middle(self, room: Room) -> LatticePoint:
         """Return the reachable lattice point nearest to the room's anchor.
 
         The anchor is the point of the room that is farthest from its walls.
@@ -580,7 +586,7 @@ class Body:
             raise PlacementError(f"{self.path}: {room.name} can't be reached from where it starts")
         return point
 
-    def point(self, xy: Point) -> tuple[int, int]:
+    def point(self, xy: Point) -> LatticePoint:
         """Return a point [m] on the lattice.
 
         Raises:
@@ -601,9 +607,7 @@ class Body:
             why = "is where the costmap lets no route pass"
         raise self._is_not_free(xy, self.space.nearest(x, y, self.part), why)
 
-    def _is_not_free(
-        self, xy: Point, near: tuple[int, int] | None, why: str = ""
-    ) -> PlacementError:
+    def _is_not_free(self, xy: Point, near: LatticePoint | None, why: str = "") -> PlacementError:
         """Return the error about a point; it names the nearest free one, in few decimals."""
         why = why or f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
         lattice = self.home.plan.lattice

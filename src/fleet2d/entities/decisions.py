@@ -371,7 +371,9 @@ class DecidingActor(Actor):
 
     def follow_order(self, order: Order | None, step: int) -> None:
         """Follow an order from a step on, in place of its behaviors; None: follow them again."""
-        self.order, self.waiting, self.arbiter.own = order, None, frozenset()
+        self.order = order
+        self.waiting = None
+        self.arbiter.own = frozenset()
         self._chosen = None
         self.decide_again(step)
 
@@ -485,7 +487,9 @@ class DecidingActor(Actor):
 
     def decide(self, now: Situation) -> None:
         """Ask the behaviors, in order, for a plan that begins now."""
-        step, (plan, self._chosen) = now.step, (self._chosen, None)
+        step = now.step
+        plan = self._chosen
+        self._chosen = None
         if self.is_stuck or (self.charge is not None and self.charge.is_empty):
             plan = now.plan().stay()
         waiting = self.waiting
@@ -509,7 +513,7 @@ class DecidingActor(Actor):
                 f"{self.path}: decide() returned a plan that doesn't begin here and now: make one"
                 " by now.plan()"
             )
-        self.plan, self.motion, self.planned_at = plan, plan.finish(), step
+        self._follow(plan, step)
         if self.charge is not None:
             self.charge.record(plan)
         with blame(self.path, step):
@@ -571,8 +575,13 @@ class DecidingActor(Actor):
         self._runs_down(now)
         if self.plan.began[0] == step:  # its first rows happened, though it ends at once
             plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]
-        self.plan, self.motion, self.planned_at = plan, plan.finish(), step
+        self._follow(plan, step)
         self._set_next_decision(now, fresh=True)
+
+    def _follow(self, plan: Plan, step: int) -> None:
+        self.plan = plan
+        self.motion = plan.finish()
+        self.planned_at = step
 
     def _set_next_decision(self, now: Situation, *, fresh: bool) -> None:
         """Set when it decides next: the plan is over, or another behavior may interrupt it."""

@@ -5,12 +5,12 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isqrt, sqrt
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, TURN, heading_of, turn_between
 
@@ -79,7 +79,7 @@ class Drive(Component):
         ...         return [Moment(length / (route.speed / 2), length, route.heading)]
     """
 
-    kind: ClassVar[str] = "drive"
+    kind = "drive"
 
     @abstractmethod
     def moments(self, route: Route) -> Iterable[Moment]:
@@ -138,7 +138,9 @@ def breakpoints(
         x, y = ax + round((bx - ax) * share), ay + round((by - ay) * share)
         return round(moment.seconds * 1e6), x, y, moment.heading % TURN, 0
 
-    rows, leg, last = [], 0, Moment(0.0, 0.0, heading)
+    rows = []
+    leg = 0
+    last = Moment(0.0, 0.0, heading)
     route = Route(tuple(legs), heading, rates[0] / units_per_m, rates[1])
     for moment in _checked(drive, route, ends[-1]) if legs else ():
         while moment.metres > ends[leg + 1] + NEAR_M:
@@ -206,7 +208,6 @@ def _between(last: Moment, moment: Moment, metres: float) -> Moment:
     return Moment(seconds, metres, last.heading + round(turn * share))
 
 
-@register("drive", "differential")
 class Differential(Drive):
     """Turns on the spot towards each leg of its route, then drives straight, at constant rates."""
 
@@ -232,7 +233,6 @@ class Differential(Drive):
         return [(length / speed, length)]
 
 
-@register("drive", "holonomic")
 class Holonomic(Drive):
     """Drives in any direction at constant speed, without stopping to turn.
 
@@ -261,7 +261,6 @@ class Holonomic(Drive):
             yield Moment(seconds, metres, heading)
 
 
-@register("drive", "trapezoidal")
 class Trapezoidal(Differential):
     """Turns on the spot towards each leg; on it, accelerates, drives at constant speed, brakes.
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, PeerAddress, Speed, TurnRateDeg
 from fleet2d.entities.behavior import Actor, Behavior, LightHours
@@ -40,7 +40,7 @@ class EvidenceSource(Component):
     After `start` it has `notes`, lines about its log: what was left out, and what doesn't fit.
     """
 
-    kind: ClassVar[str] = "evidence_source"
+    kind = "evidence_source"
 
     besides_cameras: bool = False
 
@@ -62,7 +62,6 @@ class EvidenceSource(Component):
         raise NotImplementedError
 
 
-@register("evidence_source", "live")
 class LiveDetections(EvidenceSource):
     """Perceive what arrives while the run goes on, from a real robot or another program.
 
@@ -106,7 +105,7 @@ class Entity(BodySettings):
             none: it stays still.
     """
 
-    behaviors: tuple[Annotated[Behavior, OneOf("behavior")], ...] = ()
+    behaviors: tuple[OneOf[Behavior], ...] = ()
 
 
 class User(Entity):
@@ -124,9 +123,9 @@ class User(Entity):
     camera: Camera | None = None
     answers: AnswersField | None = None
     lights: LightHours = ()
-    sight_events: ClassVar[tuple[str, str]] = (EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN)
-    uses_furniture: ClassVar[bool] = True
-    uses_portals: ClassVar[bool] = True
+    sight_events = (EventKind.ROBOT_LOST, EventKind.ROBOT_SEEN)
+    uses_furniture = True
+    uses_portals = True
 
     def model_post_init(self, _: object, /) -> None:
         """Refuse errors of perception."""
@@ -168,21 +167,21 @@ class Robot(Entity):
     radius: Length = Field(default=0.15, gt=0, le=2)
     speed: Speed = Field(default=0.6, ge=0.01, le=20)
     turn_rate_deg: TurnRateDeg = Field(default=90.0, ge=0.01, le=36000)
-    drive: Annotated[Drive, OneOf("drive")] = Differential()
+    drive: OneOf[Drive] = Differential()
     camera: Camera | None = Camera()
     cameras: dict[str, Camera] = Field(default={})
     perception: Perception | None = None
-    perceives: Annotated[EvidenceSource, OneOf("evidence_source")] | None = None
+    perceives: OneOf[EvidenceSource] | None = None
 
-    usual_height: ClassVar[float] = 0.4
-    minds_costs: ClassVar[bool] = True
-    minds_floor: ClassVar[bool] = True
+    usual_height = 0.4
+    minds_costs = True
+    minds_floor = True
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None
     keep_out: tuple[str, ...] = ()
-    sight_events: ClassVar[tuple[str, str]] = (EventKind.USER_LOST, EventKind.USER_SEEN)
-    request_events: ClassVar[frozenset[str]] = REQUEST_EVENTS
+    sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
+    request_events = REQUEST_EVENTS
 
     @model_validator(mode="before")
     @classmethod

@@ -16,6 +16,7 @@ from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import BELL_STD, F64, I64, TURN, BatteryState, Breakpoints, Window
+from fleet2d.runtime.clock import MINUTE_US
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import EventKind
 
@@ -134,7 +135,6 @@ def _track(motion: Motion) -> Breakpoints:
 
 
 MAX_CORRECTION_INTERVAL = timedelta(days=1)
-MINUTE_US = 60_000_000
 # Noise is in 1/65536 of the unit of what it is added to, per unit of random_bell.
 FINE = 1 << 16
 ALONG_AXES = [f"{kind} {axis}" for kind in ("drift", "left", "jump") for axis in "xy"]
@@ -241,7 +241,8 @@ class Drift:
             displacements: When it was carried off; a list that may grow.
         """
         self._displacements = displacements
-        self._step_us, self._every_us = step_us, micros(settings.corrected_every)
+        self._step_us = step_us
+        self._every_us = micros(settings.corrected_every)
         hours = settings.corrected_every / timedelta(hours=1)
         self._jump_chance = settings.jumps_per_hour * hours
         self._drift, self._jump, self._residual = (

@@ -20,10 +20,11 @@ from fleet2d.entities.body import Arrangement, Body, Track
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
 from fleet2d.runtime.events import EventKind
 
-Detour = Callable[[tuple[int, int], tuple[int, int]], I64 | None]
+Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
 
 
 def resumed(plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None) -> Plan | None:
@@ -81,7 +82,7 @@ def _rest(
         return None
     goes_on_us = max(int(track.time[stop]), interrupted_us)
     goal = int(track.x[stop]), int(track.y[stop])
-    route = detour((plan.x, plan.y), goal) if detour else None
+    route = detour(plan.position, goal) if detour else None
     if detour and route is None:
         return None
     try:
@@ -111,7 +112,8 @@ def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
     """Return the heading at a moment between a breakpoint and the next."""
     times = track.time
     headings = track.heading
-    begin, end = int(times[stop]), int(times[stop + 1])
+    begin = int(times[stop])
+    end = int(times[stop + 1])
     turn = int(turn_between(int(headings[stop]), int(headings[stop + 1])))
     return (int(headings[stop]) + turn * (time_us - begin) // max(end - begin, 1)) % TURN
 
@@ -285,7 +287,7 @@ class RoutesAround:
         for x, y, reach in people.tolist():
             self.cost[(xs - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach] = CLOSED
 
-    def __call__(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+    def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
         return route_by_cost(self._space, self.cost, start, goal)
 
@@ -346,7 +348,7 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         goal = beside
         rest[:, 1:3] = goal
     plan = now.plan()
-    route = detour((plan.x, plan.y), goal)
+    route = detour(plan.position, goal)
     if route is None:
         return None
     since_us = max(int(rows[stop, 0]), begin_us)
@@ -400,7 +402,7 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def _beside(actor: Actor, goal: tuple[int, int], detour: RoutesAround) -> tuple[int, int] | None:
+def _beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan = actor.home.plan
     space = actor.space

@@ -1,10 +1,8 @@
 """Objects of a home that have a state during a run, and doors."""
 
-from typing import ClassVar
-
 from pydantic import Field
 
-from fleet2d.configuration.components import Component, Settings, register
+from fleet2d.configuration.components import Component, Settings
 from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.configuration.units import PositiveDuration, TimeOfDay
 from fleet2d.entities.place import Point
@@ -20,7 +18,7 @@ class HomeObject(Component):
     Furniture that just stands there is part of the floor plan.
     """
 
-    kind: ClassVar[str] = "object"
+    kind = "object"
 
 
 class Turn(Settings):
@@ -42,7 +40,6 @@ class Turn(Settings):
             raise problem("nothing happens then: give 'open' or 'locked', true or false")
 
 
-@register("object", "door")
 class Door(HomeObject):
     """A door: while it is shut, it blocks sight and ways exactly like a wall.
 

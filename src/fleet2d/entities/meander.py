@@ -5,7 +5,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import AngleDeg
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
@@ -15,7 +14,6 @@ from fleet2d.kernels import BELL_STD, TURN, WalkRule
 MAX_STRIDE = 256 << 21
 
 
-@register("behavior", "meander")
 class Meander(Behavior):
     """Walk at random, for good: two-dimensional Brownian motion at a constant speed.
 

@@ -18,6 +18,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.furniture import FURNITURE
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
@@ -198,7 +199,7 @@ def seat_at(body: "Body", place: object) -> PlacedObject | None:
     return furniture_of(body, parse_place(place)) if body.entity.uses_furniture else None
 
 
-def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
+def stop_at(body: "Body", place: RoomChoice | Point) -> LatticePoint:
     """Return the lattice point at which a body stops for a place.
 
     For a point, that point; for a room, its middle; for furniture, the point in front of it.
@@ -209,7 +210,7 @@ def stop_at(body: "Body", place: RoomChoice | Point) -> tuple[int, int]:
     return stops_at(body, place)[0]
 
 
-def stops_at(body: "Body", place: RoomChoice | Point) -> list[tuple[int, int]]:
+def stops_at(body: "Body", place: RoomChoice | Point) -> list[LatticePoint]:
     """Return the lattice points at which a body stops for a place: one per room of its kind."""
     if is_point(place):
         return [body.point(place)]  # type: ignore[arg-type]
@@ -313,7 +314,7 @@ def forbidden_rooms(body: "Body", names: tuple[str, ...]) -> frozenset[int]:
     return frozenset(forbidden)
 
 
-def lies_in(body: "Body", point: tuple[int, int], rooms: frozenset[int]) -> bool:
+def lies_in(body: "Body", point: LatticePoint, rooms: frozenset[int]) -> bool:
     """Return whether a lattice point lies in one of some rooms, by their indices."""
     room = body.home.plan.room_of_point(*point) if rooms else None
     return room is not None and room.index in rooms
@@ -336,8 +337,8 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
 
 
 def points_at_distance(
-    body: "Body", center: tuple[int, int], distance: int, directions: int
-) -> Iterator[tuple[int, int]]:
+    body: "Body", center: LatticePoint, distance: int, directions: int
+) -> Iterator[LatticePoint]:
     """Yield the points at a distance from a point where a body can stand, in the point's room.
 
     Args:

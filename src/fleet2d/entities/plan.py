@@ -15,6 +15,7 @@ from fleet2d.configuration.units import MAX_DURATION, micros
 from fleet2d.entities.body import STANDING, Body, Motion, RandomWalk, Track
 from fleet2d.entities.place import Point, RoomChoice, seat_at
 from fleet2d.errors import ComponentError, NoWayError, errors_as
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import POSTURES, PlacedObject, Posture
 from fleet2d.floorplan.slow_area import slowed
 from fleet2d.floorplan.space import Space, straight_way
@@ -87,6 +88,11 @@ class Plan:
         return self.body.clock.step_us
 
     @property
+    def position(self) -> LatticePoint:
+        """Where the body is at its end so far [lattice]."""
+        return self.x, self.y
+
+    @property
     def time(self) -> datetime:
         """The local time up to which it is planned."""
         return self.body.clock.start + timedelta(microseconds=self.time_us)
@@ -122,20 +128,20 @@ class Plan:
             return self
         if off is not None:
             self._step_to(*off)
-        for passing in space.passings((self.x, self.y), (x, y)) if route is None else ():
+        for passing in space.passings(self.position, (x, y)) if route is None else ():
             self.go_to_point(*passing.begin)
             self.stay_until(self.time_us + passing.takes_us // 2)
             self.jump(self.time_us, x=passing.end[0], y=passing.end[1])
             self.stay_until(self.time_us + passing.takes_us - passing.takes_us // 2)
         if route is None:
-            route = space.route((self.x, self.y), (x, y))
+            route = space.route(self.position, (x, y))
         if route is None:
             at = body.home.plan.lattice.to_metres([x, y]).round(2).tolist()
             raise NoWayError(f"{body.path}: there is no way to {at} for a body of its radius")
         self._walk(route)
         return self
 
-    def _go_shortest(self, space: Space, x: int, y: int, off: tuple[int, int] | None) -> bool:
+    def _go_shortest(self, space: Space, x: int, y: int, off: LatticePoint | None) -> bool:
         """Step `off` an object and walk a shortest route, if that is all; return whether it was."""
         body = self.body
         routes = space.shortest
@@ -177,7 +183,7 @@ class Plan:
             NoWayError: There is no way to it, or none at present.
         """
         at = self.body.place_at(thing, place)
-        if self.away or (self.x, self.y) != (at.x, at.y):
+        if self.away or self.position != (at.x, at.y):
             self.go_to_point(*at.approach)
         self._check_goes_on()
         body = self.body
@@ -214,13 +220,13 @@ class Plan:
 
     def _step_to(self, x: int, y: int) -> None:
         """Go straight to a lattice point; neither walls nor furniture count."""
-        if (x, y) != (self.x, self.y):
-            self._walk(straight_way((self.x, self.y), (x, y)))
+        if (x, y) != self.position:
+            self._walk(straight_way(self.position, (x, y)))
 
     def reaches(self, x: int, y: int) -> bool:
         """Return whether there is a way to a lattice point from where the plan ends so far."""
         space = self.body.space
-        at = (self.x, self.y)
+        at = self.position
         return space.route(at, (x, y)) is not None or bool(space.passings(at, (x, y)))
 
     def follow(self, breakpoints: I64) -> Self:
@@ -262,6 +268,10 @@ class Plan:
     def face(self, x: int, y: int) -> Self:
         """Turn on the spot towards a lattice point."""
         return self.turn_to(kernels.heading_of(x - self.x, y - self.y))
+
+    def face_place(self, place: Point) -> Self:
+        """Turn on the spot towards a place [m]."""
+        return self.face(*self.body.home.plan.lattice.point_at(place))
 
     def _turn(self, headings: int) -> Self:
         self._check_goes_on()

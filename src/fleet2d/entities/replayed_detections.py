@@ -8,7 +8,6 @@ import numpy as np
 import shapely
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, counted, suggest
 from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.behavior import Actor
@@ -17,7 +16,7 @@ from fleet2d.errors import errors_as
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, LogKeys, begin_of_run, files_of
-from fleet2d.logs.placement import LogFrame
+from fleet2d.logs.placement import COORDINATE_LIMIT_M, LogFrame
 from fleet2d.storage.bags import is_bag
 
 if TYPE_CHECKING:
@@ -26,13 +25,10 @@ if TYPE_CHECKING:
 
 # If more detections than this are outside of the home, the frame of the log is wrong.
 MAX_OUTSIDE = 0.5
-# Coordinates are clipped to this, far outside of any home [m].
-COORDINATE_LIMIT_M = 1e6
 # Labels that mean nobody known in usual detectors.
 ANONYMOUS = frozenset({"unknown", "person", "people", "human", "none", "nobody", "0", ""})
 
 
-@register("evidence_source", "replay")
 class ReplayedDetections(EvidenceSource, LogKeys):
     """Perceive what a real robot perceived: the detections in a table, or on a topic of a bag.
 

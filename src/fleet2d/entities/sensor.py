@@ -135,7 +135,8 @@ class SensorState:
             if self.on and steps[i] > self.last + self.hold + 1:
                 readings.append(self._off())
             if not self.on:
-                self.on, self.user = True, int(users[i])
+                self.on = True
+                self.user = int(users[i])
                 readings.append(SensorReading(int(steps[i]), True, self.user))
             self.last = int(steps[j])
         if self.on and self.last + self.hold + 1 < end:

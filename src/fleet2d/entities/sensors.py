@@ -2,13 +2,12 @@
 
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import (
     AngleDeg,
     Duration,
@@ -38,7 +37,6 @@ SILENT = frozenset({"unavailable", "unknown", ""})
 """The states of a sensor that reports nothing, as Home Assistant writes them."""
 
 
-@register("object", "contact_sensor")
 class ContactSensor(Sensor):
     """A sensor that reports OPEN when a door opens, and CLOSE when it shuts.
 
@@ -48,7 +46,7 @@ class ContactSensor(Sensor):
 
     of: str
 
-    words: ClassVar[tuple[str, str]] = ("OPEN", "CLOSE")
+    words = ("OPEN", "CLOSE")
 
     def watch(self, door: int) -> None:
         """Set the door that it watches, by its number in the home."""
@@ -65,7 +63,6 @@ class ContactSensor(Sensor):
         return steps, np.full(len(steps), -1, np.int64)
 
 
-@register("object", "occupancy_sensor")
 class OccupancySensor(FurnitureSensor):
     """A sensor that is on while somebody is on a bed, a sofa or a chair."""
 
@@ -83,7 +80,6 @@ class OccupancySensor(FurnitureSensor):
         return first_cause(on_object, view.first)
 
 
-@register("object", "smart_plug")
 class SmartPlug(FurnitureSensor):
     """A plug that is on while a person stays where its device is used: a stove, a desk, a TV.
 
@@ -119,7 +115,6 @@ class SmartPlug(FurnitureSensor):
         return first_cause(at_device & still & view.present[: view.users, 1:], view.first)
 
 
-@register("object", "motion_sensor")
 class MotionSensor(Sensor):
     """A sensor that is on while a person moves in view, with no wall between, and a while longer.
 
@@ -193,7 +188,6 @@ class MotionSensor(Sensor):
         return from_right & to_left if half <= quarter else from_right | to_left
 
 
-@register("object", "live_sensor")
 class LiveSensor(Sensor):
     """A real sensor: it is on or off as an intervention `report` says; see `fleet2d live`.
 
@@ -212,7 +206,6 @@ class LiveSensor(Sensor):
         return none, none
 
 
-@register("object", "replay_sensor")
 class ReplaySensor(Sensor, LogKeys):
     """A real sensor, whose readings are replayed from a table.
 

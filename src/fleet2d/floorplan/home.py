@@ -16,6 +16,7 @@ from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import format_duration, parse_duration
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.costmap import CostedSpace
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.layers import COSTMAP, Layers
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, UsePlace, find_named
@@ -76,7 +77,7 @@ class Home:
         self.layers = Layers(plan)
         self._shapes = _shapes_of(plan, doorway_segments(plan.lattice, self.doors))
         self._walls: tuple[int, Mesh] = (-1, plan.sight_mesh)
-        self._places: tuple[int, dict[tuple[int, int], tuple[int, int]]] = (-1, {})
+        self._places: tuple[int, dict[LatticePoint, LatticePoint]] = (-1, {})
         # The layer `costmap` at its last use, the number of its changes, and the spaces of bodies
         # that pay its costs.
         self._costs: I32 = np.zeros((0, 0), np.int32)
@@ -199,7 +200,7 @@ class Home:
         """
         return find_named(self.objects, name, self.plan.name, "object", PlacementError)
 
-    def approach(self, use: UsePlace, space: Space, part: int) -> tuple[int, int]:
+    def approach(self, use: UsePlace, space: Space, part: int) -> LatticePoint:
         """Return the lattice point from which a body steps to a place where an object is used.
 
         Raises:
@@ -216,7 +217,7 @@ class Home:
         return self._shapes.room_of(thing)
 
     @property
-    def approaches(self) -> Mapping[tuple[int, int], tuple[int, int]]:
+    def approaches(self) -> Mapping[LatticePoint, LatticePoint]:
         """The point from which a body steps to each place of use at present, by place [lattice]."""
         if self._places[0] != self.version:
             point_at = self.plan.lattice.point_at
@@ -225,12 +226,12 @@ class Home:
             self._places = self.version, ways
         return self._places[1]
 
-    def approach_of(self, place: tuple[int, int]) -> tuple[int, int] | None:
+    def approach_of(self, place: LatticePoint) -> LatticePoint | None:
         """Return the point from which a body steps to a place of use [lattice]; None for others."""
         version, approaches = self._places
         return (approaches if version == self.version else self.approaches).get(place)
 
-    def way_out(self, space: Space, part: int) -> tuple[int, int]:
+    def way_out(self, space: Space, part: int) -> LatticePoint:
         """Return the lattice point where a body in a part of the space leaves the home.
 
         Raises:
@@ -238,14 +239,14 @@ class Home:
         """
         return self._nearest(space, *self._door(space, part), part)
 
-    def _nearest(self, space: Space, x: int, y: int, part: int) -> tuple[int, int]:
+    def _nearest(self, space: Space, x: int, y: int, part: int) -> LatticePoint:
         point = space.nearest(x, y, part)
         if point is None:
             body = f"a body of radius {space.radius:g} m"
             raise PlacementError(f"{body} fits nowhere in {self.plan.name}")
         return point
 
-    def _door(self, space: Space, part: int) -> tuple[int, int]:
+    def _door(self, space: Space, part: int) -> LatticePoint:
         """Return the plan's entrance, or the middle of the likeliest room with an exit."""
         at = self.plan.entrance
         if at is None:

@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from fleet2d.errors import FloorPlanError
 from fleet2d.kernels import CELL_CENTRE, F64, I64
 
+LatticePoint = tuple[int, int]
+"""x and y of a point [lattice]."""
+
 UNITS_PER_CELL = 64
 MARGIN_CELLS = 2
 MIN_CELL_M = 0.01
@@ -153,11 +156,11 @@ class Lattice:
         return units.astype(np.int64) - self._origin_units
 
     @cached_property
-    def _origin_point(self) -> tuple[int, int]:
+    def _origin_point(self) -> LatticePoint:
         x, y = self._origin_units.tolist()
         return x, y
 
-    def point_at(self, xy: Sequence[float]) -> tuple[int, int]:
+    def point_at(self, xy: Sequence[float]) -> LatticePoint:
         """Return one position (x, y) [m] as the nearest lattice point; quicker than `to_lattice`.
 
         Example:
@@ -190,7 +193,7 @@ class Lattice:
         """Return (row, column) of the cell that holds a lattice point."""
         return int(y) // UNITS_PER_CELL, int(x) // UNITS_PER_CELL
 
-    def cell_centre(self, row: int, column: int) -> tuple[int, int]:
+    def cell_centre(self, row: int, column: int) -> LatticePoint:
         """Return a cell's centre (x, y) [lattice]: the odd point next to its exact middle."""
         return UNITS_PER_CELL * column + CELL_CENTRE, UNITS_PER_CELL * row + CELL_CENTRE
 

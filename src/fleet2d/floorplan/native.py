@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import shapely
@@ -30,7 +30,6 @@ from pydantic_core import core_schema
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.bounds import CROSSINGS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
@@ -351,7 +350,6 @@ def native_schema() -> dict[str, Any]:
     return dialect | PlanFile.model_json_schema()
 
 
-@register("floorplan", "native")
 class Native(FileSource):
     """A plan in Fleet2D's own format.
 
@@ -359,9 +357,8 @@ class Native(FileSource):
         path: The plan's JSON or YAML file.
     """
 
-    marks: ClassVar = (("format", FORMAT),)
-
-    small_bytes: ClassVar[int] = SMALL_BYTES
+    marks = (("format", FORMAT),)
+    small_bytes = SMALL_BYTES
 
     path: InputPath
 
@@ -517,7 +514,6 @@ def _part_document(polygon: Polygon) -> dict[str, Any]:
 HOMES = Path(__file__).with_name("homes")
 
 
-@register("floorplan", "bundled")
 class Bundled(FloorPlanSource):
     """A home that comes with Fleet2D.
 

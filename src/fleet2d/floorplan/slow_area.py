@@ -14,10 +14,8 @@ from shapely import Polygon
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Duration, Length, Share, micros
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.lattice import Lattice, LatticePoint
 from fleet2d.kernels import I64, TURN, turn_between
-
-PointXY = tuple[int, int]
 
 
 class SlowArea(Settings):
@@ -57,11 +55,11 @@ class SlowRegion(NamedTuple):
         stop_us: How long a robot stops when it enters it [us].
     """
 
-    corners: tuple[PointXY, ...]
+    corners: tuple[LatticePoint, ...]
     speed: Fraction
     stop_us: int
 
-    def sides(self) -> Iterator[tuple[PointXY, PointXY]]:
+    def sides(self) -> Iterator[tuple[LatticePoint, LatticePoint]]:
         """Yield its sides."""
         return pairwise([*self.corners, self.corners[0]])
 
@@ -73,7 +71,7 @@ class SlowRegion(NamedTuple):
                 is_inside ^= x < ax + (y - ay) * Fraction(bx - ax, by - ay)
         return is_inside
 
-    def crossings(self, start: PointXY, end: PointXY) -> set[Fraction]:
+    def crossings(self, start: LatticePoint, end: LatticePoint) -> set[Fraction]:
         """Return where a leg crosses its sides, as shares of the leg strictly between 0 and 1."""
         (x, y), dx, dy = start, end[0] - start[0], end[1] - start[1]
         shares = set()

@@ -313,7 +313,7 @@ class FloorPlanSource(Component):
         slows: Areas that slow robots down: wet floors, carpets, edges at which they stop.
     """
 
-    kind: ClassVar[str] = "floorplan"
+    kind = "floorplan"
 
     # Keys, each with its value unless that is None; by one the content of a file is recognized.
     marks: ClassVar[tuple[tuple[str, str | None], ...]] = ()

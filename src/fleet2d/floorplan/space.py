@@ -14,7 +14,7 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice, LatticePoint
 from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, Portal, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, cells_of, read_only
@@ -46,9 +46,6 @@ PORTAL_REACH_M = 1.0
 SECOND_US = 1_000_000
 # Number of results that a space caches of each of its searches.
 CACHED_ROUTES = 4096
-
-
-PointXY = tuple[int, int]  # [lattice]
 
 
 class Space:
@@ -143,7 +140,7 @@ class Space:
             return -1
         return int(self._part_of_triangle[locate(self.mesh, x, y)])
 
-    def passings(self, start: tuple[int, int], goal: tuple[int, int]) -> Sequence[Any]:
+    def passings(self, start: LatticePoint, goal: LatticePoint) -> Sequence[Any]:
         """Return the portals on the way from one lattice point to another: here none are used."""
         return ()
 
@@ -173,12 +170,12 @@ class Space:
 
     def _find_nearest(
         self, x: int, y: int, part: int | None = None, room: int | None = None
-    ) -> tuple[int, int] | None:
+    ) -> LatticePoint | None:
         """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
         cells = self._by_distance(x, y, 1, part, room)
         return self.plan.lattice.cell_centre(*cells[0].tolist()) if len(cells) else None
 
-    def _find_route(self, start: tuple[int, int], goal: tuple[int, int]) -> I64 | None:
+    def _find_route(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return the shortest path (n, 2) from `start` to `goal` [lattice], or None.
 
         From a start on the border of the space, where a walk may end early, it first leads inside.
@@ -204,7 +201,7 @@ class Space:
         """
         return self._metres(self._steps(places))
 
-    def distances(self, place: tuple[int, int], points: I64) -> F64:
+    def distances(self, place: LatticePoint, points: I64) -> F64:
         """Return the walking distances of points from a place, as `distance_field` measures them.
 
         Args:
@@ -224,7 +221,7 @@ class Space:
     def _metres(self, steps: NDArray[np.signedinteger]) -> F64:
         return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
-    def _way_in(self, x: int, y: int) -> tuple[int, int] | None:
+    def _way_in(self, x: int, y: int) -> LatticePoint | None:
         walls = self.walls
         triangle = locate(walls, x, y)
         for row, column in self._by_distance(x, y, ESCAPE_ATTEMPTS).tolist():
@@ -304,7 +301,7 @@ class PointDistances:
         self._measured = 0
         self._steps: NDArray[np.signedinteger] | None = None  # (rows, columns, points)
 
-    def of(self, place: PointXY) -> F64:
+    def of(self, place: LatticePoint) -> F64:
         """Return the distances from a lattice point, float64 (points,) [m]."""
         if self._steps is None and self._measured < len(self._points):
             self._measured += 1
@@ -326,8 +323,8 @@ class Passing:
         takes_us: How long it takes from one to the other [us].
     """
 
-    begin: PointXY
-    end: PointXY
+    begin: LatticePoint
+    end: LatticePoint
     takes_us: int
 
 
@@ -374,7 +371,7 @@ class LinkedSpace(Space):
         part = self.base.part_at(x, y)
         return int(self._rank[part]) if 0 <= part < len(self._rank) else -1
 
-    def passings(self, start: PointXY, goal: PointXY) -> list[Passing]:
+    def passings(self, start: LatticePoint, goal: LatticePoint) -> list[Passing]:
         """Return the portals on the way from one lattice point to another, in order.
 
         The way is the shortest, in straight lines and with the times of portals as metres.
@@ -382,8 +379,8 @@ class LinkedSpace(Space):
         base = self.base
         metre = self.plan.lattice.units_per_m
         goal_part = base.part_near(*goal)
-        queue: list[tuple[float, int, PointXY, list[Passing]]] = [(0.0, 0, start, [])]
-        best: dict[PointXY, float] = {}
+        queue: list[tuple[float, int, LatticePoint, list[Passing]]] = [(0.0, 0, start, [])]
+        best: dict[LatticePoint, float] = {}
         tries = 0
         while queue:
             length, _, place, used = heapq.heappop(queue)
@@ -405,7 +402,7 @@ class LinkedSpace(Space):
                 heapq.heappush(queue, (length + far, tries, other, through))
         return []
 
-    def _end(self, at: tuple[float, float]) -> PointXY | None:
+    def _end(self, at: tuple[float, float]) -> LatticePoint | None:
         """Return where a body stands at the end of a portal [lattice], or None if nowhere."""
         x, y = self.plan.lattice.point_at(at)
         if 0 <= self.base.part_at(x, y) < self.base.parts:
@@ -485,7 +482,7 @@ def _grow_walls(ring: F64, octagon: I64) -> NDArray[np.object_]:
 
 
 @lru_cache(CACHED_ROUTES)
-def straight_way(begin: tuple[int, int], end: tuple[int, int]) -> I64:
+def straight_way(begin: LatticePoint, end: LatticePoint) -> I64:
     """Return the straight route, int64 (2, 2), read-only as those of `Space.route` are."""
     return read_only(np.array([begin, end], np.int64))
 
@@ -600,7 +597,7 @@ def with_approaches(
 
 def nearest_standing(
     plan: FloorPlan, use: UsePlace, standing: Bool, reach: float, obstacles: Sequence[Polygon] = ()
-) -> tuple[int, int] | None:
+) -> LatticePoint | None:
     """Return the cell (row, column) from which a body gets to a place of use, or None.
 
     Args:

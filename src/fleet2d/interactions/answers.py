@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from fleet2d.configuration.components import Component, OneOf, register
-from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
+from fleet2d.configuration.components import Component, OneOf
+from fleet2d.configuration.units import Duration, PositiveDuration, Share
 from fleet2d.interactions.attitude import Attitude, AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome
 from fleet2d.runtime.determinism import Draws, logistic, stream_key, sum_in_order
@@ -64,7 +64,7 @@ class AnswerPart(Component):
         ...         return -9.0 if now.time.weekday() == 0 else 0.0
     """
 
-    kind: ClassVar[str] = "answer_part"
+    kind = "answer_part"
     stage: ClassVar[Stage] = "accept"
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
@@ -72,7 +72,10 @@ class AnswerPart(Component):
         raise NotImplementedError
 
 
-@register("answer_part", "notice")
+# From there on a robot is noticed less.
+NOTICED_WITHIN_M = 2.0
+
+
 class NoticePart(AnswerPart):
     """Whether the robot is heard or seen.
 
@@ -81,22 +84,20 @@ class NoticePart(AnswerPart):
         asleep: Added for a sleeper: noticing wakes.
         out_of_sight: Added without line of sight.
         reading: Added for what is only shown, to a person who looks elsewhere.
-        reach: Distance from which on it is harder [m].
-        per_metre: Added for each metre beyond it.
+        per_metre: Added for each metre beyond the second.
     """
 
-    stage: ClassVar[Stage] = "notice"
+    stage = "notice"
 
     base: float = 3.0
     asleep: float = -4.0
     out_of_sight: float = -2.0
     reading: float = -4.0
-    reach: Length = 2.0
     per_metre: float = -1.0
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
         """Sum the terms that make it hard to notice."""
-        total = self.base + self.per_metre * max(0.0, now.distance - self.reach)
+        total = self.base + self.per_metre * max(0.0, now.distance - NOTICED_WITHIN_M)
         if now.activity in ASLEEP:
             total += self.asleep
         if not now.in_sight:
@@ -137,7 +138,6 @@ LOADS: Mapping[str, float] = {
 }
 
 
-@register("answer_part", "activity")
 class ActivityPart(AnswerPart):
     """The load of the activity: asleep never, on the phone hardly, at breakfast well.
 
@@ -146,7 +146,7 @@ class ActivityPart(AnswerPart):
         loads: What each activity takes off; these come before the built-in ones.
     """
 
-    stage: ClassVar[Stage] = "available"
+    stage = "available"
 
     base: float = 1.2
     loads: dict[str, float] = Field(default={})
@@ -156,7 +156,6 @@ class ActivityPart(AnswerPart):
         return self.base - self.loads.get(now.activity, LOADS.get(now.activity, 0.0))
 
 
-@register("answer_part", "company")
 class CompanyPart(AnswerPart):
     """Other people in the room.
 
@@ -164,7 +163,7 @@ class CompanyPart(AnswerPart):
         each: Added for each of them, up to three.
     """
 
-    stage: ClassVar[Stage] = "available"
+    stage = "available"
 
     each: float = -0.5
 
@@ -173,7 +172,6 @@ class CompanyPart(AnswerPart):
         return self.each * min(now.company, 3)
 
 
-@register("answer_part", "movement")
 class MovementPart(AnswerPart):
     """Whether the person is going somewhere.
 
@@ -181,7 +179,7 @@ class MovementPart(AnswerPart):
         going: Added if so.
     """
 
-    stage: ClassVar[Stage] = "available"
+    stage = "available"
 
     going: float = -1.5
 
@@ -201,42 +199,43 @@ KIND_LOGITS: Mapping[str, float] = {
 }
 
 
-@register("answer_part", "importance")
+# The value of an interaction that adds half of what the highest would.
+HALF_WORTH = 2.0
+
+
 class ImportancePart(AnswerPart):
     """Its kind, and its value to the person.
 
     Attributes:
         kinds: Logit of each kind; these come before the built-in ones.
-        worth: Added for a very high value; half of it at `half_worth`.
-        half_worth: The value at which half of `worth` is added.
+        worth: Added for a very high value; half of it for a value of 2.
     """
 
     kinds: dict[str, float] = Field(default={})
     worth: float = 1.5
-    half_worth: float = Field(default=2.0, gt=0)
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
         """Add kind and value."""
         do = now.interaction.do
         worth = now.interaction.worth
         kind = self.kinds.get(do, KIND_LOGITS[do])
-        return kind + self.worth * worth / (worth + self.half_worth)
+        return kind + self.worth * worth / (worth + HALF_WORTH)
 
 
-@register("answer_part", "manner")
+# Between these distances a robot that addresses somebody is neither too near nor too far.
+NEAREST_M = 0.45
+FARTHEST_M = 2.5
+
+
 class MannerPart(AnswerPart):
     """How the robot comes: too near, from far away, from behind, in the way.
 
     Attributes:
-        nearest: Distance below which it is too near [m].
-        farthest: Distance from which on it is too far [m].
-        off: Added if it is too near or too far.
+        off: Added if it is nearer than 0.45 m or farther than 2.5 m.
         behind: Added if it comes from behind.
         in_the_way: Added if it stands within a metre of a person who is going somewhere.
     """
 
-    nearest: Length = 0.45
-    farthest: Length = 2.5
     off: float = -0.6
     behind: float = -0.5
     in_the_way: float = -0.8
@@ -244,33 +243,29 @@ class MannerPart(AnswerPart):
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
         """Add the terms of its manner: from behind, too near or far, in the way."""
         total = self.behind if now.from_behind else 0.0
-        if not self.nearest <= now.distance <= self.farthest:
+        if not NEAREST_M <= now.distance <= FARTHEST_M:
             total += self.off
         if now.is_moving and now.distance < 1:
             total += self.in_the_way
         return total
 
 
-@register("answer_part", "recency")
 class RecencyPart(AnswerPart):
     """The time since the robot addressed the person last.
 
     Attributes:
-        at_once: Added right after it.
-        over: Time after which it no longer counts; it fades evenly.
+        at_once: Added right after it; it fades evenly within an hour.
     """
 
     at_once: float = -1.5
-    over: PositiveDuration = timedelta(hours=1)
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
         """Add what is left of the last time."""
         if state.last is None:
             return 0.0
-        return self.at_once * max(0.0, 1 - (now.time - state.last) / self.over)
+        return self.at_once * max(0.0, 1 - (now.time - state.last) / timedelta(hours=1))
 
 
-@register("answer_part", "burden")
 class BurdenPart(AnswerPart):
     """Too many prompts of late.
 
@@ -287,21 +282,18 @@ class BurdenPart(AnswerPart):
         return self.each * max(0.0, state.burden - self.tolerance)
 
 
-@register("answer_part", "attitude")
 class AttitudePart(AnswerPart):
     """What months have made of the person: novelty, habit, trust and annoyance.
 
     Attributes:
         novelty: Added while the robot is new.
-        habit: Added if the interaction is expected at this time of day.
-        expected_within: How far from the usual time it is still expected.
+        habit: Added if the interaction is expected at this time of day, within half an hour.
         trust: Added at full trust; as much is taken off without any.
         annoyance: Added for each unit of annoyance.
     """
 
     novelty: float = 0.7
     habit: float = 0.8
-    expected_within: Duration = timedelta(minutes=30)
     trust: float = 0.8
     annoyance: float = -0.4
 
@@ -309,7 +301,7 @@ class AttitudePart(AnswerPart):
         """Sum the terms of the attitude."""
         return (
             self.novelty * state.novelty
-            + self.habit * state.expects(now.name, now.time, self.expected_within)
+            + self.habit * state.expects(now.name, now.time, timedelta(minutes=30))
             + self.trust * (2 * state.trust - 1)
             + self.annoyance * state.annoyance
         )
@@ -388,7 +380,6 @@ class Start(NamedTuple):
     kind: str
 
 
-@register("initiative", "rates")
 class Initiative(Component):
     """What people start by themselves: on average so often a day, at any time of it.
 
@@ -401,7 +392,7 @@ class Initiative(Component):
             enough sends it away, bans it or switches it off.
     """
 
-    kind: ClassVar[str] = "initiative"
+    kind = "initiative"
 
     calls: float = Field(default=0.0, ge=0, le=1000)
     questions: float = Field(default=0.0, ge=0, le=1000)
@@ -417,6 +408,12 @@ class Initiative(Component):
         return sorted(starts)
 
 
+# The least and the greatest time until an answer.
+ANSWER_TAKES = (timedelta(seconds=2), timedelta(seconds=8))
+# Annoyance beyond that of sending a robot away, at which it is banned, and switched off.
+BAN_AFTER = 2.0
+OFF_AFTER = 5.0
+
 PARTS = (
     "notice", "activity", "company", "movement", "importance", "manner", "recency", "burden",
     "attitude",
@@ -424,7 +421,6 @@ PARTS = (
 """The parts of a person's answers, which are types of `answer_part`, too."""
 
 
-@register("answers", "stages")
 class Answers(Component):
     """How a person answers robots; each part may be replaced by a class of your own.
 
@@ -442,36 +438,31 @@ class Answers(Component):
         initiative: What the person starts without being addressed.
         defers: Probability that a person who isn't available asks for it later.
         later: Least and greatest time after which it may come again.
-        answer_takes: Least and greatest time until the answer.
-        sends_away_at: Annoyance from which on the robot is sent away from the room.
-        away_for: For how long.
-        bans_at: Annoyance from which on it is banned from a bedroom or bathroom.
-        bans_for: For how long.
-        off_at: Annoyance from which on it is switched off.
-        off_for: For how long.
+        sends_away_at: Annoyance from which on the robot is sent away from the room; two more, and
+            it is banned from a bedroom or bathroom; five more, and it is switched off.
+        away_for: For how long it is sent away.
+        bans_for: For how long it is banned.
+        off_for: For how long it is switched off.
     """
 
-    kind: ClassVar[str] = "answers"
+    kind = "answers"
 
-    notice: Annotated[AnswerPart, OneOf("answer_part")] = NoticePart()
-    activity: Annotated[AnswerPart, OneOf("answer_part")] = ActivityPart()
-    company: Annotated[AnswerPart, OneOf("answer_part")] = CompanyPart()
-    movement: Annotated[AnswerPart, OneOf("answer_part")] = MovementPart()
-    importance: Annotated[AnswerPart, OneOf("answer_part")] = ImportancePart()
-    manner: Annotated[AnswerPart, OneOf("answer_part")] = MannerPart()
-    recency: Annotated[AnswerPart, OneOf("answer_part")] = RecencyPart()
-    burden: Annotated[AnswerPart, OneOf("answer_part")] = BurdenPart()
-    attitude: Annotated[AnswerPart, OneOf("answer_part")] = AttitudePart()
-    months: Annotated[Attitude, OneOf("attitude")] = Attitude()
-    initiative: Annotated[Initiative, OneOf("initiative")] = Initiative()
+    notice: OneOf[AnswerPart] = NoticePart()
+    activity: OneOf[AnswerPart] = ActivityPart()
+    company: OneOf[AnswerPart] = CompanyPart()
+    movement: OneOf[AnswerPart] = MovementPart()
+    importance: OneOf[AnswerPart] = ImportancePart()
+    manner: OneOf[AnswerPart] = MannerPart()
+    recency: OneOf[AnswerPart] = RecencyPart()
+    burden: OneOf[AnswerPart] = BurdenPart()
+    attitude: OneOf[AnswerPart] = AttitudePart()
+    months: OneOf[Attitude] = Attitude()
+    initiative: OneOf[Initiative] = Initiative()
     defers: Share = 0.3
     later: tuple[Duration, Duration] = (timedelta(minutes=15), timedelta(hours=1))
-    answer_takes: tuple[Duration, Duration] = (timedelta(seconds=2), timedelta(seconds=8))
     sends_away_at: float = 3.0
     away_for: PositiveDuration = timedelta(minutes=30)
-    bans_at: float = 5.0
     bans_for: PositiveDuration = timedelta(days=7)
-    off_at: float = 8.0
     off_for: PositiveDuration = timedelta(hours=24)
 
     @model_validator(mode="before")
@@ -510,7 +501,7 @@ class Answers(Component):
         if notices >= self.chance("notice", now, state):
             return None
         willingness = self.chance("available", now, state)
-        delay = _between(self.answer_takes, slow)
+        delay = _between(ANSWER_TAKES, slow)
         woke = now.activity in ASLEEP
         if available < willingness and accepts < self.chance("accept", now, state):
             return Reply(Outcome.ACCEPTED, delay, willingness=willingness)
@@ -522,9 +513,9 @@ class Answers(Component):
 
     def complaint(self, state: AttitudeState, room: str) -> Outcome | None:
         """Return how a person who is annoyed enough gets rid of a robot in a type of room."""
-        if state.annoyance >= self.off_at:
+        if state.annoyance >= self.sends_away_at + OFF_AFTER:
             return Outcome.SWITCHED_OFF
-        if state.annoyance >= self.bans_at and room in PRIVATE_ROOMS:
+        if state.annoyance >= self.sends_away_at + BAN_AFTER and room in PRIVATE_ROOMS:
             return Outcome.BANNED
         return Outcome.SENT_AWAY if state.annoyance >= self.sends_away_at else None
 
@@ -540,5 +531,5 @@ def _with_type(value: Any) -> Any:
     return {"type": "stages", **value} if is_untyped else value
 
 
-AnswersField = Annotated[Answers, OneOf("answers"), BeforeValidator(_with_type)]
+AnswersField = Annotated[OneOf[Answers], BeforeValidator(_with_type)]
 """A field for how somebody answers; without a type: stages."""

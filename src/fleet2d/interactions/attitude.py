@@ -6,15 +6,23 @@ and ranges of all of them.
 
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 from pydantic import Field
 
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.runtime.clock import DAY, DAY_S, midnight_of
 from fleet2d.runtime.determinism import exp2
+
+# Time over which prompts are averaged.
+BURDEN_OVER = timedelta(days=7)
+# Part of the distance to full trust that an accepted interaction gains.
+GAINS = 0.05
+# Part of the trust that a mistake costs; a prompt for nothing costs a tenth of it.
+LOSES = 0.3
+# Part of the distance to a full habit that an accepted interaction gains.
+HABIT_FORMS = 0.15
 
 
 @dataclass
@@ -47,31 +55,22 @@ class AttitudeState:
         return strength if min(off_s, DAY_S - off_s) <= window.total_seconds() else 0.0
 
 
-@register("attitude", "fading")
 class Attitude(Component):
     """How a person's attitude to a robot changes: interest that fades, some patience.
 
     Attributes:
         novelty_lasts: Half-life of the novelty.
         annoyance_lasts: Half-life of annoyance.
-        burden_over: Time over which prompts are averaged.
         trust: Trust at first.
         annoyed_by: What a prompt adds to annoyance at the worst moment; at a good one nothing.
-        gains: Part of the distance to full trust that an accepted interaction gains.
-        loses: Part of the trust that a mistake costs; a prompt for nothing costs a tenth of it.
-        habit_forms: Part of the distance to a full habit that an accepted interaction gains.
     """
 
-    kind: ClassVar[str] = "attitude"
+    kind = "attitude"
 
     novelty_lasts: PositiveDuration = timedelta(days=14)
     annoyance_lasts: PositiveDuration = timedelta(days=2)
-    burden_over: PositiveDuration = timedelta(days=7)
     trust: Share = 0.5
     annoyed_by: float = Field(default=0.4, ge=0, le=100)
-    gains: Share = 0.05
-    loses: Share = 0.3
-    habit_forms: Share = 0.15
 
     def begin(self, start: datetime) -> AttitudeState:
         """Return the attitude to a robot that has just come."""
@@ -82,7 +81,7 @@ class Attitude(Component):
         passed = time - state.time
         state.novelty *= exp2(-(passed / self.novelty_lasts))
         state.annoyance *= exp2(-(passed / self.annoyance_lasts))
-        state.burden *= exp2(-(passed / self.burden_over) * 1.4426950408889634)
+        state.burden *= exp2(-(passed / BURDEN_OVER) * 1.4426950408889634)
         state.time = time
 
     def addressed(
@@ -97,25 +96,24 @@ class Attitude(Component):
             willingness: Probability that the person was available, 0 at the worst moment.
         """
         state.last = state.time
-        state.burden += DAY / self.burden_over
+        state.burden += DAY / BURDEN_OVER
         if outcome == Outcome.MISTAKEN:
-            state.trust *= 1 - self.loses
+            state.trust *= 1 - LOSES
             state.annoyance += self.annoyed_by
             return
         state.annoyance += self.annoyed_by * (1 - willingness)
         if outcome == Outcome.ACCEPTED:
-            state.trust += self.gains * (1 - state.trust)
+            state.trust += GAINS * (1 - state.trust)
             strength, usual_s = state.habits.get(name, (0.0, 0.0))
             time_s = (state.time - midnight_of(state.time)).total_seconds()
             is_usual = state.expects(name, state.time, timedelta(hours=1)) > 0
             usual_s = usual_s + 0.3 * (time_s - usual_s) if is_usual else time_s
             strength = strength if is_usual else 0.0
-            state.habits[name] = (strength + self.habit_forms * (1 - strength), usual_s)
+            state.habits[name] = (strength + HABIT_FORMS * (1 - strength), usual_s)
         elif outcome in (Outcome.DECLINED, Outcome.SENT_AWAY):
-            state.trust *= 1 - self.loses / 10
+            state.trust *= 1 - LOSES / 10
 
 
-@register("attitude", "steady")
 class SteadyAttitude(Attitude):
     """A person whose interest doesn't fade, and who is soon at peace: about a quarter of people."""
 
@@ -124,7 +122,6 @@ class SteadyAttitude(Attitude):
     annoyed_by: float = Field(default=0.2, ge=0, le=100)
 
 
-@register("attitude", "leaving")
 class LeavingAttitude(Attitude):
     """A person who soon loses interest and is easily annoyed: more than half of app users."""
 

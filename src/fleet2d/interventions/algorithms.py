@@ -1,18 +1,16 @@
 """Interventions on algorithms: what they have learned, and what others read of them."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field
 
 from fleet2d.algorithms.algorithm import FROZEN, WITHHELD, RoomDistribution
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, problem
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError, errors_as
 from fleet2d.interventions.intervention import Intervention, Lasting, World
 
 
-@register("intervention", "reset")
 class ResetAlgorithm(Intervention):
     """Let an algorithm forget what it has learned, or load what another run has learned.
 
@@ -28,7 +26,7 @@ class ResetAlgorithm(Intervention):
         'ltp'
     """
 
-    subject: ClassVar[str] = "algorithm"
+    subject = "algorithm"
     algorithm: str
     learned: InputPath | None = None
 
@@ -46,7 +44,6 @@ class ResetAlgorithm(Intervention):
             world.reset(self.algorithm, self.learned)
 
 
-@register("intervention", "replace")
 class ReplaceOutput(Lasting):
     """Let behaviors and other algorithms read another output of an algorithm for a while.
 
@@ -64,7 +61,7 @@ class ReplaceOutput(Lasting):
         {'kitchen_0': 1.0}
     """
 
-    subject: ClassVar[str] = "algorithm"
+    subject = "algorithm"
     algorithm: str
     rooms: dict[str, float] = Field(default={}, min_length=0)
     values: dict[str, float | str] = Field(default={})

@@ -5,7 +5,6 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, suggest, validating
 from fleet2d.configuration.units import AngleDeg, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior
@@ -63,7 +62,6 @@ class BodyIntervention(Intervention):
             actor.rooms(place)  # type: ignore[arg-type]
 
 
-@register("intervention", "put")
 class Put(BodyIntervention):
     """Put a body at a place at once, as if it were carried; it replans there.
 
@@ -109,7 +107,6 @@ class Put(BodyIntervention):
         return actor.find_anywhere(self.to, world.step * world.clock.step_us, "put")
 
 
-@register("intervention", "send")
 class Send(BodyIntervention):
     """Send a body to a place, where it stays until it is released.
 
@@ -140,7 +137,6 @@ class Send(BodyIntervention):
         self.actor(world).follow_order(order, world.step)
 
 
-@register("intervention", "hold")
 class HoldStill(BodyIntervention):
     """Let a body stay still where it is, until it is released.
 
@@ -167,7 +163,6 @@ class HoldStill(BodyIntervention):
         self.actor(world).follow_order(StandStill(self.duration, self.posture), world.step)
 
 
-@register("intervention", "release")
 class Release(BodyIntervention):
     """Return a body to the control of its own behaviors.
 
@@ -181,7 +176,6 @@ class Release(BodyIntervention):
         self.actor(world).follow_order(None, world.step)
 
 
-@register("intervention", "replan")
 class Replan(BodyIntervention):
     """Make a body replan, whatever it is doing.
 
@@ -195,7 +189,6 @@ class Replan(BodyIntervention):
         self.actor(world).decide_again(world.step)
 
 
-@register("intervention", "configure")
 class Configure(BodyIntervention):
     """Change keys of a behavior of a body: it starts anew with them, and the body replans.
 
@@ -237,7 +230,6 @@ class Configure(BodyIntervention):
             return type(behavior).model_validate({**present, **self.keys})
 
 
-@register("intervention", "drive")
 class TakeControl(BodyIntervention):
     """Control a body externally for the rest of the run, by plans instead of its behaviors.
 
@@ -251,7 +243,6 @@ class TakeControl(BodyIntervention):
         world.drive(self.actor(world))
 
 
-@register("intervention", "decide")
 class Decide(BodyIntervention):
     """Give a plan to an externally controlled body.
 
@@ -329,7 +320,6 @@ class PersonIntervention(BodyIntervention):
         return user(world, self.entity)
 
 
-@register("intervention", "away")
 class Away(PersonIntervention):
     """Send a person to the exit, and away until called home.
 
@@ -348,7 +338,6 @@ class Away(PersonIntervention):
         self.actor(world).follow_order(GoOut(duration=self.duration), world.step)
 
 
-@register("intervention", "call_home")
 class CallHome(PersonIntervention):
     """Call a person home, who comes in at the exit and stays until released.
 
@@ -373,7 +362,6 @@ class CallHome(PersonIntervention):
         self.actor(world).follow_order(GoTo(self.to, duration=self.duration), world.step)
 
 
-@register("intervention", "guest")
 class LetIn(CallHome):
     """Let a guest, a user with the behavior `guest`, come, stay for a while, and leave.
 
@@ -399,7 +387,6 @@ class LetIn(CallHome):
         super().check(world)
 
 
-@register("intervention", "activity")
 class StartActivity(PersonIntervention):
     """Let a person do an activity at its place, sitting or lying as is usual.
 

@@ -1,10 +1,9 @@
 """Interventions on the home: its doors, furniture, rooms and sensors; and the end of others."""
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.entities.place import Point
 from fleet2d.entities.sensor import SensorFault
@@ -32,7 +31,6 @@ class HomeIntervention(Intervention):
         world.change(self.home_change)
 
 
-@register("intervention", "change")
 class ChangeHome(HomeIntervention):
     """Change the home like an entry of `changes`.
 
@@ -44,7 +42,7 @@ class ChangeHome(HomeIntervention):
         'bath_door'
     """
 
-    subject: ClassVar[str] = "change"
+    subject = "change"
     change: HomeChange
 
     @property
@@ -60,11 +58,10 @@ class DoorIntervention(HomeIntervention):
         door: The door.
     """
 
-    subject: ClassVar[str] = "door"
+    subject = "door"
     door: str
 
 
-@register("intervention", "open")
 class OpenDoor(DoorIntervention):
     """Open a door, even a locked one.
 
@@ -74,7 +71,6 @@ class OpenDoor(DoorIntervention):
     """
 
 
-@register("intervention", "shut")
 class ShutDoor(DoorIntervention):
     """Shut a door, as soon as nobody stands in the doorway.
 
@@ -84,7 +80,6 @@ class ShutDoor(DoorIntervention):
     """
 
 
-@register("intervention", "lock")
 class LockDoor(DoorIntervention):
     """Lock a door: nobody opens it by hand once it is shut.
 
@@ -94,7 +89,6 @@ class LockDoor(DoorIntervention):
     """
 
 
-@register("intervention", "unlock")
 class UnlockDoor(DoorIntervention):
     """Unlock a door.
 
@@ -104,7 +98,6 @@ class UnlockDoor(DoorIntervention):
     """
 
 
-@register("intervention", "move")
 class MoveFurniture(HomeIntervention):
     """Move a piece of furniture.
 
@@ -118,13 +111,12 @@ class MoveFurniture(HomeIntervention):
         (2.0, 1.0)
     """
 
-    subject: ClassVar[str] = "object"
+    subject = "object"
     object: str
     to: Point
     turn_deg: float = Field(default=0.0, ge=-3600, le=3600)
 
 
-@register("intervention", "room")
 class SetRoomType(HomeIntervention):
     """Change the type of a room: behaviors that go to a bedroom go there from then on.
 
@@ -137,12 +129,11 @@ class SetRoomType(HomeIntervention):
         'bedroom'
     """
 
-    subject: ClassVar[str] = "name"
+    subject = "name"
     name: str
     type: str
 
 
-@register("intervention", "lights")
 class SwitchLights(HomeIntervention):
     """Switch the light of a room on or off.
 
@@ -155,12 +146,11 @@ class SwitchLights(HomeIntervention):
         'off'
     """
 
-    subject: ClassVar[str] = "room"
+    subject = "room"
     room: str
     turn: Literal["on", "off"]
 
 
-@register("intervention", "slow")
 class SlowFloor(SlowArea, Lasting):
     """Let a wet floor or a carpet slow robots down, or its edge stop them; they don't know of it.
 
@@ -174,7 +164,7 @@ class SlowFloor(SlowArea, Lasting):
         0.2
     """
 
-    subject: ClassVar[str] = "area"
+    subject = "area"
 
     def begin(self, world: World) -> None:
         """Apply all that are active."""
@@ -188,7 +178,7 @@ class SensorIntervention(Intervention):
         sensor: The sensor.
     """
 
-    subject: ClassVar[str] = "sensor"
+    subject = "sensor"
     sensor: str
 
     def check(self, world: World) -> None:
@@ -196,7 +186,6 @@ class SensorIntervention(Intervention):
         check_known(self.sensor, "sensor", world.sensors)
 
 
-@register("intervention", "report")
 class ReportState(SensorIntervention):
     """Let a real sensor report its state: one of the type `live_sensor`.
 
@@ -225,7 +214,6 @@ class ReportState(SensorIntervention):
         world.stick(self.sensor, self.says)
 
 
-@register("intervention", "stick")
 class StickSensor(SensorIntervention, Lasting):
     """Let a sensor report a fixed state: a false alarm if it is short, a fault if it is long.
 
@@ -246,7 +234,6 @@ class StickSensor(SensorIntervention, Lasting):
         world.stick(self.sensor, active[-1].says if active else None)
 
 
-@register("intervention", "restore")
 class Restore(Intervention):
     """End all active interventions on a robot, a sensor or an algorithm that have a duration.
 
@@ -258,7 +245,7 @@ class Restore(Intervention):
         'astro'
     """
 
-    subject: ClassVar[str] = "name"
+    subject = "name"
     name: str
 
     def check(self, world: World) -> None:

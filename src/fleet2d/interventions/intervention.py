@@ -136,7 +136,7 @@ class Intervention(Component):
     draws of all other bodies stay the same.
     """
 
-    kind: ClassVar[str] = "intervention"
+    kind = "intervention"
     # The field whose value follows the verb in the short form: `put: ana`.
     subject: ClassVar[str] = "entity"
 

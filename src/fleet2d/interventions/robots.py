@@ -4,7 +4,7 @@ from datetime import timedelta
 
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import check_known, problem, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Command
@@ -40,7 +40,6 @@ class RobotIntervention(BodyIntervention):
         return robot(world, self.entity)
 
 
-@register("intervention", "call")
 class Call(RobotIntervention):
     """Call a robot, as a user or an app does: to a place, to find a person, or to dock.
 
@@ -98,7 +97,6 @@ class Call(RobotIntervention):
         self.actor(world).receive(command, world.step)
 
 
-@register("intervention", "dismiss")
 class Dismiss(RobotIntervention):
     """Send a robot away: it drops what it was called to do, whom it follows, and its search.
 
@@ -112,7 +110,6 @@ class Dismiss(RobotIntervention):
         self.actor(world).dismiss(world.step)
 
 
-@register("intervention", "keep_out")
 class KeepOut(RobotIntervention, Lasting):
     """Tell a robot to keep out of rooms: it leaves them, and goes round them until it may again.
 
@@ -168,7 +165,6 @@ class KeepOut(RobotIntervention, Lasting):
         return [room for room in rooms if room.name in names or room.type in names]
 
 
-@register("intervention", "battery")
 class SetBattery(RobotIntervention):
     """Set the charge of a robot's battery.
 
@@ -232,7 +228,6 @@ class Switch(Lasting):
         behavior_number(body(world, self.entity), self.behavior)
 
 
-@register("intervention", "switch_off")
 class SwitchOff(Switch):
     """Switch a camera or a behavior off: the camera sees nothing, the behavior never decides.
 
@@ -258,7 +253,6 @@ class SwitchOff(Switch):
         actor.decide_again(world.step)
 
 
-@register("intervention", "switch_on")
 class SwitchOn(Switch):
     """Switch a camera or a behavior on again.
 
@@ -347,7 +341,6 @@ def relocalizes_after(actor: Actor) -> timedelta | None:
     return None if settings is None else settings.relocalizes
 
 
-@register("intervention", "fault")
 class Fault(Trouble):
     """Let a part of a robot fail for a while: stuck wheels, or a camera that sees less.
 
@@ -438,7 +431,6 @@ class RealDetection(Settings):
     heading_deg: AngleDeg = 0.0
 
 
-@register("intervention", "perceive")
 class Perceive(RobotIntervention):
     """Let a robot with `perceives: live` perceive people now, as a real robot did.
 
@@ -476,7 +468,6 @@ def false_sighting(user: str, spot: tuple[float, float], heading_deg: float) -> 
     return FalseSighting("" if user == UNKNOWN else user, *spot, heading_of(heading_deg) or 0)
 
 
-@register("intervention", "relocalize")
 class Relocalize(RobotIntervention):
     """Let a robot know where it is: what keeps it lost is over.
 
@@ -510,7 +501,6 @@ class Relocalize(RobotIntervention):
         )
 
 
-@register("intervention", "kidnap")
 class Kidnap(Trouble):
     """Carry a robot elsewhere without its knowledge: it is lost there, until it knows its place.
 
@@ -645,7 +635,6 @@ class PerceptionIntervention(Trouble):
         check_camera(self.actor(world), self.camera)
 
 
-@register("intervention", "suppress")
 class Suppress(PerceptionIntervention):
     """Let a robot miss a person who is in view.
 
@@ -670,7 +659,6 @@ class Suppress(PerceptionIntervention):
         user(world, self.user)
 
 
-@register("intervention", "mistake")
 class Mistake(PerceptionIntervention):
     """Let a robot mistake a person whom it notices for another one.
 
@@ -699,7 +687,6 @@ class Mistake(PerceptionIntervention):
         check_perceived(world, self.entity, self.taken_for)
 
 
-@register("intervention", "inject")
 class Inject(PerceptionIntervention):
     """Let a robot perceive a person who isn't there, in every look, wherever it looks.
 

@@ -24,7 +24,7 @@ from fleet2d.errors import Fleet2DError, InputError, errors_as, extra, os_errors
 from fleet2d.inputs import open_input, within
 from fleet2d.live import questions
 from fleet2d.runs.run import Run, open_run
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import write_atomically
 
 MAX_TEXT = 1 << 20
@@ -400,9 +400,10 @@ def server(folder: Path) -> Any:
         from fleet2d.scenario.schema import describe_components
 
         return [
-            f"{c.kind} {c.type}: {c.summary} Keys: {', '.join(f.name for f in c.fields)}"
+            f"{c.kind} {c.type}: {c.summary} Keys: {', '.join(f.name for f in c.fields)}; those of"
+            f" {', '.join(c.shares) or 'no other'}, too"
             for c in describe_components()
-            if kind in ("", c.kind)
+            if kind in ("", c.kind) or c.kind == "shared"
         ]
 
     def picture(run: str) -> Image:

@@ -167,7 +167,7 @@ def sources_of(scenario: Scenario) -> dict[tuple[str, str], str]:
     "front_door").
 
     Example:
-        >>> from fleet2d.scenario.model import load_scenario
+        >>> from fleet2d.scenario.load import load_scenario
         >>> changes = "users.ana={type: live, source: 'udp://127.0.0.1:9000'}"
         >>> sources_of(load_scenario(None, changes))
         {('body', 'ana'): 'udp://127.0.0.1:9000'}

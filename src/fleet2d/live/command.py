@@ -59,7 +59,7 @@ def live(
     from fleet2d.live.bridge import Bridge
     from fleet2d.live.library_errors import libraries_told
     from fleet2d.live.peers import open_peers
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     scenario, overrides = split(arguments)
     changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]

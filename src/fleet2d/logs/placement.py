@@ -17,6 +17,8 @@ from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading
 from fleet2d.runtime.determinism import sum_in_order
 
 Pair = tuple[float, float]
+# Coordinates are clipped to this, far outside of any home [m].
+COORDINATE_LIMIT_M = 1e6
 RoomChoice = tuple[str, ...]
 
 DOOR = "door"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import timedelta
 from itertools import pairwise
 from math import dist
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,6 @@ from pydantic import Field
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import AWAY
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric, nested, pairs_of
@@ -24,12 +23,11 @@ RestPlace = tuple[float, float]
 MAX_PLACES = 4  # places per user in the closing table
 
 
-@register("metric", "distance")
 class Distance(Metric):
     """Metres that each body covers per day, as the sum of its moves from step to step."""
 
-    unit: ClassVar[str] = "m a day"
-    least: ClassVar[Mapping[str, float]] = {"": 0}
+    unit = "m a day"
+    least = {"": 0}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -44,14 +42,13 @@ class Distance(Metric):
             between = dist(self.last[name], poses.at(0)) if name in self.last else 0.0
             self.metres[name] = self.metres.get(name, 0.0) + between + poses.distance
             self.last[name] = poses.at(-1)
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
 
     def result(self) -> dict[str, Any]:
         """Return {name: metres per day}."""
         return {name: metres / self.days for name, metres in self.metres.items() if self.days}
 
 
-@register("metric", "travel")
 class Travel(Metric):
     """Relocations and metres a day, of each robot.
 
@@ -64,8 +61,8 @@ class Travel(Metric):
         apart: Distance between two places of rest [m].
     """
 
-    units: ClassVar[Mapping[str, str]] = {"relocations": "a day", "metres": "m a day"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
+    units = {"relocations": "a day", "metres": "m a day"}
+    least = {"": 0}
 
     rest: PositiveDuration = timedelta(minutes=1)
     apart: Length = Field(default=0.5, ge=0)
@@ -98,7 +95,7 @@ class Travel(Metric):
                         self.relocations[robot] += 1
                         self.last_rest[robot] = place
             self.standing[robot] = standing
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {relocations, metres}}, both per day."""
@@ -108,7 +105,6 @@ class Travel(Metric):
         }
 
 
-@register("metric", "battery")
 class BatteryUse(Metric):
     """Lowest charge, dockings a day, and shares of time charging and empty, of each robot.
 
@@ -119,9 +115,9 @@ class BatteryUse(Metric):
     too. `empty` is the share of steps with an empty battery, from which on the robot stands still.
     """
 
-    unit: ClassVar[str] = "share of time"
-    units: ClassVar[Mapping[str, str]] = {"lowest": "share of a full charge", "dockings": "a day"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
+    unit = "share of time"
+    units = {"lowest": "share of a full charge", "dockings": "a day"}
+    least = {"": 0}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -148,7 +144,8 @@ class BatteryUse(Metric):
             elif event.event == EventKind.CHARGED and name in self.docked_at:
                 steps = event.step - self.docked_at.pop(name)
                 self.charging[name] = self.charging.get(name, 0) + steps
-        self.steps, self.step_s = history.end, history.step_s
+        self.steps = history.end
+        self.step_s = history.step_s
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {lowest, dockings, charging}}, and empty of those that ran empty."""
@@ -165,14 +162,13 @@ class BatteryUse(Metric):
         return numbers
 
 
-@register("metric", "room_share")
 class RoomShare(Metric):
     """Share of time that each user spends in each room, and away.
 
     Stored per period; the result is over the whole run. Shares of a user sum to one.
     """
 
-    unit: ClassVar[str] = "share of time"
+    unit = "share of time"
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -196,10 +192,11 @@ class RoomShare(Metric):
 
     def result(self) -> dict[str, Any]:
         """Return {user: {room: share}} for the rooms that the user was in."""
-        return {
-            user: {n: float(s / steps.sum()) for n, s in zip(self.names, steps, strict=True) if s}
-            for user, steps in self.seconds.items()
-        }
+        result = {}
+        for user, steps in self.seconds.items():
+            shares = zip(self.names, (steps / steps.sum()).tolist(), strict=True)
+            result[user] = {room: share for room, share in shares if share}
+        return result
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -210,7 +207,6 @@ class RoomShare(Metric):
         }
 
 
-@register("metric", "stays")
 class Stays(Metric):
     """Where each user truly is: a row for each stay in a room, or away.
 
@@ -238,7 +234,6 @@ class Stays(Metric):
         }
 
 
-@register("metric", "co_presence")
 class CoPresence(Metric):
     """Share of a user's steps at home in which a robot is in the same room.
 
@@ -246,7 +241,7 @@ class CoPresence(Metric):
     the user is at home. Between two rooms, where no room is, they don't count as together.
     """
 
-    unit: ClassVar[str] = "share of time at home"
+    unit = "share of time at home"
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -255,7 +250,7 @@ class CoPresence(Metric):
     def update(self, history: History, state: Present) -> Any:
         """Count the steps together."""
         for pair in pairs_of(history, state):
-            counts = self.steps.setdefault((pair.robot, pair.user), [0, 0])
+            counts = self.steps.setdefault(pair.names, [0, 0])
             counts[0] += pair.user_poses.steps_together(pair.robot_poses)
             counts[1] += pair.user_poses.steps_at_home
 

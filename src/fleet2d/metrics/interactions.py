@@ -3,20 +3,18 @@
 import copy
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.interactions.answers import ASLEEP, AnswerRecord, Answers, Circumstances, Wanted
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Outcome
-from fleet2d.metrics.metric import BetterValues, Metric, columns_of, nested
+from fleet2d.metrics.metric import Metric, columns_of, nested
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
@@ -29,7 +27,6 @@ TOLD = frozenset(
 )  # fmt: skip
 
 
-@register("metric", "interactions")
 class Interactions(Metric):
     """What came of what robots wanted of people: value, answers, interruptions, annoyance.
 
@@ -48,8 +45,8 @@ class Interactions(Metric):
     Its table has a row for each time that a person was addressed, with the truth of it.
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"interrupted", "wait_s", "trust", "asked"})
-    units: ClassVar[Mapping[str, str]] = {
+    hidden = frozenset({"interrupted", "wait_s", "trust", "asked"})
+    units = {
         "wanted": "requests",
         "kept": "share of requests",
         **dict.fromkeys(("answered", "accepted"), "share of times asked"),
@@ -57,8 +54,8 @@ class Interactions(Metric):
         **dict.fromkeys(("annoyance", "mean_annoyance", "trust"), "of 1"),
         "woke": "times",
     }
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {
+    least = {"": 0}
+    better = {
         **dict.fromkeys(("answered", "accepted", "kept", "value", "trust"), "higher"),
         **dict.fromkeys(("missed", "wait_s", "woke", "annoyance", "mean_annoyance"), "lower"),
     }
@@ -162,7 +159,6 @@ class OpenRequest:
     value: float = 0.0
 
 
-@register("metric", "timing_regret")
 class TimingRegret(Metric):
     """How much more value asking at the best time of the same life would have had.
 
@@ -182,8 +178,8 @@ class TimingRegret(Metric):
         every: Distance of the times compared; those at which the person was addressed are, too.
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"requests", "value"})
-    better: ClassVar[BetterValues] = {"value": "higher", "regret": "lower"}
+    hidden = frozenset({"requests", "value"})
+    better = {"value": "higher", "regret": "lower"}
 
     every: PositiveDuration = timedelta(minutes=5)
 

@@ -1,30 +1,30 @@
 """Errors of long-term presence: distances of the estimate from the true occupancy of rooms."""
 
 import math
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence, presence_of
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
-from fleet2d.configuration.components import register
-from fleet2d.configuration.units import PositiveDuration, Share, micros
+from fleet2d.configuration.units import PositiveDuration, micros
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB
 from fleet2d.kernels import earth_mover as minimal_cost
-from fleet2d.metrics.metric import BetterValues, Metric
-from fleet2d.runtime.clock import DAY_S, HOUR_US
+from fleet2d.metrics.metric import Metric
+from fleet2d.runtime.clock import HOUR_US
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
+# Total variation at which burn-in ends.
+BURN_IN = 0.1
 MEAN = "mean"
 
 
@@ -226,7 +226,7 @@ class LongTermMetric(Metric):
 
     def count(self, counts: I64, history: History) -> tuple[I64, int]:
         """Add a period; return the counts of the window and its steps."""
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
         self.periods.append((counts, len(history)))
         if self.window is not None:
             del self.periods[: -max(1, math.floor(self.window / self.period))]
@@ -243,7 +243,6 @@ class LongTermMetric(Metric):
         return {user: row for user, row in rows.items() if len(rows) != 2 or user != ANYONE}
 
 
-@register("metric", "ltp_error")
 class LtpError(LongTermMetric):
     """Distance of long-term presence from the true occupancy, over time.
 
@@ -251,7 +250,7 @@ class LtpError(LongTermMetric):
 
     - tv: total variation, 1/2 sum |p - q|, 0 to 1;
     - js: Jensen-Shannon divergence to base 2, 0 to 1;
-    - kl: sum p ln(p / q'), q' being q smoothed by `alpha` [nats];
+    - kl: sum p ln(p / q'), q' being q smoothed by 0.001 [nats];
     - max_gap, mean_gap: greatest and mean |p - q| of a room;
     - tau: rank correlation of the rooms, Kendall's tau of the pairs that differ in truth, -1 to 1
       (`distances.rank_correlation`): it matters to a robot that goes to the likeliest rooms;
@@ -265,29 +264,25 @@ class LtpError(LongTermMetric):
 
     The result has the values at the end; `flips`, the number of updates that changed the likeliest
     room at home; and `burn_in_day`: the first day n, from 1, from whose end on tv was at most
-    `burn_in`, left out if there is none. Users who were never at home are left out.
+    0.1, left out if there is none. Users who were never at home are left out.
 
     Attributes:
         given: The shares that are compared.
-        alpha: Smoothing of the estimate for KL.
-        burn_in: Total variation at which burn-in ends.
     """
 
-    hidden: ClassVar[Set[str]] = frozenset({"js", "kl", "max_gap", "mean_gap", "tau", "flips"})
-    unit: ClassVar[str] = "at the end"
-    units: ClassVar[Mapping[str, str]] = {
+    hidden = frozenset({"js", "kl", "max_gap", "mean_gap", "tau", "flips"})
+    unit = "at the end"
+    units = {
         "tv": "share of time in wrong rooms",
         "earth_mover_m": "m on foot from the truth",
         "inside": "share of rooms in interval",
         "burn_in_day": "day from which tv is small",
     }
-    least: ClassVar[Mapping[str, float]] = {"": 0, "tau": -1}
-    largest: ClassVar[Mapping[str, float]] = {"js": 1, "tau": 1}
-    better: ClassVar[BetterValues] = {"": "lower", "inside": "higher", "tau": "higher"}
+    least = {"": 0, "tau": -1}
+    largest = {"js": 1, "tau": 1}
+    better = {"": "lower", "inside": "higher", "tau": "higher"}
 
     given: Literal["home", "away", "hour_of_week"] = "home"
-    alpha: float = Field(default=1e-3, gt=0, le=1)
-    burn_in: Share = 0.1
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -348,7 +343,7 @@ class LtpError(LongTermMetric):
         return {
             "tv": total_variation(truth, estimate),
             "js": jensen_shannon(truth, estimate),
-            "kl": kl_divergence(truth, estimate, self.alpha),
+            "kl": kl_divergence(truth, estimate),
             "max_gap": gaps.max(axis=-1),
             "mean_gap": gaps.mean(axis=-1),
             "tau": rank_correlation(truth, estimate),
@@ -363,7 +358,7 @@ class LtpError(LongTermMetric):
             best = int(presence.share(user).argmax())
             last_best, flips = self.best.get(user, (best, 0))
             self.best[user] = best, flips + (best != last_best)
-            if self.last[user]["tv"] > self.burn_in:
+            if self.last[user]["tv"] > BURN_IN:
                 self.within[user] = None
             elif self.within.get(user) is None:
                 self.within[user] = today
@@ -377,7 +372,6 @@ class LtpError(LongTermMetric):
         return results
 
 
-@register("metric", "ltp_gap")
 class LtpGap(LongTermMetric):
     """Gap of long-term presence per room, over time: |p - q|, given at home.
 
@@ -387,8 +381,8 @@ class LtpGap(LongTermMetric):
     Users who were never at home are left out.
     """
 
-    unit: ClassVar[str] = "share of time, gap at the end"
-    better: ClassVar[BetterValues] = {"": "lower"}
+    unit = "share of time, gap at the end"
+    better = {"": "lower"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""

@@ -31,7 +31,7 @@ class Metric(Component):
         on: Events that update it, instead of the period: those of the events table, and sensor.
     """
 
-    kind: ClassVar[str] = "metric"
+    kind = "metric"
     # How far before its period it reads the history; timedelta.max: all of it.
     looks_back: ClassVar[timedelta] = timedelta(0)
     # What has to be computed for it: exposure, explored, first_seen, last_seen …
@@ -159,6 +159,11 @@ class RobotUserPair(NamedTuple):
     user: str
     robot_poses: BodyPoses
     user_poses: BodyPoses
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """The names of the robot and the user."""
+        return self.robot, self.user
 
     @property
     def at_home(self) -> Bool:

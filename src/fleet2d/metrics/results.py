@@ -10,7 +10,7 @@ MAX_COLUMNS = 6
 """With more subjects than this, a metric has a row for each of them instead of a column."""
 
 
-class Row(NamedTuple):
+class ResultRow(NamedTuple):
     """A line of the closing table."""
 
     name: str
@@ -18,14 +18,14 @@ class Row(NamedTuple):
     unit: str
 
 
-class Block(NamedTuple):
+class ResultTable(NamedTuple):
     """The lines of a metric: the first names its subjects, each of the others has one measure."""
 
-    rows: Sequence[Row]
+    rows: Sequence[ResultRow]
     hidden: int  # numbers that it leaves out
 
 
-def blocks_of(results: Mapping[str, Any], configured: Mapping[str, Any]) -> list[Block]:
+def blocks_of(results: Mapping[str, Any], configured: Mapping[str, Any]) -> list[ResultTable]:
     """Lay out the results of all metrics that measured something.
 
     Args:
@@ -37,7 +37,7 @@ def blocks_of(results: Mapping[str, Any], configured: Mapping[str, Any]) -> list
     return [block for block in blocks if len(block.rows) > 1]
 
 
-def block_of(metric: str, metric_class: type[Metric], result: Any) -> Block:
+def block_of(metric: str, metric_class: type[Metric], result: Any) -> ResultTable:
     """Lay out the result of a metric: a column for each subject, such as a person.
 
     Only the numbers next to the subjects are in it, not what is nested in them.
@@ -51,7 +51,7 @@ def block_of(metric: str, metric_class: type[Metric], result: Any) -> Block:
     has_names_alone = depth == 1 and not any(name in metric_class.units for (name,) in shown)
     if has_names_alone and len(shown) <= MAX_COLUMNS:
         subjects, measures = measures, [()]
-    rows = [Row(metric, [" · ".join(subject) for subject in subjects], "")]
+    rows = [ResultRow(metric, [" · ".join(subject) for subject in subjects], "")]
     last_unit = ""
     for measure in measures:
         unit = metric_class.units.get("".join(measure), metric_class.unit)
@@ -59,9 +59,9 @@ def block_of(metric: str, metric_class: type[Metric], result: Any) -> Block:
             _text(shown[subject + measure], unit) if subject + measure in shown else ""
             for subject in subjects
         ]
-        rows.append(Row("".join(measure), values, "" if unit == last_unit else unit))
+        rows.append(ResultRow("".join(measure), values, "" if unit == last_unit else unit))
         last_unit = unit
-    return Block(rows, hidden)
+    return ResultTable(rows, hidden)
 
 
 def _numbers(result: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

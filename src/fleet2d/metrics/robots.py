@@ -1,21 +1,19 @@
 """Metrics of robots toward people: how soon they find them, and how often they are in the way."""
 
-from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, PositiveDuration, Speed, micros
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.space import PointXY, Space
+from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, points_in_sight
 from fleet2d.metrics.metric import (
-    BetterValues,
     Metric,
     columns_of,
     in_sight,
@@ -25,7 +23,6 @@ from fleet2d.metrics.metric import (
     quantile,
     restricted_mean,
 )
-from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.camera import DEFAULT_RANGE_M
@@ -33,7 +30,6 @@ from fleet2d.sight.camera import DEFAULT_RANGE_M
 ENDS = (EventKind.FOUND, EventKind.NOT_AT_HOME, EventKind.GAVE_UP)
 
 
-@register("metric", "reach_time")
 class ReachTime(Metric):
     """Seconds that a robot would drive to a user who called it, at evenly spaced times.
 
@@ -48,11 +44,11 @@ class ReachTime(Metric):
         radius: The robot's radius [m].
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"calls"})
-    unit: ClassVar[str] = "s"
-    units: ClassVar[Mapping[str, str]] = {"calls": "calls", "unreached": "calls"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"": "lower"}
+    hidden = frozenset({"calls"})
+    unit = "s"
+    units = {"calls": "calls", "unreached": "calls"}
+    least = {"": 0}
+    better = {"": "lower"}
 
     every: PositiveDuration = timedelta(minutes=10)
     speed: Speed = Field(default=0.6, gt=0)
@@ -71,7 +67,7 @@ class ReachTime(Metric):
         space = state.home.space(self.radius)
         lattice = state.home.plan.lattice
         for pair in pairs_of(history, state):
-            key = (pair.robot, pair.user)
+            key = pair.names
             seconds = self.seconds.setdefault(key, [])
             self.unreached.setdefault(key, 0)
             for i in calls[pair.at_home[calls]].tolist():
@@ -102,7 +98,7 @@ class ReachTime(Metric):
         return results
 
 
-def _route(space: Space, part: int, start: PointXY, target: PointXY) -> I64 | None:
+def _route(space: Space, part: int, start: LatticePoint, target: LatticePoint) -> I64 | None:
     """Return the shortest route in a part of the space to its place nearest to the target."""
     goal = target if space.part_at(*target) == part else space.nearest(*target, part)
     return None if goal is None else space.route(start, goal)
@@ -139,7 +135,6 @@ class SearchRecord(NamedTuple):
     ideal: float
 
 
-@register("metric", "time_to_find")
 class TimeToFind(Metric):
     """Durations and outcomes of the searches of behavior `find` for a user, for each robot.
 
@@ -170,16 +165,16 @@ class TimeToFind(Metric):
         radius: The robot's radius [m].
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"p90", "spl", "out_mean"})
-    unit: ClassVar[str] = "s"
-    units: ClassVar[Mapping[str, str]] = {
+    hidden = frozenset({"p90", "spl", "out_mean"})
+    unit = "s"
+    units = {
         "searches": "in all",
         **dict.fromkeys(("success", "spl", "out_told"), "share of searches"),
         "ratio": "times the way",
         **dict.fromkeys(("false", "false_out"), "searches"),
     }
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {
+    least = {"": 0}
+    better = {
         **dict.fromkeys(("success", "spl", "out_told"), "higher"),
         **dict.fromkeys(("mean", "median", "p90", "ratio", "false", "false_out"), "lower"),
     }
@@ -213,7 +208,8 @@ class TimeToFind(Metric):
             self.driven[robot] = float(driven[-1])
         for search in ended:
             self.done.setdefault(search.robot, []).append(search)
-        self.end, self.step_s = history.end, history.step_s
+        self.end = history.end
+        self.step_s = history.step_s
         return columns_of(SearchRecord._fields, ended)
 
     def _driven(self, history: History, robot: str) -> F64:
@@ -313,7 +309,6 @@ class TimeToFind(Metric):
 ZONES = {"intimate": 0.45, "personal": 1.2, "social": 3.6}
 
 
-@register("metric", "blocking")
 class Blocking(Metric):
     """How often, and for how long, a robot is in the way of a user who walks.
 
@@ -328,10 +323,10 @@ class Blocking(Metric):
         clearance: Distance between the centres [m].
     """
 
-    unit: ClassVar[str] = "a day"
-    units: ClassVar[Mapping[str, str]] = {"seconds": "s a day"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"": "lower"}
+    unit = "a day"
+    units = {"seconds": "s a day"}
+    least = {"": 0}
+    better = {"": "lower"}
 
     clearance: Length = Field(default=0.4, gt=0, le=3)
 
@@ -344,7 +339,7 @@ class Blocking(Metric):
     def update(self, history: History, state: Present) -> Any:
         """Count the steps in which a user walks into a robot."""
         for pair in pairs_of(history, state):
-            key = (pair.robot, pair.user)
+            key = pair.names
             is_near = pair.distance < self.clearance
             xy = pair.user_poses.xy
             # A step leads from one pose to the next: the first from the last of the last period.
@@ -364,19 +359,16 @@ class Blocking(Metric):
                 met = self.counts.get((steps_aside[event.detail], event.entity))
                 if met is not None:  # else a robot stepped aside, by a behavior of its own
                     met["asides"] = met.get("asides", 0) + 1
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
-        return nested(
-            {
-                pair: {name: value / self.days for name, value in counts.items()}
-                for pair, counts in self.counts.items()
-            }
-        )
+        rates = {}
+        for pair, counts in self.counts.items():
+            rates[pair] = {name: value / self.days for name, value in counts.items()}
+        return nested(rates)
 
 
-@register("metric", "intrusion")
 class Intrusion(Metric):
     """Minutes a day that a robot is in each of Hall's zones of a user.
 
@@ -385,10 +377,10 @@ class Intrusion(Metric):
     how people feel about a robot depends on much else.
     """
 
-    hidden: ClassVar[frozenset[str]] = frozenset({"social"})
-    unit: ClassVar[str] = "min a day"
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"": "lower"}
+    hidden = frozenset({"social"})
+    unit = "min a day"
+    least = {"": 0}
+    better = {"": "lower"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -400,21 +392,19 @@ class Intrusion(Metric):
         rows = []
         for pair in pairs_of(history, state):
             distance = pair.distance
-            key = (pair.robot, pair.user)
+            key = pair.names
             near = np.flatnonzero(distance < max(ZONES.values()))
             near = near[in_sight(state.home.plan, pair, near)]
             counts, _ = np.histogram(distance[near], [0.0, *ZONES.values()])
             minutes = counts * history.step_s / 60
             self.minutes[key] = self.minutes.get(key, 0.0) + minutes
             rows.append((*key, *minutes.tolist()))
-        self.days += len(history) * history.step_s / DAY_S
+        self.days += history.days
         return columns_of(("robot", "user", *ZONES), rows)
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {zone: minutes a day}}}."""
-        return nested(
-            {
-                pair: dict(zip(ZONES, (minutes / self.days).tolist(), strict=True))
-                for pair, minutes in self.minutes.items()
-            }
-        )
+        rates = {}
+        for pair, minutes in self.minutes.items():
+            rates[pair] = dict(zip(ZONES, (minutes / self.days).tolist(), strict=True))
+        return nested(rates)

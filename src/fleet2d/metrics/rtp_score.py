@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,10 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import BeliefReader
 from fleet2d.algorithms.presence.estimator import natural_log
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, UNKNOWN_TRUTH, Bool
-from fleet2d.metrics.metric import BetterValues, Metric, UnknownPlaces, columns_of
+from fleet2d.metrics.metric import Metric, UnknownPlaces, columns_of
 from fleet2d.runtime.determinism import sum_in_order
 
 MIN_PROBABILITY = 1e-6  # smaller probabilities are raised to this before taking logarithms
@@ -250,7 +249,6 @@ class ScoredBins(NamedTuple):
         return ScoredBins._make(column[which] for column in self)
 
 
-@register("metric", "rtp_score")
 class RtpScore(Metric):
     """Scores of real-time presence and of a naive guess, minute by minute, by last-seen gap.
 
@@ -293,22 +291,22 @@ class RtpScore(Metric):
         reference: Another algorithm to which the skill is relative, too.
     """
 
-    unit: ClassVar[str] = "all gaps"
-    units: ClassVar[Mapping[str, str]] = {
+    unit = "all gaps"
+    units = {
         "log_loss": "nats, 0 is best",
         "top_1": "share of minutes guessed right",
         "ece": "mean gap of forecasts and rates",
         "skill": "1 best, 0 like last room seen",
         "reference_skill": "1 best, 0 like the reference",
     }
-    least: ClassVar[Mapping[str, float]] = dict.fromkeys(
+    least = dict.fromkeys(
         ("log_loss", "brier", "top_1", "top_2", "ece", "ece_classwise", "sharpness"), 0
     )
-    largest: ClassVar[Mapping[str, float]] = {
+    largest = {
         **dict.fromkeys(("top_2", "ece", "ece_classwise", "skill", "reference_skill"), 1),
         "brier": 2,
     }
-    better: ClassVar[BetterValues] = {
+    better = {
         **dict.fromkeys(("log_loss", "brier", "reliability", "ece", "ece_classwise"), "lower"),
         **dict.fromkeys(("top_1", "top_2", "skill", "reference_skill", "resolution"), "higher"),
     }
@@ -440,19 +438,20 @@ class RtpScore(Metric):
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return each user's main scores over all gaps."""
-        return {
-            user: {name: scores[ALL][name] for name in SUMMARY_SCORES if name in scores[ALL]}
-            for user, scores in result.items()
-            if ALL in scores
-        }
+        summary = {}
+        for user, scores in result.items():
+            if ALL in scores:
+                main = [name for name in SUMMARY_SCORES if name in scores[ALL]]
+                summary[user] = {name: scores[ALL][name] for name in main}
+        return summary
 
 
 def _sums(scored: ScoredBins) -> list[tuple[Any, ...]]:
     """Return the number of bins and the sums of scores of each class of gaps that occurs."""
-    bins = np.bincount(scored.gap, minlength=len(GAPS))
+    bins = np.bincount(scored.gap, minlength=len(GAPS)).tolist()
     scores = _scores(scored.belief, scored.truth).values()
     sums = [np.bincount(scored.gap, values, len(GAPS)).tolist() for values in scores]
-    return [(GAPS[g], int(bins[g]), *(sum_[g] for sum_ in sums)) for g in np.flatnonzero(bins)]
+    return [row for row in zip(GAPS, bins, *sums, strict=True) if row[1]]
 
 
 def _mean_scores(belief: F64, truth: I64) -> dict[str, float]:

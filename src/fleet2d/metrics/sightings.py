@@ -1,16 +1,15 @@
 """Metrics of sightings: how much of the home robots observe, whom they see, and mistake."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
-from fleet2d.configuration.components import register
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, UNKNOWN_TRUTH
-from fleet2d.metrics.metric import BetterValues, Metric
+from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import HOUR_S
 
 UNKNOWN = "unknown"  # name in the confusion of a person not recognized
@@ -18,15 +17,14 @@ NO_ONE = "nobody"  # name in the confusion of false positives
 SHARES = {"half": 0.5, "most": 0.9}
 
 
-@register("metric", "sightings")
 class Sightings(Metric):
     """Share of a user's steps at home at which at least one robot perceives the user.
 
     Detections of a real robot count while the user is known to be at home.
     """
 
-    unit: ClassVar[str] = "share of time at home"
-    better: ClassVar[BetterValues] = {"": "higher"}
+    unit = "share of time at home"
+    better = {"": "higher"}
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -54,7 +52,6 @@ class Sightings(Metric):
         return {user: seen / at_home for user, (seen, at_home) in self.steps.items() if at_home}
 
 
-@register("metric", "detections")
 class Detections(Metric):
     """Precision, recall and identity confusion of each robot, over all its cameras.
 
@@ -75,8 +72,8 @@ class Detections(Metric):
     detections, false positives and identities, by robot and user.
     """
 
-    unit: ClassVar[str] = "share"
-    better: ClassVar[BetterValues] = dict.fromkeys(("recall", "precision", "recognized"), "higher")
+    unit = "share"
+    better = dict.fromkeys(("recall", "precision", "recognized"), "higher")
 
     def start(self, home: Home) -> None:
         """Begin counting."""
@@ -142,15 +139,11 @@ class Detections(Metric):
         numbers: dict[str, Any] = {
             name: int(part) / int(whole) for name, (part, whole) in ratios.items() if whole
         }
-        confusion = {
-            true: {
-                perceived: int(counts[t, p]) / int(counts[t].sum())
-                for p, perceived in enumerate((*users, UNKNOWN))
-                if counts[t, p]
-            }
-            for t, true in enumerate((*users, NO_ONE))
-            if counts[t].sum()
-        }
+        confusion = {}
+        for true, row in zip((*users, NO_ONE), counts.tolist(), strict=True):
+            perceived = zip((*users, UNKNOWN), row, strict=True)
+            if any(row):
+                confusion[true] = {name: count / sum(row) for name, count in perceived if count}
         if confusion:
             numbers["confusion"] = confusion
         if self.unknown[robot]:
@@ -160,13 +153,12 @@ class Detections(Metric):
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return all numbers but the confusion of identities."""
-        return {
-            robot: {key: value for key, value in numbers.items() if key != "confusion"}
-            for robot, numbers in result.items()
-        }
+        summary = {}
+        for robot, numbers in result.items():
+            summary[robot] = {name: each for name, each in numbers.items() if name != "confusion"}
+        return summary
 
 
-@register("metric", "coverage")
 class Coverage(Metric):
     """Share of the floor of all rooms that was in view of a robot, and times to half and 90 %.
 
@@ -176,11 +168,11 @@ class Coverage(Metric):
     if that never happened.
     """
 
-    needs: ClassVar[frozenset[str]] = frozenset({"first_seen"})
-    unit: ClassVar[str] = "h"
-    units: ClassVar[Mapping[str, str]] = {"share": "share of the floor"}
-    least: ClassVar[Mapping[str, float]] = {"": 0}
-    better: ClassVar[BetterValues] = {"share": "higher"}
+    needs = frozenset({"first_seen"})
+    unit = "h"
+    units = {"share": "share of the floor"}
+    least = {"": 0}
+    better = {"share": "higher"}
 
     def start(self, home: Home) -> None:
         """Begin without any cells seen."""

@@ -15,6 +15,7 @@ from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
 from fleet2d.routines import distributions
 from fleet2d.routines.distributions import Distribution
+from fleet2d.runtime.clock import SECOND
 
 FORMS: dict[str, dict[str, Any]] = {
     "text": {"type": "string"},
@@ -40,7 +41,6 @@ class SchemaForms:
 SettingsType = TypeVar("SettingsType", bound=Settings)
 
 FOLDER = Path(__file__).parent
-SECOND = timedelta(seconds=1)
 # Standard deviation of a duration of which only the mean is given, relative to the mean.
 DEFAULT_SPREAD = 0.3
 
@@ -143,8 +143,6 @@ class Activity(Settings):
 
     Attributes:
         rooms: Rooms or kinds of rooms to try, in turn.
-        never_in: Rooms or kinds of rooms that `any` leaves out; by default those that nobody lives
-            in, like bathrooms and storage rooms. In a home with no others it is done there.
         objects: Kinds of furniture to use, tried in turn; none: a spot in the room.
         posture: Posture if there is no such furniture.
         away: Whether it is done out of the home.
@@ -162,7 +160,6 @@ class Activity(Settings):
     """
 
     rooms: tuple[str, ...] = ("any",)
-    never_in: tuple[str, ...] = NOT_LIVED_IN
     objects: tuple[str, ...] = ()
     posture: Literal["stand", "sit", "lie"] = "stand"
     away: bool = False

@@ -141,7 +141,8 @@ def lognormal(mean_s: float, std_s: float) -> Distribution:
     """Return the lognormal distribution of a mean and a standard deviation [s]."""
     ratio = std_s / mean_s
     variance = log(1 + ratio * ratio)
-    sigma, middle = math.sqrt(variance), mean_s / math.sqrt(1 + ratio * ratio)
+    sigma = math.sqrt(variance)
+    middle = mean_s / math.sqrt(1 + ratio * ratio)
     return _from_normal(lambda z: middle * exp2(sigma * z / _LN2))
 
 

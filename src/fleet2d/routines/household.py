@@ -29,9 +29,8 @@ from fleet2d.routines.activity import (
 )
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, values_in
 from fleet2d.routines.planner import Episode, with_episode
-from fleet2d.runtime.clock import DAY
+from fleet2d.runtime.clock import DAY, SECOND
 
-SECOND = timedelta(seconds=1)
 AWAY = "holiday"
 
 
@@ -105,7 +104,8 @@ def with_absences(
         firsts = [*(a for a, _ in stays), end]
         absences += [(a, b) for a, b in zip(lasts, firsts, strict=True) if a < b]
     for leaves, returns in absences:
-        first, last = max(leaves, begin), min(returns, end)
+        first = max(leaves, begin)
+        last = min(returns, end)
         if first < last:
             day = with_episode(day, Episode(AWAY, first, last))
     return list(day)

@@ -14,12 +14,12 @@ from fleet2d.kernels import ANY_ROOM, NO_GAP_S, RoomUse
 from fleet2d.routines import planner
 from fleet2d.routines.activity import find_activity, seconds
 from fleet2d.routines.distributions import exponential, uniform
-from fleet2d.routines.household import SECOND, Household, Period, RandomVisits, with_absences
+from fleet2d.routines.household import Household, Period, RandomVisits, with_absences
 from fleet2d.routines.interruptions import interrupt
 from fleet2d.routines.persona import Persona, YearEvent, holds_on
 from fleet2d.routines.planner import PLANNED, SLEEP, DayPlan, Episode, Job, PrivateRooms
 from fleet2d.routines.templates import starts
-from fleet2d.runtime.clock import DAY_S
+from fleet2d.runtime.clock import DAY_S, SECOND
 from fleet2d.runtime.determinism import Draws, stream_key
 
 Days = tuple[int, int]
@@ -106,15 +106,19 @@ def _draw(event: YearEvent, key: np.uint64, year: int) -> list[Days]:
         found = _by_chance(event.every, event, draws, year)
         if event.season is None:
             return found
-        parts = [_part_of_year(event.season, each) for each in (year - 1, year)]
-        return [span for span in found if any(a <= span[0] <= b for a, b in parts)]
+        begins = set[int]()
+        for each in (year - 1, year):
+            first, last = _part_of_year(event.season, each)
+            begins.update(range(first, last + 1))
+        return [span for span in found if span[0] in begins]
     if event.holidays is not None:
         return [(day.toordinal(), day.toordinal()) for day in event.dates if day.year == year]
     if event.season is not None:
         return [_part_of_year(event.season, year)]
     if event.once is not None:
         ends = event.once if isinstance(event.once, tuple) else (event.once, event.once)
-        first, last = ends[0].toordinal(), ends[1].toordinal()
+        first = ends[0].toordinal()
+        last = ends[1].toordinal()
     else:
         assert event.yearly is not None
         first, last = _part_of_year(event.yearly, year)
@@ -126,7 +130,8 @@ def _by_chance(every: timedelta, event: YearEvent, draws: Draws, year: int) -> l
     gap = exponential(seconds(every))
     now_s = 0
     found = list[Days]()
-    first, last = date(year, 1, 1).toordinal(), date(year, 12, 31).toordinal()
+    first = date(year, 1, 1).toordinal()
+    last = date(year, 12, 31).toordinal()
     while True:
         now_s += gap.draw(draws)
         begin = first + now_s // DAY_S

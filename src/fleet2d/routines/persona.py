@@ -63,7 +63,6 @@ class Manners(Settings):
         too_close: Distance below which a robot is too close [m].
         patience: How long a robot may stand too close.
         leaves: Probability of leaving for another room after that.
-        leaves_for: How long the person stays there.
         hears: Distance at which its call is heard [m].
         comes: Probability of coming when it calls.
         comes_for: How long the person stays with it.
@@ -80,7 +79,6 @@ class Manners(Settings):
     too_close: Length = Field(default=0.7, gt=0)
     patience: Duration = timedelta(seconds=30)
     leaves: Share = 0.3
-    leaves_for: AnyDurationDistribution = DurationDistribution(mean=timedelta(minutes=5))
     hears: Length = Field(default=10.0, gt=0)
     comes: Share = 0.7
     comes_for: AnyDurationDistribution = DurationDistribution(mean=timedelta(seconds=40))

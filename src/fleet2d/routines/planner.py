@@ -368,7 +368,8 @@ def _draw_ending(
 ) -> tuple[int, int] | None:
     """Draw an ending of an activity at about a time: numbers of the day and of the activity."""
     times, positions = recording.endings[activity]
-    low, high = bisect_left(times, now - REACH_S), bisect_right(times, now + REACH_S)
+    low = bisect_left(times, now - REACH_S)
+    high = bisect_right(times, now + REACH_S)
     return positions[low + draws.below(high - low)] if high > low else None
 
 

@@ -42,6 +42,7 @@ WEEK_STEPS = 7 * DAY_STEPS
 DAWN_S = 4 * HOUR_S  # the survey's days begin at 04:00
 AGES = 96  # the largest age of an episode that is distinguished [steps]
 ONE = 1 << 24
+SHARE_UNIT = 10_000  # the survey's shares are in parts of this
 WARM_UP_WEEKS = 2
 SLEEP_S = (8 * HOUR_S, HOUR_S)  # mean and deviation; the survey's mean is of nights cut at 04:00
 SPREAD = 0.6  # standard deviation of an episode's duration, relative to its mean
@@ -98,10 +99,8 @@ def groups() -> list[str]:
 
 def shares(group: str, kind: str) -> list[dict[str, float]]:
     """Return the share of people in each category at half past each hour, of a kind of day."""
-    return [
-        {c: part / 10_000 for c, part in zip(CATEGORIES, hour, strict=True)}
-        for hour in table()["groups"][group][kind]
-    ]
+    hours = np.array(table()["groups"][group][kind]) / SHARE_UNIT
+    return [dict(zip(CATEGORIES, hour, strict=True)) for hour in hours.tolist()]
 
 
 @cache
@@ -128,7 +127,7 @@ def group(name: str) -> SurveyGroup:
 
 def _targets(facts: dict[str, Any]) -> F64:
     """Return the survey's shares at each step of a week from Monday 04:00, (WEEK_STEPS, 9)."""
-    days = [np.array(facts[kind], np.float64) / 10_000 for kind in ("weekday", "weekend")]
+    days = [np.array(facts[kind], np.float64) / SHARE_UNIT for kind in ("weekday", "weekend")]
     from_dawn = [np.roll(day, -4, axis=0) for day in days]
     # At 04:30, 05:30, …: three steps after each hour's begin.
     at = np.concatenate([from_dawn[day > 4] for day in range(7)])
@@ -220,7 +219,6 @@ def draw_episodes(
     return blocks, EpisodeState(now, age)
 
 
-SHARE_UNIT = 10_000  # the survey's shares are in parts of this
 PLAIN = {
     "sleeping": "sleep", "food_prep": "cook", "laundry": "laundry", "travel": "travel", "tv": "tv",
 }  # fmt: skip

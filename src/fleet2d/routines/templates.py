@@ -192,7 +192,10 @@ def _days_after(persona: "Persona", name: str) -> set[str]:
     days = persona.days
     if any(day.dates for day in days.values()):
         return set(days)
-    of_week = [next(n for n in reversed(days) if i in days[n].weekdays) for i in range(7)]
+    of_week = [""] * 7
+    for each, day in days.items():  # a later one precedes
+        for weekday in day.weekdays:
+            of_week[weekday] = each
     after = {of_week[(i + 1) % 7] for i in range(7) if of_week[i] == name}
     return after or {name}
 

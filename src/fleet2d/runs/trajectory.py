@@ -246,7 +246,7 @@ def _walker(
     from fleet2d.entities.behavior import Actor  # few paths need a walker
     from fleet2d.entities.meander import Meander
     from fleet2d.floorplan.home import Home
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     bodies = {key: sections[key] for key in _BODIES if key in sections}
     with stored_code(run.directory or "the run", bodies, trust=run.trust):

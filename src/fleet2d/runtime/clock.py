@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from fleet2d.kernels import F64, I64, TURN, UNIT, half_sines
 
 MICROSECOND = timedelta(microseconds=1)
+SECOND = timedelta(seconds=1)
+SECOND_US = 1_000_000
+MINUTE_US = 60 * SECOND_US
 HOUR_S = 60 * 60
 DAY_S = 24 * HOUR_S
 DAY_MINUTES = 24 * 60

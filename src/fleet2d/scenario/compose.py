@@ -9,28 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.bounds import EXTENDED_FILES, YAML_VALUES, one_line
-from fleet2d.configuration.components import Component, base_of, lookup
+from fleet2d.configuration.components import Component, base_of, kind_at, lookup
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
 from fleet2d.inputs import resolved
+from fleet2d.scenario.model import Scenario
 
 BUNDLED = Path(__file__).parent / "bundled"
 ENTRIES = ("users", "robots", "objects", "interactions", "algorithms", "metrics", "expect")
 """The sections whose entries have names and can be deleted with null."""
-
-_SLOTS = (
-    (re.compile(r"floorplan"), "floorplan"),
-    (re.compile(r"(users|robots)/[^/]+(/behaviors/\d+)?"), "behavior"),
-    (re.compile(r"robots/[^/]+/drive"), "drive"),
-    (re.compile(r"objects/[^/]+"), "object"),
-    (re.compile(r"algorithms/[^/]+"), "algorithm"),
-    (re.compile(r"metrics/[^/]+"), "metric"),
-    (
-        re.compile(r"robots/[^/]+/(camera/|cameras/[^/]+/)?perception/errors/[^/]+"),
-        "perception_error",
-    ),
-)
 
 
 def compose(
@@ -80,16 +68,6 @@ def merge(base: Document, change: Document) -> Document:
     """Return ``base`` with ``change`` applied; neither is modified."""
     merger = _Merger(dict(base.places), change.places)
     return Document(merger.merge(base.data, change.data, ()), merger.places)
-
-
-def slot_kind(keys: Keys) -> str | None:
-    """Return the kind of component that is configured at a key path, None if there is none.
-
-    >>> slot_kind(("users", "ana")), slot_kind(("simulation",))
-    ('behavior', None)
-    """
-    path = "/".join(keys)
-    return next((kind for pattern, kind in _SLOTS if pattern.fullmatch(path)), None)
 
 
 def bundled_path(name: str) -> Path:
@@ -186,7 +164,7 @@ class _Merger:
         self.new_places = new_places
 
     def merge(self, base: Any, change: Any, keys: Keys) -> Any:
-        kind = slot_kind(keys)
+        kind = kind_at(Scenario, keys)
         if kind:
             base, change = _unfold(base, change), _unfold(change, base)
         if not isinstance(change, Mapping):

@@ -1,7 +1,7 @@
 """The format of scenarios: a JSON Schema for editors, a list of components for people."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -10,13 +10,11 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_json_schema
 from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
 
-from fleet2d.configuration.components import PACKAGES, Component, Settings, aliases, components
+from fleet2d.configuration.built_in import COMPONENTS
+from fleet2d.configuration.components import Component, Settings, aliases, components
 from fleet2d.interventions.intervention import verbs
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
-
-UNTYPED = {"type": "object", "not": {"required": ["type"]}}
-"""The schema of an entry whose type is its name."""
 
 
 class _SchemaGenerator(GenerateJsonSchema):
@@ -45,77 +43,122 @@ class FieldDescription:
 
 @dataclass(frozen=True)
 class ComponentDescription:
-    """A registered component and its configuration."""
+    """A component and its configuration: its own keys, and who describes those that it shares."""
 
     kind: str
     type: str
     aliases: tuple[str, ...]
     summary: str
     fields: tuple[FieldDescription, ...]
+    shares: tuple[str, ...]
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
-    # Interrupts are named by behaviors, not by the scenario.
-    registry = {kind: components(kind) for kind in PACKAGES if kind != "interrupt"}
-    classes = [cls for types in registry.values() for cls in types.values()]
-    models: list[type[BaseModel]] = [Scenario, *classes]
-    references, definitions = models_json_schema(
-        [(model, "validation") for model in models], schema_generator=_SchemaGenerator
-    )
-    definitions = definitions["$defs"]
-    kinds = {
-        kind: {
-            name: definitions[_key(references[cls, "validation"])] for name, cls in classes.items()
-        }
-        for kind, classes in registry.items()
-    }
+    classes = _classes()
+    definitions = _definitions(classes)
+    kinds: dict[str, dict[str, str]] = {kind: {} for kind in COMPONENTS}
+    for cls, (kind, name) in classes.items():
+        if kind in kinds:
+            kinds[kind][name] = cls.__name__
+    del kinds["interrupt"]  # behaviors name them, not the scenario
     acts = kinds.pop("intervention")
-    for cls in verbs().values():
-        definitions.pop(_key(references[cls, "validation"]))
-    definitions["Entry"] = {
-        "anyOf": [
-            _by_verb(definitions["Entry"], verb, cls.subject, acts[verb])
-            for verb, cls in verbs().items()
-        ]
-    }
+    times = definitions["Entry"]["properties"]
+    del times["act"]
+    forms = [
+        _by_verb(verb, verbs()[verb].subject, name, definitions[name], times)
+        for verb, name in acts.items()
+    ]
+    definitions["Entry"] = {"properties": times, "anyOf": forms}
     for kind, types in kinds.items():
-        for name, definition in types.items():
-            properties = definition.get("properties", {})
+        for name, cls_name in types.items():
             names = [name, *aliases(kind, name)]
             type_schema = {"enum": names} if names[1:] else {"const": name}
-            definition.update(title=name, properties={"type": type_schema, **properties})
-        own = registry[kind].values()
-        forms = [{**references[cls, "validation"], "required": ["type"]} for cls in own]
-        definitions[kind] = {"anyOf": [*forms, *_forms_without_fields(kind, registry[kind])]}
+            definition = definitions[cls_name]
+            properties = {"type": type_schema, **definition.get("properties", {})}
+            definition.update(title=name, properties=properties)
+        forms = [{"$ref": f"#/$defs/{name}", "required": ["type"]} for name in types.values()]
+        definitions[kind] = {"anyOf": [*forms, *_forms_without_fields(kind, types)]}
     definitions = {
-        key: _without_required(_expand(value, kinds)) for key, value in definitions.items()
+        key: _without_required(_expand(value, definitions, kinds))
+        for key, value in definitions.items()
     }
-    result = definitions.pop(_key(references[Scenario, "validation"]))
+    result = definitions.pop("Scenario")
     _allow_composition(result["properties"])
     dialect = "https://json-schema.org/draft/2020-12/schema"
     return {"$schema": dialect, **result, "$defs": definitions}
 
 
+def _classes() -> dict[type[Settings], tuple[str, str]]:
+    """Return all settings with their kind and name: sections, types, and groups of their keys."""
+    sections = {cls: ("scenario", cls.__name__) for cls in _parts_of(Scenario)}
+    types: dict[type[Settings], tuple[str, str]] = {
+        cls: (kind, name) for kind in COMPONENTS for name, cls in components(kind).items()
+    }
+    groups = dict.fromkeys(part for cls in types for part in _parts_of(cls))
+    parts = {cls: ("part", cls.__name__) for cls in groups if cls not in sections}
+    return {**sections, **types, **parts}
+
+
+def _definitions(classes: Iterable[type[Settings]]) -> dict[str, Any]:
+    """Return the schemas of settings and of a scenario by the names of their classes.
+
+    Keys that several classes inherit are in the schema of the class that declares them, to which
+    theirs refer.
+    """
+    models: list[type[BaseModel]] = [Scenario, *classes]
+    _, content = models_json_schema(
+        [(model, "validation") for model in models], schema_generator=_SchemaGenerator
+    )
+    definitions: dict[str, Any] = content["$defs"]
+    heirs: dict[tuple[str, str], list[str]] = {}
+    for cls in classes:
+        for key in cls.model_fields:
+            heirs.setdefault((_declarer(cls, key), key), []).append(cls.__name__)
+    for (owner, key), names in heirs.items():
+        if len(names) > 1:
+            _share(definitions, owner, key, names)
+    return definitions
+
+
+def _declarer(cls: type[Settings], key: str) -> str:
+    """Return the name of the class that declares a key of a class."""
+    return next(
+        base.__name__ for base in cls.__mro__ if key in vars(base).get("__annotations__", {})
+    )
+
+
+def _share(definitions: dict[str, Any], owner: str, key: str, heirs: Sequence[str]) -> None:
+    """Move a key to the schema of the class that declares it, but for heirs that change it."""
+    first = definitions[heirs[0]]
+    shared = definitions.setdefault(owner, {"properties": {}, "required": []})
+    content = shared["properties"].setdefault(key, first["properties"][key])
+    if key in first.get("required", ()) and key not in shared.get("required", ()):
+        shared["required"].append(key)
+    for name in heirs:
+        properties = definitions[name]["properties"]
+        if name != owner and properties[key] == content:
+            properties[key] = _reference(owner, key)
+
+
+def _reference(owner: str, key: str) -> dict[str, str]:
+    return {"$ref": f"#/$defs/{owner}/properties/{key}"}
+
+
 def _by_verb(
-    entry: Mapping[str, Any], verb: str, subject: str, act: Mapping[str, Any]
+    verb: str, subject: str, name: str, act: Mapping[str, Any], times: Iterable[str]
 ) -> dict[str, Any]:
     """Return the schema of an entry of a script: its verb, the time, and the other keys."""
-    times = {key: value for key, value in entry["properties"].items() if key != "act"}
-    details = {key: value for key, value in act["properties"].items() if key != subject}
+    keys = {verb if key == subject else key: _reference(name, key) for key in act["properties"]}
     required = [key for key in act.get("required", ()) if key != subject]
     return {
         "title": verb,
         "description": act.get("description", ""),
         "type": "object",
-        "properties": {verb: act["properties"][subject], **times, **details},
+        "properties": keys | {key: _reference("Entry", key) for key in times},
         "required": [verb, *required],
         "additionalProperties": False,
     }
-
-
-def _key(reference: Mapping[str, Any]) -> str:
-    return str(reference["$ref"]).rpartition("/")[2]
 
 
 def _forms_without_fields(kind: str, names: Iterable[str]) -> list[dict[str, Any]]:
@@ -128,22 +171,26 @@ def _forms_without_fields(kind: str, names: Iterable[str]) -> list[dict[str, Any
     ]
 
 
-def _expand(value: Any, kinds: Mapping[str, Mapping[str, Any]]) -> Any:
+def _expand(
+    value: Any, definitions: Mapping[str, Any], kinds: Mapping[str, Mapping[str, str]]
+) -> Any:
     """Return a schema with the marks of `OneOf` and `ShortForm` replaced by types."""
     if isinstance(value, list):
-        return [_expand(item, kinds) for item in value]
+        return [_expand(item, definitions, kinds) for item in value]
     if not isinstance(value, dict):
         return value
-    result = {k: _expand(v, kinds) for k, v in value.items() if k != "x-short-form"}
+    result = {key: _expand(item, definitions, kinds) for key, item in value.items()}
     if (kind := result.pop("x-kind", None)) is not None:
         result["$ref"] = f"#/$defs/{kind}"
-        if result.pop("x-by-name", False):
-            result = {"anyOf": [result, UNTYPED]}
-    if (mark := value.get("x-short-form")) is not None:
-        for definition in kinds[mark["kind"]].values():
-            properties = definition["properties"] | mark["body"]
-            result["anyOf"].append({**definition, "properties": properties, "required": ["type"]})
-        result["anyOf"] += _forms_without_fields(mark["kind"], kinds[mark["kind"]])
+    if (kind := result.pop("x-short-form", None)) is not None:
+        body = str(result["anyOf"][0]["$ref"]).rpartition("/")[2]
+        keys = definitions[body]["properties"].keys() - {"behaviors"}
+        for title, name in kinds[kind].items():
+            own = {key: _reference(name, key) for key in definitions[name]["properties"]}
+            properties = own | {key: _reference(body, key) for key in sorted(keys)}
+            form = {"title": title, "type": "object", "additionalProperties": False}
+            result["anyOf"].append({**form, "properties": properties, "required": ["type"]})
+        result["anyOf"] += _forms_without_fields(kind, kinds[kind])
     return result
 
 
@@ -157,26 +204,23 @@ def _allow_composition(properties: dict[str, Any]) -> None:
     deletion = {"type": "null", "description": "null deletes an entry of the extended file"}
     for section in ENTRIES:
         entry = properties[section]["additionalProperties"]
-        forms = [entry, UNTYPED, deletion]
-        if section in ("users", "robots"):  # only algorithms and metrics are typed by their name
-            del forms[1]
-        properties[section]["additionalProperties"] = {"anyOf": forms}
+        properties[section]["additionalProperties"] = {"anyOf": [entry, deletion]}
 
 
 def describe_components() -> list[ComponentDescription]:
     """Return descriptions of all parts of a scenario: fields, their units and defaults.
 
     First the sections of every scenario (kind `scenario`, with their names in Python), then every
-    registered type, and the groups of keys in their fields (kind `part`).
+    type, the groups of keys in their fields (kind `part`), and the keys that several of all these
+    share (kind `shared`).
     """
-    types = {(kind, name): cls for kind in PACKAGES for name, cls in components(kind).items()}
-    sections = _parts_of(Scenario)
-    parts = [part for cls in types.values() for part in _parts_of(cls) if part not in sections]
-    return [
-        *(_describe("scenario", cls.__name__, cls) for cls in sections),
-        *(_describe(kind, name, cls) for (kind, name), cls in types.items()),
-        *(_describe("part", cls.__name__, cls) for cls in dict.fromkeys(parts)),
-    ]
+    classes = _classes()
+    definitions = _definitions(classes)
+    kinds = {cls.__name__: place for cls, place in classes.items()}
+    for name, definition in definitions.items():
+        if definition.get("properties") and name != "Scenario":
+            kinds.setdefault(name, ("shared", name))
+    return [_describe(*place, definitions[name], kinds) for name, place in kinds.items()]
 
 
 def _parts_of(cls: type[Settings], above: tuple[type[Settings], ...] = ()) -> list[type[Settings]]:
@@ -195,27 +239,24 @@ def _settings_in(annotation: Any) -> list[type[Settings]]:
     return [part for argument in get_args(annotation) for part in _settings_in(argument)]
 
 
-def _describe(kind: str, name: str, cls: type[Settings]) -> ComponentDescription:
-    schema = cls.model_json_schema(schema_generator=_SchemaGenerator)
-    if "$ref" in schema:  # it is nested in itself
-        schema = schema["$defs"][schema["$ref"].rpartition("/")[2]]
-    properties = schema.get("properties", {})
-    required = schema.get("required", ())
-    return ComponentDescription(
-        kind,
-        name,
-        aliases(kind, name) if issubclass(cls, Component) else (),
-        (cls.__doc__ or "").strip().partition("\n")[0],
-        tuple(
-            FieldDescription(
-                key,
-                _type_of(value),
-                None if key in required else _default_text(value.get("default")),
-                value.get("description", ""),
-            )
-            for key, value in properties.items()
-        ),
-    )
+def _describe(
+    kind: str, name: str, definition: Mapping[str, Any], kinds: Mapping[str, tuple[str, str]]
+) -> ComponentDescription:
+    fields = []
+    shares = []
+    for key, value in definition.get("properties", {}).items():
+        _, is_shared, place = value.get("$ref", "").partition("/$defs/")
+        owner, is_key, _ = place.partition("/properties/")
+        if is_shared and is_key:
+            shares.append(kinds[owner][1])
+            continue
+        is_required = key in definition.get("required", ())
+        default = None if is_required else _default_text(value.get("default"))
+        text = value.get("description", "")
+        fields.append(FieldDescription(key, _type_of(value), default, text))
+    summary = definition.get("description", "").partition("\n")[0]
+    shared = tuple(dict.fromkeys(shares))
+    return ComponentDescription(kind, name, aliases(kind, name), summary, tuple(fields), shared)
 
 
 def _type_of(value: Mapping[str, Any]) -> str:
@@ -228,7 +269,8 @@ def _type_of(value: Mapping[str, Any]) -> str:
         return str(value["$ref"]).rpartition("/")[2]
     options = value.get("anyOf", value.get("oneOf"))
     if options:
-        return " | ".join(dict.fromkeys(_type_of(option) for option in options))
+        types = [_type_of(option) for option in options if "not" not in option]
+        return " | ".join(dict.fromkeys(types))
     if "prefixItems" in value:
         return f"[{', '.join(map(_type_of, value['prefixItems']))}]"
     if value.get("type") == "array":

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from decimal import Decimal
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -451,7 +451,7 @@ class SightSettings(Settings):
             and the exposure of rooms; null: in every step.
     """
 
-    method: Annotated[FieldOfView, OneOf("sight")] = LineOfSight()
+    method: OneOf[FieldOfView] = LineOfSight()
     people_occlude: bool = False
     heights: bool = False
     seen_every: PositiveDuration | None = None

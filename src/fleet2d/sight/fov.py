@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections import OrderedDict
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.configuration.problems import problem_at
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.home import Home
@@ -25,6 +25,8 @@ from fleet2d.kernels import visible_region as visible_region_fast
 __all__ = ["Bool", "FieldOfView", "Flashlight", "LineOfSight", "Reach", "VisibilityPolygon"]
 Pieces = tuple[I32, I32]
 FORMAT = 1
+# Memory for the poses of a flashlight; the least recently used go first.
+MEMORY_BYTES = 64e6
 # Memory of an entry besides its bits: keys, tuple and array.
 ENTRY_BYTES = 450
 
@@ -132,7 +134,7 @@ class FieldOfView(Component):
         [True, False]
     """
 
-    kind: ClassVar[str] = "sight"
+    kind = "sight"
 
     def start(self, home: Home) -> None:
         """Prepare for a run."""
@@ -178,7 +180,6 @@ class FieldOfView(Component):
         return self.sees(home, x, y, heading, reach, centres.astype(np.int64)).reshape(rows.shape)
 
 
-@register("sight", "line_of_sight")
 class LineOfSight(FieldOfView):
     """Follow the line to each point through the home, without a cache.
 
@@ -207,7 +208,6 @@ class Regions(NamedTuple):
     wall: I32
 
 
-@register("sight", "visibility_polygon")
 class VisibilityPolygon(FieldOfView):
     """Compute the region visible from a place once, then look points up in it.
 
@@ -337,18 +337,12 @@ class CellBits(NamedTuple):
     bits: U8
 
 
-@register("sight", "flashlight")
 class Flashlight(FieldOfView):
     """Cache the set of cells in view of each pose, and look points up by their cell.
 
     A point is in view if the centre of its cell is, so it is exact for the centres of cells, and
     up to half a cell elsewhere. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
-
-    Attributes:
-        memory_mb: Memory for poses; the least recently used go first.
     """
-
-    memory_mb: float = Field(default=64.0, gt=0)
 
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points lie in cells whose centre is visible from (x, y)."""
@@ -388,7 +382,7 @@ class Flashlight(FieldOfView):
             cells = _pack(filled_cells(home, x, y, heading, reach))
             self._bytes += ENTRY_BYTES + cells.bits.nbytes
         self._cache[key] = cells
-        while self._bytes > self.memory_mb * 1e6 and len(self._cache) > 1:
+        while self._bytes > MEMORY_BYTES and len(self._cache) > 1:
             _, oldest = self._cache.popitem(last=False)
             self._bytes -= ENTRY_BYTES + oldest.bits.nbytes
         return cells

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, model_serializer, model_validator
 from pydantic_core import CoreSchema
 
-from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings, register
+from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings
 from fleet2d.configuration.problems import check_known, problem, problem_at
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, micros
 from fleet2d.errors import ComponentError
@@ -344,9 +344,9 @@ class Perception(Settings):
     identity: Identity = Identity()
     attributes: Attributes = Attributes()
     errors: Annotated[
-        dict[str, Annotated[PerceptionError, OneOf("perception_error", by_name=True)]],
+        dict[str, OneOf[PerceptionError]],
         CheckNames,
-        NameAsType,
+        NameAsType(),
     ] = Field(default={})
 
 
@@ -395,7 +395,6 @@ class Confusable(Settings):
         return BY_HEIGHT.at(HEIGHTS[self.kind] if self.kind is not None else self.height or 0.0)
 
 
-@register("perception_error", "taken_for")
 class TakenFor(PerceptionError):
     """Some users, such as pets, are taken for others at times, each at a rate of its own.
 

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import radians
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
@@ -304,7 +304,7 @@ class PerceptionError(Component):
         True
     """
 
-    kind: ClassVar[str] = "perception_error"
+    kind = "perception_error"
 
     @abstractmethod
     def distort(self, sightings: "CameraSightings") -> "CameraSightings":
@@ -325,7 +325,6 @@ class PerceptionError(Component):
         )
 
 
-@register("perception_error", "miscalibration")
 class Miscalibration(PerceptionError):
     """A camera that isn't mounted or calibrated as the robot assumes: the same error in each look.
 
@@ -346,7 +345,6 @@ class Miscalibration(PerceptionError):
         return moved.replace(heading=moved.heading + radians(self.yaw_deg))
 
 
-@register("perception_error", "outliers")
 class Outliers(PerceptionError):
     """A share of sightings is far off along the ray, as when the depth is that of the background.
 

@@ -11,7 +11,7 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.studies.intervals import LEVEL, POWER, UNLIMITED, Limits, MeanEstimate, estimate
-from fleet2d.studies.records import VARIANT
+from fleet2d.studies.results import VARIANT
 
 if TYPE_CHECKING:
     import polars as pl

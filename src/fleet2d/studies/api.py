@@ -1,36 +1,43 @@
 """Studies from Python: `fleet2d.study` and `fleet2d.map_runs`."""
 
+import itertools
 import pickle
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.cluster_executors import RayExecutor, SlurmExecutor
 from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import (
-    Executor,
+    Crew,
     LocalExecutor,
-    LostTask,
     SerialExecutor,
-    TaskSchedule,
+    TaskQueue,
     WorkerTask,
     cores,
+    portable,
+    run_tasks,
 )
 from fleet2d.studies.plan import Changed
 from fleet2d.studies.progress import observing
 from fleet2d.studies.reader import Study, open_study
-from fleet2d.studies.simulator import describe_error, run_scenario
+from fleet2d.studies.simulator import run_scenario
 from fleet2d.studies.specification import read_specification
 
 Result = TypeVar("Result")
 ExecutorName = Literal["local", "ray", "slurm", "serial"]
+SLURM_JOBS = 16
+SLURM_SHARE = 0.5  # of a job's time, in which it begins variants
+SUBMITIT_TIMEOUT_MIN = 5  # of a job without `timeout_min`
 
 
 def study(
@@ -47,9 +54,10 @@ def study(
     Args:
         source: A study file, or the same as a mapping.
         out: A folder, or a location like s3://bucket/study; None: studies/NAME.
-        workers: The number of worker processes; None: one per core.
+        workers: The number of worker processes; None: one per core. Of an executor of your own:
+            how many calls it gets at a time.
         executor: Where they run: `local`, `ray`, `slurm`, `serial` (in this process), or an
-            executor of your own.
+            executor of your own, as `concurrent.futures` defines them.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
             to continue.
@@ -67,11 +75,9 @@ def study(
     """
     specification = read_specification(source)
     location = out or default_location(specification.name)
-    with observing() as observer:
-        run_study(
-            check_study(specification), location, make_executor(executor, workers),
-            fail_fast=fail_fast, changed=changed, observer=observer,
-        )  # fmt: skip
+    checked = check_study(specification)
+    with observing() as observer, open_crew(executor, workers) as crew:
+        run_study(checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer)
     return open_study(location)
 
 
@@ -105,54 +111,66 @@ def map_runs(
         >>> hours = [fleet2d.load_scenario("simulation.duration=1 h", seed=s) for s in range(2)]
         >>> digests = fleet2d.map_runs(operator.attrgetter("digest"), hours)  # doctest: +SKIP
     """
-    resolved = tuple(load_scenario(scenario).resolved() for scenario in scenarios)
-    if not resolved:
-        return []
-    homes = map(home_key, resolved)  # scenarios that share a home go to one worker in turn
-    tasks = TaskSchedule(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
-    job = FunctionJob(pickled(function), resolved)
+    resolved = [load_scenario(scenario).resolved() for scenario in scenarios]
+    tasks = [
+        FunctionTask(number, number, "", home_key(content), content)
+        for number, content in enumerate(resolved)
+    ]
     results: dict[int, Result] = {}
-    with closing(make_executor(executor, workers).run(job, tasks)) as events:
-        for event in events:
-            if isinstance(event, LostTask):
-                raise ComponentError(f"scenario {event.task.index}: {event.reason}")
-            succeeded, value = pickle.loads(event.payload)  # noqa: S301 - from our own workers
+    with (
+        open_crew(executor, workers) as crew,
+        closing(run_tasks(crew, FunctionJob(pickled(function)), TaskQueue(tasks))) as rounds,
+    ):
+        for end in itertools.chain.from_iterable(rounds):
+            number = end.task.number
+            if end.loss is not None:
+                raise ComponentError(f"scenario {number}: {end.loss}")
+            succeeded, value = end.payload
             if not succeeded:
-                value.add_note(f"in scenario {event.task.index}")
+                value.add_note(f"in scenario {number}")
                 raise value
-            results[event.task.index] = value
+            results[number] = pickle.loads(value)  # noqa: S301 - from our own workers
             if on_result is not None:
-                on_result(event.task.index)
-    return [results[i] for i in range(len(resolved))]
+                on_result(number)
+    return [results[number] for number in range(len(tasks))]
 
 
-def make_executor(
+@contextmanager
+def open_crew(
     executor: ExecutorName | Executor,
     workers: int | None = None,
     slurm: Mapping[str, Any] | None = None,
-) -> Executor:
-    """Return an executor by its name.
+) -> Iterator[Crew]:
+    """Yield a crew of an executor by its name, which ends with the context; or of your own.
 
     Args:
-        executor: Its name; an executor is returned as it is.
+        executor: The name; or an executor, which stays open.
         workers: The number of workers; None: one per core, or 16 jobs of Slurm.
         slurm: submitit's parameters of jobs of Slurm.
 
     Raises:
         InputError: There is no executor of that name, or its package is missing.
     """
+    count = workers or cores()
     match executor:
         case "local":
-            return LocalExecutor(workers or cores())
+            crew = Crew(LocalExecutor(count), count)
         case "serial":
-            return SerialExecutor()
+            crew = Crew(SerialExecutor())
         case "ray":
-            return RayExecutor(workers)
+            ray = RayExecutor()
+            crew = Crew(ray, workers or max(ray.cores, 1))
         case "slurm":
-            return SlurmExecutor(workers, slurm)
+            jobs = workers or SLURM_JOBS
+            batch_s = SLURM_SHARE * 60 * (slurm or {}).get("timeout_min", SUBMITIT_TIMEOUT_MIN)
+            crew = Crew(SlurmExecutor(jobs, slurm), jobs, batch_s)
         case str():
             raise InputError(f"there is no executor {executor!r}: give local, ray, slurm or serial")
-    return executor
+        case _:
+            yield Crew(executor, count)
+            return
+    with crew.executor:
+        yield crew
 
 
 def default_location(name: str) -> str:
@@ -183,37 +201,37 @@ def pickled(function: Callable[..., Any]) -> bytes:
     return cloudpickle.dumps(function)
 
 
+@dataclass(frozen=True)
+class FunctionTask(WorkerTask):
+    """A scenario to run.
+
+    Attributes:
+        scenario: The content of the scenario.
+    """
+
+    scenario: Mapping[str, Any] = field(default_factory=dict)
+
+
 @dataclass
 class FunctionJob:
     """Runs scenarios, and calls a function with each run.
 
     Attributes:
         function: The function, pickled.
-        scenarios: The scenarios, in the order of the tasks' indices.
     """
 
     function: bytes
-    scenarios: Sequence[Any]
 
-    def __call__(self, task: WorkerTask) -> bytes:
-        """Return what the function returns, or the error, pickled."""
+    def __call__(self, task: FunctionTask) -> tuple[bool, Any]:
+        """Return whether the function succeeded, and what it returned, pickled, or its error."""
         try:
-            run = run_scenario(self.scenarios[task.index])
-            return pickle.dumps((True, self._callable(run)))
+            run = run_scenario(task.scenario)
+            return True, pickle.dumps(self._callable(run))
         except Exception as error:  # noqa: BLE001 - raised again in the driver
-            return pickle.dumps((False, _portable(error)))
+            return False, portable(error)
 
     @cached_property
     def _callable(self) -> Callable[[Run], Any]:
         """The function, which a worker reads once: it may hold a lot."""
         function: Callable[[Run], Any] = pickle.loads(self.function)  # noqa: S301 - our own
         return function
-
-
-def _portable(error: Exception) -> Exception:
-    """Return the error if it can be pickled, else one with the same text."""
-    try:
-        pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
-    except Exception:  # noqa: BLE001 - errors of users may do anything
-        return RuntimeError(describe_error(error))
-    return error

@@ -247,7 +247,7 @@ class FloorplansAxis(Axis):
         settings: Further keys of the floor plan, such as furnish.
     """
 
-    is_population: ClassVar[bool] = True
+    is_population = True
 
     floorplans: Texts
     settings: dict[str, Any] = Field(default={})
@@ -299,7 +299,7 @@ class SyntheticAxis(Axis):
         settings: Further keys of the homes, such as area_m2 and furnish.
     """
 
-    is_population: ClassVar[bool] = True
+    is_population = True
 
     synthetic: Count | tuple[int, ...]
     first: int = Field(default=0, ge=0)
@@ -327,7 +327,7 @@ class PersonasAxis(Axis):
         user: The name of the user who has the persona.
     """
 
-    is_population: ClassVar[bool] = True
+    is_population = True
 
     personas: Texts
     user: str

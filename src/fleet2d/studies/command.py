@@ -1,7 +1,6 @@
-"""The commands `fleet2d study run`, `tune`, `status`, `rerun`, `report`, `power` and `track`."""
+"""The commands `fleet2d study run`, `tune`, `status`, `rerun`, `report` and `power`."""
 
 import gc
-import itertools
 import json
 import signal
 from collections.abc import Iterator, Mapping
@@ -78,7 +77,7 @@ def run(  # noqa: PLR0913 - options of the command line
       fleet2d study run speeds.yaml --dry-run
       fleet2d study run speeds.yaml --workers 8 --out speeds
     """
-    from fleet2d.studies.api import default_location, make_executor
+    from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
 
@@ -88,10 +87,13 @@ def run(  # noqa: PLR0913 - options of the command line
         return
     location = out or default_location(checked.specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
-    with _interruptible(location), observing(quiet=quiet) as observer:
-        where = make_executor(executor, workers, slurm_parameters(slurm))
+    with (
+        _interruptible(location),
+        observing(quiet=quiet) as observer,
+        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+    ):
         counts = run_study(
-            checked, location, where, fail_fast=fail_fast, changed=changed, observer=observer
+            checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
         )
     if as_json:
         _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
@@ -251,29 +253,6 @@ def power(
         _print(str(table).replace("null", "–"))
 
 
-@studying.command()
-def track(
-    location: Where,
-    to: Annotated[Literal["mlflow", "wandb"], typer.Option(help="The tracker.")],
-    project: Annotated[
-        str, typer.Option(help="The experiment of MLflow, or the project of Weights & Biases.")
-    ] = "fleet2d",
-    uri: Annotated[
-        str | None, typer.Option(help="MLflow's store; left out: as MLFLOW_TRACKING_URI says.")
-    ] = None,
-) -> None:
-    """Store a study in MLflow or Weights & Biases.
-
-    Examples:
-      fleet2d study track studies/speeds --to mlflow --project speeds
-    """
-    from fleet2d.studies.reader import open_study
-    from fleet2d.studies.trackers import track as store
-
-    count = store(open_study(location), to, project, uri)
-    _print(f"{count} variants stored in {project}")
-
-
 def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str, Any]:
     """Return the axis and the reference value of a comparison.
 
@@ -292,7 +271,7 @@ def _reference(study: "Study", metric: str, against: str | None) -> Mapping[str,
 
     axis, _, text = against.partition("=")
     check_axes([axis], study.columns)
-    labels = study.arrow_variants.column(axis).unique().to_pylist()
+    labels = study.variants[axis].unique().to_list()
     by_text = {str(label): label for label in labels if label is not None}
     if text not in by_text:
         raise InputError(f"--against: {axis} has no value {text!r}{suggest(text, by_text)}")
@@ -307,32 +286,32 @@ def _print_size(count: int) -> None:
 
 def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and how much all of them are."""
-    from fleet2d.studies.executors import LocalExecutor, cores
+    from fleet2d.studies.api import open_crew
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.progress import in_words
 
     plan = checked.plan
-    check_setups(plan, LocalExecutor(workers or cores()))
+    with open_crew("local", workers) as crew:
+        check_setups(plan, crew)
     for column, labels in plan.design.labels.items():
         values = ", ".join(map(str, labels[:MAX_LINES]))
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""
         _print(f"{column}: {values}{more}")
     _print("")
-    for variant in itertools.islice(plan.variants, MAX_LINES):
-        _print(f"  {plan.design.describe(variant.index)}")
+    for index in plan.variants["index"].head(MAX_LINES):
+        _print(f"  {plan.design.describe(index)}")
     if len(plan.variants) > MAX_LINES:
         _print(f"  … {len(plan.variants) - MAX_LINES} more")
-    simulated = in_words(timedelta(seconds=plan.variants.total_simulated_s))
+    simulated = in_words(timedelta(seconds=plan.variants["simulated_s"].sum()))
     variants = counted(len(plan.variants), "variant")
-    homes = counted(len(plan.variants.home_keys), "home")
+    homes = counted(plan.variants["home_key"].n_unique(), "home")
     _print(f"\n{variants}, {homes}, {simulated} of simulated time")
 
 
 def _print_failures(location: str) -> None:
     from fleet2d.studies.reader import open_study
 
-    table = open_study(location).arrow_variants.select(["variant", "status", "error"])
-    failed = [row for row in table.to_pylist() if row["status"] == "failed"]
+    failed = open_study(location).failures.to_dicts()
     for row in failed[:MAX_LINES]:
         _print(f"variant {row['variant']} failed: {row['error']}", err=True)
     if len(failed) > MAX_LINES:
@@ -345,8 +324,7 @@ def _row_of(study: "Study", variant: str) -> dict[str, Any]:
     Raises:
         InputError: There is no such variant, or several.
     """
-    columns = ["variant", "identity", "digest", *study.columns]
-    rows: list[dict[str, Any]] = study.arrow_variants.select(columns).to_pylist()
+    rows = study.variants.select("variant", "identity", "digest", *study.columns).to_dicts()
     found = [row for row in rows if str(row["variant"]) == variant]
     if not found and len(variant) >= IDENTITY_START:
         found = [row for row in rows if (row["identity"] or "").startswith(variant)]
@@ -398,16 +376,19 @@ def tune(
     Examples:
       fleet2d study tune search.yaml --workers 8
     """
-    from fleet2d.studies.api import default_location, make_executor
+    from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.progress import observing_trials
     from fleet2d.studies.specification import read_specification
     from fleet2d.studies.tuning import tune as search
 
     specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
-    runner = make_executor(executor, workers, slurm_parameters(slurm))
-    with _interruptible(folder), observing_trials(show=not quiet) as bar:
-        result = search(specification, folder, runner, bar, changed=changed, storage=storage)
+    with (
+        _interruptible(folder),
+        observing_trials(show=not quiet) as bar,
+        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+    ):
+        result = search(specification, folder, crew, bar, changed=changed, storage=storage)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())

@@ -19,14 +19,15 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError, ScenarioError, errors_as, os_errors_as
 from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
-from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.scenario.load import scenario_of
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Choice, Label, key_path
 from fleet2d.studies.simulator import input_files
 from fleet2d.studies.specification import SEED, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results: those above the
-# engine in the order of imports.
+# engine in the order of imports, but `homes`.
 _LEAVES = ("__main__", "cli", "learning", "live", "studies", "testing", "viewing")
 _SUFFIXES = (".py", ".so", ".yaml", ".json")
 _NO_EFFECT = ("max_span", "speedup")  # keys of `simulation` that change no result
@@ -126,7 +127,7 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 
 NOT_APPLICABLE = -1
-MAX_VARIANTS = 10_000_000
+MAX_VARIANTS = 1_000_000
 SWITCHES = ("key_frames", "observations", "events", "decisions")
 """Keys of `artifacts` that are named after their tables."""
 

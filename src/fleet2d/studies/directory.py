@@ -4,53 +4,34 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
+from pydantic import BaseModel, ConfigDict
 
-from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as
-from fleet2d.kernels import I32, U8, Bool
-from fleet2d.storage.files import PARTIAL, FolderLock, path_in
+from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as, extra
+from fleet2d.storage.files import PARTIAL, FolderLock
 from fleet2d.studies.intervals import Limits
-from fleet2d.studies.parts import (
-    Part,
-    ResultRows,
-    next_number,
-    part_name,
-    read_parts,
-    read_results,
-    record_names,
-    write_part,
-)
-from fleet2d.studies.records import (
-    VARIANT,
-    Journal,
-    array_of,
-    check_numbers,
-    numbers_of,
-    read_journal,
-)
-from fleet2d.studies.storage import Storage, from_json, writing
+from fleet2d.studies.results import VARIANT, check_numbers, read_results
+from fleet2d.studies.storage import Storage, writing
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    import polars as pl
 
-FORMAT = 1
+FORMAT = 2
+COMPLETE = "complete"
+FAILED = "failed"
 MISSING = "missing"
-# Statuses of variants with results.
-COMPLETE = 1
-FAILED = 2
 LOCK = "lock"
 META = "study.json"
 PLAN = "plan.parquet"
 SCENARIOS = "scenarios.parquet"
 VARIANTS = "variants.parquet"
-_STATE = b"fleet2d.parts"
-_PLAN_ONLY = ("identity", "scenario", "template", "home_key")  # no columns of `variants`
+PLAN_ONLY = ("identity", "scenario", "template", "home_key")
+"""Columns of the plan that variants don't have, or from their results."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +49,10 @@ class Counts:
     failed: int
 
     @classmethod
-    def of(cls, statuses: Sequence[str | None]) -> Self:
-        """Count the statuses of variants."""
-        return cls(len(statuses), statuses.count("complete"), statuses.count("failed"))
+    def of(cls, variants: "pl.DataFrame") -> Self:
+        """Count variants by their statuses."""
+        statuses = variants["status"].to_list()
+        return cls(len(statuses), statuses.count(COMPLETE), statuses.count(FAILED))
 
     @property
     def missing(self) -> int:
@@ -81,8 +63,7 @@ class Counts:
 SHARE = "share"  # the unit of numbers from 0 to 1 begins with it
 
 
-@dataclass(frozen=True)
-class MetricFacts:
+class MetricFacts(BaseModel):
     """What readers should know of a metric.
 
     Attributes:
@@ -94,16 +75,17 @@ class MetricFacts:
         better: Which of two values is better, `higher` or `lower`, by the same names.
     """
 
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
     description: str = ""
     unit: str = ""
-    units: Mapping[str, str] = field(default_factory=dict)
-    least: Mapping[str, float] = field(default_factory=dict)
-    largest: Mapping[str, float] = field(default_factory=dict)
-    better: Mapping[str, str] = field(default_factory=dict)
+    units: dict[str, str] = {}
+    least: dict[str, float] = {}
+    largest: dict[str, float] = {}
+    better: dict[str, str] = {}
 
 
-@dataclass(frozen=True)
-class Meta:
+class Meta(BaseModel):
     """The content of `study.json`.
 
     Attributes:
@@ -120,15 +102,17 @@ class Meta:
         notes: Remarks of its author.
     """
 
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
     name: str
     description: str
     code: str
     columns: tuple[str, ...]
     populations: tuple[str, ...]
     tables: tuple[str, ...]
-    compare: tuple[Mapping[str, Any], ...] = ()
+    compare: tuple[dict[str, Any], ...] = ()
     source: str = ""
-    metrics: Mapping[str, MetricFacts] = field(default_factory=dict)
+    metrics: dict[str, MetricFacts] = {}
     tags: tuple[str, ...] = ()
     notes: str = ""
 
@@ -161,11 +145,17 @@ class StudyDirectory:
 
     Attributes:
         storage: The folder or store of its files.
-        scratch: A local folder for the journal and for unfinished files.
+        scratch: A local folder for the lock.
     """
 
     def __init__(self, location: str | Path) -> None:
-        """Name the folder; nothing is read or written."""
+        """Name the folder; nothing is read or written.
+
+        Raises:
+            InputError: polars is not installed.
+        """
+        with extra("study", "studies need polars"):
+            import polars as pl  # noqa: F401 - whether it is there
         self.storage = Storage(location)
         self.scratch = self.storage.folder or _scratch_of(self.storage.location)
 
@@ -214,7 +204,7 @@ class StudyDirectory:
                     f"{self.location} was written by a later Fleet2D (format {version}): update"
                     " Fleet2D"
                 )
-            meta: Meta = from_json(Meta, content)
+            meta = Meta.model_validate(content)
             if unknown := set(meta.populations) - set(meta.columns):
                 raise ValueError(f"its populations {', '.join(sorted(unknown))} are no columns")
             return meta
@@ -226,77 +216,23 @@ class StudyDirectory:
             ArtifactError: It can't be written, or holds a Python value that JSON can't hold.
         """
         with errors_as(ArtifactError, "the study can't be described", of=(TypeError, ValueError)):
-            content = json.dumps({"format": FORMAT, **asdict(meta)}, indent=1)
+            content = json.dumps({"format": FORMAT, **meta.model_dump()}, indent=1)
         self.storage.write(META, content.encode())
 
-    def intact_parts(self, on_note: Callable[[str], None]) -> list[Part]:
-        """Return the undamaged parts; delete the others, so that their variants are run again.
-
-        Args:
-            on_note: Receives a remark for each part that is deleted.
-
-        Raises:
-            RunDirectoryError: There is a link in the folder.
-        """
-        intact = []
-        for record in record_names(self.storage):
-            part = None
-            try:
-                part = Part.read(self.storage, record)
-                problem = part.problem(self.storage, checksums=self.storage.folder is not None)
-                count = f"the {part.variants} variants of that part"
-            except RunDirectoryError as error:
-                self.storage.path(record)  # refuses a link
-                problem = str(error).partition(":")[0]
-                count = "its variants"
-            if part is not None and problem is None:
-                intact.append(part)
-                continue
-            on_note(f"{problem}: {count} are run again")
-            # The record first: a part never counts without its files.
-            self.storage.delete(record)
-            for file in part.files if part else ():
-                self.storage.delete(file.name)
-        return intact
-
-    def plan_batches(self, columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
-        """Yield the plan, or some of its columns, `variant` among them, some rows at a time.
+    def plan(self, without: Collection[str] = ()) -> "pl.DataFrame":
+        """Return the plan, without some columns: a row for each variant, with its parameters.
 
         Raises:
             RunDirectoryError: It is missing or damaged.
         """
-        for table in self.storage.read_batches(PLAN, columns):
-            with self.storage.reading(PLAN):
-                check_numbers(table)
-            yield table
-
-    def statuses(self, parts: Sequence[Part]) -> U8:
-        """Return the status of each variant with results, by number: uint8 (n,).
-
-        It is 0 without results, else COMPLETE or FAILED; the newest result counts.
-        """
-        status = np.zeros(0, np.uint8)
-
-        def note(numbers: I32, is_complete: Bool) -> None:
-            nonlocal status
-            missing = int(numbers.max(initial=-1)) + 1 - len(status)
-            if missing > 0:
-                status = np.append(status, np.zeros(max(missing, len(status)), np.uint8))
-            status[numbers] = np.where(is_complete, COMPLETE, FAILED)
-
-        for table in read_results(self.storage, parts, (VARIANT, "status")):
-            is_complete = [status == "complete" for status in table.column("status").to_pylist()]
-            note(numbers_of(table), np.array(is_complete, np.bool_))
-        for record in read_journal(self.journal_path(parts)):
-            note(np.array([record.number], np.int32), np.array([record.is_complete]))
-        return status
+        frame = self.storage.read_frame(PLAN, (VARIANT, *PLAN_ONLY), without)
+        with self.storage.reading(PLAN):
+            check_numbers(frame)
+        return frame
 
     def counts(self) -> Counts:
         """Return how far the study is."""
-        numbers = np.concatenate([numbers_of(table) for table in self.plan_batches([VARIANT])])
-        status = self.statuses(read_parts(self.storage))
-        status = np.append(status, np.zeros(int(numbers.max(initial=0)) + 1, np.uint8))[numbers]
-        return Counts(len(numbers), *(int((status == c).sum()) for c in (COMPLETE, FAILED)))
+        return Counts.of(self.variants())
 
     def scenario(self, number: int) -> dict[str, Any]:
         """Return the scenario of a variant, with its seed.
@@ -304,96 +240,31 @@ class StudyDirectory:
         Raises:
             RunDirectoryError: The study has no such variant.
         """
-        row_filter = [(VARIANT, "=", number)]
-        rows = self.storage.read_table(PLAN, ["template", "seed"], row_filter).to_pylist()
-        if not rows:
+        rows = self.plan().filter(variant=number)
+        if not len(rows):
             raise RunDirectoryError(f"{self.location} has no variant {number}")
-        template_filter = [("template", "=", rows[0]["template"])]
+        scenarios = self.storage.read_frame(SCENARIOS, ("template", "scenario"))
         with self.storage.reading(SCENARIOS):
-            texts = self.storage.read_table(SCENARIOS, filters=template_filter).to_pylist()
-            content: dict[str, Any] = json.loads(texts[0]["scenario"])
-            content["simulation"]["seed"] = rows[0]["seed"]
+            (text,) = scenarios.filter(template=rows["template"][0])["scenario"]
+            content: dict[str, Any] = json.loads(text)
+            content["simulation"]["seed"] = rows["seed"][0]
         return content
 
-    def variants(self) -> "pa.Table":
+    def variants(self) -> "pl.DataFrame":
         """Return parameters, status, times, digest and metrics of all variants.
 
-        They are in the order of the design, from their file if that is up to date.
+        They are in the order of the design.
 
         Raises:
             RunDirectoryError: Files are missing or damaged.
         """
-        import pyarrow as pa
+        import polars as pl
 
-        parts = read_parts(self.storage)
-        headers = [record.header for record in read_journal(self.journal_path(parts))]
-        if not headers and self.storage.exists(VARIANTS):
-            table = self.storage.read_table(VARIANTS)
-            if (table.schema.metadata or {}).get(_STATE) == _state(parts, has_journal=False):
-                return table
-        return pa.concat_tables(self._variant_tables(parts, headers))
-
-    def _variant_tables(
-        self, parts: Sequence[Part], headers: Sequence[Mapping[str, Any]]
-    ) -> "Iterator[pa.Table]":
-        """Yield the variants, a block of rows of the plan at a time."""
-        import pyarrow as pa
-
-        results = ResultRows(self.storage, parts, headers)
-        state = {_STATE: _state(parts, bool(headers))}
-        for plan in self.plan_batches():
-            newest = results.of(numbers_of(plan))
-            names = (name for name in plan.column_names if name not in _PLAN_ONLY)
-            columns = {name: plan.column(name) for name in names}
-            columns |= {
-                name: newest.column(name) for name in newest.column_names if name != VARIANT
-            }
-            statuses = (status or MISSING for status in columns["status"].to_pylist())
-            columns["status"] = array_of(statuses, pa.string())
-            yield pa.table(columns).replace_schema_metadata(state)
-
-    def write_variants(self, observe: "Callable[[pa.Table], pa.Table]") -> None:
-        """Write `variants.parquet`, which may be larger than the memory.
-
-        Args:
-            observe: Receives some rows after the other, and returns them.
-
-        Raises:
-            ArtifactError: It can't be written.
-        """
-        tables = map(observe, self._variant_tables(read_parts(self.storage), ()))
-        self.storage.write_batches(VARIANTS, tables, self.scratch)
-
-    def journal_path(self, parts: Iterable[Part]) -> Path:
-        """Return the path of the journal of the next part."""
-        return path_in(self.scratch, f"journal-{part_name(next_number(parts))}.bin")
-
-    def open_journal(self, parts: Iterable[Part]) -> Journal:
-        """Open the journal of the next part; journals of committed parts are removed.
-
-        Raises:
-            ArtifactError: It can't be written.
-        """
-        path = self.journal_path(parts)
-        with writing(self.scratch):
-            self.scratch.mkdir(parents=True, exist_ok=True)
-            for journal in self.scratch.glob("journal-*.bin"):
-                if journal.name < path.name:  # left by a crash between commit and removal
-                    journal.unlink()
-        return Journal(path)
-
-    def commit(self, journal: Journal, parts: Iterable[Part]) -> Part:
-        """Turn a journal into a part, and remove it.
-
-        Raises:
-            ArtifactError: The part can't be written; the journal stays.
-        """
-        scratch = path_in(self.scratch, "partial")
-        part = write_part(self.storage, scratch, next_number(parts), journal)
-        journal.close()
-        with suppress(OSError):
-            journal.path.unlink()
-        return part
+        plan = self.plan(PLAN_ONLY)
+        results = read_results(self.storage)
+        with self.storage.reading(PLAN):
+            joined = plan.join(results, on=VARIANT, how="left", maintain_order="left")
+            return joined.with_columns(pl.col("status").fill_null(MISSING))
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -413,12 +284,7 @@ class StudyDirectory:
 
 
 def _scratch_of(location: str) -> Path:
-    """Return the local folder for the unfinished files of a remote store."""
+    """Return the local folder for the lock of a remote store."""
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     name = hashlib.sha256(location.encode()).hexdigest()[:16]
     return Path(base) / "fleet2d" / "studies" / name
-
-
-def _state(parts: Iterable[Part], has_journal: bool) -> bytes:
-    sizes = [[part.number, *(file.sha256[:16] for file in part.files)] for part in parts]
-    return json.dumps([sizes, has_journal]).encode()

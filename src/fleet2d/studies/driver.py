@@ -1,18 +1,15 @@
 """Running a study: missing variants are run, and each result is stored at once."""
 
-import time
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.configuration.problems import did_you_mean
-from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.errors import ComponentError, Fleet2DError, extra
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.design import (
     Design,
@@ -25,20 +22,17 @@ from fleet2d.studies.design import (
 )
 from fleet2d.studies.directory import (
     COMPLETE,
-    SCENARIOS,
     VARIANTS,
     Counts,
     Meta,
     MetricFacts,
     StudyDirectory,
 )
-from fleet2d.studies.executors import Event, Executor, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
 from fleet2d.studies.intervals import LEVEL
-from fleet2d.studies.parts import Part
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
-    PlanSchedule,
     ScenarioFile,
     StudyPlan,
     check_setups,
@@ -47,23 +41,25 @@ from fleet2d.studies.plan import (
     write_plan,
 )
 from fleet2d.studies.reader import Study
-from fleet2d.studies.records import (
+from fleet2d.studies.results import (
     RESULT_COLUMNS,
-    Journal,
-    VariantRecord,
-    array_of,
-    record_of,
-    results_table,
+    VARIANT,
+    ResultWriter,
+    VariantResult,
+    drop_damaged,
+    read_results,
+    result_of,
+    results_frame,
 )
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
 from fleet2d.studies.specification import AdaptSettings, Specification, read_specification
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    import polars as pl
 
 
-class AdaptiveSchedule(TaskSchedule):
-    """The tasks of a study in rounds of seeds; between rounds the results so far decide.
+class AdaptiveRounds:
+    """The variants of a study in rounds of seeds; between rounds the results so far decide.
 
     All values of the axis have the same seeds as long as they get any, so pairs stay fair. To give
     up a value, its difference must be significant at 5 % over all rounds together (Bonferroni).
@@ -73,91 +69,71 @@ class AdaptiveSchedule(TaskSchedule):
         self,
         settings: AdaptSettings,
         plan: StudyPlan,
-        missing: NDArray[np.integer[Any]],
         directory: StudyDirectory,
         on_note: Callable[[str], None],
     ) -> None:
-        """Start the first round.
+        """Prepare the rounds.
 
         Args:
             settings: The section `adapt` of the study file.
             plan: All variants.
-            missing: The places of variants without results.
             directory: The study, for results so far.
             on_note: Receives a remark for each decision.
         """
-        super().__init__(())
-        self._settings = settings
-        self._design = plan.design
+        self._settings, self._plan = settings, plan
         self._directory, self._on_note = directory, on_note
-        self._planned = plan.variants
-        self._is_missing = np.zeros(len(plan.variants), np.bool_)
-        self._is_missing[missing] = True
         self._dropped = set[object]()
-        seeds = len(plan.design.seeds)
-        round_of = plan.variants.index % seeds // settings.seeds
-        rounds = range(-(-seeds // settings.seeds))
-        self._rounds = deque(np.flatnonzero(round_of == number) for number in rounds)
-        self._looks = len(self._rounds) - 1
-        self._unfinished = 0
         self._places = list[int]()
-        self._start_round()
 
     @property
     def plan(self) -> StudyPlan:
         """The variants of all rounds so far."""
-        places = np.array(sorted(self._places), np.int64)
-        return StudyPlan(self._design, self._planned.take(places))
+        return StudyPlan(self._plan.design, self._plan.variants[sorted(self._places)])
 
-    def on_end(self) -> None:
-        """Count a task that has ended; after the last of a round, the next one starts."""
-        self._unfinished -= 1
-        if not self._unfinished:
-            self._start_round()
+    def __iter__(self) -> "Iterator[pl.DataFrame]":
+        """Yield the variants of each round, after those of the last have results."""
+        ((axis, _),) = self._settings.against.items()
+        design = self._plan.design
+        index = self._plan.variants["index"].to_numpy()
+        seeds = len(design.seeds)
+        round_of = index % seeds // self._settings.seeds
+        looks = int(round_of.max())
+        for number in range(looks + 1):
+            if self._places and not self._goes_on(looks):
+                return
+            places = np.flatnonzero(round_of == number).tolist()
+            labels = (design.parameters(int(index[place]))[axis] for place in places)
+            found = zip(places, labels, strict=True)
+            new = [place for place, label in found if label not in self._dropped]
+            self._places += new
+            yield self._plan.variants[new]
 
-    def _start_round(self) -> None:
-        while self._rounds and not self._unfinished:
-            if self._places:
-                self._decide()
-            ((axis, _),) = self._settings.against.items()
-            labels = self._design.parameters
-            part = self._rounds.popleft().tolist() if self._rounds else []
-            index = self._planned.index
-            places = [i for i in part if labels(int(index[i]))[axis] not in self._dropped]
-            self._places += places
-            for place in places:
-                if self._is_missing[place]:
-                    self.add(self._planned.task(place))
-                    self._unfinished += 1
-
-    def _decide(self) -> None:
-        """Give up values that are clearly worse, and all further rounds if intervals are narrow."""
+    def _goes_on(self, looks: int) -> bool:
+        """Give up values that are clearly worse; return whether others need more seeds."""
         settings = self._settings
         study = Study(self._directory)
         ((axis, _),) = settings.against.items()
         # Not those of later rounds, which an interrupted or larger study may have.
-        numbers = self._planned.number[self._places].tolist()
-        seeds = len(np.unique(self._planned.index[self._places] % len(self._design.seeds)))
+        so_far = self._plan.variants[self._places]
+        numbers = so_far[VARIANT].to_list()
+        seeds = (so_far["index"] % len(self._plan.design.seeds)).n_unique()
         table = study.paired(settings.metric, settings.against, variants=numbers).to_dicts()
         open_rows = [row for row in table if row[axis] not in self._dropped]
         sign = -1 if settings.goal == "maximize" else 1
         for row in open_rows if settings.goal else ():
-            if sign * row["difference"] > 0 and row["p"] < (1 - LEVEL) / self._looks:
+            if sign * row["difference"] > 0 and row["p"] < (1 - LEVEL) / looks:
                 self._dropped.add(row[axis])
                 self._on_note(f"{axis} = {row[axis]} is clearly worse after {seeds} seeds: dropped")
         left = [row for row in open_rows if row[axis] not in self._dropped]
         # NaN, that of an interval which can't be told, is the largest, and never narrow.
         width = np.max([row["high"] - row["low"] for row in left], initial=0.0)
-        if not left or (settings.width is not None and width <= settings.width):
-            self._rounds.clear()
-            self._on_note(
-                f"no more than {seeds} seeds: "
-                + (f"intervals are {width:.3g} wide" if left else "all values are worse")
-            )
+        if left and (settings.width is None or not width <= settings.width):
+            return True
+        reason = f"intervals are {width:.3g} wide" if left else "all values are worse"
+        self._on_note(f"no more than {seeds} seeds: {reason}")
+        return False
 
 
-PART_BYTES = 32_000_000  # size at which a journal becomes a part
-PART_S_REMOTE = 60.0  # the longest time that results for a store are on this machine only
 CHANGED_MESSAGE = (
     "a file that the variant reads, or Fleet2D itself, changed after the study began: run the study"
     " again"
@@ -178,15 +154,15 @@ class StudyJob:
     metrics: tuple[str, ...]
     tables: tuple[str, ...]
 
-    def __call__(self, task: WorkerTask) -> VariantRecord:
-        """Run a variant; return its record, with the error if it fails."""
+    def __call__(self, task: WorkerTask) -> VariantResult:
+        """Run a variant; return its results, with the error if it fails."""
         try:
             scenario = self.scenario(task)
         except Fleet2DError as error:  # a file changed after the study was planned
             outcome = VariantOutcome("failed", error=describe_error(error))
         else:
             outcome = execute(scenario, self.metrics, self.tables)
-        return record_of(task, outcome)
+        return result_of(task, outcome)
 
     def scenario(self, task: WorkerTask) -> Scenario:
         """Return the scenario of a variant.
@@ -213,7 +189,7 @@ class Observer:
     def on_start(self, counts: Counts, workers: int) -> None:
         """Receive how many variants have results, and how many workers run the others."""
 
-    def on_result(self, record: VariantRecord) -> None:
+    def on_result(self, result: VariantResult) -> None:
         """Receive the results of a variant."""
 
 
@@ -233,11 +209,27 @@ class CheckedStudy:
     scenarios: ScenarioFile
     metrics: Mapping[str, MetricFacts]
 
-    def note_missing(self, headers: Iterable[Mapping[str, Any]], observer: Observer) -> None:
-        """Note which metrics that the study names are missing in complete variants, by headers."""
-        summary = VariantSummary(self)
-        summary.add(results_table(headers))
-        summary.note_missing(observer)
+    def note_missing(self, variants: "pl.DataFrame", observer: Observer) -> None:
+        """Note which metrics that the study names are missing in complete variants."""
+        import polars as pl
+
+        complete = variants.filter(status=COMPLETE)
+        others = {*RESULT_COLUMNS, *self.plan.design.columns, "simulated_s"}
+        metrics = [name for name in complete.columns if name not in others]
+        named = [each for each in self.specification.file.named_metrics() if each[0][0] != "tune"]
+        place_of = self.specification.places.place
+        places = {name: place_of(location) for location, name in reversed(named)}
+        for name in dict.fromkeys(name for _, name in named if name != "*"):
+            fitting = [metric for metric in metrics if is_kept(metric, [name])]
+            lacks = pl.all_horizontal(pl.lit(value=True), pl.col(fitting).is_null())
+            lacking = len(complete.filter(lacks))
+            if lacking:
+                hint = did_you_mean(name, metrics) if lacking == len(complete) else ""
+                place = f"{places[name]}: " if places[name] else ""
+                observer.on_note(
+                    f"{place}{lacking} of {len(complete)} complete variants have no metric"
+                    f" {name}{hint}"
+                )
 
     @property
     def job(self) -> StudyJob:
@@ -257,8 +249,11 @@ def check_study(
         on_size: Receives the number of variants before they are built.
 
     Raises:
-        InputError: The study is wrong; the message names file and line, or axis and value.
+        InputError: The study is wrong; the message names file and line, or axis and value. Or
+            polars is not installed.
     """
+    with extra("study", "studies need polars"):
+        import polars as pl  # noqa: F401 - whether it is there
     specification = read_specification(source)
     scenarios, names = ScenarioFile(), KnownNames()
 
@@ -276,7 +271,7 @@ def check_study(
 def run_study(
     checked: CheckedStudy,
     location: str | Path,
-    executor: Executor,
+    crew: Crew,
     *,
     fail_fast: bool = False,
     changed: Changed | None = None,
@@ -287,7 +282,7 @@ def run_study(
     Args:
         checked: The study.
         location: Its folder or store.
-        executor: Where variants run.
+        crew: Where variants run.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
             to continue.
@@ -302,141 +297,89 @@ def run_study(
     directory = StudyDirectory(location)
     directory.check_empty()
     if not directory.exists():
-        check_setups(checked.plan, executor, observer.on_check)
+        check_setups(checked.plan, crew, observer.on_check)
     with directory.locked():
-        parts = directory.intact_parts(observer.on_note)
-        status = directory.statuses(parts)
+        for problem in drop_damaged(directory.storage):
+            observer.on_note(problem)
+        results = read_results(directory.storage)
         adapt = checked.specification.file.adapt
         # Of an adaptive study, new variants may be those of rounds that it doesn't need.
         plan = reconcile(
-            checked.plan, directory, status > 0, changed, observer.on_note, notes_new=adapt is None
+            checked.plan,
+            directory,
+            results[VARIANT],
+            changed,
+            observer.on_note,
+            notes_new=adapt is None,
         )
-        variants = plan.variants
         _write_plan(directory, checked, plan)
-        status = np.append(status, np.zeros(int(variants.number.max()) + 1, np.uint8))
-        missing = np.flatnonzero(status[variants.number] != COMPLETE)
-        keeper = _ResultKeeper(directory, parts)
-        counts = Counts(len(variants), len(variants) - len(missing), 0)
-        observer.on_start(counts, executor.workers)
-        failed = 0
+        complete = results.filter(status=COMPLETE)[VARIANT]
+        run = _StudyRun(checked, plan, directory, crew, observer, fail_fast)
+        if adapt is None:
+            run.run_missing([plan.variants], complete)
+        else:
+            rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note)
+            if run.run_missing(rounds, complete):
+                write_plan(directory, rounds.plan)
+        variants = directory.variants()
+        directory.storage.write_table(VARIANTS, variants.to_arrow())
+    checked.note_missing(variants, observer)
+    return Counts.of(variants)
+
+
+@dataclass
+class _StudyRun:
+    """Runs variants of a study, and stores their results."""
+
+    checked: CheckedStudy
+    plan: StudyPlan
+    directory: StudyDirectory
+    crew: Crew
+    observer: Observer
+    fail_fast: bool
+
+    def run_missing(self, rounds: "Iterable[pl.DataFrame]", complete: "pl.Series") -> bool:
+        """Run the variants of each round that are not complete; return whether all were run."""
+        import polars as pl
+
+        total = len(self.plan.variants)
+        is_complete = pl.col(VARIANT).is_in(complete.implode())
+        done = len(self.plan.variants.filter(is_complete))
+        self.observer.on_start(Counts(total, done, 0), self.crew.workers)
+        queues = (TaskQueue(self.plan.tasks(round_.filter(~is_complete))) for round_ in rounds)
         is_checked = False
-        schedule = TaskSchedule() if adapt else PlanSchedule(variants, missing)
+        with closing(self._results(queues)) as found:
+            for result in found:
+                self.observer.on_result(result)
+                if result.is_complete and not is_checked:
+                    self.checked.note_missing(results_frame([result.row]), self.observer)
+                    is_checked = True
+                if self.fail_fast and not result.is_complete:
+                    return False
+        return True
+
+    def _results(self, queues: Iterable[TaskQueue]) -> Generator[VariantResult]:
+        """Run the tasks of one queue after the other; yield and store their results."""
+        writer = ResultWriter(self.directory.storage)
         try:
-            if adapt is not None:
-                schedule = AdaptiveSchedule(adapt, plan, missing, directory, observer.on_note)
-            with closing(executor.run(checked.job, schedule)) as events:
-                for event in events:
-                    record = _record(event)
-                    keeper.add(record)
-                    schedule.on_end()
-                    observer.on_result(record)
-                    failed += not record.is_complete
-                    if record.is_complete and not is_checked:
-                        checked.note_missing([record.header], observer)
-                        is_checked = True
-                    if failed and fail_fast:
-                        break
-        except BaseException:
-            keeper.pause()
-            raise
-        keeper.finish()
-        if isinstance(schedule, AdaptiveSchedule) and not schedule:
-            write_plan(directory, schedule.plan)
-        summary = VariantSummary(checked)
-        directory.write_variants(summary.add)
-    summary.note_missing(observer)
-    return summary.counts
+            for queue in queues:
+                with closing(run_tasks(self.crew, self.checked.job, queue)) as steps:
+                    for ends in steps:
+                        for result in map(_result, ends):
+                            writer.add(result)
+                            yield result
+                        writer.flush()
+                writer.flush(now=True)  # the next queue may depend on it
+        finally:
+            writer.flush(now=True)
 
 
-class VariantSummary:
-    """What is to be said of the variants of a study, of which some rows come after the other."""
-
-    def __init__(self, checked: CheckedStudy) -> None:
-        """Start without variants."""
-        file = checked.specification.file
-        self.counts = Counts(0, 0, 0)
-        self._others = {*RESULT_COLUMNS, *checked.plan.design.columns, "simulated_s"}
-        named = [each for each in file.named_metrics() if each[0][0] != "tune"]
-        place = checked.specification.places.place
-        self._places = {name: place(location) for location, name in reversed(named)}
-        self._lacking = {name: 0 for _, name in named if name != "*"}
-        self._metrics: list[str] = []
-
-    def add(self, variants: "pa.Table") -> "pa.Table":
-        """Add some variants; return them."""
-        import pyarrow as pa
-
-        from fleet2d.artifacts.arrow import values_of
-
-        statuses = variants.column("status").to_pylist()
-        new, old = Counts.of(statuses), self.counts
-        self.counts = Counts(
-            old.total + new.total, old.complete + new.complete, old.failed + new.failed
-        )
-        complete = variants.filter(array_of((s == "complete" for s in statuses), pa.bool_()))
-        self._metrics = [name for name in complete.column_names if name not in self._others]
-        for pattern in self._lacking:
-            lacks = np.ones(len(complete), bool)
-            for name in self._metrics:
-                if is_kept(name, [pattern]):
-                    lacks &= values_of(complete[name].is_null())
-            self._lacking[pattern] += int(np.count_nonzero(lacks))
-        return variants
-
-    def note_missing(self, observer: Observer) -> None:
-        """Note which of the metrics that the study names are missing in complete variants."""
-        complete = self.counts.complete
-        for pattern, lacking in self._lacking.items():
-            if lacking:
-                hint = did_you_mean(pattern, self._metrics) if lacking == complete else ""
-                place = self._places[pattern]
-                observer.on_note(
-                    f"{place}{': ' * bool(place)}{lacking} of {complete} complete variants have no"
-                    f" metric {pattern}{hint}"
-                )
-
-
-def _record(event: Event) -> VariantRecord:
-    if isinstance(event, LostTask):
-        return record_of(event.task, VariantOutcome("failed", error=event.reason), event.attempts)
-    record: VariantRecord = event.payload
-    return VariantRecord({**record.header, "attempts": event.attempts}, record.body)
-
-
-class _ResultKeeper:
-    """Stores results: each in the journal at once, and many together in parts."""
-
-    def __init__(self, directory: StudyDirectory, parts: list[Part]) -> None:
-        self._directory, self._parts = directory, parts
-        self._journal: Journal | None = directory.open_journal(parts)
-        self._commit_time = time.monotonic()
-
-    def add(self, record: VariantRecord) -> None:
-        """Store the results of a variant."""
-        if self._journal is None:
-            self._journal = self._directory.open_journal(self._parts)
-        self._journal.append(record)
-        age_s = time.monotonic() - self._commit_time
-        is_due = self._directory.storage.folder is None and age_s > PART_S_REMOTE
-        if is_due or self._journal.size > PART_BYTES:
-            self._commit(self._journal)
-
-    def finish(self) -> None:
-        """Move all results into parts."""
-        if self._journal is not None and len(self._journal):
-            self._commit(self._journal)
-        elif self._journal is not None:
-            self._journal.close()
-            self._journal.path.unlink()
-
-    def pause(self) -> None:
-        """Close the journal; its results stay there until the study is continued."""
-        if self._journal is not None:
-            self._journal.close()
-
-    def _commit(self, journal: Journal) -> None:
-        self._parts.append(self._directory.commit(journal, self._parts))
-        self._journal, self._commit_time = None, time.monotonic()
+def _result(end: TaskEnd) -> VariantResult:
+    if end.loss is not None:
+        result = result_of(end.task, VariantOutcome("failed", error=end.loss))
+    else:
+        result = end.payload
+    return VariantResult({**result.row, "attempts": end.attempts}, result.tables)
 
 
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
@@ -444,19 +387,19 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
     file = checked.specification.file
     source = checked.specification.source
     directory.storage.delete(VARIANTS)  # it may belong to another plan
-    directory.storage.write(SCENARIOS, checked.scenarios.content())
+    checked.scenarios.write(directory)
     write_plan(directory, plan)
     meta = Meta(
-        checked.specification.name,
-        file.description,
-        code_version(),
-        checked.plan.design.columns,
-        file.populations,
-        file.keep.tables,
-        tuple(comparison.model_dump() for comparison in file.compare),
-        source.read_text(encoding="utf-8") if source else "",
-        checked.metrics,
-        file.tags,
-        file.notes,
+        name=checked.specification.name,
+        description=file.description,
+        code=code_version(),
+        columns=checked.plan.design.columns,
+        populations=file.populations,
+        tables=file.keep.tables,
+        compare=tuple(comparison.model_dump() for comparison in file.compare),
+        source=source.read_text(encoding="utf-8") if source else "",
+        metrics=dict(checked.metrics),
+        tags=file.tags,
+        notes=file.notes,
     )
     directory.write_meta(meta)

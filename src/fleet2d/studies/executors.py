@@ -1,4 +1,4 @@
-"""Executors: they run the tasks of a study in this process, in others, or on a cluster."""
+"""Tasks on executors of `concurrent.futures`: in this process, in others, or on a cluster."""
 
 import math
 import multiprocessing
@@ -7,22 +7,31 @@ import pickle
 import signal
 import sys
 import threading
+import time
 import traceback
-from abc import ABC, abstractmethod
-from collections import deque
-from collections.abc import Generator, Hashable, Iterable, Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
+from dataclasses import dataclass
+from functools import lru_cache
+from multiprocessing.connection import Connection
 from types import ModuleType
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
-from fleet2d.errors import InputError
+from fleet2d.errors import ComponentError, InputError
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
-TASKS_PER_WORKER = 2  # tasks of a worker: one runs, one waits, so that it is never idle
 MAX_ATTEMPTS = 3  # of a task whose worker dies each time
-MAX_STARTS = 3  # of a worker that ends before it is ready
+MAX_BATCH = 100  # tasks that a worker gets at once
+BATCH_S = 1.0  # after which a worker returns the results of its tasks so far
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
 
 
@@ -46,330 +55,290 @@ class WorkerTask:
 class WorkerJob(Protocol):
     """A function that workers receive once and call for each task; it can be pickled."""
 
-    def __call__(self, task: WorkerTask) -> Any:
+    def __call__(self, task: Any, /) -> Any:
         """Do a task; return its results, which can be pickled."""
         ...
 
 
-class TaskSchedule:
-    """Tasks in groups that share a home; a worker stays with a group until it is empty.
-
-    A worker without a group gets the largest that no other worker has, else the last task of the
-    largest group, so that all workers are busy to the end.
+class TaskQueue:
+    """Tasks that wait, in groups that share a home, so that a worker builds it once.
 
     Example:
-        >>> tasks = [WorkerTask(i, i, "", home) for i, home in enumerate("aabbb")]
-        >>> schedule = TaskSchedule(tasks)
-        >>> [schedule.take("first").number, schedule.take("second").number]
-        [2, 0]
+        >>> queue = TaskQueue(WorkerTask(i, i, "", home) for i, home in enumerate("abab"))
+        >>> [task.number for task in queue.take(2)]
+        [0, 2]
     """
 
     def __init__(self, tasks: Iterable[WorkerTask] = ()) -> None:
         """Group tasks by home."""
-        self._groups: dict[str, deque[WorkerTask]] = {}
-        self._owners: dict[Hashable, str] = {}
+        groups: dict[str, deque[WorkerTask]] = {}
         for task in tasks:
-            self.add(task)
-
-    def add(self, task: WorkerTask) -> None:
-        """Add a task to the group of its home."""
-        self._groups.setdefault(task.home, deque()).append(task)
-
-    def on_end(self) -> None:
-        """Note that a task has ended, with results or without."""
-
-    def __len__(self) -> int:
-        """Return the number of tasks that no worker has."""
-        return sum(map(len, self._groups.values()))
+            groups.setdefault(task.home, deque()).append(task)
+        self._groups = deque(groups.values())
 
     def __bool__(self) -> bool:
-        """Return whether there are more tasks."""
+        """Return whether tasks wait."""
         return bool(self._groups)
 
-    def take(self, worker: Hashable) -> WorkerTask | None:
-        """Return the next task for a worker; None if there are no more."""
-        if not self._groups:
-            return None
-        home = self._owners.get(worker)
-        if home in self._groups:
-            return self._pop(home, first=True)
-        owned = set(self._owners.values())
-        free = [home for home in self._groups if home not in owned]
-        largest = max(free or self._groups, key=lambda home: len(self._groups[home]))
-        self._owners[worker] = largest
-        return self._pop(largest, first=bool(free))
-
-    def put_back(self, task: WorkerTask) -> None:
-        """Return a task to the front of the group of its home."""
-        group = self._groups.pop(task.home, deque())
-        group.appendleft(task)
-        self._groups = {task.home: group, **self._groups}
-
-    def leave(self, worker: Hashable) -> None:
-        """Free the group of a worker that has ended."""
-        self._owners.pop(worker, None)
-
-    def _pop(self, home: str, *, first: bool) -> WorkerTask:
-        group = self._groups[home]
-        task = group.popleft() if first else group.pop()
+    def take(self, workers: int) -> list[WorkerTask]:
+        """Remove some tasks of one home: at most a worker's share of all that wait."""
+        share = math.ceil(sum(map(len, self._groups)) / workers)
+        group = self._groups[0]
+        taken = [group.popleft() for _ in range(min(share, len(group), MAX_BATCH))]
         if not group:
-            del self._groups[home]
-        return task
+            self._groups.popleft()
+        return taken
+
+    def put_back(self, tasks: Iterable[WorkerTask]) -> None:
+        """Return tasks of one home: they are next."""
+        if group := deque(tasks):
+            self._groups.appendleft(group)
 
 
-class FinishedTask(NamedTuple):
-    """A finished task with its results."""
-
-    task: WorkerTask
-    payload: Any
-    attempts: int
-
-
-class LostTask(NamedTuple):
-    """A task without results, as its worker died in each attempt; with the reason."""
-
-    task: WorkerTask
-    reason: str
-    attempts: int
-
-
-Event = FinishedTask | LostTask
-
-
-class Executor(Protocol):
-    """Runs tasks somewhere."""
-
-    @property
-    def workers(self) -> int:
-        """How many tasks run at a time."""
-        ...
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        """Yield an event for each task as it ends; closing the iterator ends all work."""
-        ...
-
-
-class SerialExecutor:
-    """Runs tasks in this process, one after the other: for debuggers and profilers."""
-
-    workers = 1
-
-    def run(self, job: WorkerJob, tasks: TaskSchedule) -> Generator[Event]:
-        """Yield an event for each task."""
-        while (task := tasks.take(self)) is not None:
-            yield FinishedTask(task, job(task), 1)
-
-
-class Ready:
-    """The message of a worker that is set up."""
-
-
-class Broken(NamedTuple):
-    """The message of a worker that can't be set up, with the traceback."""
-
-    trace: str
-
-
-class Done(NamedTuple):
-    """The message of a worker that has done its first task, with its memory [MB]."""
-
-    payload: Any
-    rss_mb: float = 0.0
-
-
-class Died(NamedTuple):
-    """What the driver notes about a worker that has ended, with the reason."""
-
-    reason: str
-
-
-@dataclass(eq=False)
-class Worker:
-    """A worker, as the driver knows it.
+class TaskEnd(NamedTuple):
+    """A task that has ended.
 
     Attributes:
-        tasks: Its tasks; it is running the first.
-        is_ready: Whether it is set up. Until then it gets no tasks.
-        is_full: Whether it uses so much memory that it must be replaced.
+        task: The task.
+        attempts: How often it was run.
+        payload: Its results; None if it is lost.
+        loss: Why it has none: its worker died in each attempt. None if it has results.
     """
 
-    tasks: deque[WorkerTask] = field(default_factory=deque, init=False)
-    is_ready: bool = field(default=False, init=False)
-    is_full: bool = field(default=False, init=False)
+    task: Any
+    attempts: int
+    payload: Any = None
+    loss: str | None = None
 
 
-AnyWorker = TypeVar("AnyWorker", bound=Worker)
-
-
-class CrewExecutor(ABC, Generic[AnyWorker]):
-    """Base class of executors with several workers, each of which runs many tasks and may die.
+@dataclass(frozen=True)
+class Crew:
+    """An executor, and how it is used.
 
     Attributes:
-        memory_mb: Memory beyond which a worker is replaced between two tasks [MB].
+        executor: The executor.
+        workers: How many calls it gets at a time.
+        batch_s: After how long a call returns the results so far; the rest is called again.
     """
 
-    memory_mb = math.inf
-
-    def __init__(self) -> None:
-        """Create the executor; workers start with `run`."""
-        self._crew: list[AnyWorker] = []
-        self._failed_starts = 0
-        self._attempts: dict[int, int] = {}  # that failed, by the number of the task
-
-    @property
-    @abstractmethod
-    def workers(self) -> int:
-        """The largest number of workers at present."""
-
-    @abstractmethod
-    def _start(self, job: Any) -> AnyWorker:
-        """Start a worker."""
-
-    @abstractmethod
-    def _send(self, worker: AnyWorker, task: WorkerTask) -> None:
-        """Send a task to a worker. Errors are ignored: `_messages` reports a dead worker."""
-
-    @abstractmethod
-    def _messages(self) -> Iterator[tuple[AnyWorker, Ready | Broken | Done | Died]]:
-        """Wait for messages from workers, at most one from each."""
-
-    @abstractmethod
-    def _end(self, workers: list[AnyWorker]) -> None:
-        """End workers at once; none of their tasks is needed."""
-
-    def run(self, job: Any, tasks: TaskSchedule) -> Generator[Event]:
-        """Yield an event for each task as it ends; closing the iterator ends all work.
-
-        Raises:
-            InputError: Workers can't be set up.
-        """
-        self._attempts = {}
-        try:
-            while tasks or any(worker.tasks for worker in self._crew):
-                self._fill(job, tasks)
-                for worker, message in self._messages():
-                    event = self._handle(worker, message, tasks)
-                    if event is not None:
-                        yield event
-        finally:
-            self._end(self._crew)
-            self._crew = []
-
-    def _fill(self, job: Any, tasks: TaskSchedule) -> None:
-        """Hand tasks to workers that are ready, and start workers for the others."""
-        full = [worker for worker in self._crew if worker.is_full and not worker.tasks]
-        self._end(full)
-        for worker in full:
-            self._crew.remove(worker)
-            tasks.leave(worker)
-        for worker in self._crew:
-            while worker.is_ready and not worker.is_full and len(worker.tasks) < TASKS_PER_WORKER:
-                task = tasks.take(worker)
-                if task is None:
-                    break
-                worker.tasks.append(task)
-                self._send(worker, task)
-        if (most := self.workers - len(self._crew)) > 0:
-            starting = sum(not worker.is_ready for worker in self._crew)
-            self._crew += [self._start(job) for _ in range(min(most, len(tasks) - starting))]
-
-    def _handle(
-        self, worker: AnyWorker, message: Ready | Broken | Done | Died, tasks: TaskSchedule
-    ) -> Event | None:
-        """Process the message of a worker; return the event of a task that has ended."""
-        match message:
-            case Ready():
-                worker.is_ready = True
-                self._failed_starts = 0
-            case Broken(trace):
-                raise InputError(f"a worker can't be set up:\n{trace}")
-            case Done(payload, rss_mb):
-                task = worker.tasks.popleft()
-                worker.is_full = rss_mb > self.memory_mb
-                return FinishedTask(task, payload, self._attempts.get(task.number, 0) + 1)
-            case Died(reason):
-                return self._replace(worker, reason, tasks)
-        return None
-
-    def _replace(self, worker: AnyWorker, reason: str, tasks: TaskSchedule) -> LostTask | None:
-        """Drop a dead worker; return the task that it ran if that was the last attempt."""
-        self._crew.remove(worker)
-        tasks.leave(worker)
-        if not worker.is_ready:
-            self._failed_starts += 1
-            if self._failed_starts >= MAX_STARTS * self.workers:
-                raise InputError(f"workers end before they are ready: {reason}; see their output")
-        while len(worker.tasks) > 1:
-            tasks.put_back(worker.tasks.pop())
-        for task in worker.tasks:
-            self._attempts[task.number] = self._attempts.get(task.number, 0) + 1
-            if self._attempts[task.number] == MAX_ATTEMPTS:
-                text = f"{reason} in each of {MAX_ATTEMPTS} attempts"
-                return LostTask(task, text, MAX_ATTEMPTS)
-            tasks.put_back(task)
-        return None
+    executor: Executor
+    workers: int = 1
+    batch_s: float = BATCH_S
 
 
-@dataclass(eq=False)
-class LocalWorker(Worker):
-    """A worker process and the driver's end of the pipe to it."""
+def run_tasks(crew: Crew, job: WorkerJob, queue: TaskQueue) -> Generator[list[TaskEnd]]:
+    """Yield tasks that have ended, some at a time, or none after a while.
 
-    process: multiprocessing.process.BaseProcess
-    connection: "Connection[Any, Any]"
+    Tasks of a call that failed, as a worker died, are called again, each alone. Closing the
+    iterator cancels what has not begun.
+
+    Raises:
+        InputError: Workers can't be set up.
+        ComponentError: The executor is broken.
+    """
+    content = pickle.dumps(job)
+    attempts = Counter[int]()
+    running: dict[Future[list[Any]], list[WorkerTask]] = {}
+    try:
+        while queue or running:
+            while queue and len(running) < crew.workers:
+                batch = queue.take(crew.workers)
+                attempts.update(task.number for task in batch)
+                running[_submitted(crew, content, batch)] = batch
+            ended, _ = wait(running, BATCH_S, FIRST_COMPLETED)
+            yield [
+                end
+                for future in ended
+                for end in _ends(future, running.pop(future), attempts, queue)
+            ]
+    finally:
+        for future in running:
+            future.cancel()
 
 
-class LocalExecutor(CrewExecutor[LocalWorker]):
-    """Runs tasks in worker processes on this machine.
+def _submitted(crew: Crew, content: bytes, batch: list[WorkerTask]) -> "Future[list[Any]]":
+    try:
+        return crew.executor.submit(run_batch, content, batch, crew.batch_s)
+    except BrokenExecutor as error:
+        raise ComponentError(
+            f"the executor is broken: {error}; with a new one the same study goes on"
+        ) from error
 
-    Each has a pipe of its own. A `concurrent.futures.ProcessPoolExecutor` would share one among
-    all, and wait for ever for a worker that was killed while it sent its results.
+
+def _ends(
+    future: "Future[list[Any]]", batch: list[WorkerTask], attempts: Counter[int], queue: TaskQueue
+) -> Iterator[TaskEnd]:
+    """Yield the tasks of a call that have ended; the others go back to the queue."""
+    error = future.exception()
+    if error is None:
+        payloads = future.result()
+        rest = batch[len(payloads) :]
+        attempts.subtract(task.number for task in rest)
+        queue.put_back(rest)
+        for task, payload in zip(batch, payloads, strict=False):
+            yield TaskEnd(task, attempts[task.number], payload)
+        return
+    if not isinstance(error, Exception) or isinstance(error, InputError):
+        raise error
+    last_line = (str(error).strip().splitlines() or [type(error).__name__])[-1]
+    for task in reversed(batch):
+        if attempts[task.number] < MAX_ATTEMPTS:
+            queue.put_back([task])
+        else:
+            loss = f"{last_line} in each of {MAX_ATTEMPTS} attempts"
+            yield TaskEnd(task, MAX_ATTEMPTS, loss=loss)
+
+
+def run_batch(content: bytes, tasks: Sequence[WorkerTask], seconds: float) -> list[Any]:
+    """Do some tasks in a worker; return the results of those done after some seconds, one at least.
+
+    Args:
+        content: The job, pickled.
+        tasks: The tasks.
+        seconds: After how long none is begun.
+
+    Raises:
+        InputError: The job can't be loaded.
+    """
+    job = _loaded(content)
+    end_s = time.monotonic() + seconds
+    results = []
+    for task in tasks:
+        results.append(job(task))
+        if time.monotonic() >= end_s:
+            break
+    return results
+
+
+@lru_cache(maxsize=1)
+def _loaded(content: bytes) -> WorkerJob:
+    """Return a job, which a worker loads once.
+
+    Raises:
+        InputError: It can't be loaded.
+    """
+    try:
+        with rare_collections():  # of the modules that the job needs
+            job: WorkerJob = pickle.loads(content)  # noqa: S301 - from our own driver
+    except Exception as error:
+        raise InputError(f"a worker can't be set up:\n{traceback.format_exc()}") from error
+    return job
+
+
+class SerialExecutor(Executor):
+    """Calls functions in this process, one after the other: for debuggers and profilers."""
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        """Call a function; return its result in a future. Errors go through."""
+        future: Future[Any] = Future()
+        future.set_result(function(*args, **kwargs))
+        return future
+
+
+class LocalExecutor(ThreadPoolExecutor):
+    """Calls functions in worker processes on this machine, for each of which a thread waits.
+
+    Each process has a pipe of its own. A `ProcessPoolExecutor` would share one among all, and wait
+    for ever for a worker that was killed while it sent its results.
 
     Args:
         workers: The number of processes.
-        memory_mb: Memory beyond which a process is replaced between two tasks [MB]; None: an equal
+        memory_mb: Memory beyond which a process is replaced between two calls [MB]; None: an equal
             share of 80 % of the machine's memory.
     """
 
-    workers = 0
-
     def __init__(self, workers: int, memory_mb: float | None = None) -> None:
-        """Create the executor; workers start with `run`."""
-        super().__init__()
-        self.workers = workers
-        self.memory_mb = memory_mb or MEMORY_SHARE * _memory_mb() / workers
+        """Create the executor; processes start with the first calls."""
+        super().__init__(workers, "fleet2d-worker")
+        self._memory_mb = memory_mb or MEMORY_SHARE * _memory_mb() / workers
+        self._lock = threading.Lock()
+        self._is_open = True
+        self._processes: list[_WorkerProcess] = []
+        self._idle: list[_WorkerProcess] = []
 
-    def _start(self, job: WorkerJob) -> LocalWorker:
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        """Call a function in a worker process; an error of the future says that it died."""
+        return super().submit(self._call, function, *args, **kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End all processes at once."""
+        with self._lock:
+            self._is_open = False
+            for process in self._processes:
+                process.kill()
+        super().shutdown(wait, cancel_futures=True)
+
+    def _call(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        with self._lock:
+            if not self._is_open:
+                raise RuntimeError("the executor is closed")
+            process = self._idle.pop() if self._idle else self._start()
+        try:
+            is_result, content, memory_mb = process.call(function, args, kwargs)
+        except (EOFError, OSError):
+            self._end(process)
+            raise RuntimeError(f"the worker process ended ({process.cause})") from None
+        if memory_mb > self._memory_mb:
+            self._end(process)
+        else:
+            self._idle.append(process)
+        if is_result:
+            return content
+        raise content
+
+    def _start(self) -> "_WorkerProcess":
+        process = _WorkerProcess()
+        self._processes.append(process)
+        return process
+
+    def _end(self, process: "_WorkerProcess") -> None:
+        process.kill()
+        with self._lock, suppress(ValueError):  # closed meanwhile
+            self._processes.remove(process)
+
+
+class _WorkerProcess:
+    """A worker process, and the driver's end of the pipe to it."""
+
+    def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
-        connection, other_end = context.Pipe()
-        process = context.Process(target=_work, args=(pickle.dumps(job), other_end))
+        self._connection, other_end = context.Pipe()
+        self._process = context.Process(target=_work, args=(other_end,))
         with _worker_environment():
-            process.start()
+            self._process.start()
         other_end.close()  # the end of the process ends the pipe
-        return LocalWorker(process, connection)
+        self._is_ready = False
 
-    def _send(self, worker: LocalWorker, task: WorkerTask) -> None:
-        with suppress(OSError):
-            worker.connection.send(task)
+    @property
+    def cause(self) -> str:
+        """Why a process that was killed had ended before."""
+        code = self._process.exitcode
+        return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
 
-    def _messages(self) -> Iterator[tuple[LocalWorker, Ready | Broken | Done | Died]]:
-        worker_of = {worker.connection: worker for worker in self._crew}
-        for connection in wait(list(worker_of)):
-            worker = worker_of[connection]  # type: ignore[index]
-            try:
-                message = worker.connection.recv()
-            except (EOFError, OSError):
-                self._end([worker])
-                code = worker.process.exitcode
-                cause = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-                message = Died(f"the worker process ended ({cause})")
-            yield worker, message
+    def call(self, function: Callable[..., Any], args: Any, kwargs: Any) -> tuple[bool, Any, float]:
+        """Call a function: whether it returned, what it returned or raised, and the memory [MB].
 
-    def _end(self, workers: list[LocalWorker]) -> None:
-        for worker in workers:
-            worker.process.kill()
-        for worker in workers:
-            worker.process.join()
-            worker.connection.close()
+        Raises:
+            EOFError: The process has ended.
+            InputError: It ended before it was ready.
+        """
+        try:
+            if not self._is_ready:
+                self._connection.recv()
+                self._is_ready = True
+        except EOFError:
+            self.kill()
+            raise InputError(
+                f"workers end before they are ready ({self.cause}): see their output"
+            ) from None
+        self._connection.send((function, args, kwargs))
+        answer: tuple[bool, Any, float] = self._connection.recv()
+        return answer
+
+    def kill(self) -> None:
+        """End the process at once."""
+        self._process.kill()
+        self._process.join()
 
 
 @contextmanager
@@ -396,22 +365,28 @@ def _worker_environment() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-def _work(job: bytes, connection: "Connection[Any, Any]") -> None:
-    """Run the tasks that arrive: the main function of a worker process."""
+def _work(connection: "Connection[Any, Any]") -> None:
+    """Do the calls that arrive: the main function of a worker process."""
     os.dup2(2, 1)  # what components print must not mix with the output of the command
     threading.Thread(target=_end_with_driver, daemon=True).start()
     with suppress(EOFError, OSError):  # the driver has ended
-        try:
-            with rare_collections():  # of the modules that the job needs
-                function: WorkerJob = pickle.loads(job)  # noqa: S301 - from our own driver
-        except BaseException:  # noqa: BLE001 - imports may raise anything
-            connection.send(Broken(traceback.format_exc()))
-            return
-        connection.send(Ready())
+        connection.send("ready")
         while True:
-            task = connection.recv()
-            payload = function(task)
-            connection.send(Done(payload, peak_memory_mb() or 0.0))
+            function, args, kwargs = connection.recv()
+            try:
+                answer = (True, function(*args, **kwargs))
+            except Exception as error:  # noqa: BLE001 - raised again in the driver
+                answer = (False, portable(error))
+            connection.send((*answer, peak_memory_mb() or 0.0))
+
+
+def portable(error: Exception) -> Exception:
+    """Return an error if it can be pickled, else one with its class and text."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
+    except Exception:  # noqa: BLE001 - errors of users may do anything
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
 
 
 def _end_with_driver() -> None:

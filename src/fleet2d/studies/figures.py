@@ -10,7 +10,7 @@ from fleet2d.errors import extra
 from fleet2d.kernels import F64
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.studies.intervals import estimate
-from fleet2d.studies.records import VARIANT
+from fleet2d.studies.results import VARIANT
 
 if TYPE_CHECKING:
     import polars as pl

@@ -1,11 +1,11 @@
 """The plan of a study: its variants, checked and stored."""
 
+import itertools
 import json
 import re
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError, ScenarioError
-from fleet2d.kernels import F64, I32, Bool
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Label
 from fleet2d.studies.design import (
@@ -28,14 +27,20 @@ from fleet2d.studies.design import (
     scenario_content,
     scenario_hashes,
 )
-from fleet2d.studies.directory import PLAN, MetricFacts, StudyDirectory
-from fleet2d.studies.executors import Executor, LostTask, SerialExecutor, TaskSchedule, WorkerTask
-from fleet2d.studies.records import VARIANT, array_of, numbers_of
+from fleet2d.studies.directory import PLAN, PLAN_ONLY, SCENARIOS, MetricFacts, StudyDirectory
+from fleet2d.studies.executors import (
+    Crew,
+    SerialExecutor,
+    TaskQueue,
+    WorkerTask,
+    run_tasks,
+)
+from fleet2d.studies.results import VARIANT
 from fleet2d.studies.simulator import check_setup, is_kept
 from fleet2d.studies.specification import SEED, Specification
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    import polars as pl
 
 
 MAX_PROBLEMS = 10  # in one report
@@ -43,123 +48,25 @@ LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of
 FEW_SETUPS = 8  # up to here starting workers costs more than it saves
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedVariant:
-    """A variant before it is run.
-
-    Attributes:
-        number: Its number in results; it stays when the study is extended.
-        index: Its index in the design.
-        identity: The hash of everything that its results depend on.
-        scenario: The hash of its scenario alone.
-        template: The hash of its scenario without the seed.
-        home_key: The same for variants that can share a home.
-        simulated_s: The simulated time of its run [s].
-    """
-
-    number: int
-    index: int
-    identity: str
-    scenario: str
-    template: str
-    home_key: str
-    simulated_s: float
-
-
-HASH = np.dtype("S16")
-"""A hash of 32 hexadecimal digits, packed."""
-Hashes = NDArray[np.bytes_]
-
-
-def packed(hashes: Iterable[str]) -> Hashes:
-    """Return hashes of 32 hexadecimal digits as HASH, (n,).
-
-    >>> unpacked(packed(["00" * 15 + "ab"])[0])
-    '000000000000000000000000000000ab'
-    """
-    return np.array([bytes.fromhex(text) for text in hashes], HASH)
-
-
-def unpacked(value: bytes) -> str:
-    """Return the hexadecimal digits of a packed hash; numpy cuts zeros off its end."""
-    return value.ljust(HASH.itemsize, b"\0").hex()
-
-
-@dataclass(frozen=True)
-class PlannedVariants:
-    """The variants of a plan as columns, 40 bytes each: as objects, ten million would take 5 GB.
-
-    Attributes:
-        seeds: How many variants of the design a combination has.
-        index: Their indices in the design, ascending: int32 (n,).
-        number: Their numbers in results: int32 (n,).
-        identity: Their identities: HASH (n,).
-        scenario: The hashes of their scenarios: HASH (n,).
-        template: The hashes of the scenarios of combinations without seeds: HASH (m,).
-        simulated_s: The simulated times of combinations [s]: float64 (m,).
-        home: For each combination, its home, an index of `home_keys`: int32 (m,).
-        home_keys: The keys of homes.
-    """
-
-    seeds: int
-    index: I32
-    number: I32
-    identity: Hashes
-    scenario: Hashes
-    template: Hashes
-    simulated_s: F64
-    home: I32
-    home_keys: tuple[str, ...]
-
-    def __len__(self) -> int:
-        """Return the number of variants."""
-        return len(self.index)
-
-    def __iter__(self) -> Iterator[PlannedVariant]:
-        """Yield them in their order."""
-        return map(self.__getitem__, range(len(self)))
-
-    def __getitem__(self, place: int) -> PlannedVariant:
-        """Return the variant at a place."""
-        combination = int(self.index[place]) // self.seeds
-        return PlannedVariant(
-            int(self.number[place]),
-            int(self.index[place]),
-            unpacked(self.identity[place]),
-            unpacked(self.scenario[place]),
-            unpacked(self.template[combination]),
-            self.home_keys[self.home[combination]],
-            float(self.simulated_s[combination]),
-        )
-
-    def task(self, place: int) -> WorkerTask:
-        """Return the task to run the variant at a place."""
-        index = int(self.index[place])
-        home = self.home_keys[self.home[index // self.seeds]]
-        return WorkerTask(int(self.number[place]), index, unpacked(self.identity[place]), home)
-
-    @property
-    def total_simulated_s(self) -> float:
-        """The simulated time of all variants [s]."""
-        per_combination = np.bincount(self.index // self.seeds, minlength=len(self.simulated_s))
-        return float((per_combination * self.simulated_s).sum())
-
-    def take(self, places: NDArray[np.integer[Any]]) -> "PlannedVariants":
-        """Return some of them, by their places."""
-        columns = ("index", "number", "identity", "scenario")
-        return replace(self, **{name: getattr(self, name)[places] for name in columns})
-
-
 class StudyPlan(NamedTuple):
     """A design and its variants, all checked.
 
     Attributes:
         design: The design.
-        variants: The variants, in the order of the design.
+        variants: A row for each variant, in the order of the design: `variant`, its number in
+            results, which stays when the study is extended; `index` in the design; `identity`, the
+            hash of everything that its results depend on; `scenario`, that of its scenario alone;
+            `template`, that of its scenario without the seed; `home_key`, the same for variants
+            that can share a home; `simulated_s` [s].
     """
 
     design: Design
-    variants: PlannedVariants
+    variants: "pl.DataFrame"
+
+    def tasks(self, variants: "pl.DataFrame") -> list[WorkerTask]:
+        """Return the tasks to run some of its variants."""
+        columns = variants.select(VARIANT, "index", "identity", "home_key")
+        return list(itertools.starmap(WorkerTask, columns.iter_rows()))
 
 
 class KnownNames:
@@ -189,12 +96,12 @@ class KnownNames:
             if name not in self.facts:
                 description = (kind.__doc__ or "").strip().partition("\n")[0]
                 self.facts[name] = MetricFacts(
-                    description,
-                    kind.unit,
-                    kind.units,
-                    {name: float(number) for name, number in kind.least.items()},
-                    {name: float(number) for name, number in kind.largest.items()},
-                    kind.better,
+                    description=description,
+                    unit=kind.unit,
+                    units=dict(kind.units),
+                    least=dict(kind.least),
+                    largest=dict(kind.largest),
+                    better=dict(kind.better),
                 )
 
     def check(self, specification: Specification) -> None:
@@ -249,18 +156,13 @@ def make_plan(
     Raises:
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
-    count = len(design.combinations)
-    seeds = len(design.seeds)
-    identities, scenarios = np.zeros((2, count, seeds), HASH)
-    templates = np.zeros(count, HASH)
-    simulated_s = np.zeros(count)
-    homes = np.zeros(count, np.int32)
-    home_keys = dict[str, int]()
+    import polars as pl
+
+    frames: list[pl.DataFrame] = []  # of combinations: as text, hashes take twice the memory
     problems: list[str] = []
     first_of = dict[tuple[str, str], int]()
     repeated = _repeated(design.seeds)  # two variants with the same scenario
-    for number in range(count):
-        first = number * seeds
+    for first in range(0, len(design), len(design.seeds)):
         try:
             scenario = design.scenario(first)
             content = scenario_content(scenario)
@@ -272,15 +174,21 @@ def make_plan(
             continue
         simulation = content["simulation"]
         template = content_hash({**content, "simulation": {**simulation, "seed": None}})
-        repeated = repeated or (first_of.setdefault((template, inputs), first), first)
-        repeated = None if repeated[0] == repeated[1] else repeated
+        same = first_of.setdefault((template, inputs), first)
+        if same != first and repeated is None:
+            repeated = same, first
         hashes = list(scenario_hashes(content, design.seeds))
-        scenarios[number] = packed(hashes)
-        identities[number] = packed(identity(each, inputs) for each in hashes)
-        templates[number] = bytes.fromhex(template)
-        homes[number] = home_keys.setdefault(home_key(content), len(home_keys))
         step, duration = (parse_duration(simulation[key]) for key in ("step", "duration"))
-        simulated_s[number] = (duration // step * step).total_seconds()
+        frame = pl.DataFrame(
+            {"scenario": hashes, "identity": [identity(each, inputs) for each in hashes]}
+        )
+        frames.append(
+            frame.with_columns(
+                template=pl.lit(template),
+                home_key=pl.lit(home_key(content)),
+                simulated_s=pl.lit((duration // step * step).total_seconds()),
+            )
+        )
         on_scenario(template, scenario)
     _raise_problems(problems)
     if repeated is not None:
@@ -289,9 +197,9 @@ def make_plan(
             f"{one} and {other} are the same scenario: an axis sets what another axis or a rule"
             " overrides, or has a value twice"
         )
-    places = np.arange(count * seeds, dtype=np.int32)
-    columns = identities.reshape(-1), scenarios.reshape(-1), templates, simulated_s, homes
-    return StudyPlan(design, PlannedVariants(seeds, places, places, *columns, tuple(home_keys)))
+    numbers = pl.int_range(pl.len(), dtype=pl.Int32)
+    variants = pl.concat(frames).with_columns(numbers.alias(VARIANT), numbers.alias("index"))
+    return StudyPlan(design, variants)
 
 
 def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
@@ -301,59 +209,18 @@ def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
     return next((pair for pair in pairs if pair[0] != pair[1]), None)
 
 
-class PlannedTasks(deque[WorkerTask]):
-    """Tasks of variants that share a home; of those that nobody had yet only places are there."""
-
-    def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
-        """Take the places of variants, in their order."""
-        super().__init__()
-        self._variants, self._places = variants, places
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return super().__len__() + len(self._places)
-
-    def popleft(self) -> WorkerTask:
-        """Remove the first task, one that was put back if there is one, and return it."""
-        if super().__len__():
-            return super().popleft()
-        place = self._places[0]
-        self._places = self._places[1:]
-        return self._variants.task(place)
-
-    def pop(self) -> WorkerTask:  # type: ignore[override]
-        """Remove the last task and return it."""
-        if not len(self._places):
-            return super().pop()
-        place = self._places[-1]
-        self._places = self._places[:-1]
-        return self._variants.task(place)
-
-
-class PlanSchedule(TaskSchedule):
-    """The tasks of some variants of a plan, grouped by home."""
-
-    def __init__(self, variants: PlannedVariants, places: NDArray[np.integer[Any]]) -> None:
-        """Group variants, by their places, by home."""
-        super().__init__()
-        homes = variants.home[variants.index[places] // variants.seeds]
-        _, first = np.unique(homes, return_index=True)
-        for home in homes[np.sort(first)].tolist():
-            tasks = PlannedTasks(variants, places[homes == home].astype(np.int32))
-            self._groups[variants.home_keys[home]] = tasks
-
-
 def setups_to_check(plan: StudyPlan) -> list[int]:
     """Return the places of variants in which each home meets each choice of every other axis.
 
     Their set-up shows people and robots that have no room where they start, without setting up
     every variant.
     """
-    by_home = np.argsort(plan.variants.home, kind="stable")
-    homes = np.split(by_home, np.flatnonzero(np.diff(plan.variants.home[by_home])) + 1)
-    chosen = [number for home in homes for number in _covering(plan.design, home)]
     seeds = len(plan.design.seeds)
-    return [number * seeds for number in chosen]
+    homes: dict[str, list[int]] = {}
+    for number, home in enumerate(plan.variants["home_key"].gather_every(seeds)):
+        homes.setdefault(home, []).append(number)
+    chosen = (_covering(plan.design, np.array(numbers)) for numbers in homes.values())
+    return [number * seeds for number in itertools.chain.from_iterable(chosen)]
 
 
 def _covering(design: Design, numbers: NDArray[np.integer[Any]]) -> Iterator[int]:
@@ -387,7 +254,7 @@ def setup_problem(design: Design, task: WorkerTask) -> str:
 
 
 def check_setups(
-    plan: StudyPlan, executor: Executor, on_progress: Callable[[int, int], None] = lambda *_: None
+    plan: StudyPlan, crew: Crew, on_progress: Callable[[int, int], None] = lambda *_: None
 ) -> None:
     """Set up the variants that `setups_to_check` returns: homes with people and robots in them.
 
@@ -395,18 +262,21 @@ def check_setups(
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
     problems: dict[int, str] = {}
-    tasks = list(map(plan.variants.task, setups_to_check(plan)))
-    runner = executor if len(tasks) > FEW_SETUPS else SerialExecutor()
+    tasks = plan.tasks(plan.variants[setups_to_check(plan)])
+    if len(tasks) <= FEW_SETUPS:
+        crew = Crew(SerialExecutor())
     job = partial(setup_problem, plan.design)
-    with closing(runner.run(job, TaskSchedule(tasks))) as events:
-        for done, event in enumerate(events):
-            on_progress(done + 1, len(tasks))
-            text = event.reason if isinstance(event, LostTask) else event.payload
-            if text:
-                problems[event.task.index] = f"{plan.design.describe(event.task.index)}: {text}"
-            if len(problems) == MAX_PROBLEMS:
+    done = 0
+    with closing(run_tasks(crew, job, TaskQueue(tasks))) as rounds:
+        for ends in rounds:
+            done += len(ends)
+            on_progress(done, len(tasks))
+            for end in ends:
+                if text := end.loss or end.payload:
+                    problems[end.task.index] = f"{plan.design.describe(end.task.index)}: {text}"
+            if len(problems) >= MAX_PROBLEMS:
                 break
-    _raise_problems([problems[index] for index in sorted(problems)])
+    _raise_problems([problems[index] for index in sorted(problems)[:MAX_PROBLEMS]])
 
 
 def _raise_problems(problems: list[str]) -> None:
@@ -425,49 +295,32 @@ def _raise_problems(problems: list[str]) -> None:
 
 
 Changed = Literal["redo", "keep"]
-PLAN_BATCH = 5_000  # rows of the plan that are in memory as text
-BATCH = 1000
-FIND_BATCH = 1 << 20  # hashes that are looked up together: bounds the memory
 
 
 class ScenarioFile:
-    """Collects the scenarios of combinations as a compressed Parquet file in memory."""
+    """Collects the scenarios of combinations as compressed text."""
 
     def __init__(self) -> None:
-        """Create an empty file."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        self._schema = pa.schema([("template", pa.string()), ("scenario", pa.string())])
-        self._sink = pa.BufferOutputStream()
-        self._writer = pq.ParquetWriter(self._sink, self._schema, compression="zstd")
-        self._rows: list[tuple[str, str]] = []
+        """Start without scenarios."""
+        self._rows: list[tuple[str, bytes]] = []
 
     def add(self, template: str, scenario: Scenario) -> None:
         """Add the scenario of a combination, with any of its seeds."""
-        self._rows.append((template, json.dumps(scenario.resolved())))
-        if len(self._rows) == BATCH:
-            self._flush()
+        self._rows.append((template, zlib.compress(json.dumps(scenario.resolved()).encode(), 1)))
 
-    def content(self) -> bytes:
-        """Close the file and return its bytes."""
-        self._flush()
-        self._writer.close()
-        return bytes(self._sink.getvalue())
+    def write(self, directory: StudyDirectory) -> None:
+        """Write them."""
+        import polars as pl
 
-    def _flush(self) -> None:
-        import pyarrow as pa
-
-        if self._rows:
-            columns = [array_of(each, pa.string()) for each in zip(*self._rows, strict=True)]
-            self._writer.write_table(pa.table(columns, schema=self._schema))
-        self._rows = []
+        rows = [(template, zlib.decompress(text).decode()) for template, text in self._rows]
+        frame = pl.DataFrame(rows, ["template", "scenario"], orient="row")
+        directory.storage.write_table(SCENARIOS, frame.to_arrow())
 
 
 def reconcile(
     plan: StudyPlan,
     directory: StudyDirectory,
-    finished: Bool,
+    finished: "pl.Series",
     changed: Changed | None,
     on_note: Callable[[str], None],
     *,
@@ -478,7 +331,7 @@ def reconcile(
     Args:
         plan: The current plan.
         directory: The study.
-        finished: Whether there are results, by the number of the variant: bool (n,).
+        finished: The numbers of variants that have results.
         changed: What to do with results of other code, inputs or scenarios.
         on_note: Receives a remark about results that are set aside: they no longer belong to it.
         notes_new: Whether it receives one about new variants, too.
@@ -486,138 +339,93 @@ def reconcile(
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
     """
+    import polars as pl
+
     if not directory.storage.exists(PLAN):
-        if finished.any():
+        if len(finished):
             raise RunDirectoryError(
                 f"{directory.location}/{PLAN} is missing, and with it the variants of the results:"
                 " choose another --out"
             )
         return plan
-    variants, (stored_number, stored_identity) = plan.variants, _stored(directory, "identity")
-    place = _find(stored_identity, variants.identity)
-    is_stored = place >= 0
-    number = np.append(stored_number, np.int32(-1))[place]  # -1 for those at place -1
-    count = 1 + int(stored_number.max(initial=-1))
-    has_result = np.append(finished, np.zeros(count, np.bool_))[stored_number]
-    has_result[place[is_stored]] = False  # only those that are gone are left
-    stale = np.flatnonzero(has_result)
-    same = np.full(len(variants), -1, np.int32)
-    if len(stale):
-        _, stored_scenario = _stored(directory, "scenario")
-        same = np.where(is_stored, -1, _find(stored_scenario[stale], variants.scenario))
+    stored = directory.plan().select(VARIANT, "identity", "scenario")
+    numbers = stored.select("identity", stored=VARIANT).unique("identity", keep="last")
+    stale = stored.filter(pl.col(VARIANT).is_in(finished.implode()))
+    stale = stale.join(plan.variants, on="identity", how="anti")
+    others = stale.select("scenario", other=VARIANT, old="identity").unique("scenario", keep="last")
+    variants = plan.variants.join(numbers, on="identity", how="left", maintain_order="left")
+    variants = variants.join(others, on="scenario", how="left", maintain_order="left")
+    is_recomputed = pl.col("stored").is_null() & pl.col("other").is_not_null()
+    recomputed = len(variants.filter(is_recomputed))
     if len(stale) and changed is None:
-        recomputed = np.count_nonzero(same >= 0)
-        raise RunDirectoryError(_refusal(directory.location, int(recomputed), len(stale)))
-    reused = np.zeros(len(variants), np.bool_)
-    identity = variants.identity
-    if changed == "keep":
-        reused = same >= 0
-        identity = identity.copy()
-        number[reused] = stored_number[stale[same[reused]]]
-        identity[reused] = stored_identity[stale[same[reused]]]
-    is_new = ~is_stored & ~reused
-    number[is_new] = np.arange(count, count + np.count_nonzero(is_new))
-    new = np.count_nonzero(is_new)
-    set_aside = len(stale) - np.count_nonzero(reused)
+        raise RunDirectoryError(_refusal(directory.location, recomputed, len(stale)))
+    reused = recomputed if changed == "keep" else 0
+    if reused:
+        variants = variants.with_columns(
+            identity=pl.when(is_recomputed).then("old").otherwise("identity"),
+            stored=pl.col("stored").fill_null(pl.col("other")),
+        )
+    is_new = pl.col("stored").is_null()
+    first = int(stored[VARIANT].max() or 0) + 1
+    number = pl.when(is_new).then(first - 1 + is_new.cum_sum()).otherwise("stored")
+    new = len(variants.filter(is_new))
     if 0 < new < len(variants) and notes_new:
         on_note(f"{new} variants are new in {directory.location}")
-    if set_aside:
-        on_note(f"{set_aside} results no longer belong to the study: set aside")
-    return StudyPlan(plan.design, replace(variants, number=number, identity=identity))
-
-
-def _stored(directory: StudyDirectory, column: str) -> tuple[I32, Hashes]:
-    """Return the numbers of the variants of the stored plan, and a column of hashes: (n,) each."""
-    count = sum(directory.storage.row_groups(PLAN))
-    end = 0
-    with directory.storage.reading(PLAN):
-        numbers = np.empty(count, np.int32)
-        hashes = np.empty(count, HASH)
-        for batch in directory.plan_batches((VARIANT, column)):
-            begin, end = end, end + len(batch)
-            numbers[begin:end] = numbers_of(batch)
-            hashes[begin:end] = packed(batch[column].to_pylist())
-    return numbers, hashes
-
-
-def _find(among: Hashes, wanted: Hashes) -> I32:
-    """Return the last place of each wanted hash among others, or -1: int32 (n,)."""
-    order = np.argsort(among, kind="stable")
-    places = np.full(len(wanted), -1, np.int32)
-    for begin in range(0, len(wanted) if len(among) else 0, FIND_BATCH):
-        part = wanted[begin : begin + FIND_BATCH]
-        # A hash below all others comes to -1, the last of the order, which it doesn't equal.
-        place = order[np.searchsorted(among, part, side="right", sorter=order) - 1]
-        places[begin : begin + FIND_BATCH] = np.where(among[place] == part, place, -1)
-    return places
+    if len(stale) > reused:
+        on_note(f"{len(stale) - reused} results no longer belong to the study: set aside")
+    variants = variants.with_columns(number.cast(pl.Int32).alias(VARIANT))
+    return StudyPlan(plan.design, variants.drop("stored", "other", "old"))
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:
     removed = stale - recomputed
-    causes = [
-        f"{recomputed} of the same scenarios, by other code or input files" * bool(recomputed),
-        f"{removed} of scenarios that the study no longer has" * bool(removed),
-    ]
+    causes = []
+    if recomputed:
+        causes.append(f"{recomputed} of the same scenarios, by other code or input files")
+    if removed:
+        causes.append(f"{removed} of scenarios that the study no longer has")
     keep = ", --changed keep leaves those of other code as they are" if recomputed else ""
     return (
         f"{location} holds results that don't belong to this study as it is now:"
-        f" {' and '.join(filter(None, causes))}. --changed redo runs again what has changed and"
+        f" {' and '.join(causes)}. --changed redo runs again what has changed and"
         f" sets the old results aside{keep}; or choose another --out"
     )
 
 
-def plan_batches(plan: StudyPlan) -> "Iterator[pa.Table]":
-    """Yield a plan as tables: a row per variant, in the order of the design."""
-    import pyarrow as pa
-
-    from fleet2d.artifacts.arrow import number_array
+def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
+    """Write the plan of a study: a row per variant with its parameters."""
+    import polars as pl
 
     design = plan.design
-    variants = plan.variants
-    labels = {}  # by column: the number of its axis, and the label of each choice, of none last
+    index = plan.variants["index"].to_numpy()
+    combination, seed = np.divmod(index, len(design.seeds))
+    columns = []
     for number, axis in enumerate(design.axes):
-        used = set(np.unique(design.combinations[:, number]).tolist())
+        choices = design.combinations[:, number]
+        used = set(np.unique(choices).tolist())
         for column in axis.columns:
-            texts = (c.labels[column] if i in used else None for i, c in enumerate(axis.choices))
-            labels[column] = number, label_array([*texts, None])
-    homes = array_of(variants.home_keys, pa.string())
-    seeds = np.array(design.seeds, np.int64)
-    for begin in range(0, max(len(variants), 1), PLAN_BATCH):
-        index = variants.index[begin : begin + PLAN_BATCH]
-        combination, seed = np.divmod(index, len(design.seeds))
-        numbers = variants.number[begin : begin + PLAN_BATCH]
-        columns = {VARIANT: number_array(numbers, pa.int32())}
-        for name in ("identity", "scenario"):
-            values = getattr(variants, name)[begin : begin + PLAN_BATCH]
-            columns[name] = array_of(map(unpacked, values.tolist()), pa.string())
-        templates = map(unpacked, variants.template[combination].tolist())
-        columns["template"] = array_of(templates, pa.string())
-        columns["home_key"] = homes.take(number_array(variants.home[combination], pa.int32()))
-        columns["simulated_s"] = number_array(variants.simulated_s[combination], pa.float64())
-        for column, (number, texts) in labels.items():
-            codes = design.combinations[combination, number] % len(texts)  # -1 is the last
-            columns[column] = texts.take(number_array(codes, pa.int32()))
-        columns[SEED] = number_array(seeds[seed], pa.int64())
-        yield pa.table(columns)
+            labels = [
+                choice.labels[column] if place in used else None
+                for place, choice in enumerate(axis.choices)
+            ]
+            places = choices[combination] % (len(labels) + 1)  # -1, of no choice, is the last
+            columns.append(label_series([*labels, None]).gather(places).alias(column))
+    columns.append(pl.Series(SEED, np.array(design.seeds, np.int64)[seed]))
+    names = (VARIANT, *PLAN_ONLY, "simulated_s")
+    frame = plan.variants.select(*names).with_columns(columns)
+    directory.storage.write_table(PLAN, frame.to_arrow())
 
 
-def label_array(labels: list[Label]) -> "pa.Array":
+def label_series(labels: list[Label]) -> "pl.Series":
     """Return labels as a column: numbers or booleans if all labels are, else text.
 
-    >>> label_array([1, 2.5]).type, label_array([1, "a"]).to_pylist()
-    (DataType(double), ['1', 'a'])
+    >>> label_series([1, 2.5]).dtype, label_series([1, "a"]).to_list()
+    (Float64, ['1', 'a'])
     """
-    import pyarrow as pa
+    import polars as pl
 
     kinds = {type(label) for label in labels if label is not None}
-    if kinds <= {bool} or kinds <= {int}:
-        return array_of(labels, pa.bool_() if kinds == {bool} else pa.int64())
-    if kinds <= {int, float}:
-        return array_of(labels, pa.float64())
-    texts = (None if label is None else str(label) for label in labels)
-    return array_of(texts, pa.string())
-
-
-def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
-    """Write the plan of a study."""
-    directory.storage.write_batches(PLAN, plan_batches(plan), directory.scratch)
+    for kind, dtype in ((int, pl.Int64), (bool, pl.Boolean), (float, pl.Float64)):
+        if kinds <= {kind} or (kind is float and kinds <= {int, float}):
+            return pl.Series(labels, dtype=dtype)
+    return pl.Series([None if label is None else str(label) for label in labels], dtype=pl.String)

@@ -1,11 +1,9 @@
 """The progress of a study while it runs: a bar with the time left."""
 
-import math
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
@@ -17,66 +15,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from fleet2d.studies.directory import Counts
-    from fleet2d.studies.records import VariantRecord
+    from fleet2d.studies.results import VariantResult
     from fleet2d.studies.tuning import TuneObserver
-
-
-MIN_RUNS = 5  # that have finished before the time left is estimated
-CONFIDENCE = 2.0  # standard errors: 95 %
-
-
-@dataclass
-class TimeLeft:
-    """The wall time that the rest of a study takes, from the runs that have finished.
-
-    The others are taken to go on at the rate so far, which shows how many workers there are, what
-    they do beside their runs, and what else the machine does. As runs take different times, the
-    estimate is an interval: of the mean of the runs so far as a sample, and of those that are left.
-
-    Attributes:
-        missing: The number of variants to run.
-        workers: How many run at a time.
-
-    Example:
-        >>> left = TimeLeft(missing=100, workers=2)
-        >>> for _ in range(10):
-        ...     left.add(4.0)
-        >>> [round(s) for s in left.interval_s(elapsed_s=20.0)]
-        [162, 164]
-    """
-
-    missing: int
-    workers: int
-    finished: int = 0
-    _sum_s: float = 0.0
-    _sum_squares: float = 0.0
-    _longest_s: float = 0.0
-
-    def add(self, seconds: float) -> None:
-        """Add a run that has finished, and its wall time [s]."""
-        self.finished += 1
-        self._sum_s += seconds
-        self._sum_squares += seconds**2
-        self._longest_s = max(self._longest_s, seconds)
-
-    def interval_s(self, elapsed_s: float) -> tuple[float, float] | None:
-        """Return the time left, from and to [s]; None as long as too few have finished.
-
-        Args:
-            elapsed_s: The wall time since the first run began.
-        """
-        n = self.finished
-        rest = self.missing - n
-        if n < MIN_RUNS or not self._sum_s:
-            return None
-        mean_s = self._sum_s / n
-        variance = max(self._sum_squares / n - mean_s**2, 0.0) * n / (n - 1)
-        # Renewal theory: workers that are amid a run have done this many runs more than finished.
-        begun = min(self.workers, rest) * (1 - variance / mean_s**2) / 2
-        left_s = elapsed_s * max(rest - begun, 0.0) / max(n + begun, 1.0)
-        error = CONFIDENCE * math.sqrt(variance * (1 / n + 1 / max(rest, 1))) / mean_s
-        last_s = self._longest_s * (1 - 1 / self.workers)  # the others wait for the last worker
-        return left_s * max(1 - error, 0.0), left_s * (1 + error) + last_s
 
 
 class BarObserver(Observer):
@@ -87,7 +27,7 @@ class BarObserver(Observer):
         self._progress = progress
         self._task: TaskID = progress.add_task("checking", total=None)
         self._start_s = time.monotonic()
-        self._left = TimeLeft(0, 1)
+        self._finished = 0
         self._failed = 0
 
     def on_note(self, text: str) -> None:
@@ -101,25 +41,17 @@ class BarObserver(Observer):
     def on_start(self, counts: "Counts", workers: int) -> None:
         """Show the number of variants that are complete."""
         self._start_s = time.monotonic()
-        self._left = TimeLeft(counts.total - counts.complete, workers)
         self._progress.reset(
             self._task, total=counts.total, completed=counts.complete, description="running"
         )
 
-    def on_result(self, record: "VariantRecord") -> None:
-        """Show one more variant, with rate, failures and the time left."""
-        seconds = record.header.get("wall_s", {}).get("total", 0.0)
-        if not self._left.finished:
-            self._start_s = time.monotonic() - seconds  # workers take a while to start
-        self._left.add(seconds)
-        self._failed += not record.is_complete
-        elapsed_s = max(time.monotonic() - self._start_s, 1e-9)
-        text = _rate(self._left.finished / elapsed_s)
+    def on_result(self, result: "VariantResult") -> None:
+        """Show one more variant, with the rate and the failures; Rich adds the time left."""
+        self._finished += 1
+        self._failed += not result.is_complete
+        text = _rate(self._finished / max(time.monotonic() - self._start_s, 1e-9))
         if self._failed:
             text += f", {self._failed} failed"
-        if interval := self._left.interval_s(elapsed_s):
-            low, high = (in_words(timedelta(seconds=s)) for s in interval)
-            text += f", {low} left" if low == high else f", {low} to {high} left"
         self._progress.update(self._task, advance=1, description=text)
 
 

@@ -3,15 +3,14 @@
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import ArtifactError, InputError, extra
 from fleet2d.studies.answers import StudyAnswers
-from fleet2d.studies.directory import META, Counts, StudyDirectory
+from fleet2d.studies.directory import COMPLETE, FAILED, META, Counts, StudyDirectory
 from fleet2d.studies.intervals import Limits
-from fleet2d.studies.parts import TABLES, Part, plain_schema, read_parts, with_variant
-from fleet2d.studies.records import RESULT_COLUMNS, VARIANT, VariantRecord, read_journal
+from fleet2d.studies.results import RESULT_COLUMNS, TABLES, VARIANT, part_names, table_files
 from fleet2d.studies.storage import damaged
 
 if TYPE_CHECKING:
@@ -52,32 +51,22 @@ class Study(StudyAnswers):
         return f"<Study {self.location}: {counts.complete} of {counts.total} variants complete>"
 
     @cached_property
-    def arrow_variants(self) -> "pa.Table":
+    def variants(self) -> "pl.DataFrame":
         """The variants, a row each: parameters, status, time, digest and metrics.
 
         Raises:
             RunDirectoryError: Files of the study are missing or damaged.
         """
-        table = self._directory.variants()
-        missing = {*self.columns, *self.meta.populations, *RESULT_COLUMNS, "simulated_s"}
-        missing -= set(table.column_names)
+        frame = self._directory.variants()
+        missing = {*self.columns, "simulated_s"} - {*frame.columns}
         if missing:
             raise damaged(self.location, f"its variants have no {', '.join(sorted(missing))}")
-        return table
-
-    @cached_property
-    def variants(self) -> "pl.DataFrame":
-        """The variants as a polars data frame, with the columns of `arrow_variants`.
-
-        Raises:
-            InputError: polars is not installed.
-        """
-        return cast("pl.DataFrame", _polars().from_arrow(self.arrow_variants))
+        return frame
 
     @property
     def counts(self) -> Counts:
         """The numbers of complete, failed and missing variants."""
-        return Counts.of(self.arrow_variants.column("status").to_pylist())
+        return Counts.of(self.variants)
 
     @cached_property
     def comparisons(self) -> "tuple[PairedComparison, ...]":
@@ -95,21 +84,18 @@ class Study(StudyAnswers):
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics, such as `ltp_error.ana.tv`."""
         no_metrics = {*self.columns, *RESULT_COLUMNS, "simulated_s"}
-        return tuple(name for name in self.arrow_variants.column_names if name not in no_metrics)
+        return tuple(name for name in self.variants.columns if name not in no_metrics)
 
     @property
     def failures(self) -> "pl.DataFrame":
         """The variants that failed, with their errors."""
-        frame = self.variants.filter(_polars().col("status") == "failed")
+        frame = self.variants.filter(status=FAILED)
         return frame.select(VARIANT, *self.columns, "error", "trace", "attempts")
 
     @cached_property
     def tables(self) -> tuple[str, ...]:
         """The names of the tables that the study keeps and that have rows."""
-        names = {name for part in self._parts for name in part.tables}
-        for record in self._journal_records():
-            names |= {name for name, _ in record.header["tables"]}
-        return tuple(sorted(names))
+        return tuple(sorted({name for files in self._files for name in files}))
 
     def arrow(self, table: str) -> "pads.Dataset":
         """Return a table of all variants as an Arrow data set, its first column `variant`.
@@ -126,37 +112,25 @@ class Study(StudyAnswers):
                 " keep.tables in the study file names them"
             )
         storage = self._directory.storage
-        files = [part.tables[table] for part in self._parts if table in part.tables]
         with storage.reading(f"{TABLES}/{table}"):
-            paths = [storage.path(name) for name in files]
+            paths = [storage.path(files[table]) for files in self._files if table in files]
             schemas = [pads.dataset(path, filesystem=storage.filesystem).schema for path in paths]
-            recent = {
-                record.number: record.tables()[table].read_all()
-                for record in self._journal_records()
-                if record.is_complete and table in dict(record.header["tables"])
-            }
             if any((s.names[:1], s.types[:1]) != ([VARIANT], [pa.int32()]) for s in schemas):
                 raise ValueError("it has no numbers of variants")
-            field = pa.field(VARIANT, pa.int32(), nullable=False)
-            schemas += [plain_schema(rows.schema).insert(0, field) for rows in recent.values()]
             schema = pa.unify_schemas(schemas, promote_options="permissive")
-            stored = pads.dataset(paths, schema, filesystem=storage.filesystem, format="parquet")
-            if not recent:
-                return stored
-            tables = [with_variant(rows, number, schema) for number, rows in recent.items()]
-            journal = pads.dataset(pa.concat_tables(tables))
-            return pads.dataset([stored, journal]) if files else journal
+            return pads.dataset(paths, schema, filesystem=storage.filesystem, format="parquet")
 
     def polars(self, table: str) -> "pl.LazyFrame":
         """Return a table of all variants with their parameters as a lazy frame.
 
         Raises:
             ArtifactError: The study keeps no such table.
-            InputError: polars is not installed.
         """
-        rows = _polars().scan_pyarrow_dataset(self.arrow(table))
+        import polars as pl
+
+        rows = pl.scan_pyarrow_dataset(self.arrow(table))
         parameters = self.variants.lazy().select(VARIANT, *self.columns)
-        return cast("pl.LazyFrame", rows.join(parameters, on=VARIANT, how="inner"))
+        return rows.join(parameters, on=VARIANT, how="inner")
 
     def pandas(
         self,
@@ -175,7 +149,7 @@ class Study(StudyAnswers):
             ArtifactError: The study keeps no such table.
         """
         if table is None:
-            return self.arrow_variants.to_pandas()
+            return self.variants.to_pandas()
         frames = [batch.to_pandas() for batch in self.batches(table, variants, columns)]
         import pandas as pd
 
@@ -203,7 +177,7 @@ class Study(StudyAnswers):
         with extra("study", "this needs DuckDB"):
             import duckdb
         connection = duckdb.connect()
-        connection.register("variants", self.arrow_variants)
+        connection.register("variants", self.variants.to_arrow())
         for table in self.tables:
             connection.register(table, self.arrow(table))
         return connection
@@ -246,7 +220,7 @@ class Study(StudyAnswers):
     @property
     def complete(self) -> "pl.DataFrame":
         """The variants that are complete."""
-        return self.variants.filter(_polars().col("status") == "complete")
+        return self.variants.filter(status=COMPLETE)
 
     def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
         """Return the variants that are complete and have a metric, or some of them by number.
@@ -262,7 +236,8 @@ class Study(StudyAnswers):
                 f"no variant has a numeric metric {metric!r}{hint} There are:"
                 f" {', '.join(self.metrics[:20])}{', …' if len(self.metrics) > 20 else ''}"
             )
-        pl = _polars()
+        import polars as pl
+
         frame = self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
         return frame if variants is None else frame.filter(pl.col(VARIANT).is_in(list(variants)))
 
@@ -275,11 +250,10 @@ class Study(StudyAnswers):
         return self.meta.better(metric)
 
     @cached_property
-    def _parts(self) -> list[Part]:
-        return read_parts(self._directory.storage)
-
-    def _journal_records(self) -> Iterator[VariantRecord]:
-        return read_journal(self._directory.journal_path(self._parts))
+    def _files(self) -> list[dict[str, str]]:
+        """The files of the tables of each part."""
+        storage = self._directory.storage
+        return [table_files(storage, name) for name in part_names(storage)]
 
 
 def open_study(location: str | Path) -> Study:
@@ -290,11 +264,6 @@ def open_study(location: str | Path) -> Study:
 
     Raises:
         RunDirectoryError: There is no study.
+        InputError: polars is not installed.
     """
     return Study(StudyDirectory(location))
-
-
-def _polars() -> Any:
-    with extra("study", "this needs polars"):
-        import polars as pl
-    return pl

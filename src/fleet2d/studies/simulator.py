@@ -64,7 +64,7 @@ class StagedRun:
     """A run in stages: it stops at simulated times, and its results so far can be read there.
 
     Example:
-        >>> from fleet2d.scenario.model import load_scenario
+        >>> from fleet2d.scenario.load import load_scenario
         >>> stages = StagedRun(load_scenario("simulation.duration=2 h", seed=4))
         >>> hour = stages.until(3600.0)
         >>> whole = stages.until(None)

@@ -15,9 +15,10 @@ from fleet2d.configuration.problems import Location, problem, problem_at, sugges
 from fleet2d.configuration.units import PositiveDuration, folder_of
 from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
-from fleet2d.scenario.model import Scenario, explain
+from fleet2d.scenario.load import explain
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Parameter, check_count
-from fleet2d.studies.records import RESULT_COLUMNS
+from fleet2d.studies.results import RESULT_COLUMNS
 
 
 def _with_type(value: Any) -> Any:

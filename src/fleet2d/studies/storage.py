@@ -1,32 +1,19 @@
 """The files of a study: in a local folder, or in any store that pyarrow can reach."""
 
-import itertools
-import os
 import re
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import is_dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 from fleet2d.bounds import one_line
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError, errors_as
-from fleet2d.storage.files import PARTIAL, is_disk_full, path_in, plain_name, write_atomically
+from fleet2d.storage.files import is_disk_full, path_in, plain_name, write_atomically
 
 if TYPE_CHECKING:
+    import polars as pl
     import pyarrow as pa
     import pyarrow.parquet as pq
-
-COPY_BYTES = 1 << 22
-BATCH_ROWS = 5_000  # of a table that is read in parts
-GROUP_ROWS = 50_000  # most of a table that are written together
-GROUP_SHARE = 0.05  # of the rows before them
-# What libraries raise on damaged files; pyarrow's errors are subclasses of these.
-DAMAGE = (
-    ArithmeticError, AttributeError, LookupError, MemoryError, NotImplementedError, OSError,
-    RecursionError, TypeError, ValueError,
-)  # fmt: skip
 
 
 @contextmanager
@@ -53,33 +40,6 @@ def damaged(path: str | Path, reason: object) -> RunDirectoryError:
         f"{path} is damaged ({one_line(reason, 120)}): run the study again, which"
         " restores what it can"
     )
-
-
-def from_json(kind: Any, value: Any) -> Any:
-    """Return a value of JSON as text, a number, a tuple, a mapping, or a dataclass of such.
-
-    Pydantic does the same, but takes as long to load as all else that reading a study needs.
-
-    Raises:
-        TypeError: It has another type, or lacks a key or has one too many.
-
-    Example:
-        >>> from_json(tuple[int, ...], [1, 2])
-        (1, 2)
-    """
-    origin = get_origin(kind) or kind
-    of = get_args(kind)
-    hints = get_type_hints(kind) if is_dataclass(kind) else None
-    expected = {tuple: list, Mapping: dict}.get(origin, origin) if hints is None else dict
-    if expected not in (type(value), Any):
-        raise TypeError(f"{one_line(value)} is no {expected.__name__}")
-    if hints is not None:
-        return kind(**{key: from_json(hints.get(key, Any), part) for key, part in value.items()})
-    if origin is tuple:
-        return tuple(from_json(of[0], part) for part in value)
-    if origin is Mapping:
-        return {key: from_json(of[1], part) for key, part in value.items()}
-    return value
 
 
 class Storage:
@@ -140,12 +100,25 @@ class Storage:
         """
         import pyarrow.fs as pafs
 
+        return self._entries(folder, pafs.FileType.File)
+
+    def folders(self, folder: str) -> list[str]:
+        """Return the names of the folders in a folder, sorted; none if there is no such folder.
+
+        Raises:
+            ArtifactError: The store can't be reached.
+        """
+        import pyarrow.fs as pafs
+
+        return self._entries(folder, pafs.FileType.Directory)
+
+    def _entries(self, folder: str, kind: Any) -> list[str]:
+        import pyarrow.fs as pafs
+
         selector = pafs.FileSelector(self.path(folder), allow_not_found=True)
         with self._reaching():
             infos = self.filesystem.get_file_info(selector)
-        return sorted(
-            f"{folder}/{info.base_name}" for info in infos if info.type == pafs.FileType.File
-        )
+        return sorted(f"{folder}/{info.base_name}" for info in infos if info.type == kind)
 
     def exists(self, name: str) -> bool:
         """Return whether there is such a file."""
@@ -167,7 +140,7 @@ class Storage:
             yield
         except Fleet2DError:
             raise
-        except DAMAGE as error:
+        except Exception as error:  # libraries raise anything on damaged files
             raise damaged(f"{self.location}/{name}", error) from error
 
     def read(self, name: str) -> bytes:
@@ -179,31 +152,42 @@ class Storage:
         with self.reading(name), self.filesystem.open_input_file(self.path(name)) as file:
             return bytes(file.read())
 
-    def read_table(
-        self, name: str, columns: Sequence[str] | None = None, filters: Any = None
-    ) -> "pa.Table":
-        """Return the table of a Parquet file.
+    def read_frame(
+        self, name: str, needed: Iterable[str] = (), without: Collection[str] = ()
+    ) -> "pl.DataFrame":
+        """Return the table of a Parquet file as a data frame.
+
+        Args:
+            name: The file.
+            needed: Columns that it must have.
+            without: Columns to leave out.
 
         Raises:
             RunDirectoryError: There is none, it is damaged, or it lacks a column.
         """
+        import polars as pl
+
+        with self.parquet(name) as file:
+            names = file.schema_arrow.names
+            if missing := [column for column in needed if column not in names]:
+                raise ValueError(f"it has no columns {', '.join(missing)}")
+            return pl.DataFrame(file.read([name for name in names if name not in without]))
+
+    def write_table(self, name: str, table: "pa.Table", group_rows: int | None = None) -> None:
+        """Write a table as a Parquet file with checksums; readers see all of it, or none.
+
+        Raises:
+            ArtifactError: It can't be written.
+            RunDirectoryError: It is a link, or in one.
+        """
+        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        names = None if columns is None else list(columns)
-        if filters is None:  # without the modules of data sets, which take 60 MB
-            with self.parquet(name) as file:
-                table = file.read(names)
-        else:
-            with self.reading(name):
-                table = pq.read_table(
-                    self.path(name), columns=names, filters=filters, filesystem=self.filesystem
-                )
-        with self.reading(name):
-            if names and set(names) != set(table.column_names):
-                raise ValueError(f"it has no columns {', '.join(names)}")
-        return table
+        sink = pa.BufferOutputStream()
+        pq.write_table(table, sink, group_rows, compression="zstd", write_page_checksum=True)
+        self.write(name, sink.getvalue())
 
-    def write(self, name: str, content: bytes) -> None:
+    def write(self, name: str, content: Any) -> None:
         """Write a file; readers see all of it, or none.
 
         Raises:
@@ -229,86 +213,17 @@ class Storage:
         import pyarrow.parquet as pq
 
         with self.reading(name), self.filesystem.open_input_file(self.path(name)) as source:
-            yield pq.ParquetFile(source)
+            yield pq.ParquetFile(source, page_checksum_verification=True)
 
-    def row_groups(self, name: str) -> list[int]:
-        """Return how many rows each group of a Parquet file has.
+    def check(self, name: str) -> None:
+        """Read a Parquet file of a local folder, with its checksums; of another, only its footer.
 
         Raises:
             RunDirectoryError: There is none, or it is damaged.
         """
         with self.parquet(name) as file:
-            return [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
-
-    def read_batches(self, name: str, columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
-        """Yield some rows of a Parquet file after the other, at least one table.
-
-        Raises:
-            RunDirectoryError: There is none, it is damaged, or it lacks a column.
-        """
-        import pyarrow as pa
-
-        with self.parquet(name) as file:
-            names = file.schema_arrow.names if columns is None else list(columns)
-            if missing := [name for name in names if name not in file.schema_arrow.names]:
-                raise ValueError(f"it has no columns {', '.join(missing)}")
-            if not file.metadata.num_rows:
-                yield file.read(names)
-            for group in range(file.num_row_groups):  # over all at once it keeps the whole file
-                for batch in file.iter_batches(BATCH_ROWS, [group], names, use_threads=False):
-                    yield pa.Table.from_batches([batch])
-
-    def write_batches(self, name: str, tables: "Iterator[pa.Table]", scratch: Path) -> None:
-        """Write tables of one schema as a Parquet file, without having all of them in memory.
-
-        Args:
-            name: The file; readers see all of it, or none.
-            tables: The tables, one at least.
-            scratch: A local folder for the unfinished file, on the same disk as a local storage.
-
-        Raises:
-            ArtifactError: It can't be written.
-        """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        local = scratch / f"{PurePosixPath(name).name}{PARTIAL}"
-        first = next(tables)
-        group = list[pa.Table]()
-        rows = 0
-        written = 0
-        with writing(self.location):
-            scratch.mkdir(parents=True, exist_ok=True)
-            with pq.ParquetWriter(local, first.schema, compression="zstd") as file:
-                for table in itertools.chain([first], tables):
-                    group.append(table)
-                    rows += table.num_rows
-                    # Each column of a group takes 5 kB of memory until the file is finished.
-                    if rows >= min(GROUP_SHARE * written, GROUP_ROWS):
-                        file.write_table(pa.concat_tables(group))
-                        group, rows, written = [], 0, written + rows
-                if group:
-                    file.write_table(pa.concat_tables(group))
-        self.publish(local, name)
-
-    def publish(self, local: Path, name: str) -> None:
-        """Move a finished local file into the storage: by renaming if it is local, else by a copy.
-
-        Raises:
-            ArtifactError: It can't be written.
-            RunDirectoryError: Its place is a link, or in one.
-        """
-        path = self.path(name)
-        with writing(self.location):
-            with local.open("rb") as file:
-                if self.folder is not None:
-                    os.fsync(file.fileno())
-                    Path(path).parent.mkdir(parents=True, exist_ok=True)
-                    local.replace(path)
-                    return
-                with self.filesystem.open_output_stream(path) as out:
-                    shutil.copyfileobj(file, out, COPY_BYTES)
-            local.unlink()
+            for group in range(file.num_row_groups if self.folder is not None else 0):
+                file.read_row_group(group)
 
     def delete(self, name: str) -> None:
         """Delete a file, if there is one.

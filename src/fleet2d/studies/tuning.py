@@ -1,9 +1,9 @@
 """Tuning: a search for settings on training homes with Optuna, judged on other homes."""
 
 import inspect
+import itertools
 import json
-from collections import deque
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,7 +25,8 @@ from fleet2d.errors import (
 )
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.compose import apply_changes, assignment
-from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.scenario.load import scenario_of
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import OptionsAxis, Parameter, key_path, rounded
 from fleet2d.studies.design import (
     Design,
@@ -37,7 +38,7 @@ from fleet2d.studies.design import (
 )
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, check_study, run_study
-from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, run_tasks
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.simulator import StagedRun, describe_error, flat_numbers, input_files
@@ -113,9 +114,8 @@ class TrialJob:
         document = apply_changes(scenario._document, changes)
         return scenario_of(document, scenario.folder)
 
-    def __call__(self, task: WorkerTask) -> tuple[list[float] | None, str | None]:
+    def __call__(self, task: TrialTask) -> tuple[list[float] | None, str | None]:
         """Return the objectives and the error; one of them is None."""
-        assert isinstance(task, TrialTask)
         try:
             numbers = dict(flat_numbers(self._metrics(task)))
             missing = [name for name in self.objectives if name not in numbers]
@@ -127,7 +127,7 @@ class TrialJob:
             return None, describe_error(error)
 
     def _metrics(self, task: TrialTask) -> Mapping[str, Any]:
-        """Return the metrics at the end of a stage; the run of earlier stages is continued."""
+        """Return the metrics at the end of a stage; a run that this worker has goes on."""
         key = task.trial, task.index
         run = self._runs.pop(key, None) or StagedRun(self.scenario(task.index, task.settings))
         metrics = run.until(task.until_s).metrics
@@ -136,160 +136,6 @@ class TrialJob:
             while len(self._runs) > MAX_RUNS:  # workers don't hear of trials that ended early
                 del self._runs[next(iter(self._runs))]
         return metrics
-
-
-@dataclass
-class _RunningTrial:
-    """A running trial.
-
-    Attributes:
-        trial: The trial of Optuna.
-        settings: The values of the searched parameters.
-        stage: The index of the current stage.
-        objectives: The objectives of each variant that has finished the stage, by index.
-        unfinished: The number of variants that haven't finished the stage.
-        error: The first error of a variant.
-    """
-
-    trial: "optuna.Trial"
-    settings: dict[str, Any]
-    stage: int = 0
-    objectives: dict[int, list[float]] = field(default_factory=dict)
-    unfinished: int = 0
-    error: str | None = None
-
-
-class TrialSchedule(TaskSchedule):
-    """The tasks of a search, in batches of trials that are suggested and judged together.
-
-    So neither the number of workers nor their speed has an effect on what Optuna suggests. All
-    trials of a batch run all variants up to one time of `prune_at` before the next; between them
-    Optuna decides which trials continue. The worker that holds the run of a variant continues it;
-    another worker takes it only if there is nothing else, and runs it from the start.
-    """
-
-    def __init__(
-        self,
-        study: "optuna.Study",
-        settings: TuneSettings,
-        variants: Sequence[tuple[int, str]],
-        finished: int = 0,
-    ) -> None:
-        """Create the schedule without a trial.
-
-        Args:
-            study: The study of Optuna.
-            settings: The `tune` section of the study file.
-            variants: The index in the design and the home of each variant that a trial runs.
-            finished: The number of trials that are over.
-        """
-        super().__init__(())
-        self._study, self._settings, self._variants = study, settings, variants
-        self._stages = (*(time.total_seconds() for time in settings.prune_at), None)
-        self._started = finished
-        self._running: dict[int, _RunningTrial] = {}
-        self._tasks: deque[TrialTask] = deque()
-        self._holders: dict[tuple[int, int], Hashable] = {}
-        self._task_count = 0
-
-    def __len__(self) -> int:
-        """Return the largest number of tasks that workers can take now."""
-        return len(self._tasks) or self._next_batch() * len(self._variants)
-
-    def __bool__(self) -> bool:
-        """Return whether there are more tasks or trials."""
-        return bool(self._tasks) or self._started < self._settings.trials
-
-    def take(self, worker: Hashable) -> WorkerTask | None:
-        """Return the next task: of a run that the worker holds, a new run, or any task."""
-        if not self._tasks and self._next_batch():
-            self._start_batch()
-        holders = [self._holders.get((task.trial, task.index)) for task in self._tasks]
-        for holder in (worker, None, *holders):
-            if holder in holders:
-                task = self._tasks[holders.index(holder)]
-                self._tasks.remove(task)
-                self._holders[task.trial, task.index] = worker
-                return task
-        return None
-
-    def leave(self, worker: Hashable) -> None:
-        """Forget the runs that a worker held: it has ended."""
-        self._holders = {key: holder for key, holder in self._holders.items() if holder != worker}
-
-    def put_back(self, task: WorkerTask) -> None:
-        """Return a task to the front of the schedule."""
-        assert isinstance(task, TrialTask)
-        self._tasks.appendleft(task)
-
-    def finish(self, task: TrialTask, objectives: list[float] | None, error: str | None) -> int:
-        """Record the result of a task; return the number of trials that are over with it."""
-        running = self._running[task.trial]
-        running.unfinished -= 1
-        running.error = running.error or error
-        if objectives is not None:
-            running.objectives[task.index] = objectives
-        if not running.unfinished and (running.error or self._stages[running.stage] is None):
-            return self._end(running)
-        if any(each.unfinished for each in self._running.values()):
-            return 0
-        return sum(self._judge(each) for each in list(self._running.values()))
-
-    def _next_batch(self) -> int:
-        """Return the number of trials that can start now; an interrupted batch is filled."""
-        if self._running:
-            return 0
-        batch = self._settings.batch
-        return min(batch - self._started % batch, self._settings.trials - self._started)
-
-    def _start_batch(self) -> None:
-        # Optuna's samplers have random states, which aren't stored: each batch has its own.
-        self._study.sampler = make_sampler(self._settings, self._started)
-        for _ in range(self._next_batch()):
-            trial = self._study.ask()
-            search = self._settings.search
-            values = {name: suggested(trial, name, search[name]) for name in search}
-            self._running[trial.number] = _RunningTrial(trial, values)
-        self._started += len(self._running)
-        for running in self._running.values():
-            self._start_stage(running)
-
-    def _start_stage(self, running: _RunningTrial) -> None:
-        until_s = self._stages[running.stage]
-        number = running.trial.number
-        running.objectives = {}
-        running.unfinished = len(self._variants)
-        for index, home in self._variants:
-            self._task_count += 1
-            self._tasks.append(
-                TrialTask(self._task_count, index, "", home, number, running.settings, until_s)
-            )
-
-    def _judge(self, running: _RunningTrial) -> int:
-        """Start the next stage of a trial unless Optuna ends it; return whether it does."""
-        running.trial.report(self._means(running)[0], int(self._stages[running.stage] or 0))
-        if running.trial.should_prune():
-            return self._end(running, "PRUNED")
-        running.stage += 1
-        self._start_stage(running)
-        return 0
-
-    def _end(self, running: _RunningTrial, state: str = "COMPLETE") -> int:
-        """Tell Optuna that a trial is over; return 1."""
-        from optuna.trial import TrialState
-
-        if running.error is not None:
-            running.trial.set_user_attr(FAILURE, running.error)
-            state = "FAIL"
-        values = self._means(running) if state == "COMPLETE" else None
-        self._study.tell(running.trial, values, TrialState[state])
-        del self._running[running.trial.number]
-        self._holders = {key: of for key, of in self._holders.items() if key[0] in self._running}
-        return 1
-
-    def _means(self, running: _RunningTrial) -> list[float]:
-        values = [running.objectives[index] for index, _ in self._variants]
-        return [sum_in_order(of_all) / len(of_all) for of_all in zip(*values, strict=True)]
 
 
 def make_sampler(settings: TuneSettings, finished: int) -> "optuna.samplers.BaseSampler":
@@ -374,9 +220,9 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
         storage: Where the trials are stored, without secrets.
     """
     scenarios: dict[bool, list[str]] = {False: [], True: []}
-    for variant in plan.variants:
-        is_held_out = matches(settings.held_out, plan.design.parameters(variant.index))
-        scenarios[is_held_out].append(variant.scenario)
+    for index, scenario in plan.variants.select("index", "scenario").iter_rows():
+        is_held_out = matches(settings.held_out, plan.design.parameters(index))
+        scenarios[is_held_out].append(scenario)
     content = {key: content_hash(value) for key, value in settings.model_dump(mode="json").items()}
     return {
         "the training (homes, base scenario or seeds)": content_hash(sorted(scenarios[False])),
@@ -389,14 +235,14 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
         "the sampler": content["sampler"],
         "the storage": storage,
         "the version of Fleet2D": code_version(),
-        INPUTS: content_hash(sorted(variant.identity for variant in plan.variants)),
+        INPUTS: content_hash(sorted(plan.variants["identity"])),
     }
 
 
 def tune(
     source: str | Path | Mapping[str, Any] | Specification,
     folder: str | Path,
-    executor: Executor,
+    crew: Crew,
     observer: TuneObserver | None = None,
     *,
     changed: Literal["redo"] | None = None,
@@ -409,7 +255,7 @@ def tune(
     Args:
         source: The study.
         folder: The folder of the search.
-        executor: Where trials run.
+        crew: Where trials run.
         observer: Follows the progress.
         changed: `redo` starts over if the folder holds another search, whose trials stay in the
             storage under a name of their own; None: such a folder is refused.
@@ -449,11 +295,11 @@ def tune(
             path = directory.storage.path(TRIALS)
             trials = database or JournalStorage(JournalFileBackend(path))
             study = _open_trials(trials, name, settings)
-        _search(study, job, training, settings, executor, observer)
+        Search(study, job, training, settings, crew).run(observer)
     best = _best(study, settings)
     held_out = _check_held_out(specification, plan.design, best, settings)
     # After more trials, the best settings may be others.
-    run_study(held_out, directory.storage.folder / HELD_OUT, executor, changed="redo")
+    run_study(held_out, directory.storage.folder / HELD_OUT, crew, changed="redo")
     states = [trial.state.name.lower() for trial in study.trials]
     return TuneResult(
         {name: _overrides(trial, settings) for name, trial in best.items()},
@@ -470,15 +316,16 @@ def _training(plan: StudyPlan, settings: TuneSettings) -> list[tuple[int, str]]:
         ScenarioError: There is none, or it isn't clear whether one is held out.
     """
     (axis,) = settings.held_out
-    labels = [plan.design.parameters(variant.index) for variant in plan.variants]
+    labels = [plan.design.parameters(index) for index in plan.variants["index"]]
     if any(label[axis] is None for label in labels):
         raise ScenarioError(
             f"tune.held_out: the axis {axis!r} doesn't apply to all variants, some of which would"
             " be neither trained on nor held out: hold out values of another axis"
         )
+    variants = plan.variants.select("index", "home_key").iter_rows()
     training = [
-        (variant.index, variant.home_key)
-        for variant, label in zip(plan.variants, labels, strict=True)
+        variant
+        for variant, label in zip(variants, labels, strict=True)
         if not matches(settings.held_out, label)
     ]
     if not training:
@@ -494,18 +341,17 @@ def _check_content(plan: StudyPlan, settings: TuneSettings) -> None:
         ScenarioError: A held-out variant and one of the training differ by names of files only.
     """
     first_of = dict[str, tuple[bool, int]]()
-    first_seed = {variant.template: variant for variant in reversed(plan.variants)}
-    for variant in reversed(first_seed.values()):
-        scenario = plan.design.scenario(variant.index)
+    for index in plan.variants["index"].gather_every(len(plan.design.seeds)):
+        scenario = plan.design.scenario(index)
         content = scenario_content(scenario)
         text = json.dumps({**content, "simulation": {**content["simulation"], "seed": None}})
         for path in input_files(scenario):
             text = text.replace(json.dumps(str(path)), json.dumps(file_hash(path)))
-        is_held_out = matches(settings.held_out, plan.design.parameters(variant.index))
-        was_held_out, other = first_of.setdefault(text, (is_held_out, variant.index))
+        is_held_out = matches(settings.held_out, plan.design.parameters(index))
+        was_held_out, other = first_of.setdefault(text, (is_held_out, index))
         if is_held_out != was_held_out:
             raise ScenarioError(
-                f"tune.held_out: {plan.design.describe(variant.index)} and"
+                f"tune.held_out: {plan.design.describe(index)} and"
                 f" {plan.design.describe(other)} are the same but for the names of files, and only"
                 " one of them is held out: hold out both, or leave one out"
             )
@@ -537,30 +383,108 @@ def _check_identity(
     storage.write(SEARCH, json.dumps(identity, indent=1).encode())
 
 
-def _search(
-    study: "optuna.Study",
-    job: TrialJob,
-    training: list[tuple[int, str]],
-    settings: TuneSettings,
-    executor: Executor,
-    observer: TuneObserver | None,
-) -> None:
-    """Run trials up to the number of the settings."""
-    trials = study.get_trials(deepcopy=False)
-    finished = sum(trial.state.name in ("COMPLETE", "PRUNED") for trial in trials)
-    schedule = TrialSchedule(study, settings, training, finished)
-    with closing(executor.run(job, schedule)) as events:
-        for event in events:
-            task = event.task
-            assert isinstance(task, TrialTask)
-            if isinstance(event, LostTask):
-                over = schedule.finish(task, None, event.reason)
-            else:
-                over = schedule.finish(task, *event.payload)
-            finished += over
-            if over and observer is not None:
-                best = study.best_trials
-                observer(finished, settings.trials, list(best[0].values) if best else None)
+class Search:
+    """A search in batches of trials that are suggested and judged together.
+
+    So neither the number of workers nor their speed has an effect on what Optuna suggests. All
+    trials of a batch run all variants up to one time of `prune_at` before the next; between them
+    Optuna decides which trials go on.
+    """
+
+    def __init__(
+        self,
+        study: "optuna.Study",
+        job: TrialJob,
+        variants: Sequence[tuple[int, str]],
+        settings: TuneSettings,
+        crew: Crew,
+    ) -> None:
+        """Prepare a search.
+
+        Args:
+            study: The study of Optuna.
+            job: Runs a variant with a setting.
+            variants: The index in the design and the home of each variant that a trial runs.
+            settings: The `tune` section of the study file.
+            crew: Where trials run.
+        """
+        self._study, self._job, self._variants = study, job, variants
+        self._settings, self._crew = settings, crew
+
+    def run(self, observer: TuneObserver | None) -> None:
+        """Run trials up to the number of the settings; an interrupted batch is filled."""
+        total = self._settings.trials
+        trials = self._study.get_trials(deepcopy=False)
+        finished = sum(trial.state.name in ("COMPLETE", "PRUNED") for trial in trials)
+        while finished < total:
+            rest = self._settings.batch - finished % self._settings.batch
+            count = min(rest, total - finished)
+            # Optuna's samplers have random states, which aren't stored: each batch has its own.
+            self._study.sampler = make_sampler(self._settings, finished)
+            self._run_batch([self._study.ask() for _ in range(count)])
+            finished += count
+            if observer is not None:
+                best = self._study.best_trials
+                observer(finished, total, list(best[0].values) if best else None)
+
+    def _run_batch(self, trials: "list[optuna.Trial]") -> None:
+        """Run trials stage by stage, and tell Optuna what came of each."""
+        settings = {trial.number: self._suggested(trial) for trial in trials}
+        for time in self._settings.prune_at:
+            until_s = time.total_seconds()
+            # Optuna decides only after all of the batch, in their order.
+            means = {trial.number: mean for trial, mean in self._means(trials, settings, until_s)}
+            trials = [trial for trial in trials if trial.number in means]
+            for trial in trials:
+                trial.report(means[trial.number][0], int(until_s))
+            pruned = [trial for trial in trials if trial.should_prune()]
+            for trial in pruned:
+                self._study.tell(trial, state=_state("PRUNED"))
+            trials = [trial for trial in trials if trial not in pruned]
+        for trial, mean in self._means(trials, settings, None):
+            self._study.tell(trial, mean)
+
+    def _suggested(self, trial: "optuna.Trial") -> dict[str, Any]:
+        search = self._settings.search
+        return {name: suggested(trial, name, search[name]) for name in search}
+
+    def _means(
+        self,
+        trials: "list[optuna.Trial]",
+        settings: Mapping[int, Mapping[str, Any]],
+        until_s: float | None,
+    ) -> "Iterator[tuple[optuna.Trial, list[float]]]":
+        """Run trials up to a simulated time; yield those that don't fail, with their objectives."""
+        by_number = {trial.number: trial for trial in trials}
+        keys = itertools.product(by_number, self._variants)
+        tasks = [
+            TrialTask(place, index, "", home, number, settings[number], until_s)
+            for place, (number, (index, home)) in enumerate(keys)
+        ]
+        results: dict[int, dict[int, Any]] = {number: {} for number in by_number}
+        with closing(run_tasks(self._crew, self._job, TaskQueue(tasks))) as rounds:
+            for end in itertools.chain.from_iterable(rounds):
+                number = end.task.trial
+                trial = by_number.get(number)
+                if trial is None:  # it has failed
+                    continue
+                objectives, error = end.payload or (None, end.loss)
+                if error is not None:
+                    trial.set_user_attr(FAILURE, error)
+                    self._study.tell(trial, state=_state("FAIL"))
+                    del by_number[number]
+                    continue
+                results[number][end.task.index] = objectives
+                if len(results[number]) == len(self._variants):
+                    of_all = [results[number][index] for index, _ in self._variants]
+                    columns = zip(*of_all, strict=True)
+                    yield trial, [sum_in_order(column) / len(column) for column in columns]
+
+
+def _state(name: str) -> "optuna.trial.TrialState":
+    from optuna.trial import TrialState
+
+    return TrialState[name]
 
 
 def _open_database(url: str) -> tuple["optuna.storages.BaseStorage", str]:

@@ -265,7 +265,7 @@ def _homes(
     Raises:
         InputError: There are no such floor plans.
     """
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
     from fleet2d.studies.axes import FloorplansAxis, SyntheticAxis
 
     if homes is None:
@@ -297,7 +297,7 @@ def _cases(
         InputError: The scenario or an expectation is wrong, or it has no expectations.
     """
     from fleet2d.engine.simulation import Simulation
-    from fleet2d.scenario.model import load_scenario
+    from fleet2d.scenario.load import load_scenario
 
     scenario = load_scenario(source, *overrides)
     if not scenario.expect:

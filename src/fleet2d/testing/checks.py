@@ -12,7 +12,8 @@ from fleet2d.algorithms.algorithm import Algorithm, load_learned, save_learned
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ComponentError, Fleet2DError
 from fleet2d.runs.run import Run
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.sight.perception_error import PerceptionError
 
 SCENARIO: dict[str, Any] = {

@@ -13,7 +13,8 @@ import numpy as np
 from fleet2d.errors import InputError, errors_as
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 
 MAX_SEEDS = 10_000
 BISECTIONS = 14

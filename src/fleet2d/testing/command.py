@@ -59,7 +59,7 @@ def falsify(
       fleet2d falsify home.yaml --over 'home={synthetic: 50}' --budget '5 min'
       fleet2d falsify test_robot.py::test_keeps_off --over axes.yaml
     """
-    from fleet2d.studies.api import make_executor
+    from fleet2d.studies.api import open_crew
     from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
     for path in (out, out.with_suffix("")):  # the scenario, and the folder of its run
@@ -69,14 +69,14 @@ def falsify(
     job = job_of(target, read_space(parse_over(over)))
     job.check()
     search = FailureSearch(job, tries, seed=seed, finds=finds)
-    with progress_bar(show=not quiet) as bar:
+    with progress_bar(show=not quiet) as bar, open_crew("local", workers) as crew:
         task = bar.add_task("runs", total=tries if seconds is None else None)
 
         def update(search: "FailureSearch") -> None:
             narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
             bar.update(task, completed=search.tries, description=f"{search.tries} runs{narrowest}")
 
-        search.run(make_executor("local", workers), seconds, update)
+        search.run(crew, seconds, update)
     if search.failure is None:
         _print_no_failure(search, job)
         return
@@ -138,7 +138,7 @@ def job_of(target: str, space: "SearchSpace") -> "TryJob":
         InputError: There is no such scenario or test, or the scenario expects nothing.
     """
     from fleet2d.scenario.compose import compose
-    from fleet2d.scenario.model import scenario_of
+    from fleet2d.scenario.load import scenario_of
     from fleet2d.testing.search import TryJob, claimed_test
 
     path, separator, name = target.partition("::")
@@ -154,10 +154,19 @@ def job_of(target: str, space: "SearchSpace") -> "TryJob":
 def describe_failure(
     failure: "FailingPoint", job: "TryJob", target: str, out: Path, shrink: int = SHRINK_TRIES
 ) -> list[str]:
-    """Write the failing scenario, and its run beside it; return the lines of a report."""
+    """Write the failing scenario, and its run beside it; return the lines of a report.
+
+    Raises:
+        InputError: Its run doesn't fail again.
+    """
     from fleet2d.testing.failures import describe_trial
 
     trial = job.run(failure.point, failure.seed)
+    if not trial.failures:
+        raise InputError(
+            f"{target} failed at try {failure.number}, but holds when that try is repeated: it"
+            " depends on more than the scenario and the seed, such as a file or the time of day"
+        )
     command = f"fleet2d test {out}"
     if job.test is not None:
         command = f"pytest {target} --fleet2d-scenario {out}"

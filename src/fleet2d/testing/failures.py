@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from fleet2d.errors import Fleet2DError
 from fleet2d.runtime.clock import Clock
-from fleet2d.scenario.model import Scenario, load_scenario
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.testing.claim import Variant
 from fleet2d.testing.trials import (
     ASSERT,
@@ -320,14 +321,15 @@ def _failures(trial: TrialResult) -> Iterable[str]:
 def _store(
     variant: Variant, without: frozenset[int], body: Body, out: Path, trial: TrialResult
 ) -> Iterable[str]:
-    """Repeat a run and store it; yield its path, its picture, and the commands to see it."""
+    """Repeat a failing run and store it; yield its path, picture, and the commands to see it."""
     failure = trial.first_failure
+    assert failure is not None, "only failing runs are described"
     try:
         again = run_trial(variant, body, out=out, without=without)
     except Fleet2DError as error:
         yield f"  the run could not be stored: {error}"
         return
-    if failure is not None and same_failure(failure, again) is None:
+    if same_failure(failure, again) is None:
         yield "  it didn't fail again: the test depends on more than the scenario and the seed"
     step = trial.failing_step
     yield f"  run: {out}"
@@ -337,9 +339,8 @@ def _store(
 
         picture = out.with_suffix(".png")
         run = open_run(out)
-        evidence = None if failure is None else failure.evidence
-        text = failure.text.splitlines()[0] if failure is not None else ""
-        draw_failure(run, min(step, run.manifest["steps"] - 1), picture, text, evidence)
+        text = failure.text.splitlines()[0]
+        draw_failure(run, min(step, run.manifest["steps"] - 1), picture, text, failure.evidence)
         yield f"  picture: {picture}"
     except Fleet2DError as error:  # such as that matplotlib is not installed
         yield f"  no picture: {error}"

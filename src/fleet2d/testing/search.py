@@ -1,12 +1,12 @@
 """The search for a run that fails: over homes, households, timings, and any key of a scenario."""
 
 import importlib.util
+import itertools
 import math
-import pickle
 import random
 import sys
 import time
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from inspect import signature
@@ -20,9 +20,10 @@ from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_doc
 from fleet2d.configuration.problems import did_you_mean, suggest, validating
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
 from fleet2d.scenario.compose import apply_changes, assignment
-from fleet2d.scenario.model import Scenario, scenario_of
+from fleet2d.scenario.load import scenario_of
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
-from fleet2d.studies.executors import Executor, LostTask, TaskSchedule, WorkerTask
+from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, run_tasks
 from fleet2d.studies.simulator import describe_error
 from fleet2d.studies.tuning import suggested
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
@@ -204,16 +205,15 @@ class TryJob:
         self._body = self._body or self.body()
         return run_trial(Variant(self.scenario(point, seed), {"seed": seed}), self._body)
 
-    def __call__(self, task: WorkerTask) -> bytes:
-        """Return (margin, what failed, error), pickled; margin or error is None."""
-        assert isinstance(task, TryTask)
+    def __call__(self, task: TryTask) -> tuple[float | None, str, str | None]:
+        """Return (margin, what failed, error); margin or error is None."""
         try:
             result = self.run(task.point, task.seed)
         except Exception as error:  # noqa: BLE001 - some points give no valid home; reported
-            return pickle.dumps((None, "", describe_error(error)))
+            return None, "", describe_error(error)
         failure = result.first_failure
         what = " ".join(filter(None, [failure.name, failure.kind])) if failure else ""
-        return pickle.dumps((result.margin, what, None))
+        return result.margin, what, None
 
 
 class FailingPoint(NamedTuple):
@@ -234,7 +234,7 @@ class FailingPoint(NamedTuple):
     what: str
 
 
-class FailureSearch(TaskSchedule):
+class FailureSearch(TaskQueue):
     """A search for runs in which an expectation fails: random points, then those of Optuna.
 
     Attributes:
@@ -252,7 +252,6 @@ class FailureSearch(TaskSchedule):
         self._job, self._budget, self._seed, self._finds = job, budget, seed, finds
         self._started = 0
         self._deadline = math.inf
-        self._returned: list[WorkerTask] = []
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
         self._random = max(MIN_RANDOM_POINTS, round(RANDOM_SHARE * budget)) if is_guided else budget
         self._study = _optuna(seed, self._random) if is_guided else None
@@ -262,27 +261,17 @@ class FailureSearch(TaskSchedule):
         self.narrowest: tuple[float, dict[str, Any]] | None = None
         self.errors: dict[str, int] = {}
 
-    def __len__(self) -> int:
-        """Return the largest number of runs still to come."""
-        return self._budget - self._started + len(self._returned)
-
     def __bool__(self) -> bool:
         """Return whether there are runs to come."""
         may_start = self._started < self._budget and time.monotonic() <= self._deadline
-        return not self.is_over and (bool(self._returned) or may_start)
+        return not self.is_over and (super().__bool__() or may_start)
 
-    def take(self, worker: Hashable) -> WorkerTask | None:
+    def take(self, workers: int) -> list[WorkerTask]:
         """Return the next run: one that was put back, or a new one."""
-        if not self:
-            return None
-        if self._returned:
-            return self._returned.pop()
+        if super().__bool__():
+            return super().take(workers)
         self._started += 1
-        return self.ask(self._started - 1)
-
-    def put_back(self, task: WorkerTask) -> None:
-        """Return a task to be run again."""
-        self._returned.append(task)
+        return [self.ask(self._started - 1)]
 
     @property
     def tries(self) -> int:
@@ -317,27 +306,21 @@ class FailureSearch(TaskSchedule):
 
     def run(
         self,
-        executor: Executor,
+        crew: Crew,
         seconds: float | None = None,
         observer: Callable[["FailureSearch"], None] | None = None,
     ) -> FailingPoint | None:
         """Search until enough runs have failed, or the budget is used up.
 
         Args:
-            executor: Executes the runs.
+            crew: Where runs are executed.
             seconds: Wall time after which no run is started.
             observer: Called after each run.
         """
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds
-        with closing(executor.run(self._job, self)) as events:
-            for event in events:
-                assert isinstance(event.task, TryTask)
-                margin, what, error = (
-                    (None, "", event.reason)
-                    if isinstance(event, LostTask)
-                    else pickle.loads(event.payload)  # noqa: S301 - by this program's workers
-                )
-                self._add(event.task, margin, what, error)
+        with closing(run_tasks(crew, self._job, self)) as rounds:
+            for end in itertools.chain.from_iterable(rounds):
+                self._add(end.task, *(end.payload or (None, "", end.loss)))
                 if observer is not None:
                     observer(self)
                 if self.is_over:

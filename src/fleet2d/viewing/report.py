@@ -14,7 +14,7 @@ import yaml
 from fleet2d.configuration.units import format_duration
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.metrics.metric import flat
-from fleet2d.metrics.results import Block, blocks_of
+from fleet2d.metrics.results import ResultTable, blocks_of
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY
 from fleet2d.viewing.notebook import figure_png, verdict_html
@@ -113,7 +113,7 @@ def _story(run: Run) -> str:
     return f"<h2>Story</h2><ul>{''.join(moments)}</ul>" if moments else ""
 
 
-def _block(block: Block) -> str:
+def _block(block: ResultTable) -> str:
     """Return the numbers of a metric as a table."""
     head, *rows = block.rows
     subjects = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in head.values)

@@ -35,7 +35,7 @@ SETTLED = 1.1
 """A belief has settled once its error stays below the last one times this."""
 
 
-class Event(NamedTuple):
+class StoredEvent(NamedTuple):
     """A row of the table of events."""
 
     step: int
@@ -56,15 +56,15 @@ def story_of(run: Run) -> list[StoryFacts]:
     return sorted(found, key=lambda moment: moment["step"])
 
 
-def _events_of(run: Run) -> list[Event]:
+def _events_of(run: Run) -> list[StoredEvent]:
     if "events" not in run.tables:
         return []
     table = run.tables["events"]
     rows = table.filter(compute.is_in(compute.cast(table["event"], "string"), array(KINDS)))
-    return [Event(*row.values()) for row in rows.select(Event._fields).to_pylist()]
+    return [StoredEvent(*row.values()) for row in rows.select(StoredEvent._fields).to_pylist()]
 
 
-def _requests(events: Sequence[Event]) -> Iterator[StoryFacts]:
+def _requests(events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     """Yield the first time that anybody accepted what a robot wanted."""
     for event in events:
         if event.event == EventKind.ACCEPTED:
@@ -74,10 +74,10 @@ def _requests(events: Sequence[Event]) -> Iterator[StoryFacts]:
             return
 
 
-def _searches(events: Sequence[Event], clock: Clock) -> Iterator[StoryFacts]:
+def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFacts]:
     """Yield the search that took longest until it found somebody."""
     begun: dict[tuple[str, str], int] = {}
-    longest: tuple[int, Event] | None = None
+    longest: tuple[int, StoredEvent] | None = None
     for event in events:
         key = event.entity, event.detail
         if event.event == EventKind.FIND_BEGINS:
@@ -93,7 +93,7 @@ def _searches(events: Sequence[Event], clock: Clock) -> Iterator[StoryFacts]:
         yield StoryFacts(step=event.step, title="The longest search", words=words)
 
 
-def _people(run: Run, events: Sequence[Event]) -> Iterator[StoryFacts]:
+def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     """Yield who was out of view longest, awake and at home, and who went to bed latest."""
     unseen: list[tuple[timedelta, int, str]] = []
     nights: list[tuple[float, int, str]] = []
@@ -111,7 +111,9 @@ def _people(run: Run, events: Sequence[Event]) -> Iterator[StoryFacts]:
         yield StoryFacts(step=step, title="The latest night", words=words)
 
 
-def _unseen(run: Run, user: str, events: Sequence[Event]) -> Iterator[tuple[timedelta, int, str]]:
+def _unseen(
+    run: Run, user: str, events: Sequence[StoredEvent]
+) -> Iterator[tuple[timedelta, int, str]]:
     """Yield how long a user was out of view, awake and at home, and since when."""
     is_asleep = True  # until the first activity
     is_out = False
@@ -135,7 +137,9 @@ def _unseen(run: Run, user: str, events: Sequence[Event]) -> Iterator[tuple[time
             since = None
 
 
-def _nights(clock: Clock, user: str, events: Sequence[Event]) -> Iterator[tuple[float, int, str]]:
+def _nights(
+    clock: Clock, user: str, events: Sequence[StoredEvent]
+) -> Iterator[tuple[float, int, str]]:
     """Yield when a user went to bed, in hours since the evening began: once a night, to sleep."""
     activities = [e for e in events if e.entity == user and e.event == EventKind.ACTIVITY]
     nights = set()

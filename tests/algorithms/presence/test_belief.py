@@ -34,6 +34,13 @@ def test_rooms_and_away_of_a_user_and_of_anyone() -> None:
     assert presence.high() is None
 
 
+def test_intervals_of_shares_leave_out_that_of_away() -> None:
+    low = np.array([[0.5, 0.125, 0.25], [0.25, 0.375, 0.0]])
+    presence = some(interval=(low, low + 0.5))
+    assert [0.5, 0.125] == presence.low("ana").tolist()
+    assert [0.75, 0.875] == presence.high().tolist()
+
+
 def test_frozen_arrays_never_change_and_are_not_copied() -> None:
     presence = some()
     assert presence is copy.deepcopy(presence)

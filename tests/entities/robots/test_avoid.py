@@ -109,9 +109,7 @@ def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data: Path
     file = shared_data / "valetudo" / "dreame_z10_named_rooms_and_paths.json"
 
     def points(avoid: list[str]) -> int:
-        robot = {
-            "behaviors": [{"type": "retrace", "path": str(file), "spacing": 1.0, "avoid": avoid}]
-        }
+        robot = {"behaviors": [{"type": "retrace", "path": str(file), "avoid": avoid}]}
         content = scenario(robots={"astro": robot})
         content["floorplan"] = {"type": "valetudo", "path": str(file)}
         return int(table(fleet2d.run(content), "events", event="retraces")["detail"][0].split()[0])

@@ -13,12 +13,13 @@ from tests.entities.robots.robots import (
     home_with,
     names,
 )
+from tests.reference.search import play
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d import Algorithm
 from fleet2d.entities.robots.find import Sites
-from fleet2d.entities.robots.search import SearchProblem, exact, order_by, play
+from fleet2d.entities.robots.search import SearchProblem, exact, order_by
 from fleet2d.errors import InputError
 
 POLICIES = ["random", "nearest", "likeliest", "greedy", "exact", "receding"]

@@ -30,7 +30,6 @@ def test_it_sleeps_most_of_the_time_and_roams_through_its_rooms() -> None:
     [
         ({"spots": [5, 2]}, ["spots", "5", "2"]),
         ({"rooms": ["attic"]}, ["attic"]),
-        ({"stays_in_room": 2}, ["stays_in_room"]),
     ],
 )
 def test_a_pet_that_can_not_live_is_refused(fields: dict[str, Any], words: list[str]) -> None:

@@ -399,7 +399,7 @@ def test_text_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
 # --- The component ------------------------------------------------------------------------------
 
 
-def test_houseexpo_is_found_by_name_and_alias(tmp_path: Path) -> None:
+def test_houseexpo_is_found_by_name(tmp_path: Path) -> None:
     source = HouseExpo.model_validate(
         {"path": str(write(tmp_path, {"verts": SQUARE})), "cell": "10 cm"}
     )

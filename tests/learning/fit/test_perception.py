@@ -14,7 +14,7 @@ from fleet2d.errors import InputError
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.learning.fit.command import calibrate_perception, fragment, report
 from fleet2d.learning.fit.perception import DetectionLog, calibrate, read_detections
-from fleet2d.scenario.model import load_scenario
+from fleet2d.scenario.load import load_scenario
 from fleet2d.sight.camera import Camera, TableContext, error_tables
 from fleet2d.sight.perception import Curve, Perception
 

@@ -13,7 +13,7 @@ from fleet2d.live.exporters.texts import export_csv, export_geojson, export_json
 def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
     export_csv(day(), tmp_path / "day.csv", part())
 
-    table = pd.read_csv(tmp_path / "day.csv", parse_dates=["time"])
+    table = pd.read_csv(tmp_path / "day.csv", parse_dates=["time"], engine="pyarrow")
     assert table["step"].is_monotonic_increasing
     for name in NAMES:
         home = table[(table["entity"] == name) & ~table["away"]]

@@ -307,7 +307,7 @@ def presence_of(name: str, state: Present) -> Presence | None:
 
 
 class BeliefReader:
-    """Reads what an algorithm believed at the end of each bin of a period.
+    """Reads the belief of an algorithm at the end of each bin of a period.
 
     That is the output's `track`; for an output without one, it is the forecast of the newest output
     before the period.

@@ -14,7 +14,6 @@ from fleet2d.algorithms.presence.estimator import normalized
 from fleet2d.algorithms.presence.likelihood import Likelihood
 from fleet2d.algorithms.presence.model import Model
 from fleet2d.algorithms.presence.people import StateLayout, between, stretches_of
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, Bool, DayEvidence, StayModel, advance, follow
@@ -141,7 +140,7 @@ class ChainPresence(Presence):
         super().__init__(users, home[-1], away[-1], time, track=track)
 
     def corrected(self) -> "ChainPresence":
-        """Return a copy whose forecasts start from the last belief of the track."""
+        """Return a copy with forecasts from the last belief of the track on."""
         assert self.track is not None
         people = []
         for row, person in enumerate(self._people):
@@ -209,7 +208,6 @@ def steps_of(model: StayModel) -> F64:
     return steps
 
 
-@register("presence_model", "hmm")
 class Filter(Model):
     """The filter of a hidden Markov model: P(room now | all evidence so far).
 
@@ -223,21 +221,17 @@ class Filter(Model):
 
     Attributes:
         detection: Chance that somebody in view is perceived.
-        restless: Chance per bin that a person in a room changes patch, before it is learned.
     """
 
-    is_by_bin: ClassVar[bool] = True
+    is_by_bin = True
     detection: Share = Field(default=0.95, gt=0, lt=1)
-    restless: Share = 0.05
     stages: ClassVar[int] = 1
     negative: ClassVar[bool] = True
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
         super().begin(home, users, start)
-        self.learner = Likelihood(
-            detection=self.detection, restless=self.restless, stages=self.stages
-        )
+        self.learner = Likelihood(detection=self.detection, stages=self.stages)
         self.learner.begin(self.rooms, self.users)
         self.followers: list[Follower] = []
 
@@ -286,7 +280,6 @@ class Filter(Model):
         self.learner.recall(learned, self.day)
 
 
-@register("presence_model", "semi_markov")
 class SemiMarkov(Filter):
     """The filter with stays in stages, so that the time already spent in a room matters.
 
@@ -295,10 +288,9 @@ class SemiMarkov(Filter):
     while one who has been there for long stays for long; or the other way round, as is learned.
     """
 
-    stages: ClassVar[int] = 2
+    stages = 2
 
 
-@register("presence_model", "routine")
 class RoutineModel(SemiMarkov):
     """The semi-Markov filter with transitions by the hour, towards the rooms usual at that time.
 
@@ -333,7 +325,6 @@ class RoutineModel(SemiMarkov):
         return Habits(week[:, columns], total[columns], self.smoothing)
 
 
-@register("presence_model", "markov")
 class MarkovDecay(Filter):
     """The row of P^g for the room in which the user was perceived last, g bins ago.
 
@@ -341,4 +332,4 @@ class MarkovDecay(Filter):
     Before the first sighting it is the result of the transitions from the uniform distribution.
     """
 
-    negative: ClassVar[bool] = False
+    negative = False

@@ -1,4 +1,4 @@
-"""Estimators of long-term presence: their base, what they count, and shares of sightings."""
+"""Estimators of long-term presence: their base, their counts, and shares of sightings."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
-from fleet2d.configuration.components import Component, register
+from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, resampled
 
@@ -183,7 +183,7 @@ class Estimator(Component):
     forgetting, and intervals by resampling days.
     """
 
-    kind: ClassVar[str] = "presence_estimator"
+    kind = "presence_estimator"
     has_interval: ClassVar[bool] = True  # whether its output is `shares` of the sum of all days
 
     def begin(self, rooms: int, users: int, half_life: float | None = None) -> None:
@@ -333,7 +333,6 @@ def natural_log(values: ArrayLike) -> F64:
     return e * LN_2 + 2 * s * series
 
 
-@register("presence_estimator", "sighting_share")
 class SightingShare(Estimator):
     """Share of a user's sightings in each room: n_r / sum of n.
 

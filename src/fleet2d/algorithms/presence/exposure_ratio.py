@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,6 @@ from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.algorithms.presence.estimator import Estimator, natural_log, normalized
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError
@@ -31,7 +30,6 @@ RECENT = 0.5  # weight of an order's log loss a day later: periods found early a
 UNIT = 1 << 30
 
 
-@register("presence_estimator", "exposure_ratio")
 class ExposureRatio(Estimator):
     """Sightings in each room divided by the time watched, patch by patch: sum of n_p / e_p.
 
@@ -145,7 +143,6 @@ def seen_and_watched(seen: I64, watched: F64, bin_steps: int) -> F64:
     return np.concatenate([seen / bin_steps, exposure, ones], axis=-1)
 
 
-@register("presence_estimator", "audit_only")
 class AuditOnly(ExposureRatio):
     """The exposure ratio of audits only: bins in which the robot looks by the clock.
 
@@ -184,7 +181,6 @@ def _cosines() -> F64:
     return np.array([round(math.cos(2 * math.pi * m / WEEK) * UNIT) / UNIT for m in range(WEEK)])
 
 
-@register("presence_estimator", "fremen")
 class Fremen(Estimator):
     """Frequency map enhancement (Krajnik et al.), one model for each user and room.
 
@@ -208,7 +204,7 @@ class Fremen(Estimator):
         detection: Chance that somebody in view is perceived.
     """
 
-    has_interval: ClassVar[bool] = False
+    has_interval = False
 
     detection: Share = Field(default=0.95, gt=0)
 

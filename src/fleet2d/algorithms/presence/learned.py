@@ -14,7 +14,6 @@ from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel, split
 from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.bounds import WEIGHTS_BYTES, one_line
-from fleet2d.configuration.components import register
 from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ComponentError, InputError
@@ -53,7 +52,7 @@ PLACE_FEATURES = len(GROUPS) + 5
 
 
 class PlaceFacts(NamedTuple):
-    """What is known of the places of a home, which mean the same in all homes.
+    """Facts about the places of a home, which mean the same in all homes.
 
     Attributes:
         features: float64 (rooms + 1, PLACE_FEATURES), away last: the group of the kind of room, the
@@ -66,7 +65,7 @@ class PlaceFacts(NamedTuple):
 
     @classmethod
     def of(cls, kinds: Sequence[str], area_m2: Sequence[float], xy: Sequence[Any]) -> Self:
-        """Return what is known of rooms: their kinds, areas, and middles [m].
+        """Return the facts about rooms, from their kinds, areas, and middles [m].
 
         Example:
             >>> facts = PlaceFacts.of(["kitchen", "loft"], [12.0, 4.0], [(0, 0), (3, 4)])
@@ -88,7 +87,7 @@ class PlaceFacts(NamedTuple):
 
     @classmethod
     def of_home(cls, home: Home) -> Self:
-        """Return what is known of the rooms of a home."""
+        """Return the facts about the rooms of a home."""
         columns = zip(*((r.type, r.area_m2, r.anchor_xy) for r in home.rooms), strict=True)
         return cls.of(*columns)
 
@@ -162,7 +161,7 @@ class Weights(NamedTuple):
             )
 
     def of_places(self, features: F64) -> F64:
-        """Return what the first layer makes of places: float64 (places, hidden)."""
+        """Return the first layer's outputs for places: float64 (places, hidden)."""
         total = np.tile(self.start, (len(features), 1))
         for k, row in enumerate(self.places):  # in order: the same on every machine
             total += features[:, k, np.newaxis] * row
@@ -225,7 +224,6 @@ class CorrectedRoutine(RoutineModel):
         self.traces = array_of(learned, "traces", self.traces.shape)
 
 
-@register("presence_model", "learned")
 class LearnedModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network that was trained on simulated homes.
 
@@ -278,7 +276,6 @@ def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:
     return TracedEvidence(evidence.day, evidence.minute, evidence.watched, seen, unknown, belief)
 
 
-@register("presence_model", "onnx")
 class OnnxModel(CorrectedRoutine):
     """The belief of `routine`, corrected by a network of your own in an ONNX file.
 

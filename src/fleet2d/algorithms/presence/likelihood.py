@@ -10,11 +10,12 @@ from pydantic import Field
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.estimator import MIN_DAYS, Estimator, normalized
 from fleet2d.algorithms.presence.people import People, Prior, StateLayout, day_evidence, joined
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, Bool, DayEvidence, PeoplePlaces, sum_places
 
+# Chance per bin that a person in a room changes patch, before it is learned.
+RESTLESS = 0.05
 # Number of earlier days that are revisited in turn when a day is over, and of those stored.
 REVISITS = 2
 STORED_DAYS = 64
@@ -34,7 +35,6 @@ class StoredDay(NamedTuple):
     unknown: Bool
 
 
-@register("presence_estimator", "likelihood", aliases=("hmm",))
 class Likelihood(Estimator):
     """Expected share of time in each room given all evidence, in a hidden Markov chain.
 
@@ -76,13 +76,11 @@ class Likelihood(Estimator):
 
     Attributes:
         detection: Chance that somebody in view is perceived.
-        restless: Chance per bin that a person in a room changes patch, before it is learned.
         stages: Number of stages of a stay; above 1 its length isn't geometric.
         together: Largest number of consecutive bins with equal evidence that are merged.
     """
 
     detection: Share = Field(default=0.95, gt=0, lt=1)
-    restless: Share = 0.05
     stages: int = Field(default=1, ge=1, le=4)
     together: int = Field(default=5, ge=1, le=60)
 
@@ -189,7 +187,7 @@ class Likelihood(Estimator):
 
     def _create_people(self, evidence: Evidence) -> People:
         layout = StateLayout.of(evidence, self.stages)
-        prior = Prior(self.detection, self.restless)
+        prior = Prior(self.detection, RESTLESS)
         people = People(layout, prior, max(self.users, 1), self.together)
         if self.learned and not people.recall(self.learned):
             raise ComponentError(

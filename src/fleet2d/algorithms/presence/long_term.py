@@ -1,8 +1,8 @@
 """Long-term presence: where people usually are; and the base of algorithms of presence."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +11,7 @@ from fleet2d.algorithms.algorithm import Algorithm, Present, check_numbers
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator
-from fleet2d.configuration.components import OneOf, register
+from fleet2d.configuration.components import OneOf
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.floorplan.home import Home
@@ -23,7 +23,7 @@ from fleet2d.runtime.determinism import stream_key
 class PresenceAlgorithm(Algorithm):
     """Base of algorithms of presence: a component of theirs learns from the evidence."""
 
-    needs: ClassVar[Set[str]] = frozenset({"evidence"})
+    needs = frozenset({"evidence"})
 
     def start(self, home: Home) -> None:
         """Begin without evidence."""
@@ -37,7 +37,7 @@ class PresenceAlgorithm(Algorithm):
         raise NotImplementedError
 
     def _prepare(self, learner: Any, users: Sequence[str], start: datetime) -> None:
-        """Begin a run with what was learned in another one."""
+        """Begin a run with the learned state of another one."""
         raise NotImplementedError
 
     def _begin_once(self, state: Present) -> None:
@@ -62,7 +62,6 @@ class PresenceAlgorithm(Algorithm):
         self.learned_state = learned or None
 
 
-@register("algorithm", "long_term_presence", aliases=("ltp",))
 class LongTermPresence(PresenceAlgorithm):
     """Share of time that each user, and anyone, spends in each room, from robots' evidence.
 
@@ -77,7 +76,7 @@ class LongTermPresence(PresenceAlgorithm):
         interval: Coverage of its intervals, such as 0.9.
     """
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "exposure_ratio")
+    estimator: OneOf[Estimator] = cast("Any", "exposure_ratio")
     by: Literal["overall", "hour_of_week"] = "overall"
     smoothing: PositiveDuration = timedelta(hours=1)
     half_life: PositiveDuration | None = None

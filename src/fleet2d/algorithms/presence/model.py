@@ -1,9 +1,9 @@
-"""Real-time presence: the algorithm, the base of its models, simple ones, and what people say."""
+"""Real-time presence: the algorithm, the base of its models, simple ones, and answers of people."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
@@ -23,7 +23,7 @@ from fleet2d.algorithms.presence.belief import (
 )
 from fleet2d.algorithms.presence.estimator import SECOND_US, Estimator
 from fleet2d.algorithms.presence.long_term import PresenceAlgorithm
-from fleet2d.configuration.components import Component, OneOf, register
+from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import PositiveDuration, whole_steps
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
@@ -40,7 +40,7 @@ class Model(Component):
     A scenario names a model of your own, such as one learned elsewhere, by `model: module:Class`.
     """
 
-    kind: ClassVar[str] = "presence_model"
+    kind = "presence_model"
     # Whether the belief after a bin is the same however many bins `observe` gets at a time.
     is_by_bin: ClassVar[bool] = False
 
@@ -93,7 +93,6 @@ class Model(Component):
         """Restore what `remember` returned; called after `begin`."""
 
 
-@register("presence_model", "last_seen")
 class LastSeen(Model):
     """Probability 1 for the room in which the user was perceived last; uniform before that.
 
@@ -101,7 +100,7 @@ class LastSeen(Model):
     away. The naive baseline: right just after a sighting, and overconfident later.
     """
 
-    is_by_bin: ClassVar[bool] = True
+    is_by_bin = True
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
@@ -121,7 +120,6 @@ class LastSeen(Model):
         return home, np.zeros(home.shape[:2])
 
 
-@register("presence_model", "long_term")
 class LongTerm(Model):
     """Long-term presence, regardless of recent sightings.
 
@@ -129,7 +127,7 @@ class LongTerm(Model):
         estimator: The estimator of long-term presence.
     """
 
-    estimator: Annotated[Estimator, OneOf("presence_estimator")] = cast("Any", "likelihood")
+    estimator: OneOf[Estimator] = cast("Any", "likelihood")
 
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
@@ -152,7 +150,6 @@ class LongTerm(Model):
         self.estimator.recall(learned, self.day)
 
 
-@register("presence_model", "hour_of_week")
 class HourOfWeek(LongTerm):
     """Long-term presence of the hour of the week, regardless of recent sightings.
 
@@ -180,7 +177,6 @@ class HourOfWeek(LongTerm):
         return WeeklyPresence(users, self.week(), time, track=track)
 
 
-@register("algorithm", "real_time_presence", aliases=("rtp",))
 class RealTimePresence(PresenceAlgorithm):
     """Where each user, and anyone, is now: P(room | all evidence so far).
 
@@ -194,10 +190,10 @@ class RealTimePresence(PresenceAlgorithm):
     """
 
     period: PositiveDuration = timedelta(minutes=5)
-    model: Annotated[Model, OneOf("presence_model")] = cast("Any", "hmm")
+    model: OneOf[Model] = cast("Any", "hmm")
 
     def start(self, home: Home) -> None:
-        """Begin without evidence, with a model whose files can be used."""
+        """Begin without evidence, with a model that has usable files."""
         super().start(home)
         self.model.check()
 
@@ -242,7 +238,6 @@ class RealTimePresence(PresenceAlgorithm):
         check_distributions(home, away, (*state.users, ANYONE), source)
 
 
-@register("algorithm", "belief_table")
 class BeliefTable(RealTimePresence):
     """The belief of a model of real-time presence at regular times, as rows of a table.
 
@@ -271,7 +266,7 @@ class BeliefTable(RealTimePresence):
         first, end = evidence.begin, evidence.begin + len(evidence) * bin_steps
         due = np.arange(first // every + 1, end // every + 1) * every
         bins = (due - first) // bin_steps  # that are over by then
-        # With islands, what is watched in the whole evidence says where people can be.
+        # With islands, the rooms watched in the whole evidence bound the places of people.
         is_whole = self.model.is_by_bin and evidence.by_patch.island is None
         ends = [len(evidence)] if is_whole else [*bins.tolist(), len(evidence)]
         parts = [evidence.between(a, b) for a, b in pairwise([0, *ends]) if a < b]
@@ -296,7 +291,7 @@ class BeliefTable(RealTimePresence):
 
 
 class Told(NamedTuple):
-    """What somebody said about where a person is.
+    """An answer to the question where a person is.
 
     Attributes:
         step: When.
@@ -307,7 +302,6 @@ class Told(NamedTuple):
     where: str
 
 
-@register("algorithm", "told_presence")
 class ToldPresence(Algorithm):
     """Real-time presence, corrected by the answers to questions like "is Ben at home?".
 
@@ -329,7 +323,7 @@ class ToldPresence(Algorithm):
         self.told: dict[str, list[Told]] = {}  # in the present period, the last one before it first
 
     def check_sources(self, sources: Mapping[str, Algorithm]) -> None:
-        """Refuse anything but one presence; what a class of yours returns shows in the run."""
+        """Refuse anything but one presence; the output of your own class shows in the run."""
         if len(sources) != 1:
             raise ComponentError("give `reads: [rtp]`, the presence that answers correct")
         for name, source in sources.items():
@@ -342,7 +336,7 @@ class ToldPresence(Algorithm):
         return ComponentError(f"{name!r} is not a real-time presence: name one in `reads`")
 
     def update(self, history: History, state: Present) -> Any:
-        """Correct each bin of the belief by what the robot was told before."""
+        """Correct each bin of the belief by earlier answers of people."""
         belief = state.outputs.get(self.reads[0])
         if belief is None:
             return None

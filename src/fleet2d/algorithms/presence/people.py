@@ -31,7 +31,7 @@ LONGEST_STAGE = 240.0
 def day_evidence(evidence: Evidence) -> DayEvidence:
     """Return the evidence of bins of one day."""
     sightings = evidence.by_patch.sightings
-    # Where somebody unknown was perceived, who may be any user, the patch counts as unwatched.
+    # An unknown person may be any user, so a patch with one counts as unwatched.
     shown = evidence.by_patch.shown_255
     watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
     watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
@@ -308,7 +308,7 @@ class People:
             self.total = Moments(*(weight * part for part in self.total))
 
     def remember(self) -> dict[str, Any]:
-        """Return what was learned of each person, as arrays, by number."""
+        """Return the learned moments of each person, as arrays, by number."""
         return {
             str(person): {name: part[person] for name, part in self.total._asdict().items()}
             for person in range(self.count)

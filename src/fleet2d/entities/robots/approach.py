@@ -12,6 +12,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of
 from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, Bool, heading_of, points_in_sight
 from fleet2d.runtime.determinism import sum_in_order
@@ -99,7 +100,7 @@ class Viewpoints(NamedTuple):
         share: The part of the room that they show together.
     """
 
-    points: tuple[tuple[int, int], ...]
+    points: tuple[LatticePoint, ...]
     share: float
 
 
@@ -135,7 +136,7 @@ def _cover(actor: Actor, room: Room, goals: I64, enough: float, most: int) -> Vi
     """Choose points in a room, greedily, from which goals (n, 2) are seen, and their share."""
     places = np.concatenate([[actor.middle(room)], stands_in(actor, room)])
     visible = np.array([visible_from(actor, place, goals) for place in places])
-    points: list[tuple[int, int]] = []
+    points: list[LatticePoint] = []
     unseen = np.ones(len(goals), np.bool_)
     while len(points) < most and unseen.sum() > (1 - enough) * len(goals):
         gains = (visible & unseen).sum(axis=1)
@@ -172,7 +173,7 @@ def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
     return [], floor_of(actor, room)
 
 
-def stops_with_view(actor: Actor, room: Room) -> tuple[tuple[int, int], ...]:
+def stops_with_view(actor: Actor, room: Room) -> tuple[LatticePoint, ...]:
     """Return the stops in a room from which its places are seen: the middle first, if that helps.
 
     Walls and tall furniture count as they are at present.
@@ -186,7 +187,7 @@ def stops_with_view(actor: Actor, room: Room) -> tuple[tuple[int, int], ...]:
     return views.points or (actor.middle(room),)
 
 
-def unwatched(actor: Actor, stops: Sequence[tuple[int, int]]) -> list[str]:
+def unwatched(actor: Actor, stops: Sequence[LatticePoint]) -> list[str]:
     """Return what is never in view of a body that looks round at some stops, by room.
 
     A line has the room, and its furniture that is out of view; or, of a room without furniture,
@@ -250,8 +251,6 @@ def centres(cells: I64) -> I64:
 # Number of directions from a person in which points at a distance are tried.
 DIRECTIONS = 32
 
-LatticePoint = tuple[int, int]
-
 
 def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float | None:
     """Return how long a robot drives between two lattice points; None: no way.
@@ -281,7 +280,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     """
     actor = now.actor
     lattice = now.home.plan.lattice
-    position = (actor.state.x, actor.state.y)
+    position = actor.state.position
     person = lattice.to_lattice((x, y))
     goal = lattice.point_at(now.nearest_free(x, y))
     route = actor.space.route(position, (goal[0], goal[1]))
@@ -317,7 +316,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     actor = now.actor
     home = now.home
     lattice = home.plan.lattice
-    position = (actor.state.x, actor.state.y)
+    position = actor.state.position
     person = lattice.point_at((x, y))
     reach = math.ceil(distance * lattice.units_per_m)
     if _distance(person, position) >= reach:
@@ -329,7 +328,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
 def approach(now: Situation, plan: Plan, x: float, y: float, distance: float) -> Plan:
     """Drive to `spot_near` a person at (x, y) [m], unless the robot is already there."""
     spot = spot_near(now, x, y, distance)
-    if spot != (plan.x, plan.y):
+    if spot != plan.position:
         plan.go_to_point(*spot)
     return plan
 

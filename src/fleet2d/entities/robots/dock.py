@@ -1,22 +1,20 @@
 """Dock: drive to the charger before the battery is empty, and charge."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.runtime.events import EventKind
 
 # How long it rests at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)
 
 
-@register("behavior", "dock")
 class Dock(Behavior):
     """Go to the charger when the charge falls to a threshold, and stay until it is full enough.
 
@@ -33,8 +31,8 @@ class Dock(Behavior):
             as there is another way.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.CHARGED, EventKind.DOCKS})
-    answers: ClassVar[frozenset[str]] = frozenset({"dock"})
+    records = frozenset({EventKind.CHARGED, EventKind.DOCKS})
+    answers = frozenset({"dock"})
 
     threshold: Share = 0.2
     until: Share = 1.0
@@ -88,7 +86,7 @@ class Dock(Behavior):
         has_command = now.take_command("dock") is not None
         is_low = charge.level <= self.threshold
         if has_command or is_low or (self.charging and charge.level < self.until):
-            if not self.charging or (plan.x, plan.y) != charger:
+            if not self.charging or plan.position != charger:
                 self._go(plan, now.actor, charger).note(EventKind.DOCKS, charge.percent)
             self.charging = True
             return plan.stay(timedelta(microseconds=charge.time_to_charge(self.until)))
@@ -99,14 +97,14 @@ class Dock(Behavior):
                 # The row needs a plan; the shortest one, so that later behaviors are asked next.
                 return plan.stay(timedelta(microseconds=1))
         if self.rest:
-            if (plan.x, plan.y) != charger:
+            if plan.position != charger:
                 self._go(plan, now.actor, charger)
             return plan.stay(REST)
         return None
 
-    def _go(self, plan: Plan, actor: Actor, charger: tuple[int, int]) -> Plan:
+    def _go(self, plan: Plan, actor: Actor, charger: LatticePoint) -> Plan:
         """Add the way to the charger to a plan: round the rooms to avoid, else the shortest."""
         route = None
         if self.avoided:
-            route = actor.space_without(self.avoided).route((plan.x, plan.y), charger)
+            route = actor.space_without(self.avoided).route(plan.position, charger)
         return plan.go_to_point(*charger, route=route)

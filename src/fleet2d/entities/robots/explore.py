@@ -1,12 +1,10 @@
 """Explore: drive from frontier to frontier of the floor seen so far, until all of it is seen."""
 
 from datetime import datetime, timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import avoided_rooms
@@ -24,7 +22,6 @@ WORTH = 0.002
 RETRY_INTERVAL = timedelta(minutes=1)
 
 
-@register("behavior", "explore")
 class Explore(Behavior):
     """Complete the layer `explored` of the robot, frontier by frontier.
 
@@ -43,8 +40,8 @@ class Explore(Behavior):
             round in none of them, and their floor needn't be seen.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})
-    needs: ClassVar[frozenset[str]] = frozenset({"explored"})
+    records = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})
+    needs = frozenset({"explored"})
 
     enough: Share = 0.98
     reach: Length = Field(default=1.0, ge=0.1, le=5)
@@ -117,7 +114,7 @@ class Explore(Behavior):
         if not len(near):
             return None
         actor = now.actor
-        position = (actor.state.x, actor.state.y)
+        position = actor.state.position
         metres = actor.space.distances(position, centres(self.stands[near]))
         seconds = actor.seconds(metres) + TURN / actor.turn_rate
         best = int(np.argmax(gain / seconds))

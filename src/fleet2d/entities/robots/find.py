@@ -3,12 +3,10 @@
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share, TimeOfDay
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Command, Situation
@@ -34,6 +32,7 @@ from fleet2d.entities.robots.search import (
     search_problem,
 )
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
@@ -41,6 +40,8 @@ from fleet2d.runtime.events import EventKind
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 SHARE_TO_SHOW = 0.9
+# Weight of a prior proportional to the areas of rooms, beside that of the source.
+DOUBT = 0.1
 # Counted for a route that is blocked at present, as by a shut door [s].
 BLOCKED_ROUTE_S = 86_400.0
 
@@ -91,7 +92,7 @@ class Sites:
             prior: Probability that the person is in each room, float64 (n,).
         """
         travel, look = self._travel()
-        position = (now.actor.state.x, now.actor.state.y)
+        position = now.actor.state.position
         reach = [self._seconds(position, points[0]) for points in self._points]
         return search_problem(prior, reach, travel, look, self.share)
 
@@ -102,17 +103,17 @@ class Sites:
         """
         version = self._actor.home.version
         if self._times is None or self._times[0] != version:
-            last, first = [p[-1] for p in self._points], [p[0] for p in self._points]
-            travel = np.array([[self._seconds(a, b) for b in first] for a in last], np.float64)
-            turn = TURN / self._actor.turn_rate
-            look = [
-                len(points) * turn + sum_in_order(self._seconds(a, b) for a, b in pairwise(points))
-                for points in self._points
-            ]
-            self._times = version, travel, np.array(look, np.float64)
+            travel = np.empty((len(self), len(self)))
+            look = np.empty(len(self))
+            turn_s = TURN / self._actor.turn_rate
+            for site, points in enumerate(self._points):
+                ways = [self._seconds(start, goal) for start, goal in pairwise(points)]
+                look[site] = len(points) * turn_s + sum_in_order(ways)
+                travel[site] = [self._seconds(points[-1], other[0]) for other in self._points]
+            self._times = version, travel, look
         return self._times[1:]
 
-    def _seconds(self, start: tuple[int, int], goal: tuple[int, int]) -> float:
+    def _seconds(self, start: LatticePoint, goal: LatticePoint) -> float:
         seconds = way_seconds(self._actor, start, goal)
         return BLOCKED_ROUTE_S if seconds is None else seconds
 
@@ -138,7 +139,6 @@ class SearchState:
     blocked: set[int] = field(default_factory=set)
 
 
-@register("behavior", "find")
 class Find(BeliefBehavior):
     """Look for a person at given times or on command, until found, given up or believed out.
 
@@ -161,7 +161,6 @@ class Find(BeliefBehavior):
         deadline: Duration of a search after which it gives up.
         out_at: Probability of being out from which the person counts as not at home, once the robot
             has looked into every room that it can get to.
-        doubt: Weight of a prior proportional to the areas of rooms, beside that of the source.
         out: Probability that the person is out, as long as the source has no output.
         memory: Age at which an empty look counts half, because people move.
         views: The maximum number of places in a room from which it looks around.
@@ -170,10 +169,10 @@ class Find(BeliefBehavior):
         avoid: Rooms, or kinds of rooms if the home has them, that it looks into from outside only.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME}
     )
-    answers: ClassVar[frozenset[str]] = frozenset({"find"})
+    answers = frozenset({"find"})
 
     policy: Policy = "receding"
     at: tuple[TimeOfDay, ...] = ()
@@ -181,7 +180,6 @@ class Find(BeliefBehavior):
     late: Duration = timedelta(minutes=30)
     deadline: PositiveDuration = timedelta(minutes=10)
     out_at: Share = 0.9
-    doubt: Share = 0.1
     out: Share = 0.5
     memory: Duration = timedelta(minutes=20)
     views: int = Field(default=2, ge=1, le=8)
@@ -292,12 +290,12 @@ class Find(BeliefBehavior):
         """End the search: approach the person, at (x, y) [m], and stay."""
         self._end(plan, EventKind.FOUND)
         if is_in_rooms(now, x, y, self.avoided):
-            return plan.face(*now.home.plan.lattice.point_at((x, y))).stay(self.stay)
+            return plan.face_place((x, y)).stay(self.stay)
         approach(now, plan, x, y, self.distance)
         back = spot_back(now, x, y, self.distance)
-        if (plan.x, plan.y) == (now.actor.state.x, now.actor.state.y) != back:
+        if plan.position == now.actor.state.position != back:
             plan.go_to_point(*back)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         return plan.stay(self.stay)
 
     def _look_further(self, now: Situation, plan: Plan, search: SearchState) -> Plan | None:
@@ -337,7 +335,7 @@ class Find(BeliefBehavior):
         shares = belief.share[self.sites.rooms]
         total = sum_in_order(shares.tolist())
         shares = shares / total if total > 0 else np.zeros(len(sizes))
-        doubt = self.doubt if total > 0 else 1.0
+        doubt = DOUBT if total > 0 else 1.0
         mixed = (1 - doubt) * shares + doubt * sizes / int(sizes.sum())
         has_output = self.source is not None and now.outputs.get(self.source) is not None
         away = belief.away if has_output else self.out

@@ -1,17 +1,16 @@
 """Follow and come: stay behind a person in view, or drive to the one who called."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Command, Situation
 from fleet2d.entities.place import avoided_rooms, lies_in, stop_at
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import approach, centres, check_has_camera, is_in_rooms
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.runtime.events import EventKind
 
 # Distance from where a person was lost at which it looks for the person [m].
@@ -24,7 +23,6 @@ MAX_INTERVAL = timedelta(seconds=32)
 OFF_DOOR_M = 0.8
 
 
-@register("behavior", "follow")
 class Follow(Behavior):
     """Follow a person at a distance for as long as the cameras have the person in view.
 
@@ -42,8 +40,8 @@ class Follow(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.FOLLOWS, EventKind.LOST})
-    listens: ClassVar[frozenset[str]] = frozenset({EventKind.USER_SEEN})
+    records = frozenset({EventKind.FOLLOWS, EventKind.LOST})
+    listens = frozenset({EventKind.USER_SEEN})
 
     user: str = Field(default="", min_length=0)
     distance: Length = Field(default=1.5, ge=0.3, le=10)
@@ -100,14 +98,15 @@ class Follow(Behavior):
 
     def _follow(self, now: Situation, plan: Plan) -> Plan:
         self.is_searching = False
-        (x, y), (old_x, old_y) = now.in_view[self.person or ""], self.last
+        x, y = now.in_view[self.person or ""]
+        old_x, old_y = self.last
         is_resting = (x - old_x) ** 2 + (y - old_y) ** 2 <= STILL_M**2
         longest = max(MAX_INTERVAL, self.update)
         self.pause = min(2 * self.pause, longest) if is_resting else self.update
         self.last = x, y
         if not is_in_rooms(now, x, y, self.avoided):
             approach(now, plan, x, y, self.distance)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         until = now.time + self.pause
         if self.longest:
             until = min(until, self.since + self.longest)
@@ -115,7 +114,6 @@ class Follow(Behavior):
         return plan.interrupt_on(EventKind.USER_LOST).stay(until=until).ask_by(until)
 
 
-@register("behavior", "come")
 class Come(Behavior):
     """Go where the robot is called to, and wait there for a while.
 
@@ -129,9 +127,9 @@ class Come(Behavior):
             of them, it waits outside, near the door.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.VISITS})
-    answers: ClassVar[frozenset[str]] = frozenset({"come"})
-    resumes: ClassVar[bool] = True
+    records = frozenset({EventKind.VISITS})
+    answers = frozenset({"come"})
+    resumes = True
 
     stay: Duration = timedelta(minutes=10)
     avoid: tuple[str, ...] = ()
@@ -159,12 +157,12 @@ class Come(Behavior):
         self.command = None
         return plan.stay(self.stay)
 
-    def _outside(self, actor: Actor, goal: tuple[int, int]) -> tuple[int, int]:
+    def _outside(self, actor: Actor, goal: LatticePoint) -> LatticePoint:
         """Return a goal, or where the robot waits for it if that is in a room it doesn't enter."""
         if not lies_in(actor, goal, self.avoided):
             return goal
         space = actor.space_without(self.avoided)
-        cells = centres(space.cells(None, space.part_near(actor.state.x, actor.state.y)))
+        cells = centres(space.cells(None, space.part_near(*actor.state.position)))
         metres = actor.space.distances(goal, cells)
         if not np.isfinite(metres).any():
             return goal  # behind a shut door: there is no way at present

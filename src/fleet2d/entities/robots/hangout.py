@@ -1,21 +1,21 @@
 """Hangout: stand near people without blocking their way, and move rarely."""
 
-from datetime import datetime, timedelta
+from datetime import timedelta
 from functools import partial
 from itertools import combinations
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
 from pydantic import Field
 
-from fleet2d.configuration.components import register
-from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
+from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
 from fleet2d.entities.place import avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import BeliefBehavior, centres, sight_range, viewpoints_of
 from fleet2d.errors import PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB, points_in_sight
@@ -45,31 +45,30 @@ class HangoutPlaces:
         prox: How deep it is in personal space, from 1 on a seat to 0 outside, float64 (n,).
     """
 
-    def __init__(self, actor: Actor, avoid: frozenset[int], off_doors: float) -> None:
+    def __init__(self, actor: Actor, avoid: frozenset[int]) -> None:
         """Lay out the places, by walls and furniture as they are at present.
 
         Args:
             actor: The robot.
             avoid: Indices of the rooms without places.
-            off_doors: The minimum distance of a place from every doorway [m].
         """
         self._actor = actor
         home = actor.home
         people = home.space(PERSON, opens_doors=True)
         # The key has all that the places depend on: robots of other runs in this home share them.
         body = actor.space, actor.part, actor.entity.radius
-        self._key = (*body, people, home.objects, avoid, off_doors)
+        self._key = (*body, people, home.objects, avoid)
         self.points, self.room, seats, self.block, self.prox = home.cached(
-            ("places", *self._key), lambda: self._lay_out(avoid, off_doors)
+            ("places", *self._key), lambda: self._lay_out(avoid)
         )
         self._seats = dict(enumerate(seats))
 
-    def _lay_out(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64, Seats, F64, F64]:
+    def _lay_out(self, avoid: frozenset[int]) -> tuple[I64, I64, Seats, F64, F64]:
         """Return the points, their rooms, the seats of each room, and two costs of each point.
 
         The costs are `block`, how much it blocks ways, and `prox`, how near it is to a seat.
         """
-        self.points, self.room = self._candidates(avoid, off_doors)
+        self.points, self.room = self._candidates(avoid)
         seats = tuple(read_only(self._seats_of(room)) for room in self._actor.home.rooms)
         block = read_only(self._blocking())
         prox = read_only(self._proximity())
@@ -96,7 +95,7 @@ class HangoutPlaces:
         column = self._view if by == "view" else partial(self._path, tau=tau)
         return np.stack([column(room) for room in rooms], axis=1)
 
-    def _candidates(self, avoid: frozenset[int], off_doors: float) -> tuple[I64, I64]:
+    def _candidates(self, avoid: frozenset[int]) -> tuple[I64, I64]:
         actor = self._actor
         plan = actor.home.plan
         cells = actor.space.cells(None, actor.part)
@@ -107,13 +106,13 @@ class HangoutPlaces:
         cells = cells[is_candidate]
         rooms = rooms[is_candidate]
         points = centres(cells)
-        if plan.doorways and off_doors > 0:
+        if plan.doorways:
             lines = [plan.lattice.to_lattice((door.start, door.end)) for door in plan.doorways]
             gaps = shapely.distance(
                 shapely.points(points[:, None]),
                 np.array([shapely.LineString(line) for line in lines]),
             )
-            clear = gaps.min(axis=1, initial=np.inf) >= off_doors * plan.lattice.units_per_m
+            clear = gaps.min(axis=1, initial=np.inf) >= OFF_DOORS_M * plan.lattice.units_per_m
             points = points[clear]
             rooms = rooms[clear]
         return np.ascontiguousarray(points), rooms
@@ -200,26 +199,27 @@ def decay(x: F64) -> F64:
     return np.where(np.isfinite(x), 1 / growth, 0.0)
 
 
+# How far from doorways it stands at least.
+OFF_DOORS_M = 0.8
+# Weight of being near a seat, in relation to that of blocking ways.
+SEAT_WEIGHT = 0.5
 # When exploring a room: the part of it to be shown, by at most this many viewpoints.
 SHARE_TO_SHOW = 0.95
 MAX_VIEWS = 4
 
 
-@register("behavior", "hangout")
 class Hangout(BeliefBehavior):
     """Stand near where people likely are, out of their way.
 
     Every `period` it rates the places on a grid of 0.5 m by
 
-    sum over rooms p(room) nearness(place, room) - blocking * b(place) - personal_space * s(place)
-    - moving * m(place)
+    sum over rooms p(room) nearness(place, room) - b(place) - s(place) / 2 - moving * m(place)
 
     where p(room) is the probability that the user is at home and in that room, from `source`; b is
     the share of the shortest ways between two rooms that lead through the robot's body there, for a
     person of radius 0.2 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
     it; and m = t / (t + tau), with t the travel time from where it is [s]. It moves only to a place
-    that beats the present one by `hysteresis`, has been better than it for `confirm` (so that a
-    belief that flickers moves nobody), and never in quiet hours. With probability
+    that beats the present one by `hysteresis`, and never in quiet hours. With probability
     `explore` it goes to a room drawn with equal chances instead, looks round in it, and comes back,
     so that its observations don't depend only on its own beliefs.
 
@@ -231,49 +231,40 @@ class Hangout(BeliefBehavior):
         period: How often it decides where to stand.
         near: The measure of nearness: the same room; a view of its seats; or travel time.
         tau: Travel time at which nearness by `path` has fallen to 1/e.
-        blocking: Weight of blocking people's ways.
-        personal_space: Weight of being near a seat.
         moving: Weight of the travel time to a place.
         hysteresis: By how much another place must be better for it to move.
-        confirm: For how long some place must have been better by that before it moves.
         explore: Share of decisions in which it explores any room instead.
         avoid: Rooms, or kinds of rooms if the home has them, that it stays out of.
         quiet: Hours in which it doesn't move.
-        off_doors: How far from doorways it stands at least [m].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.EXPLORES, EventKind.RELOCATES})
+    records = frozenset({EventKind.EXPLORES, EventKind.RELOCATES})
 
     period: PositiveDuration = timedelta(minutes=30)
     near: Nearness = "path"
     tau: PositiveDuration = timedelta(seconds=10)
-    blocking: float = Field(default=1.0, ge=0)
-    personal_space: float = Field(default=0.5, ge=0)
     moving: float = Field(default=0.05, ge=0)
     hysteresis: float = Field(default=0.1, ge=0)
-    confirm: Duration = timedelta(0)
     explore: Share = 0.1
     avoid: tuple[str, ...] = ()
     quiet: Hours = ()
-    off_doors: Length = Field(default=0.8, ge=0)
 
     def start(self, actor: Actor) -> None:
         """Lay out the places, and rate them by what doesn't depend on where people are."""
         self.avoided = avoided_rooms(actor, "hangout.avoid", self.avoid)
-        self.places = HangoutPlaces(actor, self.avoided, self.off_doors)
+        self.places = HangoutPlaces(actor, self.avoided)
         if not len(self.places.points):
             raise PlacementError(
                 f"{actor.path}: there is no place to hang out at, off doorways by"
-                f" {self.off_doors:g} m and out of: {', '.join(self.avoid) or 'no room'}"
+                f" {OFF_DOORS_M:g} m and out of: {', '.join(self.avoid) or 'no room'}"
             )
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
-        self.penalty = self.blocking * self.places.block + self.personal_space * self.places.prox
-        self.ways: tuple[Space, dict[tuple[int, int], F64]] = actor.space, {}
+        self.penalty = self.places.block + SEAT_WEIGHT * self.places.prox
+        self.ways: tuple[Space, dict[LatticePoint, F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.rated_by: F64 | None = None  # the probabilities behind `worth`
         self.worth = -self.penalty
         self.place: int | None = None
-        self.better_since: datetime | None = None  # some place beats the present one since then
         self.decides_at = actor.clock.start
         self.is_blocked = False  # a person is on its place, or in front of it
 
@@ -298,7 +289,7 @@ class Hangout(BeliefBehavior):
             if explores:
                 self._explore(now, plan, draws.choice(self.explored))
         x, y = self.places.points[self.place].tolist()
-        if (plan.x, plan.y) != (x, y) and not self.is_blocked:
+        if plan.position != (x, y) and not self.is_blocked:
             plan.go_to_point(x, y)
             self._face_room(now, plan)
         if quiet_until is not None:
@@ -316,13 +307,9 @@ class Hangout(BeliefBehavior):
         scores = self._scores(now, belief.joint)
         best = int(np.argmax(scores))
         if self.place is not None and scores[best] <= scores[self.place] + self.hysteresis:
-            self.better_since = None
             return
-        self.better_since = self.better_since or now.time
-        if self.place is None or now.time - self.better_since >= self.confirm:
-            self.place = best
-            self.better_since = None
-            plan.note(EventKind.RELOCATES, now.home.plan.rooms[int(self.places.room[best])].name)
+        self.place = best
+        plan.note(EventKind.RELOCATES, now.home.plan.rooms[int(self.places.room[best])].name)
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
@@ -357,7 +344,7 @@ class Hangout(BeliefBehavior):
             self.ways = space, {}
         cell = actor.state.x // SUB, actor.state.y // SUB
         if cell not in self.ways[1]:
-            seconds = actor.seconds(space.distances((actor.state.x, actor.state.y), points))
+            seconds = actor.seconds(space.distances(actor.state.position, points))
             is_reachable = np.isfinite(seconds)
             way = np.where(is_reachable, seconds, 0.0)
             move = way / (way + self.tau.total_seconds())
@@ -368,5 +355,5 @@ class Hangout(BeliefBehavior):
         """Turn to the middle of the room that it stands in."""
         room = now.home.plan.rooms[int(self.places.room[self.place])]
         x, y = now.home.plan.lattice.point_at(room.anchor_xy)
-        if (x, y) != (plan.x, plan.y):
+        if (x, y) != plan.position:
             plan.face(x, y)

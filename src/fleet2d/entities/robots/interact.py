@@ -2,11 +2,10 @@
 
 import math
 from datetime import datetime, timedelta
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Duration, Length, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.giving_way import resumed
@@ -20,6 +19,7 @@ from fleet2d.entities.robots.approach import (
     is_in_rooms,
 )
 from fleet2d.errors import ComponentError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.interactions.interaction import OUTCOMES, Outcome, Request
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import exp2, sum_in_order
@@ -28,6 +28,8 @@ from fleet2d.runtime.events import EventKind
 Step = Literal["seek", "ask", "carry_out"]
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
+# It looks for a person who is at home with this probability, by `source`, at least.
+SOUGHT_FROM = 0.25
 # It looks into the likeliest rooms, until they have this part of the probability.
 ENOUGH = 0.9
 # No source is surer that a person is at home: without one, all of the probability is there.
@@ -123,10 +125,9 @@ class ServedRequest(NamedTuple):
     step: Step
     text: str
     place: Point = (0.0, 0.0)
-    came_from: tuple[int, int] = (0, 0)
+    came_from: LatticePoint = (0, 0)
 
 
-@register("behavior", "interact")
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
@@ -157,30 +158,23 @@ class Interact(BeliefBehavior):
         patience: How long it waits for an answer.
         again: Time after an answer other than yes before it addresses the same person again.
         seek: Whether it looks for people; else it serves only those who come into view.
-        seek_at: Minimum probability, by `source`, that the person is at home for it to look.
-        only_urgent_at: With `timing`: part of the time to the deadline after which it no longer
-            waits for a better moment.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {
             EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED, EventKind.WITHDRAWS,
             EventKind.OPPORTUNITY, EventKind.REPLIES,
         }
     )  # fmt: skip
-    listens: ClassVar[frozenset[str]] = frozenset(
-        {EventKind.USER_SEEN, EventKind.DUE, EventKind.QUESTION}
-    )
+    listens = frozenset({EventKind.USER_SEEN, EventKind.DUE, EventKind.QUESTION})
 
-    serves_requests: ClassVar[bool] = True
+    serves_requests = True
 
     timing: str | None = None
     look: PositiveDuration = timedelta(minutes=20)
     patience: PositiveDuration = timedelta(seconds=20)
     again: Duration = timedelta(minutes=10)
     seek: bool = True
-    seek_at: Share = 0.25
-    only_urgent_at: Share = Field(default=1.0)
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithms that it reads."""
@@ -254,7 +248,7 @@ class Interact(BeliefBehavior):
         event = next((event for event in now.events if event.event == EventKind.QUESTION), None)
         if event is None:
             return None
-        plan = now.plan().face(*now.home.plan.lattice.point_at((event.x, event.y)))
+        plan = now.plan().face_place((event.x, event.y))
         return plan.note(EventKind.REPLIES, event.user).stay(REPLY_TAKES)
 
     def _address(
@@ -291,7 +285,7 @@ class Interact(BeliefBehavior):
                 continue
             joint = self.belief(now, to).joint
             usual = min(MOST_SURE, sum_in_order(joint.tolist()))
-            if self.at_home.chance(to, now.time, usual) < self.seek_at:
+            if self.at_home.chance(to, now.time, usual) < SOUGHT_FROM:
                 self.not_sought[to] = now.time + SEARCH_PAUSE
             elif self._is_good_time(now, request):
                 return self._seek(now, request, joint)
@@ -302,7 +296,7 @@ class Interact(BeliefBehavior):
         pause = UNANSWERED_PAUSE if person in self.unanswered else SEARCH_PAUSE
         if not is_in_view:
             usual = min(MOST_SURE, sum_in_order(self.belief(now, person).joint.tolist()))
-            doubted = self.at_home.note_empty(person, now.time, usual, self.seek_at)
+            doubted = self.at_home.note_empty(person, now.time, usual, SOUGHT_FROM)
             pause = max(SEARCH_PAUSE, doubted)
         self.not_sought[person] = now.time + pause
 
@@ -335,8 +329,7 @@ class Interact(BeliefBehavior):
                 f"the output of {self.timing!r} has no chances of asking: name an algorithm of type"
                 " timing, or one whose output has a method `chance`, as TimingChances has"
             )
-        age = (now.time - request.since) / request.interaction.within
-        if output is not None and age < self.only_urgent_at:
+        if output is not None:
             chance = output.chance(to, request.name, now.time, self._room_of(now, to))
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
@@ -367,7 +360,7 @@ class Interact(BeliefBehavior):
         self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)
-        plan.face(*now.home.plan.lattice.point_at(place))
+        plan.face_place(place)
         plan.note(EventKind.ASKS, request.text).stay(self.patience).interrupt_on(*OUTCOMES)
         self.plan = plan.root
         return plan
@@ -397,7 +390,8 @@ class Interact(BeliefBehavior):
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
         total = sum_in_order(float(joint[room.index]) for room in rooms)
-        self.served, self.plan = ServedRequest(request, "seek", request.text), now.plan()
+        self.served = ServedRequest(request, "seek", request.text)
+        self.plan = now.plan()
         looked = 0.0
         for room in rooms:
             if looked > ENOUGH * total:
@@ -424,7 +418,6 @@ class Interact(BeliefBehavior):
         return plan.interrupt_on(EventKind.USER_SEEN)
 
 
-@register("behavior", "opportunistic")
 class Opportunistic(Behavior):
     """Approach a person who comes into view, and interact for a while.
 
@@ -443,13 +436,13 @@ class Opportunistic(Behavior):
         avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {
             EventKind.APPROACHES, EventKind.ASKS, EventKind.COLLECTS, EventKind.DELIVERED,
             EventKind.INTERACTION_OVER, EventKind.INTERACTS,
         }
     )  # fmt: skip
-    listens: ClassVar[frozenset[str]] = frozenset({EventKind.USER_SEEN})
+    listens = frozenset({EventKind.USER_SEEN})
 
     users: tuple[str, ...] = ()
     distance: Length = Field(default=1.2, ge=0.3, le=10)
@@ -494,7 +487,7 @@ class Opportunistic(Behavior):
     def _approach(self, now: Situation, name: str, x: float, y: float) -> Plan:
         plan = now.plan().note(EventKind.APPROACHES, name)
         approach(now, plan, x, y, self.distance)
-        plan.face(*now.home.plan.lattice.point_at((x, y)))
+        plan.face_place((x, y))
         plan.note(EventKind.INTERACTS, name)
         ready = [] if now.requests is None else now.requests.ready(now.time, (name,))
         self.asked = (ready[0], ready[0].text) if ready else None

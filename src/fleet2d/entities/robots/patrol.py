@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, InputPath, Length, OnDays, TimeOfDay, weekdays_of
 from fleet2d.entities.behavior import DOOR_WAIT, Actor, Behavior, Situation
@@ -27,16 +27,17 @@ from fleet2d.entities.place import (
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import stops_with_view, unwatched
 from fleet2d.errors import FloorPlanError, PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.load import source_of
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import I64
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.events import EventKind
 
+SPACING_M = 0.1  # points of a retraced path that are nearer to the last are left out
 MAX_NAMED = 6  # how many rooms a note names
 
 
-@register("behavior", "patrol")
 class Patrol(Behavior):
     """Make rounds: go to each room or waypoint in turn, look around, stay a while, go on.
 
@@ -54,7 +55,7 @@ class Patrol(Behavior):
             from which it sees all places at the room's furniture (without any, 95 % of the floor).
     """
 
-    resumes: ClassVar[bool] = True
+    resumes = True
 
     rooms: Literal["all"] | tuple[Place, ...] = "all"
     waypoints: tuple[Point, ...] = ()
@@ -94,13 +95,13 @@ class Patrol(Behavior):
                 f" {', '.join(hidden[:MAX_NAMED])}{more}{hint}"
             )
 
-    def _stops_at(self, actor: Actor, place: Place) -> list[tuple[int, int]]:
+    def _stops_at(self, actor: Actor, place: Place) -> list[LatticePoint]:
         if self.stop_at == "middle" or is_point(place) or furniture_of(actor, place) is not None:
             return stops_at(actor, place)
         rooms = actor.rooms(place)  # type: ignore[arg-type]
         return [stop for room in rooms for stop in self._stops_in(actor, room)]
 
-    def _stops_in(self, actor: Actor, room: Room) -> Sequence[tuple[int, int]]:
+    def _stops_in(self, actor: Actor, room: Room) -> Sequence[LatticePoint]:
         return stops_with_view(actor, room) if self.stop_at == "view" else [actor.middle(room)]
 
     def decide(self, now: Situation) -> Plan:
@@ -141,7 +142,6 @@ class ScheduledVisit(Settings):
     task: str = ""
 
 
-@register("behavior", "scheduled")
 class Scheduled(Behavior):
     """Visit rooms at fixed times of the day; between visits, later behaviors decide.
 
@@ -157,7 +157,7 @@ class Scheduled(Behavior):
             are left out, with a note.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
+    records = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
 
     visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
     late: Duration = timedelta(minutes=30)
@@ -196,9 +196,9 @@ class Scheduled(Behavior):
         return None
 
     def _visit(self, now: Situation, number: int) -> Plan:
-        visit, (x, y) = self.visits[number], self.stops[number]
+        visit = self.visits[number]
         name = visit.task or self._room_name(now.actor, number)
-        plan = now.plan().go_to_point(x, y).note(EventKind.VISITS, name)
+        plan = now.plan().go_to_point(*self.stops[number]).note(EventKind.VISITS, name)
         if visit.look_around:
             plan.turn_by(1.0)
         return plan.stay(visit.dwell)
@@ -221,27 +221,24 @@ class Scheduled(Behavior):
             yield from (entry for entry in sorted(today) if entry[0] > since)
 
 
-@register("behavior", "retrace")
 class Retrace(Behavior):
     """Drive the path in the map of a Valetudo robot, in the home of that map, at the robot's speed.
 
     The map has no times; for a log with times use the behavior `replay`. Points nearer to each
-    other than `spacing` are thinned out. A point that the body can't get to is replaced by the
+    other than 0.1 m are thinned out. A point that the body can't get to is replaced by the
     nearest one that it can, if that is within `reach`. At the end of the path it starts again,
     after `cooldown`. Events: `retraces`, with the number of points, and `retraced`.
 
     Attributes:
         path: The map's JSON file.
-        spacing: Points of the path nearer than this are left out [m].
         reach: A point farther than this from free space is left out [m].
         avoid: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.RETRACED, EventKind.RETRACES})
-    resumes: ClassVar[bool] = True
+    records = frozenset({EventKind.RETRACED, EventKind.RETRACES})
+    resumes = True
 
     path: InputPath
-    spacing: Length = Field(default=0.1, ge=0)
     reach: Length = Field(default=1.0, ge=0)
     avoid: tuple[str, ...] = ()
 
@@ -270,7 +267,7 @@ class Retrace(Behavior):
         squared_moves = ((near - points) ** 2).sum(axis=1)
         reachable = near[squared_moves <= (self.reach * lattice.units_per_m) ** 2]
         avoided = avoided_rooms(actor, "retrace.avoid", self.avoid)
-        points_left = _thin_out(reachable, self.spacing * lattice.units_per_m)
+        points_left = _thin_out(reachable, SPACING_M * lattice.units_per_m)
         self.points = [p for p in points_left if not lies_in(actor, p, avoided)]
         if len(self.points) < 2:
             raise PlacementError(
@@ -288,9 +285,9 @@ class Retrace(Behavior):
         return plan.note(EventKind.RETRACED)
 
 
-def _thin_out(points: I64, spacing: float) -> list[tuple[int, int]]:
+def _thin_out(points: I64, spacing: float) -> list[LatticePoint]:
     """Return points in order, each farther than `spacing` from the one before [lattice]."""
-    path: list[tuple[int, int]] = []
+    path: list[LatticePoint] = []
     for x, y in points.tolist():
         if not path or (x - path[-1][0]) ** 2 + (y - path[-1][1]) ** 2 > spacing * spacing:
             path.append((x, y))

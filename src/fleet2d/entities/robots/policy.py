@@ -9,13 +9,12 @@ robot's sightings (`SightingMemory`).
 
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import register
 from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import InputPath, PositiveDuration
@@ -225,7 +224,6 @@ def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
     )
 
 
-@register("behavior", "policy")
 class Policy(BeliefBehavior):
     """Let a learned policy choose the next room: to wait in, to look for a person in, or to visit.
 
@@ -249,14 +247,14 @@ class Policy(BeliefBehavior):
         deadline: Duration of a search after which it gives up (find).
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
+    records = frozenset(
         {
             EventKind.DOCKS, EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP,
             EventKind.RELOCATES, EventKind.VISITS,
         }
     )  # fmt: skip
 
-    remembers: ClassVar[bool] = True
+    remembers = True
 
     task: Literal["hangout", "find", "patrol"] = "hangout"
     file: InputPath | None = None
@@ -321,7 +319,8 @@ class Policy(BeliefBehavior):
         away = 0.0
         if self.source is not None:
             belief = self.belief(now, self.user)
-            part[:, _AT["belief"]], away = belief.joint, belief.away
+            part[:, _AT["belief"]] = belief.joint
+            away = belief.away
             for number, name in enumerate(self.names[:PEOPLE]):
                 part[:, _AT[f"belief_{number}"]] = self.belief(now, name).joint
         step_s = actor.clock.step_us / 1e6
@@ -355,7 +354,8 @@ class Policy(BeliefBehavior):
         types = {kind: name for name, kinds in KINDS.items() for kind in kinds}
         for room in actor.home.rooms:
             row = table[room.index]
-            row[_AT["room"]], row[_AT["area"]] = 1, room.cells / cells
+            row[_AT["room"]] = 1
+            row[_AT["area"]] = room.cells / cells
             if self.source is None:
                 row[_AT["belief"]] = row[_AT["area"]]
             row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1
@@ -463,7 +463,7 @@ class Policy(BeliefBehavior):
         charge = now.actor.charge
         lasts = MINUTE if self.task == "find" else self.period
         if charge is not None and plan.reaches(*charge.charger):
-            if (plan.x, plan.y) != charge.charger:
+            if plan.position != charge.charger:
                 plan.go_to_point(*charge.charger).note(EventKind.DOCKS, charge.percent)
             lasts = max(timedelta(microseconds=charge.time_to_charge(1.0)), MINUTE)
         plan.stay(lasts)
@@ -480,7 +480,7 @@ class Policy(BeliefBehavior):
             self._tally["relocations"] += 1
             return plan.interrupt_on(EventKind.USER_SEEN)
         x, y = self.poses.points[number].tolist()
-        if (plan.x, plan.y) != (x, y):
+        if plan.position != (x, y):
             self._tally["relocations"] += 1
             kind = EventKind.RELOCATES if self.task == "hangout" else EventKind.VISITS
             plan.note(kind, name).go_to_point(x, y)

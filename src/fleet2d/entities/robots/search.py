@@ -1,4 +1,4 @@
-"""Search: orders in which to look for a target, and what an order is worth.
+"""Search: orders in which to look for a target.
 
 A target stays at one of n sites, or is at none of them. A look takes time; when it ends at the
 target's site, it detects the target with a known probability. To minimize the expected time of
@@ -9,7 +9,7 @@ Policies are functions of a `SearchProblem` and return each site once. Ties go t
 that an order is the same on every machine.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -41,45 +41,6 @@ class SearchProblem(NamedTuple):
     def gain(self) -> F64:
         """Probability that the first look at each site finds the target, float64 (n,)."""
         return self.prior * self.detect
-
-
-class SearchOutcome(NamedTuple):
-    """The distribution of the time of detection for an order of looks.
-
-    Attributes:
-        time: When each look ends [s], float64 (looks,).
-        chance: Probability that the target is first found by each look, float64 (looks,).
-    """
-
-    time: F64
-    chance: F64
-
-    @property
-    def cost(self) -> float:
-        """Sum of time times chance [s], by which the orders of all sites are compared."""
-        return float(
-            sum_in_order(
-                t * p for t, p in zip(self.time.tolist(), self.chance.tolist(), strict=True)
-            )
-        )
-
-    @property
-    def success(self) -> float:
-        """Probability that the target is found at all."""
-        return sum_in_order(self.chance.tolist())
-
-    @property
-    def mean(self) -> float:
-        """Expected time of detection, given that the target is found [s]; 0 if it never is."""
-        return self.cost / self.success if self.success > 0 else 0.0
-
-    def restricted_mean(self, deadline: float) -> float:
-        """Return the expected time until the target is found or the deadline is reached [s]."""
-        inside = self.time <= deadline
-        chances = self.chance[inside].tolist()
-        times = self.time[inside].tolist()
-        before_deadline = sum_in_order(t * p for t, p in zip(times, chances, strict=True))
-        return float(before_deadline + deadline * (1 - sum_in_order(chances)))
 
 
 def search_problem(
@@ -121,44 +82,6 @@ def search_problem(
     if sum_in_order(chances.tolist()) > 1 + 1e-9 or (problem.detect > 1).any():
         raise ValueError("prior sums to more than one, or detect is above one")
     return problem
-
-
-def play(problem: SearchProblem, order: Sequence[int]) -> SearchOutcome:
-    """Return when each look of an order ends, and the probability that it finds the target.
-
-    A site may be in the order several times: the outcomes of looks are independent.
-
-    Example:
-        >>> flat = search_problem([0.5, 0.3], [4, 1], [[0, 5], [5, 0]], look=2)
-        >>> outcome = play(flat, [1, 0])
-        >>> outcome.time.tolist(), round(outcome.mean, 3), round(outcome.restricted_mean(9), 2)
-        ([3.0, 10.0], 7.375, 7.2)
-    """
-    undetected = problem.prior.copy()  # the target is at the site, and no look has found it
-    now = 0.0
-    at = -1
-    times = []
-    chances = []
-    for site in order:
-        way = problem.reach[site] if at < 0 else problem.travel[at, site]
-        now += float(way + problem.look[site])
-        times.append(now)
-        chances.append(float(undetected[site] * problem.detect[site]))
-        undetected[site] *= 1 - problem.detect[site]
-        at = site
-    return SearchOutcome(np.array(times, np.float64), np.array(chances, np.float64))
-
-
-def clairvoyant_time(problem: SearchProblem) -> float:
-    """Return the expected time of a searcher who knows the target's site [s].
-
-    The target is assumed to be at one of the sites. No policy is faster: times of policies are
-    compared with it by division.
-    """
-    direct = problem.reach + problem.look
-    total = sum_in_order(problem.prior.tolist())
-    weighted = sum_in_order((problem.prior * direct).tolist())
-    return float(weighted / total) if total > 0 else 0.0
 
 
 Policy = Literal["random", "nearest", "likeliest", "greedy", "exact", "receding"]
@@ -287,7 +210,8 @@ def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]
         problem: The problem.
         worth: A function of the time of travel and look [s] and the probability of detection.
     """
-    gain, look = problem.gain.tolist(), problem.look.tolist()
+    gain = problem.gain.tolist()
+    look = problem.look.tolist()
     remaining = list(range(len(gain)))
     order = list[int]()
     while remaining:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Literal
 
-from fleet2d.configuration.components import register
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.users.resident import ResidentBehavior, rooms_at
@@ -15,7 +14,6 @@ from fleet2d.routines.planner import REST, Episode
 from fleet2d.runtime.determinism import Draws, stream_key
 
 
-@register("behavior", "population")
 class Population(ResidentBehavior):
     """Live as a person drawn from the American Time Use Survey 2022-2023.
 
@@ -25,14 +23,9 @@ class Population(ResidentBehavior):
 
     Attributes:
         group: Group of people; any: drawn by the groups' shares of the people.
-        bodily_needs: Whether bodily needs, short errands, and a meal after hours without one,
-            interrupt activities. The survey doesn't record them: it counts their time as that of
-            the interrupted activity.
     """
 
     group: Literal["any", "workers", "retired", "working_parents", "at_home"] = "any"
-
-    bodily_needs: bool = True
 
     def start(self, actor: Actor) -> None:
         """Draw the person's group, and find where the activities are done in the home."""
@@ -51,12 +44,13 @@ class Population(ResidentBehavior):
         self.cache: dict[int, Sequence[Episode]] = {}
         known = catalogue()
         used = {*survey.activities(self.people), REST}
-        self.rules, self.interruptions = None, actor.stream("needs")
-        if self.bodily_needs:
-            needs = interruptions.population_needs()
-            errands = interruptions.usual_errands()
-            self.rules = interruptions.interruption_rules(needs, errands, known)
-            used |= interruptions.activities_of(needs, errands)
+        self.interruptions = actor.stream("needs")
+        # The survey doesn't record bodily needs, short errands, and a meal after hours without one:
+        # it counts their time as that of the interrupted activity.
+        needs = interruptions.population_needs()
+        errands = interruptions.usual_errands()
+        self.rules = interruptions.interruption_rules(needs, errands, known)
+        used |= interruptions.activities_of(needs, errands)
         self.settle(actor, {name: known[name] for name in sorted(used)}, self.make_spots(actor))
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
@@ -86,6 +80,4 @@ class Population(ResidentBehavior):
             self.states.append(after)
         details = Draws(self.details, ordinal)
         day = survey.to_activities(people, episodes, self.works_at_home, details)
-        if self.rules is None:
-            return day
         return interruptions.interrupt(self.rules, Draws(self.interruptions, ordinal), day)

@@ -1,13 +1,13 @@
 """Reactions: how people react to robots."""
 
 from datetime import timedelta
-from typing import ClassVar
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Attention, Behavior, SightEvent, Situation
 from fleet2d.entities.place import points_at_distance
 from fleet2d.entities.plan import Plan
+from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.routines.activity import DurationDistribution
 from fleet2d.routines.distributions import Distribution
 from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
@@ -25,12 +25,13 @@ RANKS = list(PROBABILITIES)
 STEP_M = 0.7
 MEET_M = 0.9
 CLEAR_M = 0.1  # minimum distance added to what is too close
+# How long a person who left a robot stays in the other room.
+LEAVES_FOR = DurationDistribution(mean=timedelta(minutes=5))
 # How long a person waits for a robot to pass.
 PASSING_TIME = timedelta(seconds=4)
 DIRECTIONS = 16
 
 
-@register("behavior", "reactions")
 class Reactions(Behavior):
     """React to robots: turn to them, step aside, come, leave; list it before other behaviors.
 
@@ -41,7 +42,7 @@ class Reactions(Behavior):
         manners: The manners; left out: those of the persona.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.REACTS})
+    records = frozenset({EventKind.REACTS})
 
     manners: Manners | None = None
 
@@ -50,8 +51,12 @@ class Reactions(Behavior):
         personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
         persona = next((p for p in personas if p is not None), None)
         self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
-        durations = ("looks", "leaves_for", "comes_for")
-        self.durations = {name: getattr(self.used_manners, name).table() for name in durations}
+        manners = self.used_manners
+        self.durations = {
+            "looks": manners.looks.table(),
+            "leaves": LEAVES_FOR.table(),
+            "comes": manners.comes_for.table(),
+        }
         # of the present reaction, and the step at which it ends
         self.rank = 0
         self.until = -1
@@ -102,7 +107,7 @@ class Reactions(Behavior):
         points = [p for p in self._points_around(now, (at_x, at_y), distance_m) if plan.reaches(*p)]
         if points:
             plan.go_to_point(*min(points, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
-        self._look_at(now, plan, event, self.durations["comes_for"], draws)
+        self._look_at(now, plan, event, self.durations["comes"], draws)
 
     def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         plan.note(EventKind.REACTS, f"leaves {event.user}")
@@ -110,7 +115,7 @@ class Reactions(Behavior):
         rooms = [room for room in now.actor.reachable_rooms() if room != now.room]
         if rooms:
             plan.go_to((draws.choice(rooms).name,), "retreat")
-        plan.stay(timedelta(seconds=self.durations["leaves_for"].draw(draws)))
+        plan.stay(timedelta(seconds=self.durations["leaves"].draw(draws)))
 
     def _step_aside(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         """Step out of the robot's way, to a random free point beside it."""
@@ -120,7 +125,7 @@ class Reactions(Behavior):
         # Across the robot's way; along it, the robot would come closer again.
         across = [
             (x, y)
-            for x, y in self._points_around(now, (plan.x, plan.y), STEP_M)
+            for x, y in self._points_around(now, plan.position, STEP_M)
             if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
             <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
         ]
@@ -135,8 +140,8 @@ class Reactions(Behavior):
         plan.stay(timedelta(seconds=lasts.draw(draws)))
 
     def _points_around(
-        self, now: Situation, center: tuple[int, int], distance_m: float
-    ) -> list[tuple[int, int]]:
+        self, now: Situation, center: LatticePoint, distance_m: float
+    ) -> list[LatticePoint]:
         """Return free points at a distance [m] from a point, in the same room."""
         distance = round(distance_m * now.home.plan.lattice.units_per_m)
         return list(points_at_distance(now.actor, center, distance, DIRECTIONS))
@@ -147,7 +152,7 @@ class Reactions(Behavior):
                 behavior.give_up(now)
 
 
-def _robot(now: Situation, event: SightEvent) -> tuple[int, int]:
+def _robot(now: Situation, event: SightEvent) -> LatticePoint:
     return now.home.plan.lattice.point_at((event.x, event.y))
 
 

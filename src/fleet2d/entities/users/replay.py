@@ -4,19 +4,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from fleet2d.configuration import units
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import counted
-from fleet2d.configuration.units import Duration, InputFileOrFolder, Length, PositiveDuration, Speed
+from fleet2d.configuration.units import Duration, InputFileOrFolder, Length, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Nearest
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import errors_as
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.space import straight_way
 from fleet2d.kernels import F64, I64, TURN, heading_of, line_of_sight, time_route
 from fleet2d.logs import placement
@@ -31,12 +31,20 @@ from fleet2d.logs.log import (
     begin_of_run,
     files_of,
 )
-from fleet2d.logs.placement import DOOR, UNKNOWN, LogFrame, LoggedVisit, LoggedVisits, RoomChoice
+from fleet2d.logs.placement import (
+    COORDINATE_LIMIT_M,
+    DOOR,
+    UNKNOWN,
+    LogFrame,
+    LoggedVisit,
+    LoggedVisits,
+    RoomChoice,
+)
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
 
-# Coordinates are clipped to this, far outside of any home [m].
-COORDINATE_LIMIT_M = 1e6
+# A leg faster than this is counted as implausible.
+FASTEST_M_S = 3.0
 # A move shorter than this is ignored for the heading [m].
 MIN_HEADING_MOVE_M = 0.1
 
@@ -103,14 +111,13 @@ class FixFollower:
         gap_us: Two fixes farther apart in time than this have a gap between them.
         gaps: What happens in a gap: "unknown": the body is away; "hold": it stays, and leaves in
             time for the next fix; "walk": it takes all that time for the way.
-        fastest: A leg faster than this is counted as implausible [m/s].
     """
 
-    def __init__(self, actor: Actor, fixes: Fixes, gap_us: int, gaps: str, fastest: float) -> None:
+    def __init__(self, actor: Actor, fixes: Fixes, gap_us: int, gaps: str) -> None:
         self.actor = actor
         self.fixes = fixes
         self.gap_us, self.gaps = gap_us, gaps
-        self.fastest = fastest * actor.home.plan.lattice.units_per_m
+        self.fastest = FASTEST_M_S * actor.home.plan.lattice.units_per_m
         self.unknown_us = self.gap_count = self.implausible = self.around = 0
         self.top_speed = 0.0
         self.heading = self._headings()
@@ -219,14 +226,11 @@ class RoomFollower:
         actor: The body.
         visits: Its visits, in order; the first begins at step 0 or before.
         at_once: Whether it goes to the next room as soon as it may, and waits there.
-        limit: A walk faster than this is counted as implausible [m/s].
     """
 
-    def __init__(
-        self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool, limit: float
-    ) -> None:
+    def __init__(self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool) -> None:
         self.actor, self.visits = actor, visits
-        self.at_once, self.limit = at_once, limit
+        self.at_once = at_once
         self.step_us = actor.clock.step_us
         self.walks = self.hurried = self.implausible = 0
         self.top_speed = 0.0  # of the walks [m/s]
@@ -272,7 +276,7 @@ class RoomFollower:
         else:
             plan.go_to_point(*self._spot(visit, plan))
 
-    def _spot(self, visit: LoggedVisit, plan: Plan) -> tuple[int, int]:
+    def _spot(self, visit: LoggedVisit, plan: Plan) -> LatticePoint:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
         return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
@@ -303,7 +307,7 @@ class RoomFollower:
         if visit.place == AWAY:
             plan.jump(arrive_us, away=1).note(EventKind.LEFT_HOME)
 
-    def _near(self, plan: Plan, spot: tuple[int, int]) -> tuple[int, int]:
+    def _near(self, plan: Plan, spot: LatticePoint) -> LatticePoint:
         """Return the place in the room of a spot that is nearest to the body."""
         room = self.actor.home.plan.room_of_point(*spot)
         if room is None:
@@ -313,11 +317,11 @@ class RoomFollower:
         ((x, y),) = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64)).tolist()
         return x, y
 
-    def _way(self, plan: Plan, spot: tuple[int, int]) -> I64:
+    def _way(self, plan: Plan, spot: LatticePoint) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
-        route = self.actor.space.route((plan.x, plan.y), spot)
+        route = self.actor.space.route(plan.position, spot)
         if route is None:  # a door is shut at present, but the log says that somebody went there
-            route = straight_way((plan.x, plan.y), spot)
+            route = straight_way(plan.position, spot)
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
     def _set_out(
@@ -338,10 +342,11 @@ class RoomFollower:
             times = times * window // takes
             self.hurried += 1
             speed = self.actor.entity.speed * takes / max(window, 1)
-            self.implausible += speed > self.limit
+            self.implausible += speed > FASTEST_M_S
             self.top_speed = max(self.top_speed, speed)
         block = np.zeros((len(rows) + 1, 5), np.int64)
-        block[:-1, 0], block[:-1, 1:4] = leave + times, rows[:, 1:]
+        block[:-1, 0] = leave + times
+        block[:-1, 1:4] = rows[:, 1:]
         block[-1] = block[-2]
         block[-1, 0] = arrive_us
         plan.follow(block)
@@ -389,7 +394,7 @@ def report_rooms(
         lines.append(
             f"{follower.hurried} of {follower.walks} walks are faster than the body walks, since"
             f" the log leaves no more time; {follower.implausible} of them faster than"
-            f" {follower.limit:g} m/s, the fastest at {follower.top_speed:.1f} m/s"
+            f" {FASTEST_M_S:g} m/s, the fastest at {follower.top_speed:.1f} m/s"
         )
     return tuple(lines)
 
@@ -442,7 +447,6 @@ RoomMap = Annotated[
 ]
 
 
-@register("behavior", "replay")
 class Replay(Behavior, LogKeys):
     """Be where a person was according to a log: a smart home's events, a script, or positions.
 
@@ -465,12 +469,9 @@ class Replay(Behavior, LogKeys):
             positions.
         still: Silence in one room up to this length is not a gap: sleepers trigger no sensor.
         reach: A position farther than this from free space is left out.
-        fastest: Walks faster than this are reported as implausible [m/s].
     """
 
-    records: ClassVar[frozenset[str]] = frozenset(
-        {EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN}
-    )
+    records = frozenset({EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN})
 
     path: InputFileOrFolder
     format: Layout = "auto"
@@ -482,7 +483,6 @@ class Replay(Behavior, LogKeys):
     gap: PositiveDuration | None = None
     still: Duration = timedelta(hours=12)
     reach: Length = Field(default=1.0, ge=0)
-    fastest: Speed = 3.0
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
@@ -532,7 +532,7 @@ class Replay(Behavior, LogKeys):
         )
         logged = placement.visits_of(log, mapped, rule)
         self.visits = logged.visits
-        follower = RoomFollower(actor, self.visits, self.gaps == "walk", self.fastest)
+        follower = RoomFollower(actor, self.visits, self.gaps == "walk")
         self.follower: RoomFollower | FixFollower = follower
         # Planned once before the run, for the report on its walks.
         follower.follow(Plan(actor, 0), 0, rejoin=False)
@@ -555,7 +555,7 @@ class Replay(Behavior, LogKeys):
             self.reach,
         )
         gap_us = units.micros(self.gap or GAP_OF_FIXES)
-        self.follower = FixFollower(actor, fixes, gap_us, self.gaps, self.fastest)
+        self.follower = FixFollower(actor, fixes, gap_us, self.gaps)
         self.follower.follow(Plan(actor, 0))
         thinned = int(np.count_nonzero(step[1:] == step[:-1]))
         self.notes = report_fixes(log, self.follower, thinned, frame)

@@ -16,13 +16,14 @@ from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
 from fleet2d.entities.plan import Plan, new_note
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import POSTURES, UsePlace
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S, CoreVenue, Resident
-from fleet2d.routines.activity import Activity, seconds
+from fleet2d.routines.activity import NOT_LIVED_IN, Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import SECOND_US, Clock
 from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.events import EventKind
 
@@ -42,7 +43,7 @@ class Spot(NamedTuple):
 
     def walk(self, plan: "Plan") -> None:
         """Go there."""
-        if plan.away or (plan.x, plan.y) != (self.x, self.y):
+        if plan.away or plan.position != (self.x, self.y):
             plan.go_to_point(self.x, self.y)
 
 
@@ -206,7 +207,6 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     return things[rank % members :: members] or [things[rank % len(things)]]
 
 
-SECOND_US = 1_000_000
 # How the core numbers ways of choosing rooms, small moves, and events.
 POLICIES = tuple(policy.name.lower() for policy in kernels.RoomPolicy)
 MOVE_KINDS = tuple(kind.name.lower() for kind in kernels.MoveKind)
@@ -347,7 +347,7 @@ class KnownHome:
         """Return how long to wait before the body may use a room [us]; None: not now."""
         return self._person.wait_for(room, self._actor.clock, now_us, takes_us)
 
-    def way_out(self) -> tuple[int, int]:
+    def way_out(self) -> LatticePoint:
         """Return the lattice point where the body leaves the home."""
         return self._actor.way_out
 
@@ -590,39 +590,40 @@ class ResidentBehavior(Behavior):
         if activity.away:
             return Venue(activity, [], [], [], (), None)
         names = activity.rooms
-        never_in = activity.never_in
         if activity.choose == "own":
-            rooms = self._own_rooms(actor, names, never_in)
+            rooms = self._own_rooms(actor, names)
         else:
             named = (r for name in names for r in self.reachable_rooms if name in (r.name, r.type))
-            rooms = list(dict.fromkeys(named)) or _match(actor, names, never_in)[1]
+            rooms = list(dict.fromkeys(named)) or _match(actor, names)[1]
         means = {kind: getattr(activity, kind) for kind in MOVE_KINDS if self.small_moves}
         moves = ((kind, max(1, seconds(mean))) for kind, mean in means.items() if mean is not None)
         seats = self.spots.at_furniture(activity, rooms)
         if not activity.fetches:
             return Venue(activity, rooms, seats, [], tuple(moves), None)
-        stores = self._own_rooms(actor, activity.fetches_from, never_in)
+        stores = self._own_rooms(actor, activity.fetches_from)
         return Venue(activity, rooms, seats, stores, tuple(moves), activity.fetch_takes.table())
 
     def _bed(self, actor: Actor, sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
         """Return the venue of sleep for a member of a household, whose bed it may share."""
-        rooms = _match(actor, sleep.rooms, sleep.never_in)[1]
+        rooms = _match(actor, sleep.rooms)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep, [room], side)
         return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
     @staticmethod
-    def _own_rooms(actor: Actor, names: RoomChoice, never_in: RoomChoice) -> list[Room]:
+    def _own_rooms(actor: Actor, names: RoomChoice) -> list[Room]:
         """Return the rooms of the first name that matches: of several of a kind, one for good."""
-        name, rooms = _match(actor, names, never_in)
+        name, rooms = _match(actor, names)
         if name == "any" or not rooms:
             return rooms
         return [Draws(actor.stream(f"room of {name}"), 0).choice(rooms)]
 
 
-def _match(actor: Actor, names: RoomChoice, never_in: RoomChoice) -> tuple[str, list[Room]]:
+def _match(actor: Actor, names: RoomChoice) -> tuple[str, list[Room]]:
     try:
-        return matching_rooms(names, actor.home.rooms, actor.reachable_rooms(), never_in=never_in)
+        return matching_rooms(
+            names, actor.home.rooms, actor.reachable_rooms(), never_in=NOT_LIVED_IN
+        )
     except PlacementError as error:
         if is_kind(actor, names):
             return "", []

@@ -1,12 +1,10 @@
 """Roaming: people whose rooms are drawn from given shares of time, and pets."""
 
 from datetime import timedelta
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import available_places, available_rooms
@@ -17,20 +15,19 @@ from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.kernels import I64
 from fleet2d.routines.activity import AnyDurationDistribution, DurationDistribution
 from fleet2d.routines.distributions import draw_weighted
+from fleet2d.routines.planner import MILLION
+from fleet2d.runtime.clock import SECOND_US
 from fleet2d.runtime.determinism import Draws, sum_in_order
 
 AWAY = "away"
-SECOND_US = 1_000_000
 # How many visits are planned at once.
 VISITS = 20
 # The minimum length of a stay after subtracting the time of travel.
 SHORTEST_US = 10 * SECOND_US
 # Points per metre of a way at which the room is looked up.
 POINTS_PER_M = 10
-MILLION = 1_000_000
 
 
-@register("behavior", "room_sampling")
 class RoomSampling(Behavior):
     """Be in each room for a given share of the time, in visits of random length.
 
@@ -110,7 +107,7 @@ class RoomSampling(Behavior):
 
     def _walk(self, actor: Actor, plan: Plan, goal: Spot) -> None:
         """Walk to a spot, and add the time on the way to the debt of the rooms it leads through."""
-        start = (plan.x, plan.y)
+        start = plan.position
         began_us = plan.time_us
         if start == goal and not plan.away:
             return
@@ -144,26 +141,26 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
     return [(room, float(np.cumsum(weights)[-1] / total)) for room, weights in by_room]
 
 
+# Probability that the next spot is in the same room.
+STAYS_IN_ROOM = 0.6
 # How many naps are planned at once.
 NAPS = 10
 
 
-@register("behavior", "pet")
 class Pet(Behavior):
     """Nap somewhere, roam through a few spots of the home, nap somewhere else.
 
     The durations of naps and stops are drawn at random. The next spot is in the same room
-    with probability `stays_in_room`, else in any room that it may enter.
+    with probability 0.6, else in any room that it may enter.
 
     Attributes:
         rooms: Rooms and kinds of rooms that it may enter; none: all.
         nap: How long it sleeps at a time.
         stop: How long it stops at a spot while it roams.
         spots: Smallest and largest number of stops between two naps.
-        stays_in_room: Probability that its next spot is in the same room.
     """
 
-    usual_height: ClassVar[float] = 0.3
+    usual_height = 0.3
 
     rooms: tuple[str, ...] = ()
     nap: AnyDurationDistribution = DurationDistribution(
@@ -173,7 +170,6 @@ class Pet(Behavior):
         mean=timedelta(seconds=40), std=timedelta(seconds=40)
     )
     spots: tuple[int, int] = (3, 12)
-    stays_in_room: float = Field(default=0.6, ge=0, le=1)
 
     def model_post_init(self, _: object, /) -> None:
         """Require a range of spots."""
@@ -207,6 +203,6 @@ class Pet(Behavior):
 
     def _walk(self, plan: Plan, draws: Draws) -> None:
         """Walk to the next spot."""
-        if draws.uniform() >= self.stays_in_room:
+        if draws.uniform() >= STAYS_IN_ROOM:
             self.room = draws.choice(self.allowed_rooms)
         draws.choice(self.places.in_room(self.room)).walk(plan)

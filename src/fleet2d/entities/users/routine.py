@@ -7,23 +7,22 @@ from functools import partial
 from itertools import islice
 from typing import NamedTuple
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
 from fleet2d.entities.users import resident
-from fleet2d.entities.users.resident import SECOND_US, ResidentBehavior, Seat, Spots, Venue
+from fleet2d.entities.users.resident import EPISODES_PER_DAY, ResidentBehavior, Seat, Spots, Venue
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S
-from fleet2d.routines.activity import Activity, catalogue
+from fleet2d.routines.activity import NOT_LIVED_IN, Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
-from fleet2d.routines.life import WELCOME, Life, Lives, MemberRooms
+from fleet2d.routines.life import CACHED_DAYS, WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import PLANNED, REST, RESUMES, SLEEP, Episode
-from fleet2d.runtime.clock import DAY_S, Clock
+from fleet2d.runtime.clock import DAY_S, SECOND_US, Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 
 # All members must get the same rooms, whatever their radius: those of a body of this radius [m].
@@ -39,17 +38,20 @@ def private_rooms(household: Household, home: Home) -> MemberRooms:
     reachable = usual_rooms(home)
     private = set[int]()
     rooms: dict[str, dict[str, list[int]]] = {}
-    for name, persona in household.members.items():
-        at_home = {a: fields for a, fields in persona.used_activities.items() if not fields.away}
-        rooms[name] = {
-            a: [r.index for r in _rooms_of(fields, reachable)] for a, fields in at_home.items()
-        }
-        for activity in persona.interruptions.exclusive & set(at_home):
-            private.update(rooms[name][activity])
-    return {
-        name: {a: indices for a, indices in own.items() if indices and private.issuperset(indices)}
-        for name, own in rooms.items()
-    }
+    for member, persona in household.members.items():
+        of_member = rooms[member] = {}
+        for name, activity in persona.used_activities.items():
+            if activity.away:
+                continue
+            indices = [room.index for room in _rooms_of(activity, reachable)]
+            if indices:
+                of_member[name] = indices
+            if name in persona.interruptions.exclusive:
+                private.update(indices)
+    result = {}
+    for member, of_member in rooms.items():
+        result[member] = {a: each for a, each in of_member.items() if private.issuperset(each)}
+    return result
 
 
 def usual_rooms(home: Home) -> list[Room]:
@@ -63,18 +65,17 @@ def _rooms_of(activity: Activity, reachable: list[Room]) -> list[Room]:
 
     All kinds count if the activity may be done in a different room each time.
     """
-    kinds = [name for name in activity.rooms if name != ANY]
-    by_kind = [[room for room in reachable if kind in (room.name, room.type)] for kind in kinds]
-    if activity.choose == "own":
-        return next((rooms for rooms in by_kind if rooms), [])
-    return list(dict.fromkeys(room for rooms in by_kind for room in rooms))
+    found: list[Room] = []
+    for kind in activity.rooms:
+        if kind != ANY:
+            found += [room for room in reachable if kind in (room.name, room.type)]
+        if found and activity.choose == "own":
+            break
+    return list(dict.fromkeys(found))
 
 
 # Bodies of the usual radius that are nearer to each other touch [m].
 TOUCHING_M = 2 * DEFAULT_RADIUS
-# The number of days whose places are kept, and of episodes of a day that have draws of their own.
-CACHED_DAYS = 3
-EPISODES_PER_DAY = 1024
 
 Places = Mapping[tuple[int, int], Seat | None]
 """The place of each member's episode, by the numbers of both; None: others have all places."""
@@ -161,11 +162,9 @@ class Seating:
 
     def _divide(self, ordinal: int) -> Places:
         """Divide the places of a day among the members, in the order in which they come."""
-        midnight = ordinal * DAY_S
-        self._taken = {
-            spot: [time for time in times if time[1] > midnight - DAY_S]
-            for spot, times in self._taken.items()
-        }
+        yesterday = (ordinal - 1) * DAY_S
+        for spot, times in self._taken.items():
+            self._taken[spot] = [(begin, end) for begin, end in times if end > yesterday]
         places: dict[tuple[int, int], Seat | None] = {}
         for claim in sorted(self._claims(ordinal), key=lambda c: (not c.is_asleep, *c[1:3])):
             address = ordinal * EPISODES_PER_DAY + claim.episodes[0]
@@ -191,7 +190,8 @@ class Seating:
                 first = episodes[numbers[0]]
                 seats, own = self._wanted_by(rank, first)
                 if seats:
-                    begin, end = midnight + first.begin, midnight + episodes[numbers[-1]].end
+                    begin = midnight + first.begin
+                    end = midnight + episodes[numbers[-1]].end
                     is_asleep = first.activity == SLEEP
                     yield SeatClaim(is_asleep, begin, rank, end, tuple(numbers), seats, own)
 
@@ -229,7 +229,7 @@ class Seating:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
             name, rooms = matching_rooms(
-                activity.rooms, self._home.rooms, self._reachable, never_in=activity.never_in
+                activity.rooms, self._home.rooms, self._reachable, never_in=NOT_LIVED_IN
             )
         except PlacementError:  # then rest replaces the activity
             return ()
@@ -278,7 +278,6 @@ TURN_US = 900 * SECOND_US
 WAY_US = 60 * SECOND_US
 
 
-@register("behavior", "routine")
 class Routine(ResidentBehavior):
     """Live by a persona: a day's activities with their times, durations, order and probability.
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, register
+from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, format_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor, Behavior, Situation
@@ -71,7 +71,6 @@ class AgendaEntry(NamedTuple):
     activity: str
 
 
-@register("behavior", "schedule")
 class Schedule(Behavior):
     """Be at fixed places at fixed times, daily or by weekday.
 
@@ -102,7 +101,8 @@ class Schedule(Behavior):
             if is_point(place):
                 actor.point(place)  # type: ignore[arg-type]
         available = {(), *available_places(actor, "schedule.days", places)}
-        self.week = [[entry for entry in day if entry.place in available] for day in self.week]
+        for day in self.week:
+            day[:] = [entry for entry in day if entry.place in available]
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
         """Return the place of the last item before the run."""

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
@@ -19,7 +18,6 @@ MAX_ITEMS = 1000
 """The number of items of a plan."""
 
 
-@register("behavior", "guest")
 class Guest(Behavior):
     """Stay out of the home; leave it through the exit if inside.
 
@@ -35,7 +33,6 @@ class Guest(Behavior):
         return now.plan().leave_home().stay()
 
 
-@register("behavior", "unknown")
 class Unknown(Behavior):
     """Be somewhere that nobody recorded, while a real robot's detections are replayed.
 
@@ -43,7 +40,7 @@ class Unknown(Behavior):
     what would need their place. Event: `unknown`.
     """
 
-    records: ClassVar[frozenset[str]] = frozenset({EventKind.UNKNOWN})
+    records = frozenset({EventKind.UNKNOWN})
 
     def decide(self, now: Situation) -> Plan:
         """Be away, without having walked out."""
@@ -55,7 +52,6 @@ class Unknown(Behavior):
         )
 
 
-@register("behavior", "live")
 class Live(Behavior):
     """Be where a real person or robot is, or go where another program says: see `fleet2d live`.
 
@@ -74,7 +70,6 @@ class Live(Behavior):
         return now.plan().stay()
 
 
-@register("behavior", "process")
 class ProcessBehavior(Behavior):
     """A behavior in another process, of any language.
 

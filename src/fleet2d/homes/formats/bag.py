@@ -4,12 +4,11 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from fleet2d.bounds import PIXELS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputFileOrFolder
 from fleet2d.errors import FloorPlanError
@@ -26,7 +25,6 @@ FREE_BELOW = 20
 OCCUPIED_ABOVE = 65
 
 
-@register("floorplan", "bag")
 class BagMap(OccupancySource):
     """The map in a bag of ROS 1 or ROS 2: the last OccupancyGrid, as a SLAM robot publishes it.
 
@@ -38,7 +36,7 @@ class BagMap(OccupancySource):
         topic: The topic of the map, if the bag has several maps and none on `/map`.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".bag", ".mcap", ".db3")
+    suffixes = (".bag", ".mcap", ".db3")
 
     path: InputFileOrFolder
     topic: str | None = None

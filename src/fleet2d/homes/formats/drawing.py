@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from fleet2d.bounds import PICTURE_BYTES
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length, PositiveLength, Share
 from fleet2d.errors import FloorPlanError, UnclearPlaceError
 from fleet2d.floorplan.files import in_file, read_file
@@ -46,7 +45,6 @@ SMALLEST_M = 1.0
 LINE_PIXELS = 2.3
 
 
-@register("floorplan", "image")
 class Image(PictureSource):
     """A drawing: dark walls on light ground.
 

@@ -4,7 +4,7 @@ import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -13,7 +13,6 @@ from shapely import LineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.file_source import FileSource
@@ -43,7 +42,6 @@ MIN_PART_M2 = 1.0
 WINDOW_LINES_M = 0.3
 
 
-@register("floorplan", "dxf")
 class Dxf(FileSource):
     """A drawing in DXF; needs the extra `cad`.
 
@@ -54,7 +52,7 @@ class Dxf(FileSource):
             windows, or all lines if there are none.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".dxf",)
+    suffixes = (".dxf",)
 
     path: InputPath
     scale: float | None = Field(default=None, gt=0)

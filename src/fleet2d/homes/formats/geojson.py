@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 import shapely
@@ -20,7 +20,6 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS, POLYGONS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
@@ -300,7 +299,6 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
     return lambda xy: np.round(xy - corner, 6)
 
 
-@register("floorplan", "geojson")
 class GeoJson(FileSource):
     """A vector plan in GeoJSON: our own dialect, or IMDF.
 
@@ -311,7 +309,7 @@ class GeoJson(FileSource):
         level: The floor, by id, name or ordinal; left out: the one of ordinal 0.
     """
 
-    marks: ClassVar = (("type", COLLECTION),)
+    marks = (("type", COLLECTION),)
 
     path: InputPath
     units: Units = "auto"

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import shapely
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 from shapely import Polygon
 from shapely.geometry import MultiPolygon
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import SMALL_BYTES, FileSource
@@ -41,7 +40,6 @@ class _HouseFile(BaseModel):
 _HOUSE_FILE = TypeAdapter(_HouseFile)
 
 
-@register("floorplan", "houseexpo")
 class HouseExpo(FileSource):
     """A plan of the HouseExpo data set.
 
@@ -49,9 +47,8 @@ class HouseExpo(FileSource):
         path: The plan's JSON file.
     """
 
-    marks: ClassVar = (("verts", None),)
-
-    small_bytes: ClassVar[int] = SMALL_BYTES
+    marks = (("verts", None),)
+    small_bytes = SMALL_BYTES
 
     path: InputPath
 

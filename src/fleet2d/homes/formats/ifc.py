@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -10,7 +10,6 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.file_source import FileSource
@@ -41,7 +40,6 @@ RAISED_M = 0.5
 SILL_M = 1.3
 
 
-@register("floorplan", "ifc")
 class Ifc(FileSource):
     """A building model in IFC; needs the extra `ifc`.
 
@@ -50,7 +48,7 @@ class Ifc(FileSource):
         level: The storey, by name or GlobalId; left out: the lowest that is not below the ground.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".ifc",)
+    suffixes = (".ifc",)
 
     path: InputPath
     level: str | None = Field(default=None, coerce_numbers_to_str=True)

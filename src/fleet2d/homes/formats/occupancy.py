@@ -1,14 +1,14 @@
 """The free space in maps and drawings of pixels: cleaned of noise, checked, traced."""
 
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import shapely
 from pydantic import Field
 from shapely import Polygon
 
-from fleet2d.bounds import CORNERS, PICTURE_BYTES, Bound
+from fleet2d.bounds import CORNERS, PICTURE_BYTES
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
@@ -117,7 +117,7 @@ class PictureSource(OccupancySource):
             is filled with; none: there is no such shade.
     """
 
-    bound: ClassVar[Bound] = PICTURE_BYTES
+    bound = PICTURE_BYTES
 
     unknown_grey: UnknownGrey = "auto"
 

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 import shapely
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter
 from shapely import LineString, Polygon
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, Length
 from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import Listed, in_file, parse_json, validate
@@ -109,7 +108,6 @@ class _Scan(BaseModel):
 _SCAN = TypeAdapter(_Scan)
 
 
-@register("floorplan", "roomplan")
 class RoomPlan(FileSource):
     """A scan by Apple's RoomPlan, exported as JSON.
 
@@ -118,7 +116,7 @@ class RoomPlan(FileSource):
         wall_m: Thickness of walls, which a scan sees from one side.
     """
 
-    marks: ClassVar = (("openings", None),)
+    marks = (("openings", None),)
 
     path: InputPath
     wall_m: Length = Field(default=0.1, ge=0.01, le=1)

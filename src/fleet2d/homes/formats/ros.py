@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.files import (
@@ -36,7 +35,6 @@ _KEYS = {
 }
 
 
-@register("floorplan", "ros")
 class Ros(PictureSource):
     """A map of the ROS map_server.
 

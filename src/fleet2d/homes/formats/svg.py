@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import shapely
@@ -16,7 +16,6 @@ from pydantic import Field
 from shapely import LineString, Polygon
 
 from fleet2d.bounds import CORNERS
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath, PositiveLength
 from fleet2d.errors import FloorPlanError, extra
 from fleet2d.floorplan.file_source import FileSource
@@ -38,7 +37,6 @@ CURVE_STEPS = 16
 WALL_M = 0.1  # of walls that are drawn as lines
 
 
-@register("floorplan", "svg")
 class Svg(FileSource):
     """A drawing in SVG; needs the extra `svg`.
 
@@ -49,7 +47,7 @@ class Svg(FileSource):
         wall_m: Thickness of walls that are drawn as lines.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".svg",)
+    suffixes = (".svg",)
 
     path: InputPath
     scale: float | None = Field(default=None, gt=0)

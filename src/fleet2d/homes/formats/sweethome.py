@@ -3,13 +3,12 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from shapely import LineString, Polygon, affinity
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
@@ -40,7 +39,6 @@ FURNITURE_WORDS = {
 MIN_SIDE_CM = 1.0
 
 
-@register("floorplan", "sweethome")
 class SweetHome(FileSource):
     """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
 
@@ -49,7 +47,7 @@ class SweetHome(FileSource):
         level: The floor, by name or id; left out: the lowest that is not below the ground.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".xml",)
+    suffixes = (".xml",)
 
     path: InputPath
     level: str | None = None

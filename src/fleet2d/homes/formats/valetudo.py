@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
@@ -20,7 +20,6 @@ from pydantic import Field, TypeAdapter
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
@@ -283,7 +282,6 @@ MAX_PARTS = 10_000
 TINY = 1e-6
 
 
-@register("floorplan", "valetudo")
 class Valetudo(PixelSource, FileSource):
     """A map of a robot vacuum that runs Valetudo.
 
@@ -299,7 +297,7 @@ class Valetudo(PixelSource, FileSource):
             walls (`exact`).
     """
 
-    marks: ClassVar = (("__class", MAP_CLASS), *((key, None) for key in WRAPPERS))
+    marks = (("__class", MAP_CLASS), *((key, None) for key in WRAPPERS))
 
     path: InputPath
     no_go: NoGo = "keep_out"

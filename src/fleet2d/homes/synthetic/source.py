@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 import shapely
 from pydantic import Field
 
-from fleet2d.configuration.components import register
 from fleet2d.configuration.units import Length, Share, limited_to
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
@@ -110,7 +109,6 @@ _CorridorWidth = Annotated[Length, limited_to(lambda m: 0.9 <= m <= 2, "a width 
 _DoorWidth = Annotated[Length, limited_to(lambda m: 0.7 <= m <= 1.2, "a width of 0.7 m to 1.2 m")]
 
 
-@register("floorplan", "synthetic")
 class Synthetic(FloorPlanSource):
     """A generated home; the same configuration is the same home on every machine.
 

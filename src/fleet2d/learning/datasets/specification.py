@@ -23,7 +23,7 @@ from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.routines.persona import origins_of
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.scenario.compose import apply_changes, assignment
-from fleet2d.scenario.model import explain, load_scenario
+from fleet2d.scenario.load import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
 
 NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")

@@ -136,7 +136,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         (True, False)
     """
 
-    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - as Gymnasium declares it
+    metadata = {"render_modes": ["rgb_array"]}
 
     def __init__(
         self,
@@ -369,7 +369,7 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
     actions of the others are ignored, and their mask allows only to rest.
     """
 
-    metadata = {"name": "fleet2d", "render_modes": ["rgb_array"]}  # noqa: RUF012
+    metadata = {"name": "fleet2d", "render_modes": ["rgb_array"]}
 
     def __init__(
         self, task: str | Path | LearningTask = "hangout", *overrides: str, **settings: Any

@@ -21,7 +21,8 @@ from fleet2d.errors import InputError, ScenarioError
 from fleet2d.floorplan.home import HOME_CACHE
 from fleet2d.floorplan.source import PLAN_CACHE
 from fleet2d.runtime.events import EventKind
-from fleet2d.scenario.model import Scenario, explain, load_scenario
+from fleet2d.scenario.load import explain, load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import check_count
 
 FOLDER = Path(__file__).with_name("tasks")
