@@ -268,7 +268,10 @@ def test_panels_keep_up_with_the_timeline_while_a_day_passes_in_a_second(page: A
     page.click("button.play")
     shown = """[document.querySelector('.lanes').ariaValueNow,
                 document.querySelector('table.now').dataset.step]"""
-    pairs = [page.evaluate(shown) for _ in range(20)]
+    pairs = []
+    for _ in range(20):
+        pairs.append(page.evaluate(shown))
+        page.wait_for_timeout(30)  # about two frames
     assert all(timeline == panel for timeline, panel in pairs)
     assert len({timeline for timeline, _ in pairs}) > 5
 

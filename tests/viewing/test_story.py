@@ -125,6 +125,19 @@ def test_run_without_events_has_no_story() -> None:
     assert {} == told()
 
 
+def test_home_without_people_has_no_story() -> None:
+    run = fleet2d.run(
+        "bundled:paper",
+        "simulation.duration=1 h",
+        "users=null",
+        "algorithms=null",
+        "metrics=null",
+        "robots.astro.behaviors=[patrol]",
+    )
+
+    assert [] == story_of(run)
+
+
 @pytest.mark.slow
 def test_story_is_in_the_order_of_its_moments() -> None:
     run = fleet2d.run("bundled:family", "simulation.duration=4 d")

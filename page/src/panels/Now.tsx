@@ -124,7 +124,7 @@ function Expectations({ run }: { run: Run }) {
   if (verdicts.length === 0) return null;
   return (
     <section class="expectations">
-      <h3>Expectations</h3>
+      <h2>Expectations</h2>
       <ul>
         {verdicts.map(({ name, outcome, says, step }) => (
           <li key={name} class={outcome === "violated" ? "is-violated" : outcome === "held" ? "is-held" : ""} title={says}>
@@ -150,7 +150,7 @@ function Story({ run }: { run: Run }) {
   if (story.length === 0) return null;
   return (
     <section class="story">
-      <h3>Story</h3>
+      <h2>Story</h2>
       <ol>
         {story.map(({ step, title: words, words: about }) => (
           <li key={words}>

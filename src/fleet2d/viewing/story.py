@@ -60,6 +60,8 @@ def _events_of(run: Run) -> list[StoredEvent]:
     if "events" not in run.tables:
         return []
     table = run.tables["events"]
+    if "user" not in table.schema.names:  # nobody lives there
+        return []
     rows = table.filter(compute.is_in(compute.cast(table["event"], "string"), array(KINDS)))
     return [StoredEvent(*row.values()) for row in rows.select(StoredEvent._fields).to_pylist()]
 
