@@ -150,6 +150,15 @@ def test_answers_reach_the_learner_and_its_chances_reach_the_robot() -> None:
     assert "opportunity" in {event for _, event in events_of(run, "opportunity")}
 
 
+def test_every_answer_changes_the_chances_of_a_question_that_was_asked_before() -> None:
+    run = fleet2d.run(timed("thompson", users={"ana": ana(outcomes=("declined",))}))
+    answered = {step // 3600 for step, _ in events_of(run, "declined")}
+    rows = table(run, "when")
+
+    assert len(answered) > 1
+    assert answered <= {int(step) // 3600 for step in rows["step"]}
+
+
 def test_outside_of_the_fixed_times_nobody_is_asked() -> None:
     run = fleet2d.run(timed({"type": "fixed_times", "hours": []}, "5 h"))
     asks = [step for step, _ in events_of(run, "asks")]

@@ -66,6 +66,14 @@ def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path: Any) -> N
     assert [0, 2] == [plan.posture_at(time_us) for time_us in (0, 30_000_000)]
 
 
+def test_body_has_the_posture_of_the_moment_in_a_plan_that_ends_standing(tmp_path: Any) -> None:
+    sim = simulation(tmp_path)
+    sim.advance(30)
+    ana = sim.actors["ana"]
+
+    assert [0, 2, 0] == [ana.posture_code(seconds * 10**6) for seconds in (0, 30, 119)]
+
+
 def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path: Any) -> None:
     sim = simulation(tmp_path)
     track = sim.actors["ana"].plan

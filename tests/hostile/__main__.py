@@ -17,7 +17,8 @@ HERE = Path(__file__).parent
 
 def count(file: Path, report: Path) -> tuple[int, int]:
     """Run the attacks of a file; return how many were tried, and how many test cases failed."""
-    options = ["-q", "-m", "", "-p", "no:cacheprovider", f"--junitxml={report}"]  # slow ones, too
+    options = ["-q", "-m", "", "-o", "junit_family=xunit1"]  # slow ones, too; with properties
+    options += ["-p", "no:cacheprovider", f"--junitxml={report}"]
     subprocess.run(
         [sys.executable, "-m", "pytest", *options, str(file)],
         cwd=HERE.parents[1],

@@ -146,7 +146,7 @@ def test_a_report_says_when_the_failure_does_not_come_again(
     fails_once: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("fleet2d.viewer.figures.draw_failure", lambda *rest: drawn.append(rest))
+    monkeypatch.setattr("fleet2d.viewing.figures.draw_failure", lambda *rest: drawn.append(rest))
     runs: list[Trial] = []
 
     def body(trial: Trial) -> None:

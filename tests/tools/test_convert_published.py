@@ -664,7 +664,7 @@ def test_no_file_is_refused(folder: Path) -> None:
 
 def test_plan_that_is_no_plan_is_refused(folder: Path) -> None:
     (folder / "plan.json").write_text("{}")
-    with pytest.raises(FloorPlanError, match="it has no key `verts`"):
+    with pytest.raises(FloorPlanError, match="is not a floor plan that Fleet2D can read"):
         convert_file(written(folder), folder / "new.yaml")
     assert not (folder / "new.yaml").exists()
 

@@ -275,6 +275,7 @@ class Scenario(Settings):
                 form with or without 'behaviors.0'.
 
         Example:
+            >>> from fleet2d import load_scenario
             >>> load_scenario("users.ana.speed=0.9").where("users.ana.speed")
             "override 'users.ana.speed=0.9'"
         """
