@@ -18,7 +18,7 @@ from fleet2d.errors import InputError
 from fleet2d.studies import cluster_executors
 from fleet2d.studies.cluster_executors import SlurmExecutor
 from fleet2d.studies.command import slurm_parameters
-from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
+from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, by_home, run_tasks
 
 optional("submitit")
 pytestmark = [
@@ -37,7 +37,7 @@ def executor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SlurmExecutor:
 
 
 def ends_of(executor: SlurmExecutor, job: Any, count: int, workers: int = 2) -> list[TaskEnd]:
-    queue = TaskQueue(WorkerTask(number, number, "") for number in range(count))
+    queue = TaskQueue(by_home(WorkerTask(number, number, "") for number in range(count)))
     return list(itertools.chain.from_iterable(run_tasks(Crew(executor, workers), job, queue)))
 
 

@@ -3,16 +3,19 @@
 import os
 import shutil
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
+import polars as pl
+import pyarrow.parquet as pq
 import pytest
+from polars.testing import assert_frame_equal
 from tests.studies.scenes import SPEED, CountingExecutor, base, digests, run, small
 from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
-from fleet2d.studies import design, driver, results, storage
+from fleet2d.studies import design, directory, driver, results, storage
 from fleet2d.studies.executors import LocalExecutor, SerialExecutor
 from fleet2d.studies.plan import Changed
 from fleet2d.studies.reader import open_study
@@ -157,18 +160,29 @@ def test_a_part_that_grows_large_is_followed_by_another(
     assert 6 == rows["variant"].n_unique()
 
 
+def test_a_data_set_of_many_slices_is_the_same(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(directory, "SLICE_ROWS", 4)
+    more = small(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=4, **ROWS)
+    _, study = run(more, copied)
+    stored = pq.ParquetFile(copied / "variants.parquet")
+    assert 3 == stored.num_row_groups
+    assert_frame_equal(pl.DataFrame(stored.read()), study.variants)
+
+
 def test_a_full_disk_ends_it_and_the_same_command_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
 ) -> None:
-    write = storage.write_atomically
+    replacing = storage.replacing
 
-    def full(path: Path, content: Any) -> None:
+    def full(path: Path) -> AbstractContextManager[int]:
         if path.parent.name == "results" and path.exists():
             raise OSError(28, "No space left on device")
-        write(path, content)
+        return replacing(path)
 
     with monkeypatch.context() as patched:
-        patched.setattr(storage, "write_atomically", full)
+        patched.setattr(storage, "replacing", full)
         patched.setattr(results, "FLUSH_EVERY_S", 0.0)
         patched.setattr(results, "FLUSH_SHARE", 1e9)
         with pytest.raises(ArtifactError, match="the disk is full"):

@@ -13,18 +13,20 @@ from tests.studies.scenes import CountingExecutor
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.studies.executors import (
+    MAX_BATCH,
     Crew,
     LocalExecutor,
     SerialExecutor,
     TaskEnd,
     TaskQueue,
     WorkerTask,
+    by_home,
     run_tasks,
 )
 
 
 def queue(homes: str) -> TaskQueue:
-    return TaskQueue(WorkerTask(i, i, "", home) for i, home in enumerate(homes))
+    return TaskQueue(by_home(WorkerTask(i, i, "", home) for i, home in enumerate(homes)))
 
 
 def homes_of(tasks: TaskQueue, workers: int) -> list[str]:
@@ -45,6 +47,13 @@ def test_a_worker_gets_the_tasks_of_a_home_together_and_the_last_home_is_shared(
 
 def test_tasks_of_one_home_are_shared_among_workers() -> None:
     assert ["aaaa", "aa", "a", "a"] == homes_of(queue("a" * 8), workers=2)
+
+
+def test_tasks_are_made_when_they_are_taken() -> None:
+    made: list[int] = []
+    group = (made.append(i) or WorkerTask(i, i, "") for i in range(300))
+    TaskQueue([(300, group)]).take(1)
+    assert list(range(MAX_BATCH)) == made
 
 
 def test_what_a_dead_worker_held_is_next() -> None:

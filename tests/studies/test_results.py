@@ -134,7 +134,7 @@ def test_results_that_name_files_of_others_delete_nothing(
     write(storage, result(1))
     rows = pq.read_table(storage.path(FILE))
     rows = rows.replace_schema_metadata({results._FILES: f'{{"rows": "{name}"}}'})
-    storage.write_table(FILE, rows)
+    storage.write_table(FILE, [rows])
     (problem,) = drop_damaged(storage)
     assert "is damaged" in problem
 

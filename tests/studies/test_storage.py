@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import polars as pl
+import pyarrow as pa
 import pyarrow.fs as pafs
 import pytest
 from tests.studies.scenes import CountingExecutor, digests, optional, run, small
@@ -115,3 +117,18 @@ def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
     storage.delete("a/b.txt")
     storage.delete("a/b.txt")
     assert (None, []) == (storage.size("a/b.txt"), storage.names("a"))
+
+
+def test_a_table_that_ends_in_an_error_leaves_the_file_before(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    table = pl.DataFrame({"variant": [1, 2]}).to_arrow()
+    storage.write_table("plan.parquet", [table])
+
+    def parts() -> Iterator[pa.Table]:
+        yield table
+        raise ArtifactError("no more")
+
+    with pytest.raises(ArtifactError, match="no more"):
+        storage.write_table("plan.parquet", parts())
+    assert ["plan.parquet"] == [path.name for path in tmp_path.iterdir()]
+    assert [1, 2] == storage.read_frame("plan.parquet")["variant"].to_list()

@@ -23,6 +23,7 @@ from fleet2d.studies.executors import (
     SerialExecutor,
     TaskQueue,
     WorkerTask,
+    by_home,
     cores,
     portable,
     run_tasks,
@@ -119,7 +120,9 @@ def map_runs(
     results: dict[int, Result] = {}
     with (
         open_crew(executor, workers) as crew,
-        closing(run_tasks(crew, FunctionJob(pickled(function)), TaskQueue(tasks))) as rounds,
+        closing(
+            run_tasks(crew, FunctionJob(pickled(function)), TaskQueue(by_home(tasks)))
+        ) as rounds,
     ):
         for end in itertools.chain.from_iterable(rounds):
             number = end.task.number

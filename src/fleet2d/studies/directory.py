@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +30,7 @@ META = "study.json"
 PLAN = "plan.parquet"
 SCENARIOS = "scenarios.parquet"
 VARIANTS = "variants.parquet"
+SLICE_ROWS = 5_000  # variants whose results are in memory at a time
 PLAN_ONLY = ("identity", "scenario", "template", "home_key")
 """Columns of the plan that variants don't have, or from their results."""
 
@@ -51,8 +52,9 @@ class Counts:
     @classmethod
     def of(cls, variants: "pl.DataFrame") -> Self:
         """Count variants by their statuses."""
-        statuses = variants["status"].to_list()
-        return cls(len(statuses), statuses.count(COMPLETE), statuses.count(FAILED))
+        statuses = variants["status"]
+        complete, failed = (int((statuses == status).sum()) for status in (COMPLETE, FAILED))
+        return cls(len(statuses), complete, failed)
 
     @property
     def missing(self) -> int:
@@ -219,13 +221,13 @@ class StudyDirectory:
             content = json.dumps({"format": FORMAT, **meta.model_dump()}, indent=1)
         self.storage.write(META, content.encode())
 
-    def plan(self, without: Collection[str] = ()) -> "pl.DataFrame":
-        """Return the plan, without some columns: a row for each variant, with its parameters.
+    def plan(self, kept: Callable[[str], bool] = lambda _: True) -> "pl.DataFrame":
+        """Return the plan, or some of its columns: a row for each variant, with its parameters.
 
         Raises:
             RunDirectoryError: It is missing or damaged.
         """
-        frame = self.storage.read_frame(PLAN, (VARIANT, *PLAN_ONLY), without)
+        frame = self.storage.read_frame(PLAN, (VARIANT, *PLAN_ONLY), kept)
         with self.storage.reading(PLAN):
             check_numbers(frame)
         return frame
@@ -258,10 +260,24 @@ class StudyDirectory:
         Raises:
             RunDirectoryError: Files are missing or damaged.
         """
+        return self._with_results(self._parameters())
+
+    def slices(self) -> "Iterator[pl.DataFrame]":
+        """Yield some `variants` at a time: all results may need more memory than there is.
+
+        Raises:
+            RunDirectoryError: Files are missing or damaged.
+        """
+        for rows in self._parameters().iter_slices(SLICE_ROWS):
+            yield self._with_results(rows)
+
+    def _parameters(self) -> "pl.DataFrame":
+        return self.plan(lambda column: column not in PLAN_ONLY)
+
+    def _with_results(self, plan: "pl.DataFrame") -> "pl.DataFrame":
         import polars as pl
 
-        plan = self.plan(PLAN_ONLY)
-        results = read_results(self.storage)
+        results = read_results(self.storage, plan[VARIANT])
         with self.storage.reading(PLAN):
             joined = plan.join(results, on=VARIANT, how="left", maintain_order="left")
             return joined.with_columns(pl.col("status").fill_null(MISSING))

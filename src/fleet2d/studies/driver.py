@@ -56,6 +56,7 @@ from fleet2d.studies.specification import AdaptSettings, Specification, read_spe
 
 if TYPE_CHECKING:
     import polars as pl
+    import pyarrow as pa
 
 
 class AdaptiveRounds:
@@ -210,7 +211,12 @@ class CheckedStudy:
     metrics: Mapping[str, MetricFacts]
 
     def note_missing(self, variants: "pl.DataFrame", observer: Observer) -> None:
-        """Note which metrics that the study names are missing in complete variants."""
+        """Note which metrics that the study names are missing in complete variants.
+
+        Args:
+            variants: What `presence` returns of them.
+            observer: Receives the notes.
+        """
         import polars as pl
 
         complete = variants.filter(status=COMPLETE)
@@ -221,8 +227,8 @@ class CheckedStudy:
         places = {name: place_of(location) for location, name in reversed(named)}
         for name in dict.fromkeys(name for _, name in named if name != "*"):
             fitting = [metric for metric in metrics if is_kept(metric, [name])]
-            lacks = pl.all_horizontal(pl.lit(value=True), pl.col(fitting).is_null())
-            lacking = len(complete.filter(lacks))
+            has_one = pl.any_horizontal(pl.lit(value=False), *fitting)
+            lacking = len(complete.filter(~has_one))
             if lacking:
                 hint = did_you_mean(name, metrics) if lacking == len(complete) else ""
                 place = f"{places[name]}: " if places[name] else ""
@@ -301,7 +307,7 @@ def run_study(
     with directory.locked():
         for problem in drop_damaged(directory.storage):
             observer.on_note(problem)
-        results = read_results(directory.storage)
+        results = read_results(directory.storage, columns=(VARIANT, "status"))
         adapt = checked.specification.file.adapt
         # Of an adaptive study, new variants may be those of rounds that it doesn't need.
         plan = reconcile(
@@ -321,10 +327,31 @@ def run_study(
             rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note)
             if run.run_missing(rounds, complete):
                 write_plan(directory, rounds.plan)
-        variants = directory.variants()
-        directory.storage.write_table(VARIANTS, variants.to_arrow())
+        variants = _write_variants(directory)
     checked.note_missing(variants, observer)
     return Counts.of(variants)
+
+
+def presence(variants: "pl.DataFrame") -> "pl.DataFrame":
+    """Return the status of variants, and which of their other columns have values."""
+    import polars as pl
+
+    return variants.select("status", pl.exclude("status").is_not_null())
+
+
+def _write_variants(directory: StudyDirectory) -> "pl.DataFrame":
+    """Write the data set of the variants; return their `presence`."""
+    import polars as pl
+
+    found = []
+
+    def parts() -> "Iterator[pa.Table]":
+        for rows in directory.slices():
+            found.append(presence(rows))
+            yield rows.to_arrow()
+
+    directory.storage.write_table(VARIANTS, parts())
+    return pl.concat(found)
 
 
 @dataclass
@@ -346,13 +373,14 @@ class _StudyRun:
         is_complete = pl.col(VARIANT).is_in(complete.implode())
         done = len(self.plan.variants.filter(is_complete))
         self.observer.on_start(Counts(total, done, 0), self.crew.workers)
-        queues = (TaskQueue(self.plan.tasks(round_.filter(~is_complete))) for round_ in rounds)
+        queues = (self.plan.queue(round_.filter(~is_complete)) for round_ in rounds)
         is_checked = False
         with closing(self._results(queues)) as found:
             for result in found:
                 self.observer.on_result(result)
                 if result.is_complete and not is_checked:
-                    self.checked.note_missing(results_frame([result.row]), self.observer)
+                    frame = presence(results_frame([result.row]))
+                    self.checked.note_missing(frame, self.observer)
                     is_checked = True
                 if self.fail_fast and not result.is_complete:
                     return False

@@ -1,5 +1,6 @@
 """Tasks on executors of `concurrent.futures`: in this process, in others, or on a cluster."""
 
+import itertools
 import math
 import multiprocessing
 import os
@@ -10,7 +11,7 @@ import threading
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -60,21 +61,26 @@ class WorkerJob(Protocol):
         ...
 
 
+def by_home(tasks: Iterable[WorkerTask]) -> list[tuple[int, Iterator[WorkerTask]]]:
+    """Return groups of tasks that share a home, as a queue takes them."""
+    groups: dict[str, list[WorkerTask]] = {}
+    for task in tasks:
+        groups.setdefault(task.home, []).append(task)
+    return [(len(group), iter(group)) for group in groups.values()]
+
+
 class TaskQueue:
     """Tasks that wait, in groups that share a home, so that a worker builds it once.
 
     Example:
-        >>> queue = TaskQueue(WorkerTask(i, i, "", home) for i, home in enumerate("abab"))
-        >>> [task.number for task in queue.take(2)]
+        >>> tasks = by_home(WorkerTask(i, i, "", home) for i, home in enumerate("abab"))
+        >>> [task.number for task in TaskQueue(tasks).take(2)]
         [0, 2]
     """
 
-    def __init__(self, tasks: Iterable[WorkerTask] = ()) -> None:
-        """Group tasks by home."""
-        groups: dict[str, deque[WorkerTask]] = {}
-        for task in tasks:
-            groups.setdefault(task.home, deque()).append(task)
-        self._groups = deque(groups.values())
+    def __init__(self, groups: Iterable[tuple[int, Iterator[WorkerTask]]] = ()) -> None:
+        """Hold the number of tasks of each home, and the tasks, which may be made when taken."""
+        self._groups = deque(groups)
 
     def __bool__(self) -> bool:
         """Return whether tasks wait."""
@@ -82,17 +88,17 @@ class TaskQueue:
 
     def take(self, workers: int) -> list[WorkerTask]:
         """Remove some tasks of one home: at most a worker's share of all that wait."""
-        share = math.ceil(sum(map(len, self._groups)) / workers)
-        group = self._groups[0]
-        taken = [group.popleft() for _ in range(min(share, len(group), MAX_BATCH))]
-        if not group:
-            self._groups.popleft()
+        share = math.ceil(sum(count for count, _ in self._groups) / workers)
+        count, group = self._groups.popleft()
+        taken = list(itertools.islice(group, min(share, MAX_BATCH)))
+        if len(taken) < count:
+            self._groups.appendleft((count - len(taken), group))
         return taken
 
-    def put_back(self, tasks: Iterable[WorkerTask]) -> None:
+    def put_back(self, tasks: Collection[WorkerTask]) -> None:
         """Return tasks of one home: they are next."""
-        if group := deque(tasks):
-            self._groups.appendleft(group)
+        if tasks:
+            self._groups.appendleft((len(tasks), iter(tasks)))
 
 
 class TaskEnd(NamedTuple):
@@ -176,7 +182,7 @@ def _ends(
         attempts.subtract(task.number for task in rest)
         queue.put_back(rest)
         for task, payload in zip(batch, payloads, strict=False):
-            yield TaskEnd(task, attempts[task.number], payload)
+            yield TaskEnd(task, attempts.pop(task.number), payload)
         return
     if not isinstance(error, Exception) or isinstance(error, InputError):
         raise error

@@ -27,7 +27,14 @@ from fleet2d.studies.design import (
     scenario_content,
     scenario_hashes,
 )
-from fleet2d.studies.directory import PLAN, PLAN_ONLY, SCENARIOS, MetricFacts, StudyDirectory
+from fleet2d.studies.directory import (
+    PLAN,
+    PLAN_ONLY,
+    SCENARIOS,
+    SLICE_ROWS,
+    MetricFacts,
+    StudyDirectory,
+)
 from fleet2d.studies.executors import (
     Crew,
     SerialExecutor,
@@ -63,10 +70,14 @@ class StudyPlan(NamedTuple):
     design: Design
     variants: "pl.DataFrame"
 
-    def tasks(self, variants: "pl.DataFrame") -> list[WorkerTask]:
+    def queue(self, variants: "pl.DataFrame") -> TaskQueue:
         """Return the tasks to run some of its variants."""
         columns = variants.select(VARIANT, "index", "identity", "home_key")
-        return list(itertools.starmap(WorkerTask, columns.iter_rows()))
+        of_homes = columns.partition_by("home_key", maintain_order=True)
+        # As objects, all tasks together take several times the memory of the rows.
+        return TaskQueue(
+            (len(rows), itertools.starmap(WorkerTask, rows.iter_rows())) for rows in of_homes
+        )
 
 
 class KnownNames:
@@ -262,15 +273,15 @@ def check_setups(
         ScenarioError: Variants are wrong; a line per problem, with axis and value.
     """
     problems: dict[int, str] = {}
-    tasks = plan.tasks(plan.variants[setups_to_check(plan)])
-    if len(tasks) <= FEW_SETUPS:
+    places = setups_to_check(plan)
+    if len(places) <= FEW_SETUPS:
         crew = Crew(SerialExecutor())
     job = partial(setup_problem, plan.design)
     done = 0
-    with closing(run_tasks(crew, job, TaskQueue(tasks))) as rounds:
+    with closing(run_tasks(crew, job, plan.queue(plan.variants[places]))) as rounds:
         for ends in rounds:
             done += len(ends)
-            on_progress(done, len(tasks))
+            on_progress(done, len(places))
             for end in ends:
                 if text := end.loss or end.payload:
                     problems[end.task.index] = f"{plan.design.describe(end.task.index)}: {text}"
@@ -314,7 +325,7 @@ class ScenarioFile:
 
         rows = [(template, zlib.decompress(text).decode()) for template, text in self._rows]
         frame = pl.DataFrame(rows, ["template", "scenario"], orient="row")
-        directory.storage.write_table(SCENARIOS, frame.to_arrow())
+        directory.storage.write_table(SCENARIOS, [frame.to_arrow()])
 
 
 def reconcile(
@@ -348,7 +359,10 @@ def reconcile(
                 " choose another --out"
             )
         return plan
-    stored = directory.plan().select(VARIANT, "identity", "scenario")
+    stored = directory.plan((VARIANT, "identity").__contains__)
+    if stored["identity"].equals(plan.variants["identity"]):  # it takes less memory than joins
+        return StudyPlan(plan.design, plan.variants.with_columns(stored[VARIANT]))
+    stored = directory.plan((VARIANT, "identity", "scenario").__contains__)
     numbers = stored.select("identity", stored=VARIANT).unique("identity", keep="last")
     stale = stored.filter(pl.col(VARIANT).is_in(finished.implode()))
     stale = stale.join(plan.variants, on="identity", how="anti")
@@ -413,7 +427,8 @@ def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
     columns.append(pl.Series(SEED, np.array(design.seeds, np.int64)[seed]))
     names = (VARIANT, *PLAN_ONLY, "simulated_s")
     frame = plan.variants.select(*names).with_columns(columns)
-    directory.storage.write_table(PLAN, frame.to_arrow())
+    parts = (rows.to_arrow() for rows in frame.iter_slices(SLICE_ROWS))
+    directory.storage.write_table(PLAN, parts)
 
 
 def label_series(labels: list[Label]) -> "pl.Series":

@@ -8,7 +8,7 @@ import json
 import math
 import re
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from fleet2d.studies.storage import Storage
 if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     from fleet2d.studies.executors import WorkerTask
     from fleet2d.studies.simulator import VariantOutcome
@@ -131,7 +132,7 @@ class ResultWriter:
         files = {name: self._write_table(name) for name in self._tables}
         rows = self._frame.sort(VARIANT).to_arrow()
         rows = rows.replace_schema_metadata({_FILES: json.dumps(files)})
-        self._storage.write_table(f"{RESULTS}/{self._number:06d}.parquet", rows)
+        self._storage.write_table(f"{RESULTS}/{self._number:06d}.parquet", [rows])
         for old in self._files.values():
             self._storage.delete(old)
         self._files = files
@@ -149,7 +150,7 @@ class ResultWriter:
         tables = [with_variant(of_all[number], number) for number in sorted(of_all)]
         file = f"{TABLES}/{name}/{self._number:06d}-{self._version:04d}.parquet"
         rows = pa.concat_tables(tables, promote_options="permissive")
-        self._storage.write_table(file, rows, ROWS_PER_GROUP)
+        self._storage.write_table(file, [rows], ROWS_PER_GROUP)
         return file
 
 
@@ -187,23 +188,41 @@ def with_variant(rows: "pa.Table", number: int) -> "pa.Table":
     return rows.add_column(0, pa.field(VARIANT, pa.int32(), nullable=False), numbers)
 
 
-def read_results(storage: Storage) -> "pl.DataFrame":
+def read_results(
+    storage: Storage,
+    numbers: "pl.Series | None" = None,
+    columns: "Sequence[str] | None" = None,
+) -> "pl.DataFrame":
     """Return the newest result of each variant.
+
+    Args:
+        storage: The files.
+        numbers: Those of the variants; None: all.
+        columns: Columns of the results; None: all, and the metrics.
 
     Raises:
         RunDirectoryError: A file is damaged.
     """
     import polars as pl
 
-    frames = [results_frame(())]
-    empty = frames[0]
+    def is_wanted(file: "pq.ParquetFile") -> bool:
+        if numbers is None:
+            return True
+        found = pl.Series(file.read([VARIANT], use_threads=False)[VARIANT])
+        return bool(numbers.is_in(found.implode()).any())
+
+    empty = results_frame(())
+    frames = [empty.select(columns or pl.all())]
     for name in part_names(storage):
-        frame = storage.read_frame(name, RESULT_COLUMNS)
+        frame = storage.read_frame(name, RESULT_COLUMNS, is_wanted=is_wanted)
         with storage.reading(name):
             metrics = [column for column in frame.columns if column not in empty.columns]
             types = {**empty.schema, **dict.fromkeys(metrics, pl.Float64)}
-            frames.append(frame.select(*types).cast(dict(types)))
             check_numbers(frame)
+            part = frame.select(*types).cast(dict(types))
+            if numbers is not None:
+                part = part.filter(pl.col(VARIANT).is_in(numbers.implode()))
+            frames.append(part.select(columns or pl.all()))
     found = pl.concat(frames, how="diagonal")
     if found[VARIANT].n_unique() < len(found):  # for a copy in memory less
         found = found.unique(VARIANT, keep="last", maintain_order=True)

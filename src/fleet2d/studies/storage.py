@@ -1,14 +1,16 @@
 """The files of a study: in a local folder, or in any store that pyarrow can reach."""
 
+import itertools
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from io import BytesIO
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from fleet2d.bounds import one_line
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError, errors_as
-from fleet2d.storage.files import is_disk_full, path_in, plain_name, write_atomically
+from fleet2d.storage.files import is_disk_full, path_in, plain_name, replacing
 
 if TYPE_CHECKING:
     import polars as pl
@@ -153,14 +155,19 @@ class Storage:
             return bytes(file.read())
 
     def read_frame(
-        self, name: str, needed: Iterable[str] = (), without: Collection[str] = ()
+        self,
+        name: str,
+        needed: Iterable[str] = (),
+        kept: Callable[[str], bool] = lambda _: True,
+        is_wanted: "Callable[[pq.ParquetFile], bool]" = lambda _: True,
     ) -> "pl.DataFrame":
         """Return the table of a Parquet file as a data frame.
 
         Args:
             name: The file.
             needed: Columns that it must have.
-            without: Columns to leave out.
+            kept: Returns whether to keep a column.
+            is_wanted: Returns whether its rows are wanted, or only its columns.
 
         Raises:
             RunDirectoryError: There is none, it is damaged, or it lacks a column.
@@ -171,10 +178,23 @@ class Storage:
             names = file.schema_arrow.names
             if missing := [column for column in needed if column not in names]:
                 raise ValueError(f"it has no columns {', '.join(missing)}")
-            return pl.DataFrame(file.read([name for name in names if name not in without]))
+            names = list(filter(kept, names))
+            # Each thread of Arrow would keep memory.
+            groups = range(file.num_row_groups if is_wanted(file) else 0)
+            table = file.read_row_groups(groups, names, use_threads=False)
+            frame = pl.from_arrow(table, rechunk=False)
+            assert isinstance(frame, pl.DataFrame)
+            return frame
 
-    def write_table(self, name: str, table: "pa.Table", group_rows: int | None = None) -> None:
+    def write_table(
+        self, name: str, parts: "Iterable[pa.Table]", group_rows: int | None = None
+    ) -> None:
         """Write a table as a Parquet file with checksums; readers see all of it, or none.
+
+        Args:
+            name: The file.
+            parts: Parts of the table, one at least, each of which becomes a group of rows.
+            group_rows: Rows of a group, of larger parts.
 
         Raises:
             ArtifactError: It can't be written.
@@ -183,9 +203,13 @@ class Storage:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        sink = pa.BufferOutputStream()
-        pq.write_table(table, sink, group_rows, compression="zstd", write_page_checksum=True)
-        self.write(name, sink.getvalue())
+        rest = iter(parts)
+        first = next(rest)
+        options = {"compression": "zstd", "write_page_checksum": True}
+        with self._replacing(name) as file, pq.ParquetWriter(file, first.schema, **options) as sink:
+            for part in itertools.chain([first], rest):
+                sink.write_table(part, group_rows)
+                pa.default_memory_pool().release_unused()
 
     def write(self, name: str, content: Any) -> None:
         """Write a file; readers see all of it, or none.
@@ -194,14 +218,28 @@ class Storage:
             ArtifactError: It can't be written.
             RunDirectoryError: It is a link, or in one.
         """
+        with self._replacing(name) as file:
+            file.write(content)
+
+    @contextmanager
+    def _replacing(self, name: str) -> Iterator[BinaryIO]:
+        """Yield a new file, which replaces one in the end; of a remote store, one in memory.
+
+        Raises:
+            ArtifactError: It can't be written.
+            RunDirectoryError: It is a link, or in one.
+        """
         path = self.path(name)
         with writing(self.location):
             if self.folder is None:
+                content = BytesIO()
+                yield content
                 with self.filesystem.open_output_stream(path) as stream:
-                    stream.write(content)
+                    stream.write(content.getbuffer())
             else:
                 Path(path).parent.mkdir(parents=True, exist_ok=True)
-                write_atomically(Path(path), content)
+                with replacing(Path(path)) as handle, open(handle, "wb", closefd=False) as file:
+                    yield file
 
     @contextmanager
     def parquet(self, name: str) -> "Iterator[pq.ParquetFile]":
@@ -210,10 +248,12 @@ class Storage:
         Raises:
             RunDirectoryError: There is none, or it is damaged.
         """
+        import pyarrow as pa
         import pyarrow.parquet as pq
 
         with self.reading(name), self.filesystem.open_input_file(self.path(name)) as source:
             yield pq.ParquetFile(source, page_checksum_verification=True)
+        pa.default_memory_pool().release_unused()
 
     def check(self, name: str) -> None:
         """Read a Parquet file of a local folder, with its checksums; of another, only its footer.
@@ -223,7 +263,7 @@ class Storage:
         """
         with self.parquet(name) as file:
             for group in range(file.num_row_groups if self.folder is not None else 0):
-                file.read_row_group(group)
+                file.read_row_group(group, use_threads=False)
 
     def delete(self, name: str) -> None:
         """Delete a file, if there is one.

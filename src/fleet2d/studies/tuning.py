@@ -38,7 +38,7 @@ from fleet2d.studies.design import (
 )
 from fleet2d.studies.directory import StudyDirectory
 from fleet2d.studies.driver import CheckedStudy, check_study, run_study
-from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, run_tasks
+from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, by_home, run_tasks
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
 from fleet2d.studies.simulator import StagedRun, describe_error, flat_numbers, input_files
@@ -462,7 +462,7 @@ class Search:
             for place, (number, (index, home)) in enumerate(keys)
         ]
         results: dict[int, dict[int, Any]] = {number: {} for number in by_number}
-        with closing(run_tasks(self._crew, self._job, TaskQueue(tasks))) as rounds:
+        with closing(run_tasks(self._crew, self._job, TaskQueue(by_home(tasks)))) as rounds:
             for end in itertools.chain.from_iterable(rounds):
                 number = end.task.trial
                 trial = by_number.get(number)
