@@ -14,6 +14,7 @@ from fleet2d.interventions import Decide, Put, Send, SwitchOff
 from fleet2d.interventions.intervention import dump_intervention, verbs
 
 PACKAGE = Path(fleet2d.__file__).parent
+ROOT = Path(__file__).parents[2]
 BUILT_IN = {cls.__name__: cls for cls in verbs().values() if cls.__module__.startswith("fleet2d.")}
 STUB = ast.parse((PACKAGE / "interventions" / "__init__.pyi").read_text(encoding="utf-8"))
 
@@ -40,7 +41,7 @@ def test_stub_has_the_signature_of_each_constructor(name: str) -> None:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_each_intervention_is_documented_with_an_example(name: str) -> None:
-    page = (PACKAGE.parents[1] / "docs" / "interventions.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "interventions.md").read_text(encoding="utf-8")
 
     assert f"`{name}`" in page
     assert f">>> {name}(" in (BUILT_IN[name].__doc__ or "")

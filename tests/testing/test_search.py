@@ -19,6 +19,7 @@ from fleet2d.testing import command
 from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
 pytest.importorskip("optuna")
+pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 OVER = "robots.astro.speed={low: 0.05, high: 0.6}"
