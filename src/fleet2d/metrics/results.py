@@ -50,7 +50,8 @@ def block_of(metric: str, metric_class: type[Metric], result: Any) -> ResultTabl
     measures = list(dict.fromkeys(path[-1:] for path in shown))
     has_names_alone = depth == 1 and not any(name in metric_class.units for (name,) in shown)
     if has_names_alone and len(shown) <= MAX_COLUMNS:
-        subjects, measures = measures, [()]
+        subjects = measures
+        measures = [()]
     rows = [ResultRow(metric, [" · ".join(subject) for subject in subjects], "")]
     last_unit = ""
     for measure in measures:
