@@ -163,7 +163,7 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. `verdict` sums up the `verdicts`, of which violated ones come first. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. `verdict` sums up the `verdicts`, of which violated ones come first. `skies` has for each day the hours until which it is dark, from which and until which it is light, and from which it is dark again; the last holds for the days that follow, too. */
 export interface RunFacts {
   title: string;
   status: string;
@@ -185,6 +185,7 @@ export interface RunFacts {
   verdicts: VerdictFacts[];
   story: StoryFacts[];
   slows: SlowFacts[];
+  skies: [number, number, number, number][];
   starts_unlit: boolean;
   event_kinds: EventKind[];
   metrics: Record<string, unknown>;

@@ -17,6 +17,7 @@ from fleet2d.viewing.run_facts import (
     intervention_marks,
     marks_of,
     sightings_of,
+    skies_of,
     slow_floors,
 )
 
@@ -110,3 +111,19 @@ def test_sightings_are_the_same_however_they_are_read(
     run.directory = None  # as a run in memory
     assert whole == sightings_of(run)
     assert sum(len(lane["first"]) for lane in whole) > 5
+
+
+def test_light_of_each_day_is_that_of_the_sun_over_the_home() -> None:
+    scenario = {"simulation": {"daylight": {"latitude": 52.5}}}
+
+    winter, _ = skies_of(scenario, Clock(datetime(2026, 12, 21, 14), 3_600_000_000, 12))
+    (summer,) = skies_of(scenario, Clock(datetime(2026, 6, 21), 1_000_000, 60))
+
+    assert winter == pytest.approx((7.6, 8.6, 15.3, 16.3), abs=0.1)
+    assert summer == pytest.approx((3.1, 4.1, 19.9, 20.9), abs=0.2)
+
+
+def test_light_is_as_cameras_have_it_where_the_scenario_has_no_daylight() -> None:
+    clock = Clock(datetime(2026, 1, 5), 1_000_000, 60)
+
+    assert [(6.0, 8.0, 17.0, 19.0)] == skies_of({"simulation": {"daylight": None}}, clock)

@@ -105,7 +105,7 @@ class PlanPainter {
       const pose = poses.get(body.name);
       return pose && !pose.away ? [{ x: frame.ux(pose.x), y: frame.uy(pose.y), radius: 1.6 * bodyRadius(frame, body) }] : [];
     });
-    const isNight = hasLight && skyAt(this.run.clock.hourAt(us)).day < 0.5;
+    const isNight = hasLight && skyAt(this.run, us).day < 0.5;
     const lit = isNight ? litRooms(this.run, us) : null;
     this.nameBoxes = this.labels!.draw(context, bodies, (room) => (lit && !lit.has(room) ? "#e8ecf8" : "#4a4438"));
   }

@@ -15,11 +15,18 @@ const LAMP = "#fff0cf";
 /** Night is drawn at a fraction of the pixels: it has no edges but those of rooms. */
 const COARSER = 3;
 
-/** How bright the sky is at an hour of the day, from 0 at night to 1 by day, and how red it is. */
-export function skyAt(hour: number): { day: number; dusk: number } {
+/** By day a room whose light is off is only a little darker than others. */
+const UNLIT_BY_DAY = 0.25;
+
+/** How bright the sky over a run is at a moment, from 0 at night to 1 by day, and how red. */
+export function skyAt(run: Run, us: number): { day: number; dusk: number } {
+  const { skies } = run.facts;
+  const hour = run.clock.hourAt(us);
+  const [darkUntil, lightFrom, lightUntil, darkFrom] = skies[Math.min(run.clock.day(us), skies.length) - 1]!;
   const rise = (from: number, to: number): number => Math.max(0, Math.min(1, (hour - from) / (to - from)));
-  const near = (at: number): number => Math.max(0, 1 - Math.abs(hour - at) / 1.4);
-  return { day: rise(6.6, 8.6) * (1 - rise(17, 19)), dusk: 0.5 * Math.max(near(7.6), near(18)) };
+  const near = (from: number, to: number): number => Math.max(0, 1 - Math.abs(hour - (from + to) / 2) / (0.7 * (to - from)));
+  const day = rise(darkUntil, lightFrom) * (1 - rise(lightUntil, darkFrom));
+  return { day, dusk: 0.5 * Math.max(near(darkUntil, lightFrom), near(lightUntil, darkFrom)) };
 }
 
 /** Rooms that are lit at a moment: by their lamps where a run has them, else those of people who are awake. */
@@ -45,10 +52,10 @@ export class Light {
 
   /** The ground in the light of a moment; `groundKey` says what is on it. */
   of(ground: HTMLCanvasElement, groundKey: string, run: Run, us: number, frame: Frame, ratio: number): HTMLCanvasElement {
-    const { day, dusk } = skyAt(run.clock.hourAt(us));
+    const { day, dusk } = skyAt(run, us);
     const dark = Math.round(20 * (1 - day)) / 20;
     const lit = run.hasLights || dark > 0.05 ? litRooms(run, us) : new Set<number>();
-    const shade = run.hasLights ? Math.max(dark, 0.6) : dark;
+    const shade = run.hasLights ? Math.max(dark, UNLIT_BY_DAY) : dark;
     if (shade === 0 && dusk < 0.05) return ground;
     const glow = Math.round(10 * dusk) / 10;
     const key = [groundKey, shade, glow, ...lit].join();

@@ -239,7 +239,9 @@ class RunFacts(TypedDict):
 
     With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all
     that Fleet2D records, also those that the run has none of. `verdict` sums up the
-    `verdicts`, of which violated ones come first.
+    `verdicts`, of which violated ones come first. `skies` has for each day the hours until which it
+    is dark, from which and until which it is light, and from which it is dark again; the last holds
+    for the days that follow, too.
     """
 
     title: str
@@ -262,6 +264,7 @@ class RunFacts(TypedDict):
     verdicts: list[VerdictFacts]
     story: list[StoryFacts]
     slows: list[SlowFacts]
+    skies: list[tuple[float, float, float, float]]
     starts_unlit: bool
     event_kinds: list[EventKind]
     metrics: dict[str, Any]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from datetime import datetime, time, timedelta
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,9 +20,11 @@ from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
 from fleet2d.runs.run import LAYER_PREFIX, Run
 from fleet2d.runs.verdicts import verdict_line, verdicts_of, violations_of
-from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.clock import TWILIGHT, Clock, Sun
 from fleet2d.runtime.events import EventKind
+from fleet2d.scenario.model import Daylight
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
+from fleet2d.sight.perception import DARK_NIGHT
 from fleet2d.storage.files import path_in
 from fleet2d.viewing.contract import (
     BodyFacts,
@@ -272,12 +275,39 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         ],
         story=story_of(run),
         slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
+        skies=skies_of(scenario, run.clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(EventKind),
         metrics=run.metrics,
         scenario=scenario,
         walks_every_s=0.0,
     )
+
+
+def skies_of(scenario: Mapping[str, Any], clock: Clock) -> list[tuple[float, float, float, float]]:
+    """Return when it gets light and dark on each day; see `RunFacts`.
+
+    Without the home's latitude it is as for cameras by default: the same on each day.
+    """
+    daylight = scenario["simulation"].get("daylight")
+    if daylight is None:
+        (dark_until, _), (light_from, _), (light_until, _), (dark_from, _) = DARK_NIGHT.points
+        return [(dark_until, light_from, light_until, dark_from)]
+    settings = Daylight(**daylight)
+    sun = Sun(settings.latitude, settings.noon)
+    first = clock.start.toordinal()
+    last = clock.time(clock.steps - 1).toordinal()
+    return [_sky(*sun.day(ordinal)) for ordinal in range(first, last + 1)]
+
+
+def _sky(rise: datetime, fall: datetime) -> tuple[float, float, float, float]:
+    """Return the hours of a day around which the sun rises and sets."""
+    midnight = datetime.combine(rise.date(), time())
+    hour = timedelta(hours=1)
+    rise_h = (rise - midnight) / hour
+    fall_h = (fall - midnight) / hour
+    twilight_h = TWILIGHT / hour
+    return rise_h - twilight_h, rise_h + twilight_h, fall_h - twilight_h, fall_h + twilight_h
 
 
 def run_title(run: Run) -> str:
@@ -406,6 +436,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         verdicts=[],
         story=[],
         slows=slow_floors(scenario, interventions_of(simulation), clock),
+        skies=skies_of(scenario, clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(EventKind),
         metrics={},
