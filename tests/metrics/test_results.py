@@ -3,7 +3,7 @@
 from fleet2d.metrics.bodies import Distance
 from fleet2d.metrics.interactions import Interactions
 from fleet2d.metrics.metric import Metric
-from fleet2d.metrics.results import ResultRow, block_of
+from fleet2d.metrics.results import ResultRow, block_of, blocks_of
 
 
 def test_people_are_columns_and_measures_rows() -> None:
@@ -54,6 +54,22 @@ def test_measures_without_a_subject_are_rows() -> None:
     block = block_of("team", Interactions, {"kept": 0.5, "woke": 3})
 
     assert ["team", "kept", "woke"] == [row.name for row in block.rows]
+
+
+def test_metric_that_measured_nothing_is_left_out() -> None:
+    configured = {"power": {"type": "battery"}, "way": {"type": "distance"}}
+
+    blocks = blocks_of({"power": {}, "way": {"ana": 3.0}}, configured)
+
+    assert ["way"] == [block.rows[0].name for block in blocks]
+
+
+def test_small_share_is_not_told_as_none() -> None:
+    shares = {"ana": {"kept": 0.0, "answered": 0.0004, "accepted": 0.001}}
+
+    _, *rows = block_of("requests", Interactions, {"astro": shares}).rows
+
+    assert [["0.0 %"], ["< 0.1 %"], ["0.1 %"]] == [list(row.values) for row in rows]
 
 
 def test_result_without_numbers_has_no_rows_but_the_head() -> None:

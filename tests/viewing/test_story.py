@@ -99,6 +99,19 @@ def test_who_gets_up_at_night_does_not_go_to_bed_later() -> None:
     assert "Ana goes to bed at 23:45" == story["The latest night"]["words"]
 
 
+def test_nap_in_the_evening_is_not_a_night() -> None:
+    story = told(
+        (21, "ana", "activity", None, "sleep"),
+        (21.5, "ana", "activity", None, "tv"),
+        (23.25, "ana", "activity", None, "sleep"),
+        (31, "ana", "activity", None, "breakfast"),
+        (46, "ana", "activity", None, "sleep"),
+        (55, "ana", "activity", None, "breakfast"),
+    )
+
+    assert "Ana goes to bed at 23:15" == story["The latest night"]["words"]
+
+
 def test_bed_after_midnight_is_later_than_before() -> None:
     story = told(
         (23.5, "ana", "activity", None, "sleep"),
