@@ -476,6 +476,9 @@ Speed = Annotated[
 ]
 """A speed, 0 or more [m/s]."""
 
+SignedSpeed = Annotated[float, _to_float(SPEED), SPEED.schema()]
+"""A speed along an axis, negative against it [m/s]."""
+
 AngleDeg = Annotated[float, _to_float(ANGLE), ANGLE.schema()]
 """An angle [degrees], counter-clockwise from +x where it is a heading."""
 
@@ -486,6 +489,9 @@ TurnRateDeg = Annotated[
     TURN_RATE.schema(),
 ]
 """How fast a body turns, 0 or more [degrees/s]."""
+
+SignedTurnRateDeg = Annotated[float, _to_float(TURN_RATE), TURN_RATE.schema()]
+"""How fast a body turns counter-clockwise, negative if clockwise [degrees/s]."""
 
 Share = Annotated[
     float,
