@@ -44,6 +44,13 @@ def test_a_command_moves_the_robot_for_its_duration_and_it_stands_then() -> None
     assert np.ptp(walked.y) < 1e-3
 
 
+def test_a_row_of_short_commands_loses_nothing_to_rounding() -> None:
+    acts = [{"at": f"{k / 10} s", "steer": "astro", "forward": 0.033} for k in range(100)]
+    walked = path(steered(*acts))
+
+    assert abs(walked.x[100] - walked.x[0] - 0.33) < 1e-3
+
+
 def test_a_turn_on_an_arc_has_the_radius_of_speed_by_rate() -> None:
     act = {"at": "0 s", "steer": "astro", "forward": 0.2, "turn_deg": 90, "duration": "2 s"}
     walked = path(steered(act, turn_rate_deg=90))

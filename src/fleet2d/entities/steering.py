@@ -85,6 +85,9 @@ class Progress(NamedTuple):
     rest: tuple[int, int, int] = (0, 0, 0)
 
 
+AT_REST = Progress()
+
+
 @dataclass
 class Steering:
     """The order to move at a velocity for a while; it ends at walls and in front of bodies.
@@ -99,7 +102,7 @@ class Steering:
     velocity: Velocity
     duration: timedelta
     others: Sequence[Disc] = ()
-    first: Progress = Progress()
+    first: Progress = AT_REST
     _progress: dict[int, Progress] = field(default_factory=dict, init=False)  # by time [us]
 
     def decide(self, now: Situation) -> Plan | None:
@@ -113,7 +116,7 @@ class Steering:
         """Return how far a robot is at a moment; as one that stands, if the time is over."""
         passed = [end_us for end_us in self._progress if end_us <= time_us]
         if not passed or time_us > max(self._progress):
-            return Progress()
+            return AT_REST
         at_us = max(passed)
         progress = self._progress[at_us]
         return progress if at_us == time_us else Progress(progress.velocity)

@@ -4,7 +4,7 @@ from datetime import timedelta
 
 from fleet2d.configuration.units import PositiveDuration, SignedSpeed, SignedTurnRateDeg
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.steering import Disc, Progress, Steering, Velocity
+from fleet2d.entities.steering import AT_REST, Disc, Steering, Velocity
 from fleet2d.interventions.intervention import World
 from fleet2d.interventions.robots import RobotIntervention
 
@@ -41,7 +41,7 @@ class Steer(RobotIntervention):
         last = actor.order
         time_us = world.step * world.clock.step_us
         is_steered = isinstance(last, Steering)
-        progress = last.progress_at(time_us) if is_steered else Progress()
+        progress = last.progress_at(time_us) if is_steered else AT_REST
         wanted = Velocity(self.forward, self.left, self.turn_deg)
         order = Steering(wanted, self.duration, _bodies_near(actor, world), progress)
         actor.follow_order(order, world.step)

@@ -26,6 +26,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import InputError, errors_as, extra, os_errors_as, printable
 from fleet2d.live.bridge import LiveStep, Peer, PeerFault, Post, lose, sources_of
+from fleet2d.live.goals import GoalStatus
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
@@ -48,6 +49,8 @@ DEVICE_CLASSES = {
 }
 """Home Assistant's class of each type of sensor."""
 WAIT_S = 5.0
+# So many programs that sent datagrams are told of goals.
+MAX_SENDERS = 16
 # Of more messages before a run, the last ones count.
 MAX_EARLY = 1000
 
@@ -107,7 +110,7 @@ def hello(simulation: Simulation) -> dict[str, Any]:
 
 
 class UdpPeer(Peer):
-    """Messages in datagrams, one JSON object each; it only receives."""
+    """Messages in datagrams, one JSON object each; senders are told what becomes of goals."""
 
     def __init__(self, host: str, port: int) -> None:
         """Listen at an address; port 0 is a free one."""
@@ -119,6 +122,7 @@ class UdpPeer(Peer):
             raise InputError(f"udp://{host}:{port}: {error.strerror or error}") from error
         self._socket.settimeout(0.2)
         self._over = False
+        self._senders: deque[Any] = deque(maxlen=MAX_SENDERS)  # their addresses, the latest last
 
     @property
     def port(self) -> int:
@@ -132,7 +136,17 @@ class UdpPeer(Peer):
     def _receive(self, post: Post) -> None:
         while not self._over:
             with contextlib.suppress(TimeoutError, OSError):
-                post(self._socket.recv(MAX_BYTES))
+                content, address = self._socket.recvfrom(MAX_BYTES)
+                if address not in self._senders:
+                    self._senders.append(address)
+                post(content)
+
+    def send(self, frame: LiveStep) -> None:
+        """Tell the latest senders which goals begin and end."""
+        news = [goal for goal in frame.goals if goal.state != GoalStatus.UNDER_WAY]
+        for address, goal in itertools.product(tuple(self._senders), news):
+            with contextlib.suppress(OSError):
+                self._socket.sendto(json.dumps(goal.message()).encode(), address)
 
     def close(self, run: Run) -> None:
         """Stop listening."""
@@ -440,6 +454,8 @@ class MqttPeer(Peer):
                 state = "ON" if event.detail == self._on.get(event.entity) else "OFF"
                 self._retain(f"{self.prefix}/sensor/{event.entity}", state)
             self._publish("event", json.dumps({**event._asdict(), "event": str(event.event)}))
+        for goal in frame.goals:
+            self._publish(f"goal/{goal.entity}", json.dumps(goal.message()))
         for table, row in frame.rows:
             self._publish(f"row/{table}", json.dumps(row, default=str))
 
