@@ -1,4 +1,7 @@
-"""Goals of bodies in a live run: what becomes of each, from its acceptance to its end."""
+"""Goals of bodies in a live run: what becomes of each, from its acceptance to its end.
+
+A body that has reached its goal stands there until it is released, as its order says.
+"""
 
 import math
 from collections.abc import Iterable
@@ -25,11 +28,6 @@ class GoalStatus(StrEnum):
     REACHED = "reached"
     IMPOSSIBLE = "impossible"
     CANCELLED = "cancelled"
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing more becomes of it."""
-        return self in (self.REACHED, self.IMPOSSIBLE, self.CANCELLED)
 
 
 class GoalState(NamedTuple):
@@ -68,7 +66,7 @@ class _Goal:
     sender: Sender
     order: GoTo | None = None
     obstacle: str | None = None  # what blocks the way; None: nothing does
-    left_m: float = math.inf
+    is_reached: bool = False  # and the body still stands there, by the order
 
     def state(
         self, state: GoalStatus, detail: str = "", metres: float = 0.0, seconds: float = 0.0
@@ -100,7 +98,7 @@ class Goals:
     def cancel(self, entity: str, reason: str) -> None:
         """Tell that the goal of a body, if it has one, is given up."""
         goal = self._goals.pop(entity, None)
-        if goal is not None:
+        if goal is not None and not goal.is_reached:
             self._news.append(goal.state(GoalStatus.CANCELLED, reason))
 
     def has(self, entity: str, name: str = "") -> bool:
@@ -109,7 +107,7 @@ class Goals:
         return goal is not None and name in ("", goal.message.id)
 
     def of(self, sender: Sender) -> list[GoalMessage]:
-        """Return the goals that somebody sent and that are under way."""
+        """Return the goals that somebody sent and that bodies follow, or stand at."""
         return [goal.message for goal in self._goals.values() if goal.sender == sender]
 
     def take_news(self, events: Iterable[Event]) -> list[GoalState]:
@@ -122,8 +120,10 @@ class Goals:
         for entity, goal in list(self._goals.items()):
             goal.obstacle = blocked.get(entity, goal.obstacle)
             state = self._state_of(goal, self._simulation.actors[entity])
-            self._news.append(state)
-            if state.state.is_over:
+            if not goal.is_reached:
+                self._news.append(state)
+            goal.is_reached |= state.state == GoalStatus.REACHED
+            if state.state == GoalStatus.CANCELLED:
                 del self._goals[entity]
         news = self._news
         self._news = []
