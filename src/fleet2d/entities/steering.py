@@ -178,8 +178,9 @@ def _length(x: float, y: float) -> float:
 
 def _gained(body: Body, time_us: int) -> float:
     """Return by how much the speed of a robot can change in a time [m/s]."""
-    is_ramped = isinstance(body.drive, Trapezoidal)
-    return body.drive.acceleration * time_us / 1e6 if is_ramped else math.inf
+    if not isinstance(body.drive, Trapezoidal):
+        return math.inf
+    return body.drive.acceleration * time_us / 1e6
 
 
 def _turned(velocity: Velocity, scale: float, heading: int) -> tuple[int, int]:

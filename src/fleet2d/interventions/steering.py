@@ -40,8 +40,7 @@ class Steer(RobotIntervention):
         actor = self.actor(world)
         last = actor.order
         time_us = world.step * world.clock.step_us
-        is_steered = isinstance(last, Steering)
-        progress = last.progress_at(time_us) if is_steered else AT_REST
+        progress = last.progress_at(time_us) if isinstance(last, Steering) else AT_REST
         wanted = Velocity(self.forward, self.left, self.turn_deg)
         order = Steering(wanted, self.duration, _bodies_near(actor, world), progress)
         actor.follow_order(order, world.step)

@@ -147,7 +147,12 @@ class Peer:
     """Another program, or a function: it may send messages to a run, and hear of it.
 
     Methods that a peer leaves out do nothing.
+
+    Attributes:
+        fastest: More times real time than it can follow are told.
     """
+
+    fastest: float = math.inf
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Connect, before the first step."""
@@ -275,6 +280,9 @@ class Bridge:
             simulation.listen_rows(self._hear)
         for number, peer in enumerate(self._peers):
             peer.open(simulation, self._post_of(number))
+        fastest = min((getattr(peer, "fastest", math.inf) for peer in self._peers), default=1.0)
+        if (self.speed or math.inf) > fastest:
+            self._say("fast", f"at more than {fastest:g} times real time, timers of ROS skip")
         try:
             with suppress(KeyboardInterrupt), _prompt_threads():
                 self._simulate()
@@ -427,19 +435,25 @@ class Bridge:
                     self._goals.refuse(message, sender, str(error))
                 continue
             self.counts["applied"] += 1
-            if isinstance(message, GoalMessage):
-                self._goals.accept(message, sender)
-            if isinstance(message, CancelMessage):
-                self._goals.cancel(message.entity, "its sender withdrew it")
-            if isinstance(message, VelocityMessage):
-                self._goals.cancel(message.entity, "the robot is steered")
-            if isinstance(message, PoseMessage):
-                self._goals.cancel(message.entity, "a pose arrived")
-                self._compare(message, sender)
-                self._heard[message.entity] = time.monotonic()
-                if message.entity in self._standing:
-                    self._standing.remove(message.entity)
-                    self._say("back", f"{message.entity}: poses arrive again")
+            self._take_note(message, sender)
+
+    def _take_note(self, message: LiveMessage, sender: Sender) -> None:
+        """Keep track of goals and of poses that are expected, after a message was applied."""
+        if isinstance(message, GoalMessage):
+            self._goals.accept(message, sender)
+        elif isinstance(message, CancelMessage):
+            self._goals.cancel(message.entity, "its sender withdrew it")
+        elif isinstance(message, VelocityMessage):
+            self._goals.cancel(message.entity, "the robot is steered")
+        elif isinstance(message, PoseMessage):
+            self._goals.cancel(message.entity, "a pose arrived")
+            self._compare(message, sender)
+            self._heard[message.entity] = time.monotonic()
+            if message.entity in self._standing:
+                self._standing.remove(message.entity)
+                self._say("back", f"{message.entity}: poses arrive again")
+        if isinstance(message, GoalMessage | VelocityMessage):
+            self._heard.pop(message.entity, None)  # no more poses are expected
 
     def _compare(self, pose: PoseMessage, sender: Sender) -> None:
         """Tell a pose that doesn't follow from the one before it."""
@@ -449,7 +463,8 @@ class Bridge:
         self._poses[name] = sender, step, pose.x, pose.y
         passed_s = (step - last) * self.simulation.clock.step_us / 1e6
         off = math.hypot(pose.x - x, pose.y - y)
-        if before != sender and time.monotonic() - self._heard[name] < self.silence_s:
+        is_recent = time.monotonic() - self._heard.get(name, -math.inf) < self.silence_s
+        if before != sender and is_recent:
             self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
         if off > JUMP_M + JUMP_M_PER_S * passed_s:
             self._count(

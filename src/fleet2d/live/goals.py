@@ -3,6 +3,7 @@
 A body that has reached its goal stands there until it is released, as its order says.
 """
 
+import json
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -58,6 +59,10 @@ class GoalState(NamedTuple):
         fields = self._asdict()
         del fields["sender"]
         return {"type": "goal_state", **fields, "state": str(self.state)}
+
+    def text(self) -> str:
+        """Return the message as JSON."""
+        return json.dumps(self.message())
 
 
 @dataclass

@@ -146,7 +146,7 @@ class UdpPeer(Peer):
         news = [goal for goal in frame.goals if goal.state != GoalStatus.UNDER_WAY]
         for address, goal in itertools.product(tuple(self._senders), news):
             with contextlib.suppress(OSError):
-                self._socket.sendto(json.dumps(goal.message()).encode(), address)
+                self._socket.sendto(goal.text().encode(), address)
 
     def close(self, run: Run) -> None:
         """Stop listening."""
@@ -282,7 +282,8 @@ def open_peer(address: str) -> Peer:
 
     Args:
         address: `udp://HOST:PORT` and `ws://HOST:PORT` listen there; `rosbridge://HOST:PORT` and
-            `mqtt://USER:PASSWORD@HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
+            `mqtt://USER:PASSWORD@HOST:PORT/PREFIX` connect to a rosbridge server and a broker;
+            `ros2://HOST:PORT/DISTRIBUTION/ROBOT` joins the graph of ROS 2, all parts optional.
 
     Raises:
         InputError: There is no such scheme, the address can't be used, or an extra isn't installed.
@@ -291,7 +292,7 @@ def open_peer(address: str) -> Peer:
         >>> open_peer("wss://here:1")
         Traceback (most recent call last):
         fleet2d.errors.InputError: 'wss://here:1' is not the address of a peer: did you mean 'ws'? \
-Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX
+Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT, mqtt://HOST:PORT/PREFIX or ros2://
     """
     with errors_as(InputError, of=PydanticCustomError):
         parts = parse_peer_address(address)
@@ -302,9 +303,13 @@ Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT
     if parts.scheme == "ws":
         return WebSocketPeer(host, port or 0)
     if parts.scheme == "rosbridge":
-        from fleet2d.live.rosbridge import RosbridgePeer
+        from fleet2d.live.ros.rosbridge import RosbridgePeer
 
         return RosbridgePeer(host, port or 9090)
+    if parts.scheme == "ros2":
+        from fleet2d.live.ros.ros2 import Ros2Peer
+
+        return Ros2Peer(parts.hostname or "localhost", port, parts.path)
 
     names = [None if part is None else unquote(part) for part in (parts.username, parts.password)]
     return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d", *names)
@@ -455,7 +460,7 @@ class MqttPeer(Peer):
                 self._retain(f"{self.prefix}/sensor/{event.entity}", state)
             self._publish("event", json.dumps({**event._asdict(), "event": str(event.event)}))
         for goal in frame.goals:
-            self._publish(f"goal/{goal.entity}", json.dumps(goal.message()))
+            self._publish(f"goal/{goal.entity}", goal.text())
         for table, row in frame.rows:
             self._publish(f"row/{table}", json.dumps(row, default=str))
 
