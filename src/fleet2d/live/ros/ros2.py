@@ -204,6 +204,8 @@ class Ros2Peer(Peer):
     ) -> None:
         """Tell the client of a goal its end, or how far the robot is."""
         status = _STATUSES.get(goal.state)
+        if goal.state == GoalStatus.ACCEPTED:  # which the client has heard
+            return
         if status is None:
             server.tell(asked, self._feedback(asked, goal, frame))
             return
