@@ -18,23 +18,27 @@ pytest.importorskip("rclpy", reason="the library of ROS is not installed: .ci/ro
 # The library of ROS imports modules that Python calls deprecated.
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
+# A quaternion that is left out is 1 in ROS, and 0 in ours.
+TURN = {"orientation": {"w": 1.0}}
 MESSAGES = {
     "rosgraph_msgs/msg/Clock": {"clock": {"sec": 5, "nanosec": 7}},
     "nav_msgs/msg/OccupancyGrid": {
         "header": {"frame_id": "map"},
-        "info": {"resolution": 0.05, "width": 3, "height": 1},
+        "info": {"resolution": 0.05, "width": 3, "height": 1, "origin": TURN},
         "data": np.array([0, 100, -1], np.int8),
     },
     "nav_msgs/msg/Odometry": {
         "child_frame_id": "astro/base_link",
-        "pose": {"pose": {"position": {"x": 1.5}}, "covariance": np.arange(36.0)},
+        "pose": {"pose": {"position": {"x": 1.5}, **TURN}, "covariance": np.arange(36.0)},
     },
     "sensor_msgs/msg/LaserScan": {"ranges": np.array([1.0, np.inf], np.float32)},
     "sensor_msgs/msg/BatteryState": {"percentage": 0.5, "present": True, "voltage": np.nan},
     "geometry_msgs/msg/Twist": {"linear": {"x": 0.25}, "angular": {"z": -1.0}},
     "geometry_msgs/msg/TwistStamped": {"header": {"frame_id": "ä"}, "twist": {}},
-    "geometry_msgs/msg/PoseStamped": {"pose": {"orientation": {"w": 1.0}}},
-    "geometry_msgs/msg/PoseWithCovarianceStamped": {"pose": {"covariance": np.ones(36)}},
+    "geometry_msgs/msg/PoseStamped": {"pose": TURN},
+    "geometry_msgs/msg/PoseWithCovarianceStamped": {
+        "pose": {"pose": TURN, "covariance": np.ones(36)}
+    },
     "action_msgs/msg/GoalStatusArray": {
         "status_list": [{"goal_info": {"goal_id": {"uuid": range(16)}}, "status": 4}] * 2
     },
