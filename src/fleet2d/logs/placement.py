@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple, Self
 
@@ -46,8 +46,9 @@ _BATH = ("bathroom", "toilet")
 THINGS: dict[str, RoomChoice] = {
     **dict.fromkeys(("front", "main", "entrance"), (DOOR,)),
     **dict.fromkeys(("fridge", "refrigerator", "freezer", "microwave", "oven", "stove"), _KITCHEN),
-    **dict.fromkeys(("dishwasher", "kettle", "cupboard", "cutlery", "pans"), _KITCHEN),
-    **dict.fromkeys(("shower", "bathtub", "bath", "basin"), _BATH),
+    **dict.fromkeys(("dishwasher", "kettle", "cupboard", "cutlery", "pans", "cups"), _KITCHEN),
+    **dict.fromkeys(("drink", "cook", "cooking", "meal"), _KITCHEN),
+    **dict.fromkeys(("shower", "bathtub", "bath", "basin", "teeth"), _BATH),
     **dict.fromkeys(("bed", "dresser", "wardrobe"), ("bedroom",)),
     **dict.fromkeys(("couch", "sofa", "tv"), ("living_room",)),
     **dict.fromkeys(("desk", "computer"), ("office", "living_room")),
@@ -248,20 +249,28 @@ def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
 
 
 def _by_words(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
-    """Return the room that a part of a label names, or the one in which a thing usually is.
+    """Return the room that a part of a label names, or the one in which a thing usually is."""
+    fits = (_first_fit(choice, rooms) for choice in meanings(label))
+    return next((fit for fit in fits if fit is not None), None)
+
+
+def meanings(label: str) -> Iterator[RoomChoice]:
+    """Yield the kinds of rooms that parts of a label may mean, the likeliest first.
 
     The last words count most: `binary_sensor.kitchen_motion` is in the kitchen, and the
     `Hall-Bedroom door` at the bedroom.
+
+    Example:
+        >>> next(meanings("binary_sensor.kitchen_motion_2"))
+        ('motion',)
+        >>> ("kitchen",) in meanings("binary_sensor.kitchen_motion_2")
+        True
     """
     words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+|[^\W\d_]+", label)
     words = [word.lower() for word in words if word.lower() not in (DOOR, AWAY)]
     pairs = [f"{first}_{second}" for first, second in pairwise(words)]
     for word in (*reversed(pairs), *reversed(words)):
-        choice = THINGS.get(word) or USUAL_ROOMS.get(word) or (word,)
-        fit = _first_fit(choice, rooms)
-        if fit is not None:
-            return fit
-    return None
+        yield THINGS.get(word) or USUAL_ROOMS.get(word) or (word,)
 
 
 # Kinds of rooms in which much the same is done, the nearest first.

@@ -25,6 +25,8 @@ _NAME = re.compile(r"(\d+)\s*,\s*([^,]+?)\s*(?:,.*)?")
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 # Sensors that are on as long as somebody is there; all others tell by switching that somebody is.
 _PRESENCE = re.compile(r"\b(mat|matt|pressure|couch|pir)\b", re.IGNORECASE)
+# The activity lasts as long as the night.
+_GOING_TO_BED, _NIGHT = "go-to-bed", "sleeping"
 _KINDS = {"-ss": "sensors", "-as": "activities"}
 _MAPS = {"sensors": "sensormap", "activities": "actionmap"}
 
@@ -32,8 +34,9 @@ _MAPS = {"sensors": "sensormap", "activities": "actionmap"}
 def read_kasteren(path: Path, *, sort: bool = False) -> ActivityLog:
     """Read the sensors and activities of a home, whichever of its files is named, or the folder.
 
-    A door or a cupboard shows that somebody is there when it opens and when it shuts, not in
-    between; a mat in a bed does all the time. Labels are the names of sensors.
+    During an activity, somebody is where it is done. Else a door or a cupboard shows that somebody
+    is there when it opens and when it shuts, not in between; a mat in a bed does all the time.
+    Labels are the names of activities and sensors.
 
     Raises:
         LogError: A line is damaged, times run backwards, or a folder holds several homes.
@@ -52,9 +55,9 @@ def read_kasteren(path: Path, *, sort: bool = False) -> ActivityLog:
         else:
             activities, order_notes = in_order(rows, file, sort=sort)
         notes += [f"{file.name}: {note}" for note in order_notes]
-    if "sensors" not in files:
-        sensors = activities
-    readings = label_by_activities(sensors, activities) if "sensors" in files else activities
+    labelled = label_by_activities(sensors, activities)
+    idle = [reading for reading in labelled if not reading.activity and reading.room != AWAY]
+    readings = sorted([*activities, *idle], key=lambda reading: reading.begin_us)
     return ActivityLog(path, "kasteren", first_day, tuple(readings), tuple(notes))
 
 
@@ -89,6 +92,7 @@ def _rows(path: Path, first_day: date, names: Mapping[str, str]) -> list[Reading
     for number, text in log_lines(path):
         begin, end, key = _row(text, path, number)
         name = names.get(key, key)
+        name = _NIGHT if name == _GOING_TO_BED else name
         begin_us = since(first_day, begin)
         end_us = max(begin_us, since(first_day, end))
         rows.append(Reading(begin_us, end_us, AWAY if is_leaving(name) else name, name, number))
