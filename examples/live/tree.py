@@ -1,4 +1,4 @@
-"""A behavior tree drives a robot: it looks into rooms until it sees Ana, then goes to the hallway.
+"""A behavior tree drives a robot: it looks for Ana, room by room, then goes to the hallway.
 
 pip install py_trees && python examples/live/tree.py
 """
@@ -14,12 +14,8 @@ from py_trees.trees import BehaviourTree
 import fleet2d
 from fleet2d.live import Bridge, LiveStep, from_iterator, to_function
 
-HOME: dict[str, Any] = {
-    "extends": "bundled:paper",
-    "simulation": {"start": "2026-01-05T19:00", "duration": "9 min"},
-    "robots": {"astro": {"behaviors": [{"type": "live"}]}},
-}
-ROOMS = ("kitchen_0", "living_room_0", "bathroom_1", "bedroom_0")
+HOME = {"extends": "bundled:paper", "robots": {"astro": {"behaviors": [{"type": "live"}]}}}
+WHEN = "simulation.start=2026-01-05T19:00", "simulation.duration=9 min"
 ENDS = {"reached": Status.SUCCESS, "impossible": Status.FAILURE, "cancelled": Status.FAILURE}
 messages, goals, seen = queue.Queue[dict[str, Any]](), dict[str, str](), set[str]()
 
@@ -44,8 +40,11 @@ class Sees(Behaviour):
         return Status.SUCCESS if self.name in seen else Status.FAILURE
 
 
-looks = [Sequence(f"in {room}", True, [GoTo(room), Sees("ana")]) for room in ROOMS]
-tree = BehaviourTree(Sequence("find", True, [Selector("search", True, looks), GoTo("hallway_0")]))
+looks = [
+    Sequence(f"in {room}", True, [GoTo(room), Sees("ana")]) for room in ("kitchen_0", "bedroom_0")
+]
+search = Selector("search", True, looks)
+tree = BehaviourTree(Sequence("find", True, [search, GoTo("hallway_0")]))
 
 
 def tick(frame: LiveStep) -> None:
@@ -56,6 +55,6 @@ def tick(frame: LiveStep) -> None:
         tree.tick()
 
 
-peers = [from_iterator(iter(messages.get, None)), to_function(tick)]
-Bridge(fleet2d.Simulation(HOME, seed=4), peers, speed=0).run()
+peers = from_iterator(iter(messages.get, None)), to_function(tick)
+Bridge(fleet2d.Simulation(HOME, *WHEN, seed=4), peers, speed=0).run()
 print("the tree ends in", tree.root.status.value)

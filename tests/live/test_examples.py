@@ -20,9 +20,9 @@ def test_a_plan_of_pddl_is_carried_out(capsys: pytest.CaptureFixture[str]) -> No
     pytest.importorskip("pyperplan", reason="pyperplan is not installed")
     runpy.run_path(str(EXAMPLES / "plan.py"))
     lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if " do " in line] == [lines[2], lines[-1]]
-    assert "do oven kitchen_0" in lines[2]
-    assert "do plants living_room_0" in lines[-1]
+    done = [line.split(" do ")[1] for line in lines if " do " in line]
+    assert sorted(done) == ["oven kitchen_0", "plants living_room_0"]  # in an order of the planner
+    assert lines == sorted(lines)  # times
 
 
 def test_a_language_model_answers_from_a_run(capsys: pytest.CaptureFixture[str]) -> None:
