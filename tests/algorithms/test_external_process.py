@@ -65,19 +65,20 @@ def test_a_python_program_learns_what_an_algorithm_does() -> None:
 
 
 def test_a_program_in_another_language_learns_the_same(compiled: Path) -> None:
-    assert fleet2d.run(scenario(compiled)).tables["share"].to_pylist() == expected()
+    run = fleet2d.run(scenario(compiled, tables="json"))
+    assert run.tables["share"].to_pylist() == expected()
 
 
 @pytest.mark.slow
-def test_copies_and_checkpoints_continue_from_its_state(compiled: Path) -> None:
-    for command in (PROGRAMS / "share.py", compiled):
-        simulation = fleet2d.Simulation(scenario(command))
-        simulation.advance(9 * 3600)
-        twins = [copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
+def test_copies_and_checkpoints_continue_from_its_state() -> None:
+    command = PROGRAMS / "share.py"
+    simulation = fleet2d.Simulation(scenario(command))
+    simulation.advance(9 * 3600)
+    twins = [copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
 
-        digests = {twin.run().digest for twin in (simulation, *twins)}
+    digests = {twin.run().digest for twin in (simulation, *twins)}
 
-        assert digests == {fleet2d.run(scenario(command)).digest}
+    assert digests == {fleet2d.run(scenario(command)).digest}
 
 
 @pytest.mark.slow
@@ -235,6 +236,35 @@ def test_a_program_decides_where_the_robot_goes() -> None:
     path = run.path("astro")
     rooms = [run.plan.rooms[r].name for r in dict.fromkeys(path.room.tolist()) if r >= 0]
     assert len(rooms) > 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rounds.mjs", "rounds.rs"])
+def test_programs_for_node_and_in_rust_do_the_same(name: str, tmp_path: Path) -> None:
+    command = PROGRAMS / name
+    tool = {".mjs": "node", ".rs": "rustc"}[command.suffix]
+    if shutil.which(tool) is None:
+        pytest.skip(f"there is no {tool}")
+    if tool == "rustc":
+        command = tmp_path / "rounds"
+        subprocess.run([tool, "-o", command, PROGRAMS / name], check=True, capture_output=True)
+
+    run = fleet2d.run(robots(command))
+
+    assert run.digest == fleet2d.run(robots(PROGRAMS / "rounds.py")).digest
+
+
+def test_a_program_whose_interpreter_is_missing_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rounds.mjs").write_text("")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ComponentError, match="can't be started by node: No such file"):
+        fleet2d.run(robots(tmp_path / "rounds.mjs"))
+
+
+def test_every_template_is_short() -> None:
+    assert all(len(file.read_text().splitlines()) <= 30 for file in PROGRAMS.iterdir())
 
 
 def test_a_copied_program_decides_as_the_first_one_would() -> None:

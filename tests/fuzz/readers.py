@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from tests.fuzz.changes import lines, pieces, structures
 from tests.homes.test_damaged_files import FORMATS, PGM
 from tests.logs.test_layout_reading import ADLS, CASAS, HOMER, SENSORS
+from tests.logs.test_layouts import EVENTS, KASTEREN, MIT, OPENSHS, STATES
 from tests.scenes import flat_document, scenario
 
 import fleet2d
@@ -341,6 +342,11 @@ READERS = {
         Reader("uci sensors", "home_Sensors.txt", lambda: lines(SENSORS), _replay, cost=2),
         Reader("uci activities", "home_ADLs.txt", lambda: lines(ADLS), _replay, cost=2),
         Reader("homer", "day.txt", lambda: lines(HOMER), _replay, cost=2),
+        Reader("casas events", "data", lambda: lines(EVENTS), _replay, cost=2),
+        Reader("kasteren", "kast_houseB-ss.txt", lambda: lines(KASTEREN), _replay, cost=2),
+        Reader("mit", "activities_data.csv", lambda: lines(MIT), _replay, cost=2),
+        Reader("openshs", "d1.csv", lambda: lines(OPENSHS), _replay, cost=2),
+        Reader("states", "history.csv", lambda: lines(STATES), _replay, cost=2),
         Reader("fixes", "rtls.csv", _words(FIXES), _replay, cost=2),
         Reader(
             "fixes as Parquet", "rtls.parquet",

@@ -286,20 +286,42 @@ def test_a_simulation_whose_metrics_take_too_long_is_gone(
         place.finish(name)
 
 
+def test_components_are_listed_by_part_and_briefly() -> None:
+    kinds = [line.partition(":")[0] for line in assistant.list_components().splitlines()]
+
+    assert len(assistant.list_components()) < 4000
+    assert all(len(assistant.list_components(kind)) < 4000 for kind in kinds)
+    assert "dwell" in assistant.list_components("behavior", "patrol")
+    with pytest.raises(InputError, match="did you mean 'behavior'"):
+        assistant.list_components("behaviour")
+    with pytest.raises(InputError, match="did you mean 'patrol'"):
+        assistant.list_components("behavior", "patroll")
+
+
 @pytest.mark.slow
 def test_a_client_uses_the_tools(place: Workspace) -> None:
     mcp = pytest.importorskip("mcp", reason="the extra mcp is not installed")
 
-    async def use() -> tuple[set[str], Any, Any]:
+    async def use() -> tuple[set[str], Any, Any, list[Any]]:
         async with mcp.Client(server(place.folder)) as client:
             tools = {tool.name for tool in (await client.list_tools()).tools}
             done = await client.call_tool("run", {"scenario": "home.yaml", "out": "first"})
             wrong = await client.call_tool("read", {"name": "../secret.yaml"})
-            return tools, done, wrong
+            more = [
+                await client.call_tool("stays", {"run": "first", "who": "ana"}),
+                await client.get_prompt("scenario_from_words", {"words": "a couple and a robot"}),
+                await client.read_resource("fleet2d://first/manifest"),
+                await client.read_resource("fleet2d://first/picture"),
+            ]
+            return tools, done, wrong, more
 
-    tools, done, wrong = asyncio.run(use())
+    tools, done, wrong, (stays, prompt, manifest, picture) = asyncio.run(use())
 
     assert {"components", "write", "check", "run", "ask", "picture", "intervene"} <= tools
+    assert "longest_hours" in stays.content[0].text
+    assert "a couple and a robot" in prompt.messages[0].content.text
+    assert json.loads(manifest.contents[0].text)["steps"] == 10800
+    assert picture.contents[0].mime_type == "image/png"
     assert json.loads(done.content[0].text)["steps"] == 10800
     assert wrong.is_error
     assert "leads out of the folder" in wrong.content[0].text

@@ -278,7 +278,7 @@ def test_damaged_positions_are_refused_with_what_to_do(
 
 
 def test_settings_of_positions_are_refused_for_other_layouts(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="are for positions"):
+    with pytest.raises(LogError, match="takes no time_zone: that is for positions"):
         read_log(write(tmp_path, "a.txt", CASAS), time_zone="UTC")
 
 

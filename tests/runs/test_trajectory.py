@@ -272,3 +272,13 @@ def test_key_frames_out_of_order_are_damaged(tmp_path: Path) -> None:
     pq.write_table(table.take(np.random.default_rng(1).permutation(table.num_rows)), path)
     with pytest.raises(ArtifactError, match=r"can't be followed .* it is damaged"):
         fleet2d.open_run(tmp_path / "run").path("astro")
+
+
+def test_times_between_poses_are_durations_or_texts() -> None:
+    run = fleet2d.run("bundled:paper", "simulation.duration=10 min", seed=4)
+
+    apart = run.path("ana", every="10 s")
+    assert apart.x.tolist() == run.path("ana", timedelta(seconds=10)).x.tolist()
+    for text, message in (("often", "expected a duration"), ("1.5 s", "not a multiple")):
+        with pytest.raises(ArtifactError, match=message):
+            run.path("ana", every=text)

@@ -38,14 +38,15 @@ NAMES = {
 class Process(Algorithm):
     """An algorithm in another process, of any language.
 
-    The program gets the history since its last update as Arrow IPC streams, and answers with a
+    The program gets the history since its last update as tables, and answers with a
     share for each room, with shares for each user, or with columns to store; see
     `fleet2d.runtime.program` for the messages.
 
     Attributes:
-        command: The program; a file .py is run by Python.
+        command: The program; a file .py is run by Python, .js and .mjs by Node.
         arguments: Its arguments.
         sends: What it is sent: observations, evidence, poses of robots.
+        tables: How: as Arrow IPC streams after the message, or in it as JSON, for a few values.
         settings: Its own settings, which it gets in the first message.
         timeout: The longest time to wait for an answer; then the run fails.
     """
@@ -55,6 +56,7 @@ class Process(Algorithm):
     sends: tuple[Literal["observations", "evidence", "poses"], ...] = Field(
         default=("observations",), min_length=1
     )
+    tables: Literal["arrow", "json"] = "arrow"
     settings: dict[str, Any] = Field(default={})
     timeout: PositiveDuration = timedelta(seconds=10)
 
@@ -86,7 +88,10 @@ class Process(Algorithm):
         blocks: dict[str, bytes] = {}
         for part in self.sends:
             blocks |= _TABLES[part](history, state)
-        message = {"type": "update", "first": history.first, "end": history.end}
+        message: dict[str, Any] = {"type": "update", "first": history.first, "end": history.end}
+        if self.tables == "json":
+            message |= {name: _columns(data) for name, data in blocks.items()}
+            blocks = {}
         answer = self.program.ask(message, blocks)
         return self._output(answer.content, state)
 
@@ -128,6 +133,12 @@ def _ipc(columns: Mapping[str, Any]) -> bytes:
     batch = pa.RecordBatch.from_arrays(arrays, list(columns))
     schema: bytes = batch.schema.serialize().to_pybytes()
     return schema + batch.serialize().to_pybytes() + END_OF_STREAM
+
+
+def _columns(data: bytes) -> dict[str, list[Any]]:
+    """Return the columns of an Arrow IPC stream."""
+    columns: dict[str, list[Any]] = pa.ipc.open_stream(data).read_all().to_pydict()
+    return columns
 
 
 def _observations(history: History, _: Present) -> dict[str, bytes]:

@@ -148,6 +148,7 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "send": "fleet2d.interventions.bodies:Send",
         "shut": "fleet2d.interventions.home:ShutDoor",
         "slow": "fleet2d.interventions.home:SlowFloor",
+        "steer": "fleet2d.interventions.steering:Steer",
         "stick": "fleet2d.interventions.home:StickSensor",
         "suppress": "fleet2d.interventions.robots:Suppress",
         "switch_off": "fleet2d.interventions.robots:SwitchOff",

@@ -96,7 +96,7 @@ InputFileOrFolder = Annotated[
 """An existing file or folder, likewise."""
 
 
-PEER_SCHEMES = ("udp", "ws", "rosbridge", "mqtt")
+PEER_SCHEMES = ("udp", "ws", "rosbridge", "mqtt", "ros2")
 
 
 def parse_peer_address(text: str) -> SplitResult:
@@ -117,14 +117,15 @@ def parse_peer_address(text: str) -> SplitResult:
     else:
         is_known = parts.scheme in PEER_SCHEMES
         is_plain = not {"#", "+", "?"} & set(text.rpartition("@")[2])
-        if is_known and parts.netloc and is_plain:
+        has_host = parts.netloc or parts.scheme == "ros2"  # whose router is on this machine
+        if is_known and has_host and is_plain:
             return parts
         wrong = did_you_mean(parts.scheme, PEER_SCHEMES)
         if is_known:
             wrong = ": it has no host." if is_plain else ": #, + and ? have no meaning in it."
     raise problem(
         f"{text!r} is not the address of a peer{wrong or '.'} Write udp://HOST:PORT, ws://HOST:PORT,"
-        " rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX"
+        " rosbridge://HOST:PORT, mqtt://HOST:PORT/PREFIX or ros2://"
     )
 
 
@@ -476,6 +477,9 @@ Speed = Annotated[
 ]
 """A speed, 0 or more [m/s]."""
 
+SignedSpeed = Annotated[float, _to_float(SPEED), SPEED.schema()]
+"""A speed along an axis, negative against it [m/s]."""
+
 AngleDeg = Annotated[float, _to_float(ANGLE), ANGLE.schema()]
 """An angle [degrees], counter-clockwise from +x where it is a heading."""
 
@@ -486,6 +490,9 @@ TurnRateDeg = Annotated[
     TURN_RATE.schema(),
 ]
 """How fast a body turns, 0 or more [degrees/s]."""
+
+SignedTurnRateDeg = Annotated[float, _to_float(TURN_RATE), TURN_RATE.schema()]
+"""How fast a body turns counter-clockwise, negative if clockwise [degrees/s]."""
 
 Share = Annotated[
     float,

@@ -242,6 +242,10 @@ class Trip:
             return None
         return plan.stay(until=self._until)
 
+    def has_reached(self, pose: Pose) -> bool:
+        """Return whether a pose is where it leads, as far as it is planned."""
+        return self._goal == (pose.x, pose.y, pose.away)
+
     def go(self, now: Situation, plan: Plan) -> None:
         """Add the way there to the plan."""
         raise NotImplementedError
@@ -362,6 +366,11 @@ class DecidingActor(Actor):
         self._waited = (0, -1)  # since when it last waited, and up to which step that counts
         self._no_way_round: object = None  # where no way round people was found, and for what
         self._blocked = ("", -1)  # what was in its way, and up to which step it waits there
+
+    @property
+    def is_immobile(self) -> bool:
+        """Whether it can't move at present: a fault, or an empty battery."""
+        return self.is_stuck or (self.charge is not None and self.charge.is_empty)
 
     def choose(self, plan: Plan) -> None:
         """Set the plan that its next decision, which is due now, results in."""
@@ -490,7 +499,7 @@ class DecidingActor(Actor):
         step = now.step
         plan = self._chosen
         self._chosen = None
-        if self.is_stuck or (self.charge is not None and self.charge.is_empty):
+        if self.is_immobile:
             plan = now.plan().stay()
         waiting = self.waiting
         self.waiting = None

@@ -6,7 +6,7 @@ from typing import Any, Literal
 from fleet2d.entities.sensor import SensorFault
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.placed_objects import Posture
-from fleet2d.interventions import algorithms, bodies, home, robots
+from fleet2d.interventions import algorithms, bodies, home, robots, steering
 from fleet2d.sight.perception import Perception
 
 # What a script may have there: the fields hold what is read from it.
@@ -78,6 +78,17 @@ class Dismiss(robots.Dismiss):
 class KeepOut(robots.KeepOut):
     def __init__(
         self, entity: str, of: str | tuple[str, ...], *, duration: Time | None = ...
+    ) -> None: ...
+
+class Steer(steering.Steer):
+    def __init__(
+        self,
+        entity: str,
+        *,
+        forward: float | str = ...,
+        left: float | str = ...,
+        turn_deg: Angle = ...,
+        duration: Time = ...,
     ) -> None: ...
 
 class SetBattery(robots.SetBattery):

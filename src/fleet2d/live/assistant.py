@@ -7,12 +7,13 @@ intervene. Code of a scenario's own never runs, and no path leads out of the fol
 import ctypes
 import functools
 import itertools
+import json
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 from pydantic_core import PydanticCustomError
 
@@ -23,6 +24,7 @@ from fleet2d.engine.simulation import Simulation, stop
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra, os_errors_as
 from fleet2d.inputs import open_input, within
 from fleet2d.live import questions
+from fleet2d.live.stays import summary
 from fleet2d.runs.run import Run, open_run
 from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import write_atomically
@@ -273,6 +275,41 @@ class Workspace:
             query = f'SELECT {what} FROM "{table}"{condition}'  # noqa: S608 - `answer` checks it
         return questions.answer(tables, query, limit)
 
+    @confined
+    def stays(
+        self,
+        run: str,
+        who: str,
+        by: Literal["room", "activity", "hour", "day"] = "room",
+        of: str = "",
+    ) -> list[dict[str, Any]]:
+        """Sum up how long a person or robot was where, or did what, in a run.
+
+        By room or activity: hours, number of stays, first and last time, and the longest stay. By
+        hour of the day: the share of it; by day: hours, first and last time.
+
+        Args:
+            run: The folder of the run.
+            who: The person or robot.
+            by: What the rows are for.
+            of: For hours and days: a room, a kind of room, an activity, or away.
+
+        Raises:
+            InputError: There is no such run, body, room or activity.
+        """
+        return summary(self._open(run), who, by, of)
+
+    @confined
+    def manifest(self, run: str) -> str:
+        """Return what a run says of itself, as JSON: scenario, metrics, notes, digest.
+
+        Raises:
+            InputError: There is no such run.
+        """
+        manifest = self._open(run).manifest
+        kept = ("status", "steps", "scenario", "metrics", "notes", "digest")
+        return json.dumps({key: manifest.get(key) for key in kept}, default=str)
+
     def _open(self, run: str) -> Run:
         return open_run(self.path(run))
 
@@ -379,6 +416,49 @@ def limited(simulation: Simulation, advice: str) -> Iterator[None]:
         timer.cancel()
 
 
+def list_components(kind: str = "", type: str = "") -> str:  # noqa: A002 - as scenarios have it
+    """List what a scenario may contain: all types; those of a kind; or the keys of one of them.
+
+    Args:
+        kind: Such as behavior, metric or intervention.
+        type: A type of that kind, such as patrol: its keys with types, defaults and meanings.
+    """
+    from fleet2d.scenario.schema import describe_components
+
+    described = describe_components()
+    by_kind: dict[str, dict[str, Any]] = {}
+    for component in described:
+        by_kind.setdefault(component.kind, {})[component.type] = component
+    if not kind:
+        return "\n".join(f"{name}: {', '.join(types)}" for name, types in by_kind.items())
+    check_known(kind, "kind", by_kind, InputError)
+    types = by_kind[kind]
+    if not type:
+        return "\n".join(f"{name}: {component.summary}" for name, component in types.items())
+    check_known(type, kind, types, InputError)
+    chosen = types[type]
+    keys = [f"{f.name} ({f.type}, {f.default}): {f.description}" for f in chosen.fields]
+    shared = [f"and the keys of {name}, by kind shared" for name in chosen.shares]
+    return "\n".join([chosen.summary, *keys, *shared])
+
+
+def scenario_from_words(words: str) -> str:
+    """Make a scenario of a sentence, check it, run it, and explain what happened."""
+    return (
+        f"Make a scenario of Fleet2D of this: {words}\n\n"
+        "1. Call `components` without arguments, then with the kinds that you need (behavior, part,"
+        " intervention, metric), then with a kind and a type for its keys. Use no other keys.\n"
+        "2. Write a YAML file that begins with `extends: bundled:paper` or `bundled:family`, and"
+        " has what the sentence says: users with personas, robots with behaviors in the order of"
+        " their priority, `expect` for what must hold, such as `never(events(moving, astro))`.\n"
+        "3. Call `check`, and mend what it says, until it passes. Read its notes.\n"
+        "4. Call `run` with a folder. Call `stays` for how long somebody was where, and `ask` for"
+        " all else; `picture` shows the ways.\n"
+        "5. Say in a few sentences what happened, with numbers from the answers, what of the"
+        " sentence the scenario doesn't show, and which keys one may change."
+    )
+
+
 def server(folder: Path) -> Any:
     """Return a server of the official SDK with the tools of a folder.
 
@@ -395,24 +475,13 @@ def server(folder: Path) -> Any:
         " it, run it, and ask its tables. `components` lists what a scenario may contain.",
     )
 
-    def components(kind: str = "") -> list[str]:
-        """List what a scenario may contain: types by kind, such as behavior or metric."""
-        from fleet2d.scenario.schema import describe_components
-
-        return [
-            f"{c.kind} {c.type}: {c.summary} Keys: {', '.join(f.name for f in c.fields)}; those of"
-            f" {', '.join(c.shares) or 'no other'}, too"
-            for c in describe_components()
-            if kind in ("", c.kind) or c.kind == "shared"
-        ]
-
     def picture(run: str) -> Image:
         """Draw the home and the ways of a run."""
         return Image(data=place.picture(run), format="png")
 
     tools = (
-        place.files, place.read, place.write, place.check, place.run, place.ask, place.begin,
-        place.advance, place.intervene, place.finish, components, picture,
+        place.files, place.read, place.write, place.check, place.run, place.stays, place.ask,
+        place.begin, place.advance, place.intervene, place.finish, list_components, picture,
     )  # fmt: skip
 
     def told(tool: Callable[..., Any]) -> Callable[..., Any]:
@@ -428,5 +497,8 @@ def server(folder: Path) -> Any:
         return answer
 
     for tool in tools:
-        app.tool()(told(tool))
+        app.tool(name=tool.__name__.removeprefix("list_"))(told(tool))
+    app.prompt(title="A scenario from a sentence")(scenario_from_words)
+    app.resource("fleet2d://{run}/manifest", mime_type="application/json")(told(place.manifest))
+    app.resource("fleet2d://{run}/picture", mime_type="image/png")(told(place.picture))
     return app

@@ -27,13 +27,16 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.engine.loop import deferred_interrupt
 from fleet2d.engine.simulation import Simulation, add_note
 from fleet2d.errors import InputError
+from fleet2d.live.goals import Goals, GoalState, Sender
 from fleet2d.live.library_errors import libraries_told
 from fleet2d.live.messages import (
+    CancelMessage,
     DetectionsMessage,
     GoalMessage,
     LiveMessage,
     PoseMessage,
     ReadingMessage,
+    VelocityMessage,
     parse_message,
 )
 from fleet2d.runs.run import Run
@@ -77,6 +80,7 @@ class LiveStep:
         bodies: x, y [m], heading [rad], room and away of each body after it, by name.
         events: Its events, in order, readings of sensors among them.
         rows: Its rows of other tables: pairs of the name of the table and the row.
+        goals: The goals that are under way, and those that have just begun or ended.
     """
 
     step: int
@@ -84,6 +88,7 @@ class LiveStep:
     bodies: Mapping[str, Mapping[str, Any]]
     events: Sequence[Event]
     rows: Sequence[tuple[str, Mapping[str, Any]]] = ()
+    goals: Sequence[GoalState] = ()
 
     @cached_property
     def messages(self) -> list[dict[str, Any]]:
@@ -93,6 +98,7 @@ class LiveStep:
             {"type": "poses", **stamp, "bodies": self.bodies},
             *({"type": "event", **e._asdict(), "event": str(e.event)} for e in self.events),
             *({"type": "row", "table": table, "row": row} for table, row in self.rows),
+            *(stamp | goal.message() for goal in self.goals),
         ]
 
     @cached_property
@@ -141,7 +147,12 @@ class Peer:
     """Another program, or a function: it may send messages to a run, and hear of it.
 
     Methods that a peer leaves out do nothing.
+
+    Attributes:
+        fastest: More times real time than it can follow are told.
     """
+
+    fastest: float = math.inf
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Connect, before the first step."""
@@ -154,10 +165,6 @@ class Peer:
 
     def close(self, run: Run) -> None:
         """Disconnect, after the last step."""
-
-
-Sender = tuple[int, int]
-"""The number of a peer, and of its client."""
 
 
 def sources_of(scenario: Scenario) -> dict[tuple[str, str], str]:
@@ -246,7 +253,7 @@ class Bridge:
             self._sources[kind, name] = numbers[address]
         self._lock = threading.Lock()
         self._dropped = 0
-        self._goals: dict[str, tuple[Sender, Any]] = {}  # who sent each body where
+        self._goals = Goals(self.simulation)
         self._inbox: queue.SimpleQueue[tuple[float, Sender, Any]] = queue.SimpleQueue()
         self._events: list[Event] = []
         self._rows: list[tuple[str, Mapping[str, Any]]] = []
@@ -273,6 +280,9 @@ class Bridge:
             simulation.listen_rows(self._hear)
         for number, peer in enumerate(self._peers):
             peer.open(simulation, self._post_of(number))
+        fastest = min((getattr(peer, "fastest", math.inf) for peer in self._peers), default=1.0)
+        if (self.speed or math.inf) > fastest:
+            self._say("fast", f"at more than {fastest:g} times real time, timers of ROS skip")
         try:
             with suppress(KeyboardInterrupt), _prompt_threads():
                 self._simulate()
@@ -357,9 +367,12 @@ class Bridge:
             message = self._read(content, len(messages) >= self.max_per_step)
             if message is None or not self._is_timely(message, arrived, sender):
                 continue
-            if isinstance(message, PoseMessage | GoalMessage):
+            if isinstance(message, PoseMessage | GoalMessage | VelocityMessage):
                 key = message.type, message.entity
-                if key in latest:  # only the last pose or goal of a body in a step counts
+                if key in latest:  # only the last one of a body in a step counts
+                    before, its_sender = messages[latest[key]]
+                    if isinstance(before, GoalMessage):
+                        self._goals.refuse(before, its_sender, "another goal came at once")
                     messages[latest[key]] = message, sender
                     self.counts["replaced"] += 1
                     continue
@@ -418,17 +431,29 @@ class Bridge:
                     self.simulation.do(act)
             except InputError as error:
                 self._count("wrong", str(error))
+                if isinstance(message, GoalMessage):
+                    self._goals.refuse(message, sender, str(error))
                 continue
             self.counts["applied"] += 1
-            if isinstance(message, GoalMessage):
-                self._goals[message.entity] = sender, message.to
-            if isinstance(message, PoseMessage):
-                self._goals.pop(message.entity, None)
-                self._compare(message, sender)
-                self._heard[message.entity] = time.monotonic()
-                if message.entity in self._standing:
-                    self._standing.remove(message.entity)
-                    self._say("back", f"{message.entity}: poses arrive again")
+            self._take_note(message, sender)
+
+    def _take_note(self, message: LiveMessage, sender: Sender) -> None:
+        """Keep track of goals and of poses that are expected, after a message was applied."""
+        if isinstance(message, GoalMessage):
+            self._goals.accept(message, sender)
+        elif isinstance(message, CancelMessage):
+            self._goals.cancel(message.entity, "its sender withdrew it")
+        elif isinstance(message, VelocityMessage):
+            self._goals.cancel(message.entity, "the robot is steered")
+        elif isinstance(message, PoseMessage):
+            self._goals.cancel(message.entity, "a pose arrived")
+            self._compare(message, sender)
+            self._heard[message.entity] = time.monotonic()
+            if message.entity in self._standing:
+                self._standing.remove(message.entity)
+                self._say("back", f"{message.entity}: poses arrive again")
+        if isinstance(message, GoalMessage | VelocityMessage):
+            self._heard.pop(message.entity, None)  # no more poses are expected
 
     def _compare(self, pose: PoseMessage, sender: Sender) -> None:
         """Tell a pose that doesn't follow from the one before it."""
@@ -438,7 +463,8 @@ class Bridge:
         self._poses[name] = sender, step, pose.x, pose.y
         passed_s = (step - last) * self.simulation.clock.step_us / 1e6
         off = math.hypot(pose.x - x, pose.y - y)
-        if before != sender and time.monotonic() - self._heard[name] < self.silence_s:
+        is_recent = time.monotonic() - self._heard.get(name, -math.inf) < self.silence_s
+        if before != sender and is_recent:
             self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
         if off > JUMP_M + JUMP_M_PER_S * passed_s:
             self._count(
@@ -450,6 +476,8 @@ class Bridge:
         kind, name = _part_of(message)
         if self._sources.get((kind, name), sender[0]) != sender[0]:
             raise InputError(f"{name} takes messages of its source only, not of others")
+        if isinstance(message, CancelMessage) and not self._goals.has(name, message.id):
+            raise InputError(f"{name} has no goal{f' {message.id!r}' if message.id else ''}")
         if not isinstance(message, PoseMessage):
             return
         actors = self.simulation.actors
@@ -514,12 +542,12 @@ class Bridge:
 
     def _withdraw(self, sender: Sender) -> None:
         """Let bodies decide again that go where a client sent them which is gone."""
-        for name, (by, to) in list(self._goals.items()):
-            if by == sender and not self.keeps_goals:
-                del self._goals[name]
-                self.counts["withdrawn"] += 1
-                self._say("gone", f"{name}: who sent it to {to} is gone: the goal is withdrawn")
-                self.simulation.do({"release": name})
+        for goal in () if self.keeps_goals else self._goals.of(sender):
+            name = goal.entity
+            self._goals.cancel(name, "its sender is gone")
+            self.counts["withdrawn"] += 1
+            self._say("gone", f"{name}: who sent it to {goal.to} is gone: the goal is withdrawn")
+            self.simulation.do({"release": name})
 
     def _count(self, kind: str, text: str, count: int = 1) -> None:
         """Count what is odd, and tell it once for each reason: numbers in it make no other one."""
@@ -547,7 +575,7 @@ class Bridge:
         simulation = self.simulation
         bodies = {n: s for n, s in simulation.state.items() if "heading" in s}
         step = simulation.step - 1
-        news = self._events[:], self._rows[:]
+        news = self._events[:], self._rows[:], self._goals.take_news(self._events)
         frame = LiveStep(step, simulation.clock.time(step), bodies, *news)
         self._events.clear()
         self._rows.clear()
@@ -585,8 +613,8 @@ def _part_of(message: LiveMessage) -> tuple[str, str]:
     if isinstance(message, ReadingMessage):
         return "sensor", message.sensor
     kind = "perceives" if isinstance(message, DetectionsMessage) else "body"
-    assert isinstance(message, PoseMessage | GoalMessage | DetectionsMessage)
-    return kind, message.entity
+    name: str = message.entity  # type: ignore[attr-defined]
+    return kind, name
 
 
 def _heading_of(message: PoseMessage | GoalMessage) -> dict[str, float]:
@@ -600,6 +628,11 @@ def _acts_of(message: LiveMessage) -> Iterator[dict[str, Any]]:
     elif isinstance(message, GoalMessage):
         to = message.to if isinstance(message.to, str) else list(message.to)
         yield {"send": message.entity, "to": to, **_heading_of(message)}
+    elif isinstance(message, CancelMessage):
+        yield {"release": message.entity}
+    elif isinstance(message, VelocityMessage):
+        velocity = message.model_dump(include={"forward", "left", "turn_deg"})
+        yield {"steer": message.entity, **velocity}
     elif isinstance(message, DetectionsMessage):
         if message.detections:
             detections = [d.model_dump() for d in message.detections]

@@ -26,7 +26,8 @@ def live(
             "--with",
             metavar="URL",
             help="Another program: ws://HOST:PORT and udp://HOST:PORT listen there,"
-            " rosbridge://HOST:PORT and mqtt://HOST:PORT/PREFIX connect. Several are possible.",
+            " rosbridge://HOST:PORT and mqtt://HOST:PORT/PREFIX connect, ros2:// joins ROS 2."
+            " Several are possible.",
         ),
     ] = None,
     speed: Annotated[float, typer.Option(min=0.0, help="Times real time; 0: unpaced.")] = 1.0,

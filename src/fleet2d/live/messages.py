@@ -7,12 +7,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from fleet2d.configuration.components import Settings
-from fleet2d.configuration.units import AngleDeg
+from fleet2d.configuration.units import AngleDeg, SignedSpeed, SignedTurnRateDeg
 from fleet2d.errors import InputError
 from fleet2d.interventions.robots import MAX_PLACE_M, RealDetection
 
 MAX_BYTES = 1 << 20
 """Size of a message."""
+MAX_ID = 200
+"""Length of the name of a goal."""
 Coordinate = Annotated[float, Field(ge=-MAX_PLACE_M, le=MAX_PLACE_M)]
 
 
@@ -49,17 +51,53 @@ class PoseMessage(LiveMessage):
 class GoalMessage(LiveMessage):
     """Where a body is to go; it stays there until the next goal.
 
+    What becomes of it is told by messages of the type "goal_state".
+
     Attributes:
         type: "goal".
         entity: The body.
         to: A room, furniture, or a point [x, y].
         heading_deg: Its heading there, counter-clockwise from +x; left out: as it arrives.
+        id: A name of the goal, which its states repeat.
     """
 
     type: Literal["goal"] = "goal"
     entity: str
     to: str | tuple[Coordinate, Coordinate]
     heading_deg: AngleDeg | None = None
+    id: str = Field(default="", max_length=MAX_ID)
+
+
+class CancelMessage(LiveMessage):
+    """Withdraws the goal of a body, which then does what its behaviors decide.
+
+    Attributes:
+        type: "cancel".
+        entity: The body.
+        id: The goal; left out: whichever it has.
+    """
+
+    type: Literal["cancel"] = "cancel"
+    entity: str
+    id: str = Field(default="", max_length=MAX_ID)
+
+
+class VelocityMessage(LiveMessage):
+    """How fast a robot is to move; it stops if no other one arrives for 0.5 s of simulated time.
+
+    Attributes:
+        type: "velocity".
+        entity: The robot.
+        forward: Its speed ahead, or back if negative.
+        left: Its speed to the left; 0 unless its drive is holonomic.
+        turn_deg: How fast it turns, counter-clockwise.
+    """
+
+    type: Literal["velocity"] = "velocity"
+    entity: str
+    forward: SignedSpeed = 0.0
+    left: SignedSpeed = 0.0
+    turn_deg: SignedTurnRateDeg = 0.0
 
 
 class DetectionsMessage(LiveMessage):
@@ -91,7 +129,13 @@ class ReadingMessage(LiveMessage):
 
 
 Message = Annotated[
-    PoseMessage | GoalMessage | DetectionsMessage | ReadingMessage, Field(discriminator="type")
+    PoseMessage
+    | GoalMessage
+    | CancelMessage
+    | VelocityMessage
+    | DetectionsMessage
+    | ReadingMessage,
+    Field(discriminator="type"),
 ]
 _MESSAGES: TypeAdapter[Any] = TypeAdapter(Message)
 

@@ -26,6 +26,7 @@ from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import InputError, errors_as, extra, os_errors_as, printable
 from fleet2d.live.bridge import LiveStep, Peer, PeerFault, Post, lose, sources_of
+from fleet2d.live.goals import GoalStatus
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
@@ -48,6 +49,8 @@ DEVICE_CLASSES = {
 }
 """Home Assistant's class of each type of sensor."""
 WAIT_S = 5.0
+# So many programs that sent datagrams are told of goals.
+MAX_SENDERS = 16
 # Of more messages before a run, the last ones count.
 MAX_EARLY = 1000
 
@@ -107,7 +110,7 @@ def hello(simulation: Simulation) -> dict[str, Any]:
 
 
 class UdpPeer(Peer):
-    """Messages in datagrams, one JSON object each; it only receives."""
+    """Messages in datagrams, one JSON object each; senders are told what becomes of goals."""
 
     def __init__(self, host: str, port: int) -> None:
         """Listen at an address; port 0 is a free one."""
@@ -119,6 +122,7 @@ class UdpPeer(Peer):
             raise InputError(f"udp://{host}:{port}: {error.strerror or error}") from error
         self._socket.settimeout(0.2)
         self._over = False
+        self._senders: deque[Any] = deque(maxlen=MAX_SENDERS)  # their addresses, the latest last
 
     @property
     def port(self) -> int:
@@ -132,7 +136,17 @@ class UdpPeer(Peer):
     def _receive(self, post: Post) -> None:
         while not self._over:
             with contextlib.suppress(TimeoutError, OSError):
-                post(self._socket.recv(MAX_BYTES))
+                content, address = self._socket.recvfrom(MAX_BYTES)
+                if address not in self._senders:
+                    self._senders.append(address)
+                post(content)
+
+    def send(self, frame: LiveStep) -> None:
+        """Tell the latest senders which goals begin and end."""
+        news = [goal for goal in frame.goals if goal.state != GoalStatus.UNDER_WAY]
+        for address, goal in itertools.product(tuple(self._senders), news):
+            with contextlib.suppress(OSError):
+                self._socket.sendto(goal.text().encode(), address)
 
     def close(self, run: Run) -> None:
         """Stop listening."""
@@ -268,7 +282,8 @@ def open_peer(address: str) -> Peer:
 
     Args:
         address: `udp://HOST:PORT` and `ws://HOST:PORT` listen there; `rosbridge://HOST:PORT` and
-            `mqtt://USER:PASSWORD@HOST:PORT/PREFIX` connect to a rosbridge server and a broker.
+            `mqtt://USER:PASSWORD@HOST:PORT/PREFIX` connect to a rosbridge server and a broker;
+            `ros2://HOST:PORT/DISTRIBUTION/ROBOT` joins the graph of ROS 2, all parts optional.
 
     Raises:
         InputError: There is no such scheme, the address can't be used, or an extra isn't installed.
@@ -277,7 +292,7 @@ def open_peer(address: str) -> Peer:
         >>> open_peer("wss://here:1")
         Traceback (most recent call last):
         fleet2d.errors.InputError: 'wss://here:1' is not the address of a peer: did you mean 'ws'? \
-Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT/PREFIX
+Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT, mqtt://HOST:PORT/PREFIX or ros2://
     """
     with errors_as(InputError, of=PydanticCustomError):
         parts = parse_peer_address(address)
@@ -288,9 +303,13 @@ Write udp://HOST:PORT, ws://HOST:PORT, rosbridge://HOST:PORT or mqtt://HOST:PORT
     if parts.scheme == "ws":
         return WebSocketPeer(host, port or 0)
     if parts.scheme == "rosbridge":
-        from fleet2d.live.rosbridge import RosbridgePeer
+        from fleet2d.live.ros.rosbridge import RosbridgePeer
 
         return RosbridgePeer(host, port or 9090)
+    if parts.scheme == "ros2":
+        from fleet2d.live.ros.ros2 import Ros2Peer
+
+        return Ros2Peer(parts.hostname or "localhost", port, parts.path)
 
     names = [None if part is None else unquote(part) for part in (parts.username, parts.password)]
     return MqttPeer(host, port or 1883, parts.path.strip("/") or "fleet2d", *names)
@@ -440,6 +459,8 @@ class MqttPeer(Peer):
                 state = "ON" if event.detail == self._on.get(event.entity) else "OFF"
                 self._retain(f"{self.prefix}/sensor/{event.entity}", state)
             self._publish("event", json.dumps({**event._asdict(), "event": str(event.event)}))
+        for goal in frame.goals:
+            self._publish(f"goal/{goal.entity}", goal.text())
         for table, row in frame.rows:
             self._publish(f"row/{table}", json.dumps(row, default=str))
 

@@ -2,7 +2,6 @@
 
 import re
 from bisect import bisect_right
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
@@ -11,6 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from fleet2d.bounds import one_line
+from fleet2d.logs.layouts import aras, kasteren, mit, openshs, states
+from fleet2d.logs.layouts.casas import read_casas, shows_casas
+from fleet2d.logs.layouts.intervals import is_leaving, label_by_activities
 from fleet2d.logs.log import (
     AWAY,
     ActivityLog,
@@ -25,11 +27,6 @@ from fleet2d.logs.log import (
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
 from fleet2d.storage.bags import is_bag
 
-CASAS_LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
-ON = frozenset({"ON", "OPEN", "PRESENT"})
-OFF = frozenset({"OFF", "CLOSE", "CLOSED", "ABSENT"})
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
-
 AGENDA = re.compile(r"(\w+) \((\d{1,9}):(\d\d) - (?:(\d{1,9})\s?days? - )?(\d{1,9}):(\d\d)\)")
 SCRIPT = re.compile(r"### (\w+?)-\w+\.txt")
 ACTION = re.compile(r"\[(\w+)\]((?: <\w+> \(\d+\))*) \[\d+\]")
@@ -43,54 +40,7 @@ _TIME = r"(\d{4}-\d\d?-\d\d?\s+\d+:\S+)"
 UCI_ADL = rf"{_TIME}\s+{_TIME}\s+(.*)"  # an interval
 HEAD = r"Start time\s+End time.*|[-\s]+"  # a line of the head of a table
 UCI_ADL_FILES = {"sensors": "_Sensors", "activities": "_ADLs"}
-LEAVING = frozenset({"leaving", "leave_home", "away", "out"})
 FIRST_LINES = 20
-
-
-def _shows_casas(line: str) -> bool:
-    """Return whether a line is an event of a sensor that switches or measures."""
-    match = CASAS_LINE.fullmatch(line)
-    if match is None:
-        return False
-    return match[5].upper() in ON | OFF or NUMBER.fullmatch(match[5]) is not None
-
-
-def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
-    """Read the events of a home; those that switch on become readings of an instant.
-
-    ::
-
-        2011-06-15 01:41:40.205759 Bathroom Bathroom ON Bed_Toilet_Transition
-
-    Only sensors that switch on show that somebody is there: a motion sensor switches off by itself,
-    seconds after the last motion, when the person may be gone.
-
-    Raises:
-        LogError: A line is damaged, or times run backwards.
-    """
-    readings: list[Reading] = []
-    others: Counter[str] = Counter()
-    first_day = None
-    for number, text in log_lines(path):
-        match = CASAS_LINE.fullmatch(text)
-        if match is None:
-            raise LogError(
-                f"{path}, line {number}: expected date, time, room, sensor, ON or OFF, and"
-                f" activity, got {one_line(text)!r}"
-            )
-        day, time, room, _, value, activity = match.groups()
-        moment = parse_time(f"{day} {time}", path, number)
-        first_day = first_day or moment.date()
-        if value.upper() in ON:
-            at = since(first_day, moment)
-            readings.append(Reading(at, at, room, (activity or "").strip(), number))
-        elif value.upper() not in OFF:
-            others[value] += 1
-    readings, notes = in_order(readings, path, sort=sort)
-    if others:
-        values = one_line(", ".join(sorted(others)[:5]), 200)
-        notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")
-    return ActivityLog(path, "casas", first_day, tuple(readings), tuple(notes))
 
 
 @dataclass
@@ -236,7 +186,7 @@ class _Row(NamedTuple):
         """Return the reading of an activity or a sensor."""
         label = self.words[-1]
         activity = label if len(self.words) == 1 else ""
-        room = AWAY if activity.lower() in LEAVING else label
+        room = AWAY if is_leaving(activity) else label
         begin_us = since(first_day, self.begin)
         end_us = since(first_day, self.end)
         return Reading(begin_us, end_us, room, activity, self.line)
@@ -267,7 +217,7 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
         notes += [f"{file.name}: {note}" for note in order_notes]
     readings = parts["activities"]
     if parts["sensors"]:
-        readings = _with_activities(parts["sensors"], readings)
+        readings = label_by_activities(parts["sensors"], readings)
     return ActivityLog(path, "uci_adl", first_day, tuple(readings), tuple(notes))
 
 
@@ -303,18 +253,6 @@ def _rows(path: Path) -> list[_Row]:
     return rows
 
 
-def _with_activities(sensors: list[Reading], activities: list[Reading]) -> list[Reading]:
-    """Label sensor readings with the concurrent activity, and add readings for absences."""
-    begins = [activity.begin_us for activity in activities]
-    readings = [reading for reading in activities if reading.room == AWAY]
-    for sensor in sensors:
-        number = bisect_right(begins, sensor.begin_us) - 1
-        is_part = number >= 0 and sensor.begin_us <= activities[number].end_us
-        readings.append(sensor._replace(activity=activities[number].activity if is_part else ""))
-    # Of readings with the same begin, being out comes last, so that it holds.
-    return sorted(readings, key=lambda reading: (reading.begin_us, reading.room == AWAY))
-
-
 class LogLayout(NamedTuple):
     """A layout.
 
@@ -322,19 +260,26 @@ class LogLayout(NamedTuple):
         matches: Returns something true if a stripped line shows this layout, and no other.
         read: Reads a file, or a folder of files of one home; `sort` sorts its lines by time.
         reads_folders: Whether it reads folders, too.
+        keys: Which other keys it takes: id, time_zone.
     """
 
     matches: Callable[[str], object]
     read: Callable[..., ActivityLog]
-    reads_folders: bool
+    reads_folders: bool = False
+    keys: tuple[str, ...] = ()
 
 
 LAYOUTS = {
-    "casas": LogLayout(_shows_casas, read_casas, reads_folders=False),
+    "casas": LogLayout(shows_casas, read_casas),
     "homer": LogLayout(AGENDA.fullmatch, read_homer, reads_folders=True),
     "uci_adl": LogLayout(
         re.compile(f"{UCI_ADL}|{HEAD}").fullmatch, read_uci_adl, reads_folders=True
     ),
+    "kasteren": LogLayout(kasteren.LINE.fullmatch, kasteren.read_kasteren, reads_folders=True),
+    "mit": LogLayout(mit.HEAD.fullmatch, mit.read_mit, reads_folders=True),
+    "aras": LogLayout(aras.LINE.fullmatch, aras.read_aras, reads_folders=True, keys=("id",)),
+    "openshs": LogLayout(openshs.HEAD.fullmatch, openshs.read_openshs),
+    "states": LogLayout(states.HEAD.fullmatch, states.read_states, keys=("id", "time_zone")),
 }
 """The layouts of rooms and activities, by name."""
 
@@ -361,7 +306,8 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
     Args:
         path: The file; or the folder, for a home that has several.
         layout: The layout; "auto" recognizes it by its content.
-        id: The tag to read, of positions; the topic or frame, of a bag; see `read_bag`.
+        id: The tag to read, of positions; the topic or frame, of a bag, see `read_bag`; the
+            person, of layouts with several.
         frame: The frame of a bag in which positions are returned; None: the map.
         columns: The names of the columns of positions; see `read_positions`.
         time_zone: The time zone of the home, for positions and bags; see `read_positions`.
@@ -401,11 +347,15 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
         from fleet2d.logs.bags import read_bag
 
         return read_bag(path, id=id, frame=frame or "map", time_zone=time_zone, sort=sort)
-    if id is not None or time_zone is not None:
+    chosen = LAYOUTS[layout]
+    given = {"id": id, "time_zone": time_zone}
+    keys = {name: value for name, value in given.items() if value is not None}
+    if unused := [name for name in keys if name not in chosen.keys]:
         raise LogError(
-            f"{path} is of the layout {layout}: id and time_zone are for positions and bags"
+            f"{path} is of the layout {layout}, which takes no {' or '.join(unused)}: that is for"
+            " positions, bags and a few layouts"
         )
-    return LAYOUTS[layout].read(path, sort=sort)
+    return chosen.read(path, sort=sort, **keys)
 
 
 def _recognize(path: Path) -> str:
@@ -417,15 +367,18 @@ def _recognize(path: Path) -> str:
     if is_bag(path):
         return "bag"
     if path.is_dir():
-        layouts = map(_recognize_lines, sorted(path.glob("*.txt")))
+        files = [file for suffix in ("txt", "csv") for file in sorted(path.glob(f"*.{suffix}"))]
+        layouts = map(_recognize_lines, files)
         layout = next((name for name in layouts if name and LAYOUTS[name].reads_folders), None)
         if layout is None:
             several = [name for name, layout in LAYOUTS.items() if layout.reads_folders]
             raise LogError(
-                f"{path}: no .txt file in this folder is of a layout with several files"
+                f"{path}: no .txt or .csv file in this folder is of a layout with several files"
                 f" ({', '.join(several)}): for other layouts name the file"
             )
         return layout
+    if states.is_database(path):
+        return "states"
     suffix = path.suffix.lower()
     if suffix in (".parquet", ".pq", ".jsonl", ".ndjson"):
         return "positions"

@@ -260,8 +260,8 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     A reading that ends before it begins counts as an instant.
 
     Raises:
-        LogError: There are none, times run backwards and `sort` is off, or one lasts longer than a
-            day.
+        LogError: There are none, times run backwards and `sort` is off, or one at home lasts
+            longer than a day.
     """
     if not readings:
         raise LogError(f"{path} holds no reading: is it the right file?")
@@ -276,7 +276,7 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
         )
     for reading in readings:
         lasts = reading.end_us - reading.begin_us
-        if lasts > DAY_US:
+        if lasts > DAY_US and reading.room != AWAY:
             raise LogError(
                 f"{path}, line {reading.line}: it lasts {lasts / 3.6e9:.1f} h; a reading lasts a"
                 " day at most: check its end"

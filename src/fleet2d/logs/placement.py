@@ -1,7 +1,9 @@
 """How a log lies in a home: the frame of its positions, the rooms of its labels, and the visits."""
 
 import difflib
-from collections.abc import Collection, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -39,6 +41,20 @@ _MEANINGS: tuple[tuple[str, RoomChoice], ...] = (
 )
 USUAL_ROOMS = {label: rooms for labels, rooms in _MEANINGS for label in labels.split()}
 """Meanings of the labels of known data sets, rooms and activities: rooms to be tried in turn."""
+_KITCHEN = ("kitchen", "dining_room")
+_BATH = ("bathroom", "toilet")
+THINGS: dict[str, RoomChoice] = {
+    **dict.fromkeys(("front", "main", "entrance"), (DOOR,)),
+    **dict.fromkeys(("fridge", "refrigerator", "freezer", "microwave", "oven", "stove"), _KITCHEN),
+    **dict.fromkeys(("dishwasher", "kettle", "cupboard", "cutlery", "pans", "cups"), _KITCHEN),
+    **dict.fromkeys(("drink", "cook", "cooking", "meal"), _KITCHEN),
+    **dict.fromkeys(("shower", "bathtub", "bath", "basin", "teeth"), _BATH),
+    **dict.fromkeys(("bed", "dresser", "wardrobe"), ("bedroom",)),
+    **dict.fromkeys(("couch", "sofa", "tv"), ("living_room",)),
+    **dict.fromkeys(("desk", "computer"), ("office", "living_room")),
+    "washing_machine": ("laundry", "bathroom"),
+}
+"""The rooms in which things usually are."""
 UNKNOWN = "unknown"
 
 
@@ -228,7 +244,33 @@ def _usual(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
     if any(room.name == label for room in rooms):
         return (label,)
     kind = room_type(label)
-    return _first_fit(USUAL_ROOMS.get(kind, (kind,)), rooms)
+    whole = _first_fit(USUAL_ROOMS.get(kind, (kind,)), rooms)
+    return whole or _by_words(label, rooms)
+
+
+def _by_words(label: str, rooms: Sequence[Room]) -> RoomChoice | None:
+    """Return the room that a part of a label names, or the one in which a thing usually is."""
+    fits = (_first_fit(choice, rooms) for choice in meanings(label))
+    return next((fit for fit in fits if fit is not None), None)
+
+
+def meanings(label: str) -> Iterator[RoomChoice]:
+    """Yield the kinds of rooms that parts of a label may mean, the likeliest first.
+
+    The last words count most: `binary_sensor.kitchen_motion` is in the kitchen, and the
+    `Hall-Bedroom door` at the bedroom.
+
+    Example:
+        >>> next(meanings("binary_sensor.kitchen_motion_2"))
+        ('motion',)
+        >>> ("kitchen",) in meanings("binary_sensor.kitchen_motion_2")
+        True
+    """
+    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+|[^\W\d_]+", label)
+    words = [word.lower() for word in words if word.lower() not in (DOOR, AWAY)]
+    pairs = [f"{first}_{second}" for first, second in pairwise(words)]
+    for word in (*reversed(pairs), *reversed(words)):
+        yield THINGS.get(word) or USUAL_ROOMS.get(word) or (word,)
 
 
 # Kinds of rooms in which much the same is done, the nearest first.

@@ -17,7 +17,7 @@ from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
 from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.trust import content_of_run, stored_code
-from fleet2d.errors import ArtifactError, RunDirectoryError, extra, printable
+from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as, extra, printable
 from fleet2d.runtime.clock import Clock
 from fleet2d.storage.files import PARTIAL, path_in
 
@@ -166,20 +166,25 @@ class Run:
         title = self.directory or "the run"
         return stored_code(title, content_of_run(self.manifest), trust=self.trust)
 
-    def path(self, entity: str, every: timedelta = timedelta(minutes=1)) -> Trajectory:
+    def path(self, entity: str, every: timedelta | str = timedelta(minutes=1)) -> Trajectory:
         """Return the poses of a user or robot at regular times, rebuilt exactly from key frames.
 
         Args:
             entity: Its name.
-            every: Time between two poses, a multiple of the step.
+            every: Time between two poses, such as "10 s", a multiple of the step.
 
         Raises:
             ArtifactError: The run stored no key frames, there is no such body, or `every` is no
-                multiple of the step.
+                duration or no multiple of the step.
         """
+        from pydantic_core import PydanticCustomError
+
+        from fleet2d.configuration.units import parse_duration
         from fleet2d.runs.trajectory import rebuild_path
 
-        return rebuild_path(self, self.plan, entity, every)
+        with errors_as(ArtifactError, "every", of=PydanticCustomError):
+            apart = parse_duration(every)
+        return rebuild_path(self, self.plan, entity, apart)
 
     def arrow(self, name: str) -> pa.Table:
         """Return a table as an Arrow table.

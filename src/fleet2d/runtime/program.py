@@ -37,6 +37,12 @@ END_S = 1.0
 QUOTED = 500
 
 
+def interpreter_of(program: Path) -> list[str]:
+    """Return the beginning of the command that runs a program, by its suffix."""
+    by_suffix = {".py": sys.executable, ".js": "node", ".mjs": "node"}
+    return [by_suffix[program.suffix]] if program.suffix in by_suffix else []
+
+
 class Answer(NamedTuple):
     """An answer of a program: its JSON object, and its blocks by name."""
 
@@ -60,7 +66,8 @@ class ExternalProgram:
         """Note what to run.
 
         Args:
-            program: The program, which runs in its folder; a file .py is run by this interpreter.
+            program: The program, which runs in its folder; what runs it follows from its suffix:
+                .py this interpreter, .js and .mjs Node.
             arguments: Its arguments.
             timeout_s: An answer that takes longer ends the run.
             start: The content of its first message.
@@ -111,10 +118,9 @@ class ExternalProgram:
 
     def _begin(self) -> None:
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - open while the program runs
-        python = [sys.executable] if self._program.suffix == ".py" else []
         try:
             process = subprocess.Popen(  # noqa: S603 - which programs may run is checked by trust
-                [*python, str(self._program), *self._arguments],
+                [*interpreter_of(self._program), str(self._program), *self._arguments],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,
@@ -123,8 +129,9 @@ class ExternalProgram:
             )
         except OSError as error:
             self._stderr.close()
+            by = "".join(f" by {name}" for name in interpreter_of(self._program))
             raise ComponentError(
-                f"{self._program} can't be started: {error.strerror or error}"
+                f"{self._program} can't be started{by}: {error.strerror or error}"
             ) from error
         self._process = process
         self._unread = bytearray()

@@ -78,7 +78,7 @@ class ProcessBehavior(Behavior):
     the next behavior decides. See `fleet2d.runtime.program` for the messages.
 
     Attributes:
-        command: The program; a file .py is run by Python.
+        command: The program; a file .py is run by Python, .js and .mjs by Node.
         arguments: Its arguments.
         settings: Its own settings, which it gets in the first message.
         timeout: The longest time to wait for an answer; then the run fails.

@@ -35,7 +35,7 @@ UNITS = {"distance": " m", "bearing": " deg"}
     "A report says how well its days match days held back.\n\nExamples:\n"
     "  fleet2d fit persona events.txt --out persona.yaml --picture fit.png",
 )
-def fit_routine(
+def fit_routine(  # noqa: PLR0913 - each is an option
     path: Annotated[
         Path, typer.Argument(metavar="LOG", help="A log of rooms and activities, or its folder.")
     ],
@@ -52,6 +52,16 @@ def fit_routine(
         str, typer.Option(help="recorded: days that switch between those of the log; laws.")
     ] = "recorded",
     sort: Annotated[bool, typer.Option(help="Sort lines whose time runs backwards.")] = False,
+    rooms: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LABEL=KIND", help="The kind of room of a label. Several."),
+    ] = None,
+    gap: Annotated[str, typer.Option(help="A longer silence is unknown.")] = "3 h",
+    still: Annotated[str, typer.Option(help="Silence in a room up to this is not.")] = "12 h",
+    id: Annotated[  # noqa: A002 - as the key of `replay`
+        str | None, typer.Option(help="The person, of a log with several.")
+    ] = None,
+    time_zone: Annotated[str | None, typer.Option(help="The time zone of the home.")] = None,
     private: Annotated[
         bool,
         typer.Option("--private", "--share", help="A persona for others: no day of the log in it."),
@@ -66,13 +76,21 @@ def fit_routine(
         picture: The file of a picture that compares it with the log; None: no picture.
         seed: The seed of the days that are sampled to compare.
         sort: Sort lines of the log whose time runs backwards.
+        rooms: The kinds of rooms of some labels, like `M003=bedroom`; nothing leaves them out.
+        gap: Silence longer than this is unknown.
+        still: Silence in one room up to this is not.
+        id: The person, of a log with several.
+        time_zone: The time zone of the home, if times have an offset.
         model: "recorded" or "laws", see `fit_persona`.
         private: Make new days of those of the log, so that the persona can be given to others.
 
     Raises:
         LogError: The log can't be read, is of positions, or has too few days.
     """
-    from fleet2d.errors import os_errors_as
+    from pydantic_core import PydanticCustomError
+
+    from fleet2d.configuration.units import parse_duration
+    from fleet2d.errors import errors_as, os_errors_as
     from fleet2d.learning.fit.persona import fit_persona, gaps, to_yaml
     from fleet2d.learning.fit.timeline import find_days, read_timeline
     from fleet2d.learning.fit.validation import validate
@@ -86,10 +104,12 @@ def fit_routine(
         raise LogError(f"--model: expected recorded or laws, got {model!r}")
     if private and model != "recorded":
         raise LogError("--private: laws hold durations of the log; leave out --model")
-    log = read_log(path, layout, sort=sort)
+    log = read_log(path, layout, sort=sort, id=id, time_zone=time_zone)
     if not isinstance(log, ActivityLog):
         raise LogError(f"{path} is a log of positions: a persona is fitted to a log of rooms")
-    timeline = read_timeline(log)
+    chosen = dict(_pair(text) for text in rooms or ())
+    with errors_as(LogError, of=PydanticCustomError):
+        timeline = read_timeline(log, chosen, parse_duration(gap), parse_duration(still))
     days = find_days(timeline)
     validation = validate(timeline, seed=seed, model=model, private=private)  # type: ignore[arg-type]
     about = (
@@ -108,6 +128,20 @@ def fit_routine(
         draw_persona(timeline, days, fitted, picture, seed)
         lines.append(str(picture))
     return [*lines, str(out)]
+
+
+def _pair(text: str) -> tuple[str, str]:
+    """Return a label and the kind of its room.
+
+    Raises:
+        LogError: There is no `=`.
+    """
+    from fleet2d.logs.log import LogError
+
+    label, mark, kind = text.rpartition("=")
+    if not mark:
+        raise LogError(f"--rooms: expected LABEL=KIND, such as M003=bedroom, got {text!r}")
+    return label, kind
 
 
 def table(validation: "Validation") -> list[str]:

@@ -1,22 +1,34 @@
 """The days of a log by minutes and by seconds, and distances between sets of days."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
 
+from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import micros
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.kernels import F64, I16, Bool
 from fleet2d.logs.log import AWAY, ActivityLog, LogError
-from fleet2d.logs.placement import DOOR, UNKNOWN, USUAL_ROOMS, VisitRule, visits_of
+from fleet2d.logs.placement import (
+    DOOR,
+    SIMILAR_ROOMS,
+    UNKNOWN,
+    USUAL_ROOMS,
+    VisitRule,
+    meanings,
+    visits_of,
+)
 from fleet2d.metrics.ltp_error import total_variation
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 from fleet2d.runtime.determinism import sum_in_order
 
 UNKNOWN_STATE = -1
+KINDS = frozenset({*SIMILAR_ROOMS, DOOR, AWAY})
+"""The kinds of rooms that labels are taken for."""
 # Silence up to this counts as staying in the room, in general and in one room.
 HOLD = timedelta(hours=3)
 MAX_STILLNESS = timedelta(hours=12)
@@ -72,13 +84,24 @@ class Timeline:
         return index[states]
 
 
-def read_timeline(log: ActivityLog) -> Timeline:
+def read_timeline(
+    log: ActivityLog,
+    rooms: Mapping[str, str] | None = None,
+    gap: timedelta = HOLD,
+    still: timedelta = MAX_STILLNESS,
+) -> Timeline:
     """Return the state, a place and an activity, of each minute of a log.
 
+    Args:
+        log: The log.
+        rooms: The kind of room of some of its labels, or away, or door; "" leaves them out.
+        gap: A longer silence is unknown.
+        still: Silence in one room up to this is not.
+
     Raises:
-        LogError: The state is unknown for most of the time.
+        LogError: The state is unknown for most of the time, or the log has no such label.
     """
-    pairs, seconds = read_seconds(log)
+    pairs, seconds = read_seconds(log, rooms, gap, still)
     minutes = _one_per_stay(pairs, by_minute(seconds, len(pairs)))
     seconds = _one_per_stay(pairs, seconds.reshape(-1, DAY_S))
     states, index = _without_rare(pairs, minutes, seconds)
@@ -93,15 +116,20 @@ def read_timeline(log: ActivityLog) -> Timeline:
     return Timeline(states, minutes, seconds, weekdays)
 
 
-def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
+def read_seconds(
+    log: ActivityLog,
+    rooms: Mapping[str, str] | None = None,
+    gap: timedelta = HOLD,
+    still: timedelta = MAX_STILLNESS,
+) -> tuple[list[ActivityPlace], I16]:
     """Return the states of a log, and for each second the index of its state, -1 if unknown."""
-    kinds = {label: (_kind(label),) for label in log.rooms}
+    kinds = kinds_of(log, rooms or {})
     rule = VisitRule(
         step_us=1_000_000,
         begin_us=0,
         steps=log.days * DAY_S,
-        gap_us=micros(HOLD),
-        still_us=micros(MAX_STILLNESS),
+        gap_us=micros(gap),
+        still_us=micros(still),
         unknown=True,
         door_us=micros(MIN_ABSENCE),
     )
@@ -121,9 +149,29 @@ def read_seconds(log: ActivityLog) -> tuple[list[ActivityPlace], I16]:
     return list(index), seconds
 
 
+def kinds_of(log: ActivityLog, rooms: Mapping[str, str]) -> dict[str, tuple[str, ...] | None]:
+    """Return the kind of room of each label of a log; None leaves its readings out.
+
+    Raises:
+        LogError: The log has no such label.
+    """
+    for label in rooms:
+        if label not in log.rooms:
+            known = suggest(label, sorted(log.rooms), "It has")
+            raise LogError(f"--rooms: the log has no label {label!r}{known}")
+    kinds: dict[str, tuple[str, ...] | None] = {label: (_kind(label),) for label in log.rooms}
+    return kinds | {label: (room,) if room else None for label, room in rooms.items()}
+
+
 def _kind(label: str) -> str:
-    kind = USUAL_ROOMS.get(room_type(label), (room_type(label),))[0]
-    return AWAY if label == AWAY else kind
+    """Return the kind of room that a label usually means; the label as one, if there is none."""
+    if label == AWAY:
+        return AWAY
+    kind = room_type(label)
+    whole = USUAL_ROOMS.get(kind, (kind,))[0]
+    if whole in KINDS:
+        return whole
+    return next((first for first, *_ in meanings(label) if first in KINDS), kind)
 
 
 def by_minute(seconds: I16, states: int) -> I16:

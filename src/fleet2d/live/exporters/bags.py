@@ -1,4 +1,4 @@
-"""ROS 2 messages in an MCAP file or as a bag in SQLite: needs the extra `ros`."""
+"""ROS 2 messages in an MCAP file, alone or as a bag: needs the extra `ros`."""
 
 import json
 import struct
@@ -10,11 +10,12 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from fleet2d.errors import RunDirectoryError, extra
+from fleet2d.errors import RunDirectoryError
 from fleet2d.kernels import I64, U8
 from fleet2d.live.exporters import Records, Selection, new_file
 from fleet2d.live.exporters.ros import Block, RosMessages, Topic
 from fleet2d.runs.run import Run
+from fleet2d.storage.bags import METADATA
 from fleet2d.storage.files import new_folder
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -60,18 +61,14 @@ def export_mcap(run: Run, path: Path, part: Selection) -> str:
     messages = RosMessages(Records(run, part), MESSAGE_HEAD.itemsize)
     layout = path.with_suffix(".layout.json")
     with new_file(path) as file:
-        topics = messages.topics.values()
-        writer = McapWriter(file, [(topic, messages.definition(topic)) for topic in topics])
-        for blocks in messages.blocks():
-            writer.write(blocks)
-        writer.finish()
+        writer = _write(messages, file)
     with new_file(layout) as file:
         file.write(json.dumps(foxglove_layout(messages), indent=1).encode())
     size = path.stat().st_size / 1e6
     return f"{writer.counts.total():,} messages in {path}, {size:.1f} MB; layout: {layout}"
 
 
-class _WrittenChunk(NamedTuple):
+class WrittenChunk(NamedTuple):
     """Where a chunk is in a file, for its summary."""
 
     begins: int  # the times of its first and last message
@@ -91,6 +88,7 @@ class McapWriter:
 
     Attributes:
         counts: The number of messages of each topic so far.
+        chunks: What has been written so far.
     """
 
     def __init__(self, file: BinaryIO, topics: Sequence[tuple[Topic, str]]) -> None:
@@ -106,7 +104,7 @@ class McapWriter:
             definitions.append(_record(SCHEMA, code, *texts))
             definitions.append(_record(CHANNEL, code, code, _text(topic.name), _text("cdr"), qos))
         self._definitions = b"".join(definitions)
-        self._chunks: list[_WrittenChunk] = []
+        self.chunks: list[WrittenChunk] = []
         self.counts: Counter[str] = Counter()
         self._put(MAGIC, _record(HEADER, _text("ros2"), _text("fleet2d")), self._definitions)
 
@@ -143,7 +141,7 @@ class McapWriter:
                 head = struct.pack("<HI", channel, index.nbytes)
                 indices[channel] = self._put(_record(MESSAGE_INDEX, head, index.tobytes()))
         sizes = self._at - at - length, len(data), len(records)
-        self._chunks.append(_WrittenChunk(begins, ends, at, length, indices, *sizes))
+        self.chunks.append(WrittenChunk(begins, ends, at, length, indices, *sizes))
 
     def _fill_heads(self, blocks: Sequence[Block]) -> None:
         """Write what stands before the messages of a topic."""
@@ -174,13 +172,13 @@ class McapWriter:
         summary = self._put(self._definitions)
         # By channel, so that a run makes the same file in every process.
         counts = dict(sorted((self._channels[topic], n) for topic, n in self.counts.items()))
-        begins = min((chunk.begins for chunk in self._chunks), default=0)
-        ends = max((chunk.ends for chunk in self._chunks), default=0)
+        begins = min((chunk.begins for chunk in self.chunks), default=0)
+        ends = max((chunk.ends for chunk in self.chunks), default=0)
         channels = len(self._channels)
-        chunks = len(self._chunks)
+        chunks = len(self.chunks)
         numbers = (self.counts.total(), channels, channels, 0, 0, chunks, begins, ends)
         self._put(_record(STATISTICS, struct.pack("<QHIIIIQQ", *numbers), _numbers(counts)))
-        for chunk in self._chunks:
+        for chunk in self.chunks:
             self._put(
                 _record(
                     CHUNK_INDEX,
@@ -324,27 +322,66 @@ def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
         InputError: rosbags isn't installed.
         RunDirectoryError: The folder exists, or can't be written.
     """
-    with extra("ros", "bags need rosbags"):
-        from rosbags.rosbag2 import Writer, WriterError
-        from rosbags.rosbag2.metadata import parse_qos
-    messages = RosMessages(Records(run, part))
-    count = 0
+    if path.exists():
+        raise RunDirectoryError(f"{path} exists: name another folder, or remove it")
+    messages = RosMessages(Records(run, part), MESSAGE_HEAD.itemsize)
+    file_name = f"{path.name}_0.mcap"
     try:
-        with new_folder(path) as made, Writer(made, version=8) as writer:
-            connections = {
-                topic.name: writer.add_connection(
-                    topic.name,
-                    topic.type,
-                    typestore=messages.types,
-                    offered_qos_profiles=parse_qos(_metadata(topic).get(QOS, "")),
-                )
-                for topic in messages.topics.values()
-            }
-            for time, name, data in messages:
-                writer.write(connections[name], time, data)
-                count += 1
+        with new_folder(path) as made:
+            made.mkdir()
+            with (made / file_name).open("wb") as file:
+                writer = _write(messages, file)
+            metadata = json.dumps(bag_metadata(messages, writer, file_name), indent=1)
+            (made / METADATA).write_text(metadata + "\n", encoding="utf-8")  # JSON is YAML
     except FileExistsError:
         raise RunDirectoryError(f"{path} exists: name another folder, or remove it") from None
-    except (OSError, WriterError) as error:
+    except OSError as error:
         raise RunDirectoryError(f"{path} can't be written: {error}") from error
-    return f"{count:,} messages in {path}"
+    return f"{writer.counts.total():,} messages in {path}"
+
+
+def _write(messages: RosMessages, file: BinaryIO) -> "McapWriter":
+    """Write the messages of a run as MCAP, and return the writer."""
+    topics = messages.topics.values()
+    writer = McapWriter(file, [(topic, messages.definition(topic)) for topic in topics])
+    for blocks in messages.blocks():
+        writer.write(blocks)
+    writer.finish()
+    return writer
+
+
+def bag_metadata(messages: RosMessages, writer: McapWriter, file: str) -> dict[str, object]:
+    """Return what `metadata.yaml` of a bag says of its file."""
+    begin = min((chunk.begins for chunk in writer.chunks), default=0)
+    end = max((chunk.ends for chunk in writer.chunks), default=0)
+    times: dict[str, object] = {
+        "duration": {"nanoseconds": end - begin},
+        "starting_time": {"nanoseconds_since_epoch": begin},
+        "message_count": writer.counts.total(),
+    }
+    topics = [
+        {
+            "topic_metadata": {
+                "name": topic.name,
+                "type": topic.type,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": _metadata(topic).get(QOS, ""),
+                "type_description_hash": messages.types.hash_rihs01(topic.type),
+            },
+            "message_count": writer.counts[topic.name],
+        }
+        for topic in messages.topics.values()
+    ]
+    information = {
+        "version": 8,
+        "storage_identifier": "mcap",
+        **times,
+        "topics_with_message_count": topics,
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file],
+        "files": [{"path": file, **times}],
+        "custom_data": {},
+        "ros_distro": "",
+    }
+    return {"rosbag2_bagfile_information": information}

@@ -1,0 +1,192 @@
+"""Steering: how a robot moves whose velocity another program commands, as by a joystick.
+
+The path is computed in pieces of equal time, each with one speed and one rate of turning, from
+integers and the sines of the core: it is the same on every machine.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import timedelta
+from typing import NamedTuple
+
+import numpy as np
+
+from fleet2d.configuration.units import micros
+from fleet2d.entities.behavior import Situation
+from fleet2d.entities.body import Body
+from fleet2d.entities.drive import Holonomic, Trapezoidal
+from fleet2d.entities.plan import Plan
+from fleet2d.kernels import I64, TURN, UNIT, cosine, sine
+
+# Within a piece the speed is constant, and the way straight.
+PIECE_US = 50_000
+# So far apart are the points of a way at which walls and bodies are looked for [m].
+SPACING_M = 0.01
+# Within an order, places and headings are kept so many times finer than the lattice.
+FINE = 1 << 16
+
+
+class Velocity(NamedTuple):
+    """How fast a robot moves, in its own frame.
+
+    Attributes:
+        forward: Ahead, or back if negative [m/s].
+        left: To its left; 0 unless its drive is holonomic [m/s].
+        turn_deg: Counter-clockwise [deg/s].
+    """
+
+    forward: float = 0.0
+    left: float = 0.0
+    turn_deg: float = 0.0
+
+    def within_limits(self, body: Body) -> "Velocity":
+        """Return the nearest velocity that a robot can reach: the direction stays as it is."""
+        left = self.left if isinstance(body.drive, Holonomic) else 0.0
+        speed = _length(self.forward, left)
+        share = min(1.0, body.entity.speed / speed) if speed else 0.0
+        limit = body.entity.turn_rate_deg
+        turn_deg = max(-limit, min(self.turn_deg, limit))
+        return Velocity(self.forward * share, left * share, turn_deg)
+
+    def towards(self, wanted: "Velocity", most: float) -> "Velocity":
+        """Return the velocity after a change of speed by at most `most` [m/s]."""
+        ahead = wanted.forward - self.forward
+        across = wanted.left - self.left
+        change = _length(ahead, across)
+        share = min(1.0, most / change) if change else 0.0
+        return Velocity(self.forward + ahead * share, self.left + across * share, wanted.turn_deg)
+
+
+class Disc(NamedTuple):
+    """Where the centre of a robot must not be: about another body [lattice]."""
+
+    x: int
+    y: int
+    reach: int
+
+    def blocks(self, old: tuple[int, int], new: tuple[int, int]) -> bool:
+        """Whether a move ends within reach of it, and no farther from it than it begins."""
+        before = (old[0] - self.x) ** 2 + (old[1] - self.y) ** 2
+        after = (new[0] - self.x) ** 2 + (new[1] - self.y) ** 2
+        return after < self.reach**2 and after <= before
+
+
+class Progress(NamedTuple):
+    """How far a steered robot is.
+
+    Attributes:
+        velocity: How fast it would move were nothing in its way.
+        rest: What rounding to the lattice has left over: x, y [1/FINE lattice], heading [1/FINE of
+            1/4096 turn]. Else a slow robot would lose a part of each command.
+    """
+
+    velocity: Velocity = Velocity()
+    rest: tuple[int, int, int] = (0, 0, 0)
+
+
+AT_REST = Progress()
+
+
+@dataclass
+class Steering:
+    """The order to move at a velocity for a while; it ends at walls and in front of bodies.
+
+    Attributes:
+        velocity: The velocity that is wanted.
+        duration: How long it is kept.
+        others: The bodies that are in the way.
+        first: How far the robot was when the order came.
+    """
+
+    velocity: Velocity
+    duration: timedelta
+    others: Sequence[Disc] = ()
+    first: Progress = AT_REST
+    _progress: dict[int, Progress] = field(default_factory=dict, init=False)  # by time [us]
+
+    def decide(self, now: Situation) -> Plan | None:
+        """Return the way of the whole time; None once that is over."""
+        if self._progress:
+            return None
+        plan = now.plan()
+        return plan.follow(self._way(now.actor, plan))
+
+    def progress_at(self, time_us: int) -> Progress:
+        """Return how far a robot is at a moment; as one that stands, if the time is over."""
+        passed = [end_us for end_us in self._progress if end_us <= time_us]
+        if not passed or time_us > max(self._progress):
+            return AT_REST
+        at_us = max(passed)
+        progress = self._progress[at_us]
+        return progress if at_us == time_us else Progress(progress.velocity)
+
+    def _way(self, body: Body, plan: Plan) -> I64:
+        units = body.home.plan.lattice.units_per_m
+        wanted = self.velocity.within_limits(body)
+        x, y, heading = (
+            FINE * at + rest
+            for at, rest in zip((plan.x, plan.y, plan.heading), self.first.rest, strict=True)
+        )
+        at = plan.x, plan.y
+        is_free = True
+        rows = []
+        duration_us = micros(self.duration)
+        self._progress[plan.time_us] = self.first
+        for begin_us in range(0, duration_us, PIECE_US):
+            end_us = min(begin_us + PIECE_US, duration_us)
+            seconds = (end_us - begin_us) / 1e6
+            velocity = self.first.velocity.towards(wanted, _gained(body, end_us))
+            turn = round(velocity.turn_deg * seconds * TURN * FINE / 360)
+            dx, dy = _turned(velocity, seconds * units, (heading + turn // 2) // FINE)
+            if is_free:
+                goal = _rounded(x + dx), _rounded(y + dy)
+                at, is_free = self._move(body, at, goal, units)
+            x, y = (x + dx, y + dy) if is_free else (FINE * at[0], FINE * at[1])
+            heading += turn
+            faced = _rounded(heading)
+            rest = x - FINE * at[0], y - FINE * at[1], heading - FINE * faced
+            rows.append((plan.time_us + end_us, *at, faced % TURN, 0))
+            self._progress[plan.time_us + end_us] = Progress(velocity, rest)
+        return np.array(rows, np.int64).reshape(-1, 5)
+
+    def _move(
+        self, body: Body, start: tuple[int, int], goal: tuple[int, int], units: float
+    ) -> tuple[tuple[int, int], bool]:
+        """Return how far the body gets, and whether nothing was in its way."""
+        dx, dy = goal[0] - start[0], goal[1] - start[1]
+        pieces = max(1, math.ceil(_length(dx, dy) / (SPACING_M * units)))
+        at = start
+        for piece in range(1, pieces + 1):
+            to = start[0] + dx * piece // pieces, start[1] + dy * piece // pieces
+            is_outside = body.space.part_at(*to) < 0
+            if to != at and (is_outside or any(disc.blocks(at, to) for disc in self.others)):
+                return at, False
+            at = to
+        return at, True
+
+
+def _rounded(value: int) -> int:
+    """Return what a number in 1/FINE rounds to."""
+    return (value + FINE // 2) // FINE
+
+
+def _length(x: float, y: float) -> float:
+    """Return the length of a vector; `math.hypot` isn't the same in all versions of Python."""
+    return math.sqrt(x * x + y * y)
+
+
+def _gained(body: Body, time_us: int) -> float:
+    """Return by how much the speed of a robot can change in a time [m/s]."""
+    if not isinstance(body.drive, Trapezoidal):
+        return math.inf
+    return body.drive.acceleration * time_us / 1e6
+
+
+def _turned(velocity: Velocity, scale: float, heading: int) -> tuple[int, int]:
+    """Return a way of so many lattice units for each m/s, in the frame of the home [1/FINE]."""
+    ahead = round(velocity.forward * scale * FINE)
+    across = round(velocity.left * scale * FINE)
+    x = ahead * cosine(heading) - across * sine(heading)
+    y = ahead * sine(heading) + across * cosine(heading)
+    return (x + UNIT // 2) // UNIT, (y + UNIT // 2) // UNIT

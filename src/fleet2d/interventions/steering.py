@@ -1,0 +1,59 @@
+"""The intervention that steers a robot by velocities, as another program or a joystick does."""
+
+from datetime import timedelta
+
+from fleet2d.configuration.units import PositiveDuration, SignedSpeed, SignedTurnRateDeg
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.steering import AT_REST, Disc, Steering, Velocity
+from fleet2d.interventions.intervention import World
+from fleet2d.interventions.robots import RobotIntervention
+
+# A command holds so long: whoever steers repeats it, or the robot stops.
+KEPT = timedelta(seconds=0.5)
+
+
+class Steer(RobotIntervention):
+    """Move a robot at a velocity, within the limits of its drive.
+
+    It stops at walls, at shut doors, and in front of bodies; its behaviors decide again when the
+    time is over. A later command takes over at the speed that the robot has by then.
+
+    Attributes:
+        entity: The robot.
+        forward: Its speed ahead, or back if negative.
+        left: Its speed to the left; 0 unless its drive is holonomic.
+        turn_deg: How fast it turns, counter-clockwise.
+        duration: How long.
+
+    Example:
+        >>> Steer("astro", forward=0.2, turn_deg="30 deg/s").duration
+        datetime.timedelta(microseconds=500000)
+    """
+
+    forward: SignedSpeed = 0.0
+    left: SignedSpeed = 0.0
+    turn_deg: SignedTurnRateDeg = 0.0
+    duration: PositiveDuration = KEPT
+
+    def begin(self, world: World) -> None:
+        """Give the order."""
+        actor = self.actor(world)
+        last = actor.order
+        time_us = world.step * world.clock.step_us
+        progress = last.progress_at(time_us) if isinstance(last, Steering) else AT_REST
+        wanted = Velocity(self.forward, self.left, self.turn_deg)
+        order = Steering(wanted, self.duration, _bodies_near(actor, world), progress)
+        actor.follow_order(order, world.step)
+
+
+def _bodies_near(actor: DecidingActor, world: World) -> list[Disc]:
+    """Return where the robot would touch the other bodies that are at home."""
+    units = actor.home.plan.lattice.units_per_m
+    others = [*world.users.values(), *world.robots.values()]
+    return [
+        Disc(
+            other.state.x, other.state.y, round((other.entity.radius + actor.entity.radius) * units)
+        )
+        for other in others
+        if other is not actor and not other.state.away
+    ]

@@ -1,0 +1,277 @@
+"""What a run publishes to ROS, whichever way it gets there: topics, types and frames.
+
+A message is a mapping of the fields of its type in ROS 2; fields that are left out are 0 or empty.
+Frames and stamps are those of `fleet2d export`: the truth about bodies is in `/tf` and
+`/NAME/odom`, what a robot knows of people in `/NAME/detections` and `/NAME/people`.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from datetime import UTC
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fleet2d.engine.simulation import Simulation
+from fleet2d.kernels import F64, Mesh, region_outline, visible_region
+from fleet2d.live.bridge import LiveStep
+
+BEAMS = 360
+"""Number of beams of a laser scan, over a whole turn."""
+SCAN_RANGE_M = 12.0
+EXACT = np.zeros(36)
+"""The covariance of what is known exactly."""
+PERSON_M = (0.4, 0.4, 1.7)
+"""The box of a detected person, whose true size no robot knows: x, y, z [m]."""
+_CHARGING, _DISCHARGING, _NOT_CHARGING = 1, 2, 3  # of sensor_msgs/msg/BatteryState
+
+
+class RosTopic(NamedTuple):
+    """A topic.
+
+    Attributes:
+        name: Its name, such as `/astro/odom`.
+        type: The type of its messages, such as `nav_msgs/msg/Odometry`.
+        is_latched: Whether later subscribers get its last message, too.
+    """
+
+    name: str
+    type: str
+    is_latched: bool = False
+
+
+Message = tuple[RosTopic, Mapping[str, Any]]
+
+
+class RosTopics:
+    """The topics of a run.
+
+    Attributes:
+        all: The topics, in the order in which a step is published.
+    """
+
+    def __init__(self, simulation: Simulation, root: str | None = None) -> None:
+        """Find out what topics there are.
+
+        Args:
+            simulation: The run.
+            root: The robot whose topics and frames have no prefix, as programs for a single robot
+                expect it.
+        """
+        self._simulation = simulation
+        self._root = root
+        self._start_ns = int(simulation.clock.start.replace(tzinfo=UTC).timestamp()) * 10**9
+        self._step_ns = simulation.clock.step_us * 1000
+        self._last: dict[str, tuple[float, float, float]] = {}
+        self._scans: dict[str, tuple[object, Any]] = {}
+        self._clock = RosTopic("/clock", "rosgraph_msgs/msg/Clock")
+        self._map = RosTopic("/map", "nav_msgs/msg/OccupancyGrid", is_latched=True)
+        self._tf = RosTopic("/tf", "tf2_msgs/msg/TFMessage")
+        self._static = RosTopic("/tf_static", "tf2_msgs/msg/TFMessage", is_latched=True)
+        self._robots = {name: self._topics_of(name) for name in simulation.scenario.robots}
+        shared = [self._clock, self._map, self._static, self._tf]
+        self.all = [*shared, *(t for topics in self._robots.values() for t in topics.values())]
+
+    def _topics_of(self, robot: str) -> dict[str, RosTopic]:
+        types = {
+            "odom": "nav_msgs/msg/Odometry",
+            "scan": "sensor_msgs/msg/LaserScan",
+            "detections": "vision_msgs/msg/Detection3DArray",
+            "people": "people_msgs/msg/People",
+        }
+        if self._simulation.actors[robot].charge is not None:
+            types["battery_state"] = "sensor_msgs/msg/BatteryState"
+        return {key: RosTopic(self.name(robot, key), of) for key, of in types.items()}
+
+    def name(self, body: str, topic: str) -> str:
+        """Return the name of a topic of a body."""
+        return f"/{topic}" if body == self._root else f"/{body}/{topic}"
+
+    def frame(self, robot: str, frame: str) -> str:
+        """Return the name of a frame of a robot."""
+        return frame if robot == self._root else f"{robot}/{frame}"
+
+    def time_ns(self, step: int) -> int:
+        """Return the simulated time of a step [ns since 1970]."""
+        return self._start_ns + step * self._step_ns
+
+    def stamp(self, step: int) -> dict[str, int]:
+        """Return the simulated time of a step."""
+        seconds, nanoseconds = divmod(self.time_ns(step), 10**9)
+        return {"sec": seconds, "nanosec": nanoseconds}
+
+    def once(self, step: int = 0) -> Iterator[Message]:
+        """Yield what is latched: the map, and the frames that don't move."""
+        plan = self._simulation.home.plan
+        lattice = plan.lattice
+        info = {
+            "map_load_time": self.stamp(step),
+            "resolution": lattice.cell,
+            "width": lattice.columns,
+            "height": lattice.rows,
+            "origin": pose_at(*lattice.origin, 0.0),
+        }
+        cells = np.where(plan.free, 0, 100).astype(np.int8).ravel()
+        yield self._map, {"header": self._header(step, "map"), "info": info, "data": cells}
+        still = pose_at(0.0, 0.0, 0.0)
+        fixed = [self._transform(step, "map", self.frame(r, "odom"), still) for r in self._robots]
+        yield self._static, {"transforms": fixed}
+
+    def of(self, frame: LiveStep) -> Iterator[Message]:
+        """Yield the messages of a step, the clock first: who hears a stamp knows its time."""
+        step = frame.step
+        yield self._clock, {"clock": self.stamp(step)}
+        present = {name: body for name, body in frame.bodies.items() if not body["away"]}
+        yield self._tf, {"transforms": [self._moved(step, *item) for item in present.items()]}
+        for robot, topics in self._robots.items():
+            if robot in present:
+                yield topics["odom"], self._odometry(step, robot, present[robot])
+                yield topics["scan"], self._scan(step, robot, present[robot])
+            if "battery_state" in topics:
+                yield topics["battery_state"], self._battery(step, robot)
+            seen = [r for t, r in frame.rows if t == "observations" and r["robot"] == robot]
+            if seen:
+                yield topics["detections"], self._detections(step, seen)
+                yield topics["people"], self._people(step, seen)
+
+    def _moved(self, step: int, name: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        pose = pose_at(body["x"], body["y"], body["heading"])
+        if name not in self._robots:
+            return self._transform(step, "map", name, pose)
+        return self._transform(step, self.frame(name, "odom"), self.frame(name, "base_link"), pose)
+
+    def _transform(
+        self, step: int, parent: str, child: str, pose: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        return {
+            "header": self._header(step, parent),
+            "child_frame_id": child,
+            "transform": {"translation": pose["position"], "rotation": pose["orientation"]},
+        }
+
+    def _odometry(self, step: int, robot: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        x = body["x"]
+        y = body["y"]
+        heading = body["heading"]
+        before = self._last.get(robot, (x, y, heading))
+        self._last[robot] = x, y, heading
+        passed_s = self._step_ns / 1e9
+        dx = (x - before[0]) / passed_s
+        dy = (y - before[1]) / passed_s
+        ahead = dx * math.cos(heading) + dy * math.sin(heading)
+        left = dy * math.cos(heading) - dx * math.sin(heading)
+        turn = (heading - before[2] + math.pi) % (2 * math.pi) - math.pi
+        twist = {"linear": vector(ahead, left), "angular": vector(0.0, 0.0, turn / passed_s)}
+        return {
+            "header": self._header(step, self.frame(robot, "odom")),
+            "child_frame_id": self.frame(robot, "base_link"),
+            "pose": {"pose": pose_at(x, y, heading), "covariance": EXACT},
+            "twist": {"twist": twist, "covariance": EXACT},
+        }
+
+    def _scan(self, step: int, robot: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        home = self._simulation.home
+        key = body["x"], body["y"], body["heading"], home.walls
+        if robot not in self._scans or self._scans[robot][0] != key:
+            x, y = home.plan.lattice.point_at((body["x"], body["y"]))
+            metres = scan_of(home.walls, x, y, body["heading"]) / home.plan.lattice.units_per_m
+            ranges = np.where(metres <= SCAN_RANGE_M, metres, np.inf).astype(np.float32)
+            self._scans[robot] = key, ranges
+        return {
+            "header": self._header(step, self.frame(robot, "base_link")),
+            "angle_min": -math.pi,
+            "angle_max": math.pi - 2 * math.pi / BEAMS,
+            "angle_increment": 2 * math.pi / BEAMS,
+            "scan_time": self._step_ns / 1e9,
+            "range_max": SCAN_RANGE_M,
+            "ranges": self._scans[robot][1],
+        }
+
+    def _battery(self, step: int, robot: str) -> dict[str, Any]:
+        actor = self._simulation.actors[robot]
+        moment = np.array([self._simulation.step * self._simulation.clock.step_us])
+        charge = actor.charge
+        assert charge is not None
+        course = charge.course(actor.motion)
+        level = float(course.levels(moment)[0])
+        piece = int(np.searchsorted(course.begins, moment[0], side="right")) - 1
+        rate = course.rates[piece]
+        is_full = rate > 0 and level >= 1
+        state = _NOT_CHARGING if is_full else _CHARGING if rate > 0 else _DISCHARGING
+        return {
+            "header": self._header(step, self.frame(robot, "base_link")),
+            "percentage": level,
+            "power_supply_status": state,
+            "present": True,
+            **dict.fromkeys(("voltage", "temperature", "current", "charge"), math.nan),
+            **dict.fromkeys(("capacity", "design_capacity"), math.nan),
+        }
+
+    def _detections(self, step: int, rows: list[Any]) -> dict[str, Any]:
+        header = self._header(step, "map")
+        box = dict(zip("xyz", PERSON_M, strict=True))
+        detections = []
+        for row in rows:
+            user = row["user"] or "unknown"
+            pose = pose_at(row["x"], row["y"], 0.0)
+            hypothesis = {"class_id": user, "score": 1.0}
+            result = {"hypothesis": hypothesis, "pose": {"pose": pose, "covariance": EXACT}}
+            extent = {"center": pose, "size": box}
+            detections.append({"header": header, "id": user, "results": [result], "bbox": extent})
+        return {"header": header, "detections": detections}
+
+    def _people(self, step: int, rows: list[Any]) -> dict[str, Any]:
+        people = [
+            {
+                "name": row["user"] or "unknown",
+                "position": vector(row["x"], row["y"]),
+                "velocity": vector(),
+                "reliability": 1.0,
+            }
+            for row in rows
+        ]
+        return {"header": self._header(step, "map"), "people": people}
+
+    def _header(self, step: int, frame: str) -> dict[str, Any]:
+        return {"stamp": self.stamp(step), "frame_id": frame}
+
+
+def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> dict[str, float]:
+    """Return a vector or point."""
+    return {"x": x, "y": y, "z": z}
+
+
+def pose_at(x: float, y: float, heading: float) -> dict[str, Any]:
+    """Return a pose on the floor."""
+    turn = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
+    return {"position": vector(x, y), "orientation": turn}
+
+
+def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
+    """Return how far a laser scanner sees to the next wall, float64 (BEAMS,) [lattice units].
+
+    Beams begin behind and turn counter-clockwise. Furniture and people are lower than the laser.
+
+    Args:
+        walls: The free space between walls and shut doors.
+        x: Its place [lattice units].
+        y: Its place [lattice units].
+        heading: Its heading [rad].
+    """
+    pieces = visible_region(walls, x, y)
+    if not len(pieces[0]):
+        return np.zeros(BEAMS)
+    ends = region_outline(walls, x, y, *pieces)[0].reshape(-1, 2, 2) - np.array([x, y])
+    right, left = ends[:, 0], ends[:, 1]
+    turn = 2 * math.pi
+    angles = heading - math.pi + turn / BEAMS * np.arange(BEAMS)
+    begins = np.arctan2(right[:, 1], right[:, 0]) % turn
+    order = np.argsort(begins, kind="stable")
+    piece = order[np.searchsorted(begins[order], angles % turn, side="right") - 1]
+    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    wall = (left - right)[piece]
+    across = direction[:, 0] * wall[:, 1] - direction[:, 1] * wall[:, 0]
+    start = right[piece]
+    along = start[:, 0] * wall[:, 1] - start[:, 1] * wall[:, 0]
+    distance: F64 = np.abs(along / np.where(across == 0, np.inf, across))
+    return distance

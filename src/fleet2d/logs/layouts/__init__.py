@@ -1,0 +1,1 @@
+"""Layouts in which smart homes are published, one module for each."""

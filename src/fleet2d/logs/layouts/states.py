@@ -1,0 +1,244 @@
+"""States of entities over time: a table of any smart home, or what Home Assistant keeps.
+
+::
+
+    entity_id,state,last_changed
+    binary_sensor.kitchen_motion,on,2026-03-28T23:30:00.123Z
+    person.ana,not_home,2026-03-29T07:02:11.000Z
+
+Home Assistant's recorder is a database, `home-assistant_v2.db`, which is read as it is.
+"""
+
+import csv
+import re
+import sqlite3
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import closing
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+from fleet2d.bounds import LOG_BYTES, LOG_ROWS, check_file, one_line
+from fleet2d.configuration.problems import suggest
+from fleet2d.logs.log import (
+    AWAY,
+    ActivityLog,
+    LogError,
+    Reading,
+    in_order,
+    log_lines,
+    parse_time,
+    since,
+)
+
+_ENTITIES = ("entity_id", "entity", "device", "sensor", "name", "item")
+_VALUES = ("state", "value", "status")
+_TIMES = ("last_changed", "last_updated", "time", "timestamp", "datetime", "date")
+HEAD = re.compile(
+    rf"(?=.*\b(?:{'|'.join(_ENTITIES)})\b)(?=.*\b(?:{'|'.join(_VALUES)})\b)"
+    rf"(?=.*\b(?:{'|'.join(_TIMES)})\b)(?!.*\b[xy]\b).*",
+    re.IGNORECASE,
+)
+"""The first line of a table."""
+DATABASE = b"SQLite format 3\0"
+"""How a database begins."""
+_ON = frozenset({"on", "open", "opened", "detected", "occupied", "motion", "present", "true", "1"})
+_OFF = frozenset({"off", "closed", "close", "clear", "false", "0", "idle", "absent", "no_motion"})
+_OUT = frozenset({"not_home", "away", "absent"})
+_PEOPLE = ("person.", "device_tracker.")
+_UNKNOWN = frozenset({"unavailable", "unknown", "none", ""})
+_QUERIES = {
+    "metadata_id": "SELECT m.entity_id, s.state, coalesce(s.last_changed_ts, s.last_updated_ts)"
+    " FROM states s JOIN states_meta m ON s.metadata_id = m.metadata_id"
+    " ORDER BY coalesce(s.last_changed_ts, s.last_updated_ts), s.state_id",
+    "entity_id": "SELECT entity_id, state, coalesce(last_changed, last_updated) FROM states"
+    " ORDER BY coalesce(last_changed, last_updated), state_id",
+}
+"""The query of each edition of the database, by a column that only it has."""
+# A database that takes longer is damaged, or isn't Home Assistant's [s].
+_MAX_SECONDS = 60.0
+_STEPS_BETWEEN = 1_000_000
+
+
+class _State(NamedTuple):
+    """A state of an entity, from a time on."""
+
+    entity: str
+    state: str
+    time: datetime
+    line: int
+
+
+def read_states(
+    path: Path,
+    *,
+    id: str | None = None,  # noqa: A002 - the name of the key
+    time_zone: str | None = None,
+    sort: bool = False,
+) -> ActivityLog:
+    """Read the states of a home: what switches on shows that somebody is there at that instant.
+
+    Labels are the entities. While a person is not at home, by a `person` or `device_tracker`, it is
+    away.
+
+    Args:
+        path: The table, or the database.
+        id: The person's entity, if there are several.
+        time_zone: The time zone of the home, if times have an offset or are of a database.
+        sort: Put rows in order of time.
+
+    Raises:
+        LogError: A row is damaged, there are several people, or a time zone is missing or unknown.
+    """
+    states = list(_local(path, _database(path) if is_database(path) else _table(path), time_zone))
+    if not states:
+        raise LogError(f"{path} holds no reading: is it the right file?")
+    person = _person(path, {s.entity for s in states}, id)
+    states = _in_order(path, states, sort=sort)
+    first_day = min(state.time for state in states).date()
+    readings: list[Reading] = []
+    others: Counter[str] = Counter()
+    left: int | None = None  # the reading of being away that isn't over
+    for state in states:
+        at = since(first_day, state.time)
+        word = state.state.strip().lower()
+        if state.entity.startswith(_PEOPLE):
+            is_out = word in _OUT and state.entity == person
+            if left is not None and state.entity == person:
+                readings[left] = readings[left]._replace(end_us=at)
+                left = None
+            if is_out:
+                left = len(readings)
+                readings.append(Reading(at, at, AWAY, "", state.line))
+        elif word in _ON:
+            readings.append(Reading(at, at, state.entity, "", state.line))
+        elif word not in _OFF:
+            others["unavailable" if word in _UNKNOWN else state.entity] += 1
+    readings, notes = in_order(readings, path, sort=sort)
+    if gone := others.pop("unavailable", 0):
+        notes.append(f"{gone} states are unavailable or unknown and left out")
+    if others:
+        names = one_line(", ".join(sorted(others)[:5]), 200)
+        notes.append(f"{others.total()} states are neither on nor off and left out: {names}")
+    return ActivityLog(path, "states", first_day, tuple(readings), tuple(notes))
+
+
+def _in_order(path: Path, states: list[_State], *, sort: bool) -> list[_State]:
+    """Return states in order of time; a file may have one entity after the other.
+
+    Raises:
+        LogError: The times of an entity run backwards, and `sort` is off.
+    """
+    last: dict[str, datetime] = {}
+    for state in () if sort else states:
+        if state.time < last.get(state.entity, state.time):
+            raise LogError(
+                f"{path}, line {state.line}: the time of {state.entity} runs backwards there; check"
+                " the clock of the log, or put its lines in order of time by 'sort: true'"
+            )
+        last[state.entity] = state.time
+    return sorted(states, key=lambda state: state.time)
+
+
+def is_database(path: Path) -> bool:
+    """Return whether a file is a database of SQLite."""
+    with path.open("rb") as file:
+        return file.read(len(DATABASE)) == DATABASE
+
+
+def _person(path: Path, entities: set[str], name: str | None) -> str | None:
+    """Return the entity of the person.
+
+    Raises:
+        LogError: There are several people, or not the one that is named.
+    """
+    people = sorted(entity for entity in entities if entity.startswith("person."))
+    people = people or sorted(entity for entity in entities if entity.startswith(_PEOPLE))
+    if name is not None and name not in people:
+        raise LogError(f"{path} has no person {name!r}{suggest(name, people, 'It has')}")
+    if name is None and len(people) > 1:
+        raise LogError(f"{path} has several people: choose one by id: {', '.join(people)}")
+    return name or next(iter(people), None)
+
+
+def _table(path: Path) -> Iterator[tuple[str, str, datetime, int]]:
+    lines = [text for _, text in log_lines(path)]
+    mark = max(",;\t", key=lines[0].count) if lines else ","
+    rows = csv.reader(lines, delimiter=mark)
+    head = [name.strip().lower() for name in next(rows, [])]
+    columns = [_column(head, names) for names in (_ENTITIES, _VALUES, _TIMES)]
+    if min(columns) < 0:
+        raise LogError(f"{path}: expected columns like entity_id, state and last_changed in line 1")
+    for line, row in enumerate(rows, 2):
+        if len(row) <= max(columns):
+            raise LogError(f"{path}, line {line}: expected {len(head)} values, got {len(row)}")
+        entity, state, text = (row[column].strip() for column in columns)
+        yield entity, state, parse_time(text, path, line), line
+
+
+def _column(head: list[str], names: tuple[str, ...]) -> int:
+    """Return the place of the first of some names in a head; -1: none is there."""
+    return next((head.index(name) for name in names if name in head), -1)
+
+
+def _database(path: Path) -> Iterator[tuple[str, str, datetime, int]]:
+    check_file(path, LOG_BYTES, LogError)
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
+            begun = time.monotonic()
+            database.set_progress_handler(
+                lambda: time.monotonic() - begun > _MAX_SECONDS, _STEPS_BETWEEN
+            )
+            kinds = dict(database.execute("SELECT name, type FROM sqlite_master").fetchall())
+            names = {row[1] for row in database.execute("PRAGMA table_info(states)")}
+            query = next((text for column, text in _QUERIES.items() if column in names), None)
+            # A view could be any query, and never end.
+            if query is None or "view" in (kinds["states"], kinds.get("states_meta")):
+                raise LogError(f"{path} has no table of states, as Home Assistant's recorder has")
+            for number, (entity, state, at) in enumerate(database.execute(query), 1):
+                if number > LOG_ROWS.limit:
+                    LOG_ROWS.check(number, path, LogError, prefix="more than ")
+                if entity is not None and at is not None:
+                    moment = _moment(at, path, number)
+                    yield str(entity), "" if state is None else str(state), moment, number
+    except sqlite3.Error as error:
+        raise LogError(f"{path} can't be read: {error}") from None
+
+
+def _moment(at: object, path: Path, row: int) -> datetime:
+    """Return a time of a database: seconds since 1970, or text, in UTC."""
+    if not isinstance(at, int | float):
+        moment = parse_time(str(at), path, row)
+        return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    try:
+        return datetime.fromtimestamp(at, UTC)
+    except (ValueError, OverflowError, OSError):
+        raise LogError(f"{path}, row {row}: {at!r} is not a time") from None
+
+
+def _local(
+    path: Path, rows: Iterator[tuple[str, str, datetime, int]], time_zone: str | None
+) -> Iterator[_State]:
+    """Yield states with local times.
+
+    Raises:
+        LogError: Times have an offset and there is no time zone, or it is unknown.
+    """
+    zone = None
+    if time_zone is not None:
+        try:
+            zone = ZoneInfo(time_zone)
+        except (ZoneInfoNotFoundError, ValueError):
+            raise LogError(f"{path}: time_zone: there is no {time_zone!r}") from None
+    for entity, state, moment, line in rows:
+        if moment.tzinfo is not None and zone is None:
+            raise LogError(
+                f"{path}, line {line}: times have an offset: name the home's time_zone, such as"
+                " Europe/Berlin"
+            )
+        is_local = moment.tzinfo is None
+        local = moment if is_local else moment.astimezone(zone).replace(tzinfo=None)
+        yield _State(entity, state, local, line)

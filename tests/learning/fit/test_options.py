@@ -1,0 +1,70 @@
+"""Options of `fleet2d fit persona`: labels of sensors, silences, residents and time zones of a log."""
+
+from pathlib import Path
+
+import pytest
+
+from fleet2d.learning.fit.command import fit_routine
+from fleet2d.learning.fit.timeline import kinds_of, read_timeline
+from fleet2d.logs.layout import read_log
+from fleet2d.logs.log import ActivityLog, LogError
+
+
+def events(path: Path) -> ActivityLog:
+    """Return the log of four days with sensors that have no rooms."""
+    lines = []
+    for day in range(2, 6):
+        for hour, sensor, doing in ((0, "M003", "Sleeping"), (8, "M018", "Meal_Preparation")):
+            marks = [f" {doing} begin", *[""] * 46, f" {doing} end"]
+            for k, mark in enumerate(marks):
+                minute = k * 10
+                time = f"{hour + minute // 60:02}:{minute % 60:02}:00"
+                lines.append(f"2026-03-0{day} {time} {sensor} ON{mark}")
+    file = path / "data"
+    file.write_text("\n".join(lines) + "\n")
+    log = read_log(file)
+    assert isinstance(log, ActivityLog)
+    return log
+
+
+def test_labels_are_given_kinds_of_rooms(tmp_path: Path) -> None:
+    log = events(tmp_path)
+    timeline = read_timeline(log, {"M003": "bedroom", "M018": "kitchen"})
+    assert timeline.places == ("bedroom", "kitchen")
+    assert {"sleeping", "meal_preparation"} == {state.activity for state in timeline.states}
+
+
+def test_a_label_without_a_kind_is_left_out(tmp_path: Path) -> None:
+    log = events(tmp_path)
+    assert kinds_of(log, {"M018": ""}) == {"M003": ("m003",), "M018": None}
+    assert read_timeline(log, {"M018": ""}).places == ("m003",)
+
+
+def test_a_shorter_gap_leaves_more_unknown(tmp_path: Path) -> None:
+    from datetime import timedelta
+
+    log = events(tmp_path)
+    known = [
+        (read_timeline(log, {}, gap, timedelta(hours=still)).minutes >= 0).sum()
+        for gap, still in ((timedelta(hours=9), 12), (timedelta(minutes=15), 1))
+    ]
+    assert known[0] > known[1]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"rooms": ["M004=kitchen"]}, "the log has no label 'M004'.*M003"),
+        ({"rooms": ["M003"]}, "expected LABEL=KIND"),
+        ({"gap": "long"}, "duration"),
+        ({"id": "1"}, "takes no id"),
+        ({"layout": "caas"}, "--format: expected one of auto, casas"),
+    ],
+)
+def test_a_wrong_option_is_told_before_anything_is_written(
+    options: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "persona.yaml"
+    with pytest.raises(LogError, match=message):
+        fit_routine(events(tmp_path).path, out, **options)  # type: ignore[arg-type]
+    assert not out.exists()

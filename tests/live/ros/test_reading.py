@@ -1,0 +1,157 @@
+"""Messages of ROS: which are poses, goals and velocities, and what is odd about the others."""
+
+import contextlib
+import copy
+import math
+import random
+import time
+from typing import Any
+
+import pytest
+
+from fleet2d.errors import InputError
+from fleet2d.live.bridge import Content, PeerFault
+from fleet2d.live.messages import parse_message
+from fleet2d.live.ros.reading import contents_of, velocities_of
+
+
+def stamped(**header: Any) -> dict[str, Any]:
+    place = {"x": 1.0, "y": 2.0, "z": 0.0}
+    turn = {"x": 0.0, "y": 0.0, "z": 1.414, "w": 1.414}
+    return {"header": header, "pose": {"position": place, "orientation": turn}}
+
+
+def contents(message: object, kind: str = "pose") -> list[Content]:
+    return list(contents_of("ana", kind, "/ana/pose", message))
+
+
+@pytest.mark.parametrize("frame", ["map", "/map", "", "home/map"])
+def test_a_pose_in_the_map_is_a_pose(frame: str) -> None:
+    (content,) = contents(stamped(frame_id=frame))
+    assert content == {
+        "type": "pose",
+        "entity": "ana",
+        "x": 1.0,
+        "y": 2.0,
+        "heading_deg": pytest.approx(90),
+    }
+
+
+@pytest.mark.parametrize("frame", ["astro/base_link", "odom", "mapped", "/astro/odom"])
+def test_a_pose_in_another_frame_is_left_out_and_told(frame: str) -> None:
+    (fault,) = contents(stamped(frame_id=frame))
+    assert isinstance(fault, PeerFault)
+    assert (fault.kind, fault.is_message) == ("in other frames", True)
+    assert fault.text.startswith(f"/ana/pose is in the frame {frame.lstrip('/')!r}: ")
+
+
+def test_the_stamp_is_the_time_of_a_pose() -> None:
+    now = int(time.time()) - 3600
+    for stamp in ({"sec": now, "nanosec": 500_000_000}, {"secs": now, "nsecs": 500_000_000}):
+        (content,) = contents(stamped(frame_id="map", stamp=stamp))
+        assert isinstance(content, dict)
+        assert content["time"] == now + 0.5
+
+
+def test_the_stamp_0_means_now_and_a_simulated_clock_is_told() -> None:
+    assert "time" not in str(contents(stamped(stamp={"sec": 0, "nanosec": 0})))
+    fault, content = contents(stamped(stamp={"sec": 12, "nanosec": 0}))
+    assert isinstance(fault, PeerFault)
+    assert (fault.kind, fault.is_message) == ("of a simulated clock", False)
+    assert "time" not in str(content)
+
+
+def test_a_goal_keeps_its_orientation() -> None:
+    (content,) = contents(stamped(frame_id="map"), "goal")
+    goal: Any = parse_message(content)  # type: ignore[arg-type]
+    assert (goal.to, goal.heading_deg) == ((1.0, 2.0), pytest.approx(90))
+
+
+@pytest.mark.parametrize("turn", [{"z": 0, "w": 0}, {"z": None, "w": 1}, {"z": math.nan}, {}])
+def test_a_quaternion_that_says_nothing_is_no_heading(turn: dict[str, Any]) -> None:
+    message = stamped(frame_id="map")
+    message["pose"]["orientation"] = turn
+    fault, content = contents(message)
+    assert isinstance(fault, PeerFault)
+    assert fault.kind == "without heading"
+    assert "heading_deg" not in str(content)
+
+
+@pytest.mark.parametrize(
+    ("message", "why"),
+    [
+        ({}, "pose: Field required"),
+        ({"pose": None}, "pose: Input should be a valid dictionary"),
+        ({"pose": {"position": {}}}, "pose.position.x: Field required"),
+        ({"pose": {"position": {"x": "a", "y": 1}}}, "pose.position.x: Input should be a valid n"),
+        ("text", "Input should be a valid dictionary"),
+        ([1], "Input should be a valid dictionary"),
+    ],
+)
+def test_a_message_without_a_pose_is_wrong(message: object, why: str) -> None:
+    (fault,) = contents(message)
+    assert isinstance(fault, PeerFault)
+    assert (fault.kind, fault.is_message) == ("wrong", True)
+    assert fault.text.startswith(f"/ana/pose: {why}")
+
+
+ODD = (None, "", "x", 1e308, -1e308, math.nan, math.inf, 10**400, -1, [], {}, [[]], True, "\x1b[2J")
+
+
+def mutated(message: Any, draw: random.Random) -> Any:
+    """Return a message with one value removed, replaced, or moved below an odd key."""
+    message = copy.deepcopy(message)
+    place = message
+    while isinstance(place, dict) and place:
+        key = draw.choice(list(place))
+        if not isinstance(place[key], dict) or draw.random() < 0.3:
+            change = draw.randrange(3)
+            value = place.pop(key)
+            if change:
+                place[key if change == 1 else "odd"] = draw.choice(ODD) if change == 1 else value
+            break
+        place = place[key]
+    return message
+
+
+def test_no_mutation_of_a_message_is_more_than_a_fault() -> None:
+    draw = random.Random(5)
+    stamp = {"sec": int(time.time()), "nanosec": 1}
+    message: Any = stamped(frame_id="map", stamp=stamp)
+    for _ in range(1000):
+        odd = mutated(message, draw)
+        odd = mutated(odd, draw) if draw.random() < 0.5 else odd
+        for content in contents(odd, draw.choice(["pose", "goal"])):
+            if not isinstance(content, PeerFault):
+                with contextlib.suppress(InputError):
+                    parse_message(content)  # type: ignore[arg-type]
+
+
+def test_a_stamp_near_the_simulated_time_is_of_its_clock() -> None:
+    """Programs that use_sim_time stamp so: by the clock on the wall these would be days late."""
+    now_ns = 1_767_614_400 * 10**9
+    near = stamped(frame_id="map", stamp={"sec": now_ns // 10**9 - 60, "nanosec": 0})
+    (content,) = contents_of("ana", "goal", "/ana/goal_pose", near, now_ns)
+    assert "time" not in str(content)
+
+
+@pytest.mark.parametrize("is_stamped", [False, True])
+def test_a_twist_is_a_velocity(is_stamped: bool) -> None:
+    twist = {"linear": {"x": 0.2, "y": -0.1, "z": 9.0}, "angular": {"z": math.pi / 2}}
+    message = {"header": {}, "twist": twist} if is_stamped else twist
+    (content,) = velocities_of("astro", "/astro/cmd_vel", message)
+    assert content == {
+        "type": "velocity",
+        "entity": "astro",
+        "forward": 0.2,
+        "left": -0.1,
+        "turn_deg": pytest.approx(90),
+    }
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, None, "fast"])
+def test_a_velocity_that_is_no_finite_number_is_wrong(number: object) -> None:
+    (fault,) = velocities_of("astro", "/astro/cmd_vel", {"linear": {"x": number}})
+    assert isinstance(fault, PeerFault)
+    assert (fault.kind, fault.is_message) == ("wrong", True)
+    assert fault.text.startswith("/astro/cmd_vel: linear.x: ")

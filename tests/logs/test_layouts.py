@@ -1,0 +1,364 @@
+"""Layouts of published smart homes: generated logs equal their truth, real ones are read whole."""
+
+import random
+import sqlite3
+from collections.abc import Callable
+from datetime import date, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fleet2d
+from fleet2d.logs.layout import read_log
+from fleet2d.logs.layouts.aras import ACTIVITIES
+from fleet2d.logs.log import AWAY, ActivityLog, LogError
+from fleet2d.logs.placement import map_rooms
+
+S = 1_000_000
+DAY = datetime(2026, 3, 2)
+Stay = tuple[int, int, str, str]  # begin and end [s since midnight of DAY], room, activity
+ROOMS = ("kitchen", "bedroom", "bathroom", "living_room")
+DOINGS = {"kitchen": "Cook", "bedroom": "Sleep", "bathroom": "Wash", "living_room": "Read"}
+
+
+# A few lines of each.
+EVENTS = """\
+2026-03-02 08:00:00.5 bedroom ON Sleep begin
+2026-03-02 09:00:00 bedroom OFF Sleep end
+2026-03-02 09:10:00 T001 21.5
+2026-03-02 09:12:00 kitchen ON
+"""
+KASTEREN = """\
+02-Mar-2026 08:00:00\t02-Mar-2026 08:00:03\t24
+02-Mar-2026 08:10:00\t02-Mar-2026 09:00:03\t5
+"""
+MIT = """\
+Toileting,3/2/2026,08:00:00,08:10:00
+100,68
+Toilet Flush,Kitchen light
+08:01:00,08:02:00
+08:01:10,08:09:00
+"""
+OPENSHS = """\
+kitchenCarp,bedroomLight,Activity,timestamp
+0,1,sleep,2026-03-02 08:00:00
+1,0,eat,2026-03-02 08:00:01
+"""
+STATES = """\
+entity_id,state,last_changed
+binary_sensor.kitchen,on,2026-03-02 08:00:00
+person.ana,not_home,2026-03-02 09:00:00
+binary_sensor.kitchen,unavailable,2026-03-02 10:00:00
+"""
+
+
+def lives(seed: int, days: int = 2) -> list[Stay]:
+    """Return the truth: stays in rooms and out of the home, one after the other."""
+    draw = random.Random(seed)
+    stays: list[Stay] = []
+    at = draw.randrange(600)
+    room = ""
+    while at < days * 86_400:
+        end = min(at + draw.randrange(120, 7200), days * 86_400)
+        if draw.random() < 0.15 and room != AWAY:
+            stays.append((at, end, AWAY, "Leave_Home"))
+            room = AWAY
+        else:
+            room = draw.choice([name for name in ROOMS if name != room])
+            stays.append((at, end, room, DOINGS[room]))
+        at = end
+    return stays
+
+
+def stamp(second: int, text: str = "%Y-%m-%d %H:%M:%S") -> str:
+    return (DAY + timedelta(seconds=second)).strftime(text)
+
+
+def casas(stays: list[Stay], path: Path) -> Path:
+    lines = []
+    for begin, end, room, doing in stays:
+        if room == AWAY:
+            continue
+        mark = f" {doing} begin"
+        for second in range(begin, end, 60):
+            lines.append(f"{stamp(second)}.25 {room} ON{mark}")
+            lines.append(f"{stamp(min(second + 5, end - 1))}.5 {room} OFF")
+            mark = ""
+        lines.append(f"{stamp(end - 1)}.75 {room} OFF {doing} end")
+    return written(path / "data", lines)
+
+
+def kasteren(stays: list[Stay], path: Path) -> Path:
+    text = "%d-%b-%Y %H:%M:%S"
+    names = {room: k for k, room in enumerate(ROOMS, 5)}
+    doings = {doing: k for k, doing in enumerate([*DOINGS.values(), "leave-house"], 14)}
+    sensors, activities = [], []
+    for begin, end, room, doing in stays:
+        number = doings["leave-house" if room == AWAY else doing]
+        activities.append(f"{stamp(begin, text)}\t{stamp(end, text)}\t{number}")
+        if room != AWAY:
+            sensors.append(f"{stamp(begin, text)}\t{stamp(end - 1, text)}\t{names[room]}\t")
+    written(path / "kast_houseB-as.txt", activities)
+    written(path / "kast_sensorMapB-ids.txt", [f"{n},pressure mat {r},x" for r, n in names.items()])
+    written(path / "kast_actionMapB.txt", [f"{n},{doing}" for doing, n in doings.items()])
+    return written(path / "kast_houseB-ss.txt", sensors)
+
+
+def mit(stays: list[Stay], path: Path) -> Path:
+    rows = []
+    for begin, end, room, doing in stays:
+        times = [stamp(second, "%H:%M:%S") for second in range(begin, min(end, begin + 600), 60)]
+        name = "Leave home" if room == AWAY else doing
+        day = f"{(DAY + timedelta(seconds=begin)):%-m/%-d/%Y}"
+        rows.append(f"{name},{day},{stamp(begin, '%H:%M:%S')},{stamp(end, '%H:%M:%S')}")
+        number = "0" if room == AWAY else str(100 + ROOMS.index(room))
+        switches = times[:1] if room == AWAY else times
+        rows.append(",".join([number] * len(switches)))
+        rows += [",".join(["thing"] * len(switches)), ",".join(switches), ",".join(switches)]
+    rooms = [f"{100 + k},{room},thing" for k, room in enumerate(ROOMS)]
+    written(path / "sensors.csv", [*rooms, "0,door,Door"])
+    return written(path / "activities_data.csv", rows)
+
+
+CODES = {"Cook": 3, "Sleep": 11, "Wash": 14, "Read": 18, "Leave_Home": 2}
+
+
+def aras(stays: list[Stay], path: Path) -> Path:
+    codes = [1] * (2 * 86_400)
+    for begin, end, _, doing in stays:
+        codes[begin:end] = [CODES[doing]] * (end - begin)
+    for day in range(2):
+        seconds = codes[day * 86_400 : (day + 1) * 86_400]
+        written(path / f"DAY_{day + 1}.txt", [f"{'0 ' * 20}27 {code}" for code in seconds])
+    return path
+
+
+def openshs(stays: list[Stay], path: Path) -> Path:
+    head = [*(f"{room}Carp" for room in ROOMS), "mainDoor", "Activity", "timestamp"]
+    rows = []
+    for begin, end, room, doing in stays:
+        for second in range(begin, end, 10):
+            on = ["1" if room == name else "0" for name in ROOMS]
+            rows.append(",".join([*on, "0", doing, stamp(second)]))
+    return written(path / "d1.csv", [",".join(head), *rows])
+
+
+def table_of_states(stays: list[Stay], path: Path) -> Path:
+    rows = ["entity_id;state;last_changed"]
+    for begin, end, room, _ in stays:
+        if room == AWAY:
+            rows.append(f"person.ana;not_home;{stamp(begin)}")
+            rows.append(f"person.ana;home;{stamp(end)}")
+            continue
+        for second in range(begin, end, 60):
+            rows.append(f"binary_sensor.{room}_motion;on;{stamp(second)}")
+            rows.append(f"binary_sensor.{room}_motion;off;{stamp(min(second + 5, end - 1))}")
+    return written(path / "history.csv", rows)
+
+
+def database(stays: list[Stay], path: Path, *, is_old: bool = False) -> Path:
+    file = path / "home-assistant_v2.db"
+    table = path / "t"
+    table.mkdir()
+    rows = [line.split(";") for line in table_of_states(stays, table).read_text().splitlines()[1:]]
+    with sqlite3.connect(file) as db:
+        if is_old:
+            db.execute(
+                "CREATE TABLE states (state_id INTEGER PRIMARY KEY, entity_id TEXT, state TEXT,"
+                " last_changed TEXT, last_updated TEXT)"
+            )
+            rows = [[entity, state, None, f"{time}.000000"] for entity, state, time in rows]
+            db.executemany(
+                "INSERT INTO states(entity_id, state, last_changed, last_updated) VALUES (?,?,?,?)",
+                rows,
+            )
+        else:
+            db.execute("CREATE TABLE states_meta (metadata_id INTEGER PRIMARY KEY, entity_id TEXT)")
+            db.execute(
+                "CREATE TABLE states (state_id INTEGER PRIMARY KEY, metadata_id INTEGER, state TEXT,"
+                " last_changed_ts FLOAT, last_updated_ts FLOAT)"
+            )
+            entities = sorted({row[0] for row in rows})
+            db.executemany("INSERT INTO states_meta VALUES (?,?)", list(enumerate(entities, 1)))
+            for entity, state, time in rows:
+                seconds = (datetime.fromisoformat(time) - datetime(1970, 1, 1)).total_seconds()
+                db.execute(
+                    "INSERT INTO states(metadata_id, state, last_updated_ts) VALUES (?,?,?)",
+                    (entities.index(entity) + 1, state, seconds),
+                )
+    db.close()
+    return file
+
+
+def old_database(stays: list[Stay], path: Path) -> Path:
+    return database(stays, path, is_old=True)
+
+
+def written(path: Path, lines: list[str]) -> Path:
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+Writer = Callable[[list[Stay], Path], Path]
+LAYOUTS: dict[str, tuple[Writer, dict[str, Any]]] = {
+    "casas": (casas, {}),
+    "kasteren": (kasteren, {}),
+    "mit": (mit, {}),
+    "aras": (aras, {"id": "2"}),
+    "openshs": (openshs, {}),
+    "states": (table_of_states, {}),
+    "database": (database, {"time_zone": "UTC"}),
+    "old database": (old_database, {"time_zone": "UTC"}),
+}
+# What stands in each layout for the rooms: labels of sensors, or activities.
+OF_ACTIVITY = {doing: room for room, doing in DOINGS.items()} | {
+    ACTIVITIES[CODES[doing] - 1]: room for room, doing in DOINGS.items()
+}
+
+
+def room_of(label: str) -> str:
+    named = (room for room in ROOMS if room in label)
+    return OF_ACTIVITY.get(label) or next(named, label)
+
+
+def at(log: ActivityLog, second: int) -> tuple[str, str]:
+    """Return the room and activity that a log shows last up to a moment."""
+    last = [reading for reading in log.readings if reading.begin_us <= second * S][-1]
+    return room_of(last.room), last.activity
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("seed", range(3))
+def test_rooms_stays_and_activities_equal_the_truth(name: str, seed: int, tmp_path: Path) -> None:
+    write, keys = LAYOUTS[name]
+    stays = lives(seed)
+    log = read_log(write(stays, tmp_path), **keys)
+
+    assert isinstance(log, ActivityLog)
+    assert log.layout == ("states" if "database" in name else name)
+    assert log.first_day in (None, date(2026, 3, 2))
+    has_absence = name != "casas"
+    has_activity = name not in ("states", "database", "old database")
+    for begin, end, room, doing in stays:
+        middle = begin + min(30, (end - begin) // 2)
+        if room == AWAY and not has_absence:
+            continue
+        found, activity = at(log, middle)
+        assert found == room, (begin, end)
+        if has_activity and room != AWAY and name != "aras":
+            assert activity == doing
+
+
+def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path: Path) -> None:
+    for name in ("kasteren", "mit", "aras"):
+        folder = tmp_path / name
+        folder.mkdir()
+        write, keys = LAYOUTS[name]
+        write(lives(5), folder)
+        assert read_log(folder, **keys).layout == name
+
+
+def test_an_absence_of_days_is_normal(tmp_path: Path) -> None:
+    lines = ["02-Mar-2026 08:00:00\t06-Mar-2026 20:00:00\t1"]
+    written(tmp_path / "kast_actionMapB.txt", ["1,leave-house"])
+    log = read_log(written(tmp_path / "kast_houseB-as.txt", lines))
+    assert isinstance(log, ActivityLog)
+    assert [(r.room, (r.end_us - r.begin_us) // (3600 * S)) for r in log.readings] == [(AWAY, 108)]
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "message"),
+    [
+        ("data", "2026-03-02 08:00:00 M001 ON\n2026-03-02 08:00 M001", "line 2: expected date, time"),
+        ("a-ss.txt", "25-Feb-2008 00:19:32\t25-Feb-2008 00:21:24\t17\nx", "line 2: expected a begin"),
+        ("a-ss.txt", "25-Fib-2008 00:19:32\t25-Feb-2008 00:21:24\t17", "is not a time"),
+        ("a.csv", "Toileting,4/1/2003,17:30:36,17:46:41\n100,68\nFlush,Light\n17:39:37", "block of five"),
+        ("a.csv", "Eat,14/1/2003,17:30:36,17:46:41\n1\nx\n17:39:37\n17:39:38", "no such time"),
+        ("a.txt", f"{'0 ' * 20}28 1", "two activities from 1 to 27"),
+        ("a.csv", "bedCarp,Activity,timestamp\n2,sleep,2016-04-01 08:00:00", "0 or 1 for sensors"),
+        ("a.csv", "entity_id,state,last_changed\na,on", "line 2: expected 3 values, got 2"),
+        ("a.csv", "entity_id,state,last_changed\na,on,yesterday", "expected a time like"),
+        ("a.csv", "entity_id,state,last_changed\na,on,2026-03-02T08:00:00Z", "name the home's time_zone"),
+        (
+            "a.csv",
+            "device,value,time\nperson.a,home,2026-03-02 08:00\nperson.b,home,2026-03-02 08:00",
+            "several people: choose one by id: person.a, person.b",
+        ),
+    ],
+)  # fmt: skip
+def test_a_damaged_log_is_refused_with_the_line(
+    tmp_path: Path, name: str, line: str, message: str
+) -> None:
+    keys = {"id": "1"} if "28 1" in line else {}
+    with pytest.raises(LogError, match=message):
+        read_log(written(tmp_path / name, line.split("\n")), **keys)
+
+
+def test_two_residents_are_chosen_by_id(tmp_path: Path) -> None:
+    aras(lives(1), tmp_path)
+    with pytest.raises(LogError, match="two people live there"):
+        read_log(tmp_path)
+    other = read_log(tmp_path, id="1")
+    assert isinstance(other, ActivityLog)
+    assert set(other.rooms) == {"Changing Clothes"}
+
+
+def test_a_database_of_something_else_is_refused(tmp_path: Path) -> None:
+    """A view could be any query: this one never ends."""
+    endless = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n)"
+    for number, statement in enumerate(
+        (
+            "CREATE TABLE other (x)",
+            f"CREATE VIEW states AS {endless} SELECT k AS entity_id, 'on' AS state,"
+            " k AS last_changed, k AS last_updated, k AS state_id FROM n",
+        )
+    ):
+        file = tmp_path / f"{number}.db"
+        with sqlite3.connect(file) as db:
+            db.execute(statement)
+        db.close()
+        with pytest.raises(LogError, match="has no table of states"):
+            read_log(file)
+    broken = tmp_path / "broken.db"
+    broken.write_bytes(b"SQLite format 3\0" + bytes(200))
+    with pytest.raises(LogError, match="can't be read"):
+        read_log(broken)
+
+
+@pytest.mark.parametrize(
+    ("label", "room"),
+    [
+        ("binary_sensor.kitchen_motion", "kitchen"),
+        ("Hall-Bedroom door", "bedroom"),
+        ("Front door", "door"),
+        ("Groceries Cupboard", "kitchen"),
+        ("livingCarp", "living_room"),
+        ("sensor.office_3_presence", "office"),
+        ("Washing machine", "laundry"),
+    ],
+)
+def test_labels_are_taken_for_the_rooms_that_their_words_name(label: str, room: str) -> None:
+    rooms = fleet2d.load_floorplan().rooms
+    (choice,) = map_rooms({label: 1}, {}, rooms)[label] or ("none",)
+    assert choice.startswith(room)
+
+
+@pytest.mark.parametrize("label", ["M003", "door", "sensor.x"])
+def test_labels_without_such_words_are_asked_for(label: str) -> None:
+    rooms = fleet2d.load_floorplan().rooms
+    if label == "door":
+        assert map_rooms({label: 1}, {}, rooms)[label] == ("door",)
+        return
+    with pytest.raises(LogError, match="no room of this home stands for"):
+        map_rooms({label: 1}, {}, rooms)
+
+
+@pytest.mark.parametrize(("home", "days", "absences"), [("A", 28, 33), ("C", 20, 47)])
+def test_real_homes_of_kasteren_are_read_whole(
+    shared_data: Path, home: str, days: int, absences: int
+) -> None:
+    log = read_log(shared_data / "activity" / "kasteren" / f"kast_house{home}-ss.txt")
+    assert isinstance(log, ActivityLog)
+    assert (log.days, log.rooms[AWAY]) == (days, absences)
+    assert {"sleeping", "take-shower", "prep-dinner"} <= {r.activity for r in log.readings}
