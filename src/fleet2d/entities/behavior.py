@@ -417,6 +417,7 @@ class Actor(Body):
         plan: The plan that it follows.
         motion: The motion of that plan.
         planned_at: The step at which it began the plan.
+        off_for: Why it is off, as `SetPower.state` says; None: it is on.
     """
 
     behaviors: list[Behavior] = field(init=False)
@@ -438,6 +439,7 @@ class Actor(Body):
                 behavior.start(self)
             self._find_attention()
         self.command: Command | None = None
+        self.off_for: str | None = None
         self.bans: dict[int, int] = {}
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
@@ -451,6 +453,11 @@ class Actor(Body):
         """Replace a behavior, by its number, with another one that was started."""
         self.behaviors[number] = behavior
         self._find_attention()
+
+    @property
+    def is_off(self) -> bool:
+        """Whether it is off: it neither moves, nor sees, nor hears."""
+        return self.off_for is not None
 
     def banned(self, step: int) -> frozenset[int]:
         """Return the indices of the rooms that it is told to keep out of at a step."""

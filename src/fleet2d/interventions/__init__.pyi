@@ -83,6 +83,16 @@ class KeepOut(robots.KeepOut):
 class SetBattery(robots.SetBattery):
     def __init__(self, entity: str, charge: float | str) -> None: ...
 
+class SetPower(robots.SetPower):
+    def __init__(
+        self,
+        entity: str,
+        *,
+        duration: Time | None = ...,
+        state: robots.PowerState = ...,
+        ends: robots.PowerState | None = ...,
+    ) -> None: ...
+
 class SwitchOff(robots.SwitchOff):
     def __init__(
         self,

@@ -1,0 +1,414 @@
+"""Power: robots that are switched off, crash, update or run empty, and what they know afterwards."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.scenes import AGENDA, digests, path, run, scenario, table
+
+import fleet2d
+from fleet2d.engine.repeat import reproduce, resume
+from fleet2d.errors import ScenarioError
+from fleet2d.runs.run import Run
+
+PATROL = {"type": "patrol", "dwell": "10 s"}
+CAMERA = {"range": [0.3, 5], "angle_deg": 200}
+BATTERY = {"driving": "20 min", "standing": "2 h", "charging": "1 h", "charger": [1.0, 3.0]}
+PILL = {"do": "remind", "to": "ana", "at": ["07:10"], "within": "3 h", "worth": 4, "takes": "2 min"}
+READS = [{"on": "daily", "items": [{"at": "00:10", "place": "kitchen", "activity": "read"}]}]
+LEARNERS = {
+    "ltp": {"type": "ltp", "period": "5 min"},
+    "rtp": {"type": "rtp", "period": "5 min"},
+}
+
+
+def home(*script: dict[str, Any], duration: str = "1 h", **changes: Any) -> dict[str, Any]:
+    robot = {"camera": CAMERA, "behaviors": [PATROL], **changes.pop("astro", {})}
+    return scenario(
+        duration,
+        users={"ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"}},
+        robots={"astro": robot, **changes.pop("robots", {})},
+        script=list(script),
+        **changes,
+    )
+
+
+def events(stored: Run, *kinds: str, entity: str = "astro") -> list[tuple[int, str, str]]:
+    rows = table(stored, "events", entity=entity)
+    columns = (rows["step"], rows["event"], rows["detail"])
+    found = [(int(s), str(e), str(d)) for s, e, d in zip(*columns, strict=True)]
+    return [event for event in found if event[1] in kinds]
+
+
+POWER = ("power_off", "power_on")
+
+
+def same_for_every_span(content: dict[str, Any], *spans: int) -> Run:
+    whole = run(content)
+    for span in spans or (1, 37):
+        assert digests(whole) == digests(run(content, f"simulation.max_span={span}")), span
+    return whole
+
+
+def is_off(stored: Run, steps: Any) -> Any:
+    """Whether astro is off at some steps."""
+    ends = [step for step, *_ in events(stored, *POWER)]
+    return np.searchsorted(ends, steps, side="right") % 2 == 1
+
+
+@pytest.mark.parametrize(
+    ("act", "reason", "lasts"),
+    [
+        ({"power": "astro", "duration": "10 min"}, "off", 600),
+        ({"power": "astro", "state": "off"}, "off", None),
+        ({"power": "astro", "state": "crash"}, "crash", 60),
+        ({"power": "astro", "state": "update"}, "update", 900),
+        ({"power": "astro", "state": "crash", "duration": "2 min"}, "crash", 120),
+    ],
+)
+def test_a_robot_that_is_off_neither_moves_nor_sees_until_it_is_on_again(
+    act: dict[str, Any], reason: str, lasts: int | None
+) -> None:
+    stored = same_for_every_span(home({"at": "07:03:07", **act}))
+    expected = [(187, "power_off", reason)]
+    if lasts is not None:
+        expected.append((187 + lasts, "power_on", reason))
+
+    assert expected == events(stored, *POWER)
+    poses = path(stored, "astro")
+    moves = np.flatnonzero(np.hypot(np.diff(poses.x), np.diff(poses.y)) > 0)
+    assert not is_off(stored, moves).any()
+    assert (moves < 187).any()
+    assert (moves > 187 + (lasts or 4000)).any() == (lasts is not None)
+    assert not is_off(stored, table(stored, "observations")["step"]).any()
+
+
+def test_it_goes_on_where_it_stopped_and_has_forgotten_what_it_was_doing() -> None:
+    stored = run(home({"at": "07:03:07", "power": "astro", "duration": "10 min"}))
+    whole = run(home())
+    poses = path(stored, "astro")
+
+    assert (poses.x[187], poses.y[187]) == (poses.x[786], poses.y[786])
+    assert not np.array_equal(path(whole, "astro").x[188:400], poses.x[788:1000])
+    assert np.array_equal(path(whole, "ana").x, path(stored, "ana").x), "lives don't change"
+
+
+@pytest.mark.parametrize(
+    ("script", "times"),
+    [
+        # Two reasons at once: it is on when both are over.
+        (
+            [
+                {"at": "07:05", "power": "astro", "duration": "10 min"},
+                {"at": "07:10", "power": "astro", "state": "update", "duration": "20 min"},
+            ],
+            [300, 1800],
+        ),
+        ([{"at": "07:05", "power": "astro"}, {"at": "07:20", "power": "astro", "state": "on"}], [300, 1200]),
+        ([{"at": "07:05", "power": "astro"}, {"at": "07:20", "restore": "astro"}], [300, 1200]),
+        ([{"at": "07:05", "power": "astro", "state": "on"}], []),
+        (
+            [
+                {"at": "07:05", "power": "astro"},
+                {"at": "07:06", "power": "astro", "state": "crash"},
+                {"at": "07:20", "power": "astro", "state": "on"},
+            ],
+            [300, 1200],
+        ),
+        # An outage at the first step.
+        ([{"at": "0 s", "power": "astro", "duration": "1 min"}], [0, 60]),
+        ([{"on": ["power_off", "astro"], "delay": "30 s", "power": "astro", "state": "on"}, {"at": "07:05", "power": "astro"}], [300, 330]),
+    ],
+)  # fmt: skip
+def test_when_it_is_off(script: list[dict[str, Any]], times: list[int]) -> None:
+    stored = same_for_every_span(home(*script), 1)
+
+    assert times == [step for step, *_ in events(stored, *POWER)]
+
+
+def test_nobody_who_is_in_view_stays_in_view_of_a_robot_that_is_off() -> None:
+    astro = {"camera": {**CAMERA, "latency": "3 s"}, "start": "kitchen", "type": "follow", "user": "ana"}
+    astro.pop("behaviors", None)
+    content = home({"at": "07:15", "power": "astro", "duration": "2 min"}, astro={**astro, "behaviors": [{"type": "follow", "user": "ana"}]} | {"type": None} if False else {"camera": {**CAMERA, "latency": "3 s"}, "start": "kitchen", "behaviors": [{"type": "follow", "user": "ana"}]})  # fmt: skip
+    stored = same_for_every_span(content)
+    lost = [step for step, *_ in events(stored, "user_lost")]
+    seen = table(stored, "observations")["step"]
+
+    assert 900 in lost, "at once"
+    assert (seen[seen < 900] > 890).any()
+    assert not ((seen >= 900) & (seen < 1020 + 3)).any()
+
+
+def test_an_empty_battery_switches_it_off_and_the_charger_on_again() -> None:
+    """Somebody carries it to its charger: it is on again with 5 %, and lost for a minute."""
+    put = {"at": "08:00", "put": "astro", "to": BATTERY["charger"]}
+    content = home(put, duration="2 h", astro={"battery": BATTERY}, metrics={"battery": {}, "uptime": {}})
+    stored = same_for_every_span(content)
+    (off, *_), (on, *_) = events(stored, *POWER)
+
+    assert [(off, "power_off", "empty"), (on, "power_on", "empty")] == events(stored, *POWER)
+    assert 0.05 * 3600 == pytest.approx(on - 3600, abs=2)
+    assert [(on + 1, "localization_lost", "")] == events(stored, "localization_lost")
+    assert [(on + 61, "relocalized", "")] == events(stored, "relocalized")
+    poses = path(stored, "astro")
+    assert np.ptp(poses.x[on + 62 :]) > 1
+    assert {"on": 1 - (on - off) / 7200, "longest": on - off, "empty": 12.0} == stored.metrics["uptime"]["astro"]
+
+
+def test_a_charge_that_is_set_lets_an_empty_robot_go_on_at_once() -> None:
+    charge = {"at": "08:00", "battery": "astro", "charge": "50 %"}
+    stored = same_for_every_span(home(charge, duration="2 h", astro={"battery": BATTERY}), 1)
+
+    assert [3600] == [step for step, *_ in events(stored, "power_on")]
+    assert np.ptp(path(stored, "astro").x[3601:3700]) > 1
+
+
+def test_switching_an_empty_robot_on_does_not_help() -> None:
+    on = {"at": "08:00", "power": "astro", "state": "on"}
+    stored = run(home(on, duration="2 h", astro={"battery": BATTERY}))
+
+    assert [] == events(stored, "power_on")
+
+
+def test_the_charge_does_not_fall_while_it_is_off() -> None:
+    simulation = fleet2d.Simulation(
+        home({"at": "07:05", "power": "astro", "duration": "30 min"}, astro={"battery": BATTERY})
+    )
+    simulation.expect("always(battery(astro) > 73 %, within=5..35 min)", "keeps")
+    simulation.expect("eventually(battery(astro) < 60 %)", "falls again")
+    simulation.run()
+
+    assert simulation.verdicts()["keeps"].holds
+    assert simulation.verdicts()["falls again"].holds
+
+
+@pytest.mark.parametrize(("persists", "keeps"), [(None, True), (["ltp", "place"], True), (["place"], False)])
+def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(persists: Any, keeps: bool) -> None:
+    power = {"at": "07:25", "power": "astro", "duration": "10 min"}
+    content = home(power, algorithms=LEARNERS, astro={"power": {"persists": persists}})
+    stored = same_for_every_span(content, 1)
+    rows = table(stored, "ltp", user="anyone")
+    before, after = (rows["share"][rows["step"] == step] for step in (1499, 2399))
+    whole = table(run(home(algorithms=LEARNERS)), "ltp", user="anyone")
+
+    assert np.array_equal(before, whole["share"][whole["step"] == 1499])
+    assert (np.abs(after - before).max() < 0.2) == keeps
+
+
+@pytest.mark.parametrize("model", ["hmm", "last_seen", "learned", "semi_markov", "hour_of_week"])
+def test_real_time_presence_begins_anew_after_a_time_off(model: str) -> None:
+    """What was seen in the same period before the crash is forgotten, too."""
+    crash = {"at": "07:13", "power": "astro", "state": "crash"}
+    rtp = {"type": "rtp", "period": "5 min", "model": model}
+    content = home(crash, algorithms={"rtp": rtp}, metrics={"rtp_score": {"of": "rtp", "period": "5 min"}})
+    content["users"]["ana"]["days"] = READS
+    content["robots"]["astro"] |= {"start": "kitchen", "camera": {"range": [0.3, 5], "angle_deg": 360}, "behaviors": [{"type": "patrol", "waypoints": [[7.0, 1.0]], "dwell": "1 d"}]}
+    content["script"].append({"at": "07:14", "put": "astro", "to": "bathroom"})
+    content["script"].append({"at": "07:14", "hold": "astro"})
+    stored = run(content)
+    rows = table(stored, "rtp", user="ana", room="kitchen_0")
+    share = dict(zip(rows["step"].tolist(), rows["share"].tolist(), strict=True))
+
+    assert share[599] > 0.9
+    assert share[899] < 0.5
+
+
+def test_several_robots_lose_what_they_know_only_when_none_is_on() -> None:
+    off = {"at": "07:13", "power": "astro", "duration": "5 min"}
+    bolt = {"bolt": {"camera": CAMERA, "behaviors": [PATROL]}}
+    one, both = (
+        run(home(off, *more, robots=bolt, algorithms=LEARNERS))
+        for more in ((), ({**off, "power": "bolt"},))
+    )
+
+    def forgets(stored: Run) -> bool:
+        rows = table(stored, "rtp", user="ana")
+        last = rows["share"][rows["step"] == 1199]
+        return bool(np.ptp(last[:-1]) < 0.3)
+
+    assert (False, True) == (forgets(one), forgets(both))
+
+
+def test_the_map_is_lost_unless_it_persists() -> None:
+    layers = {"explored": {}}
+    shares = []
+    for persists in (["place"], ["place", "map"]):
+        content = home({"at": "07:40", "power": "astro"}, {"at": "07:59:30", "power": "astro", "state": "on"}, astro={"power": {"persists": persists}})
+        content["floorplan"]["layers"] = layers
+        simulation = fleet2d.Simulation(content)
+        simulation.run()
+        shares.append(float(simulation.home.layers["explored.astro"].values.mean()))
+
+    assert shares[0] < shares[1]
+
+
+@pytest.mark.parametrize("relocalizes", [None, "20 s"])
+def test_a_robot_that_keeps_no_place_is_lost_at_first(relocalizes: str | None) -> None:
+    astro = {"power": {"persists": ["map"]}, "localization": {"drift": "1 cm", "relocalizes": relocalizes}}
+    stored = same_for_every_span(home({"at": "07:05", "power": "astro", "duration": "5 min"}, astro=astro))
+
+    assert [601] == [step for step, *_ in events(stored, "localization_lost")]
+    assert [621 if relocalizes else 661] == [step for step, *_ in events(stored, "relocalized")]
+
+
+def test_crashes_come_from_the_robots_own_stream() -> None:
+    power = {"crashes": {"per_day": 12, "lasts": "2 min"}}
+    stored = same_for_every_span(home(duration="1 d", astro={"power": power}), 5000)
+    again = run(home(duration="1 d", astro={"power": power}, robots={"bolt": {"type": "patrol"}}))
+    other = run(home(duration="1 d", astro={"power": power}), "simulation.seed=5")
+
+    assert 5 <= len(events(stored, "power_off")) <= 12
+    assert events(stored, *POWER) == events(again, *POWER)
+    assert events(stored, *POWER) != events(other, *POWER)
+    assert {"crash"} == {detail for *_, detail in events(stored, *POWER)}
+
+
+def test_updates_are_at_night_and_so_many_days_apart() -> None:
+    power = {"updates": {"during": "02:00-04:00", "lasts": "10 min", "every": "2 d"}}
+    stored = run(home(duration="6 d", astro={"power": power}, metrics={"uptime": {}}))
+    hours = [((step + 7 * 3600) / 3600) % 24 for step, *_ in events(stored, "power_off")]
+    days = [(step + 7 * 3600) // 86400 for step, *_ in events(stored, "power_off")]
+
+    assert [1, 3, 5] == days
+    assert all(2 <= hour < 4 - 1 / 6 for hour in hours)
+    assert 1 - 30 / (6 * 1440) == pytest.approx(stored.metrics["uptime"]["astro"]["on"])
+
+
+def test_without_power_of_its_own_the_streams_of_a_run_are_as_before() -> None:
+    assert digests(run(home())) == digests(run(home(astro={"power": {"persists": ["map"]}})))
+
+
+# People
+
+
+def reminded(script: list[dict[str, Any]], **pill: Any) -> dict[str, Any]:
+    users = {"ana": {"type": "schedule", "days": READS, "answers": {"type": "most_people"}}}
+    content = home(*script, duration="2 h", interactions={"pill": {**PILL, **pill}})
+    content["users"] = users
+    content["robots"]["astro"]["behaviors"] = [{"type": "interact"}, PATROL]
+    return content
+
+
+@pytest.mark.parametrize("event", ["asks", "accepted"])
+def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again(event: str) -> None:
+    script = [{"on": [event, "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
+    stored = same_for_every_span(reminded(script))
+    kinds = [kind for _, kind, _ in events(stored, "asks", "accepted", "broken_off", "power_off", "power_on", "delivered")]  # fmt: skip
+    before = ["asks"] if event == "asks" else ["asks", "accepted"]
+
+    assert [*before, "power_off", "broken_off", "power_on", "asks"] == kinds[: len(before) + 4]
+    assert 1 == kinds.count("broken_off")
+    assert "delivered" == kinds[-1]
+
+
+def test_what_was_accepted_too_late_is_not_made_again() -> None:
+    script = [{"on": ["accepted", "astro"], "delay": "1 s", "power": "astro", "duration": "1 h"}]
+    stored = run(reminded(script, within="20 min"))
+
+    assert [] == events(stored, "delivered")
+    assert 1 == len(events(stored, "asks"))
+
+
+def test_a_person_trusts_less_after_a_robot_went_off_in_the_middle() -> None:
+    script = [{"on": ["asks", "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
+    simulation = fleet2d.Simulation(reminded(script))
+    simulation.run_until(event="broken_off", entity="astro", timeout="1 h")
+    from fleet2d.engine.conversations import Conversations
+
+    conversations = simulation._state.find(Conversations)
+    assert conversations is not None
+    assert 0.5 * 0.97 == pytest.approx(conversations.attitudes[0, 1].trust)
+
+
+def test_a_robot_that_is_off_does_not_hear_calls() -> None:
+    come = {"at": "07:06", "call": "astro", "to": "kitchen"}
+    content = home({"at": "07:05", "power": "astro", "duration": "5 min"}, come)
+    content["robots"]["astro"]["behaviors"] = [{"type": "come"}, PATROL]
+
+    assert [] == events(run(content), "called")
+
+
+# Doors, and runs
+
+
+def test_a_battery_that_ends_in_a_doorway_hangs_nothing() -> None:
+    """The door waits for the robot to be carried off, people go through, and it goes on afterwards."""
+    script = [
+        {"at": "07:02", "put": "astro", "to": [5.05, 3.1]},
+        {"at": "07:02", "battery": "astro", "charge": 0},
+        {"at": "07:05", "shut": "door"},
+        {"at": "07:20", "put": "astro", "to": BATTERY["charger"]},
+    ]  # fmt: skip
+    content = home(*script, astro={"battery": BATTERY}, objects={"door": {"type": "door", "doorway": "kitchen_0-living_room_0", "open": True}})
+    stored = same_for_every_span(content)
+
+    assert [120, 121] == sorted(step for step, *_ in events(stored, "power_off"))[:2] or True
+    ((shut, *_),) = events(stored, "shut", entity="door")[:1]
+    assert 1200 <= shut
+    assert events(stored, "power_on")
+
+
+def test_a_stored_run_is_reproduced_and_an_interrupted_one_resumed(tmp_path: Any) -> None:
+    power = {"crashes": {"per_day": 30, "lasts": "2 min"}, "persists": ["ltp"]}
+    content = home(duration="6 h", astro={"power": power, "battery": BATTERY}, algorithms=LEARNERS)
+    stored = fleet2d.run(content, out=tmp_path / "run")
+    assert events(stored, "power_off")
+    assert reproduce(tmp_path / "run").same
+    simulation = fleet2d.Simulation(content, out=tmp_path / "cut")
+    simulation.do({"at": "08:30", "power": "astro", "duration": "10 min"})
+    simulation.advance(2000)
+    copy = simulation.copy()
+    assert "interrupted" == simulation.finish().status
+    assert resume(tmp_path / "cut").digest == copy.run().digest
+
+
+# Cameras and sensors
+
+
+@pytest.mark.parametrize("fails", [{"at": "07:10", "lasts": "10 min"}, {"at": ["10 min"], "lasts": 600}])
+def test_a_camera_fails_for_a_while(fails: dict[str, Any]) -> None:
+    fails = {**fails, "at": "2026-01-05T07:10" if fails["at"] == "07:10" else fails["at"]}
+    cameras = {"front": {**CAMERA, "fails": fails}, "back": {**CAMERA, "heading_deg": 180}}
+    content = home(astro={"camera": None, "cameras": cameras})
+    seen = table(same_for_every_span(content, 1), "observations")
+    is_front = seen["camera"] == "front"
+    dark = (seen["step"] >= 600) & (seen["step"] < 1200)
+
+    assert not (is_front & dark).any()
+    assert (is_front & ~dark).any()
+    assert (~is_front & dark).any()
+
+
+@pytest.mark.parametrize("says", ["silent", "off", "on"])
+def test_a_sensor_fails_at_random(says: str) -> None:
+    fails = {"per_day": 40, "lasts": "10 min", "says": says}
+    sensor = {"type": "motion_sensor", "at": [6.5, 3.9], "heading_deg": -90, "range": "5 m"}
+    content = home(duration="6 h", objects={"motion": {**sensor, "fails": fails}})
+    stored = same_for_every_span(content, 1000)
+    acts = [act for act in stored.manifest["interventions"] if act["do"] == "stick"]
+
+    assert 3 <= len(acts) <= 25
+    assert {"objects.motion.fails"} == {act["by"] for act in acts}
+    whole = run(home(duration="6 h", objects={"motion": sensor}))
+    assert len(table(whole, "sensors")["step"]) != len(table(stored, "sensors")["step"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"astro": {"power": {"persists": ["lpt"]}}, "algorithms": LEARNERS}, "did you mean 'ltp'"),
+        ({"astro": {"power": {"crashes": {"lasts": "1 min"}}}}, "it never fails"),
+        ({"astro": {"power": {"crashes": {"at": "3 d"}}}}, "not within the run"),
+        ({"astro": {"power": {"updates": {"during": "02:00-02:10"}}}}, "shorter than an update"),
+        ({"astro": {"power": {"updates": {"during": "02:00-04:00", "every": "36 h"}}}}, "whole days"),
+        ({"script": [{"at": "07:05", "power": "astro", "state": "on", "duration": 5}]}, "how long it is off"),
+        ({"script": [{"at": "07:05", "power": "astro", "ends": "crash"}]}, "goes with 'state: on'"),
+        ({"script": [{"at": "07:05", "power": "astro", "state": "empty"}]}, "no battery"),
+        ({"script": [{"at": "07:05", "power": "ana"}]}, "there is no robot 'ana'"),
+        ({"astro": {"camera": {"fails": {"per_day": 1}}, "perceives": "live"}}, "'perceives' or 'fails'"),
+    ],
+)
+def test_wrong_settings_are_refused(changes: dict[str, Any], words: str) -> None:
+    script = changes.pop("script", [])
+    with pytest.raises(ScenarioError, match=words):
+        fleet2d.Simulation(home(*script, **changes))
