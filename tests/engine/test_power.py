@@ -1,9 +1,11 @@
 """Power: robots that are switched off, crash, update or run empty, and what they know afterwards."""
 
+import copy
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.entities.robots.test_interact import Scripted
 from tests.scenes import AGENDA, digests, path, run, scenario, table
 
 import fleet2d
@@ -12,6 +14,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.runs.run import Run
 
 PATROL = {"type": "patrol", "dwell": "10 s"}
+STAYS = {"type": "patrol", "waypoints": [[7.0, 1.0]], "dwell": "1 d"}
 CAMERA = {"range": [0.3, 5], "angle_deg": 200}
 BATTERY = {"driving": "20 min", "standing": "2 h", "charging": "1 h", "charger": [1.0, 3.0]}
 PILL = {"do": "remind", "to": "ana", "at": ["07:10"], "within": "3 h", "worth": 4, "takes": "2 min"}
@@ -127,9 +130,12 @@ def test_when_it_is_off(script: list[dict[str, Any]], times: list[int]) -> None:
 
 
 def test_nobody_who_is_in_view_stays_in_view_of_a_robot_that_is_off() -> None:
-    astro = {"camera": {**CAMERA, "latency": "3 s"}, "start": "kitchen", "type": "follow", "user": "ana"}
-    astro.pop("behaviors", None)
-    content = home({"at": "07:15", "power": "astro", "duration": "2 min"}, astro={**astro, "behaviors": [{"type": "follow", "user": "ana"}]} | {"type": None} if False else {"camera": {**CAMERA, "latency": "3 s"}, "start": "kitchen", "behaviors": [{"type": "follow", "user": "ana"}]})  # fmt: skip
+    watches = {
+        "camera": {"range": [0.3, 5], "angle_deg": 360, "latency": "3 s"},
+        "behaviors": [STAYS],
+    }
+    content = home({"at": "07:15", "power": "astro", "duration": "2 min"}, astro=watches)
+    content["users"]["ana"]["days"] = READS
     stored = same_for_every_span(content)
     lost = [step for step, *_ in events(stored, "user_lost")]
     seen = table(stored, "observations")["step"]
@@ -142,7 +148,7 @@ def test_nobody_who_is_in_view_stays_in_view_of_a_robot_that_is_off() -> None:
 def test_an_empty_battery_switches_it_off_and_the_charger_on_again() -> None:
     """Somebody carries it to its charger: it is on again with 5 %, and lost for a minute."""
     put = {"at": "08:00", "put": "astro", "to": BATTERY["charger"]}
-    content = home(put, duration="2 h", astro={"battery": BATTERY}, metrics={"battery": {}, "uptime": {}})
+    content = home(put, duration="65 min", astro={"battery": BATTERY}, metrics={"uptime": {}})
     stored = same_for_every_span(content)
     (off, *_), (on, *_) = events(stored, *POWER)
 
@@ -150,9 +156,9 @@ def test_an_empty_battery_switches_it_off_and_the_charger_on_again() -> None:
     assert 0.05 * 3600 == pytest.approx(on - 3600, abs=2)
     assert [(on + 1, "localization_lost", "")] == events(stored, "localization_lost")
     assert [(on + 61, "relocalized", "")] == events(stored, "relocalized")
-    poses = path(stored, "astro")
-    assert np.ptp(poses.x[on + 62 :]) > 1
-    assert {"on": 1 - (on - off) / 7200, "longest": on - off, "empty": 12.0} == stored.metrics["uptime"]["astro"]
+    assert np.ptp(path(stored, "astro").x[on + 62 :]) > 0.3
+    uptime = {"on": 1 - (on - off) / 3900, "longest": on - off, "empty": 86400 / 3900}
+    assert uptime == pytest.approx(stored.metrics["uptime"]["astro"])
 
 
 def test_a_charge_that_is_set_lets_an_empty_robot_go_on_at_once() -> None:
@@ -182,8 +188,12 @@ def test_the_charge_does_not_fall_while_it_is_off() -> None:
     assert simulation.verdicts()["falls again"].holds
 
 
-@pytest.mark.parametrize(("persists", "keeps"), [(None, True), (["ltp", "place"], True), (["place"], False)])
-def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(persists: Any, keeps: bool) -> None:
+@pytest.mark.parametrize(
+    ("persists", "keeps"), [(None, True), (["ltp", "place"], True), (["place"], False)]
+)
+def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(
+    persists: Any, keeps: bool
+) -> None:
     power = {"at": "07:25", "power": "astro", "duration": "10 min"}
     content = home(power, algorithms=LEARNERS, astro={"power": {"persists": persists}})
     stored = same_for_every_span(content, 1)
@@ -195,45 +205,50 @@ def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(persists: Any,
     assert (np.abs(after - before).max() < 0.2) == keeps
 
 
-@pytest.mark.parametrize("model", ["hmm", "last_seen", "learned", "semi_markov", "hour_of_week"])
+@pytest.mark.parametrize("model", ["hmm", "last_seen", "learned", "semi_markov"])
 def test_real_time_presence_begins_anew_after_a_time_off(model: str) -> None:
     """What was seen in the same period before the crash is forgotten, too."""
-    crash = {"at": "07:13", "power": "astro", "state": "crash"}
-    rtp = {"type": "rtp", "period": "5 min", "model": model}
-    content = home(crash, algorithms={"rtp": rtp}, metrics={"rtp_score": {"of": "rtp", "period": "5 min"}})
-    content["users"]["ana"]["days"] = READS
-    content["robots"]["astro"] |= {"start": "kitchen", "camera": {"range": [0.3, 5], "angle_deg": 360}, "behaviors": [{"type": "patrol", "waypoints": [[7.0, 1.0]], "dwell": "1 d"}]}
-    content["script"].append({"at": "07:14", "put": "astro", "to": "bathroom"})
-    content["script"].append({"at": "07:14", "hold": "astro"})
-    stored = run(content)
-    rows = table(stored, "rtp", user="ana", room="kitchen_0")
-    share = dict(zip(rows["step"].tolist(), rows["share"].tolist(), strict=True))
+    shares = []
+    for state in ("crash", "on"):
+        content = home(
+            {"at": "07:13", "power": "astro", "state": state},
+            {"at": "07:14", "put": "astro", "to": "bathroom"},
+            {"at": "07:14", "hold": "astro"},
+            algorithms={"rtp": {"type": "rtp", "model": model}},
+            metrics={"rtp_score": {"of": "rtp", "period": "5 min"}},
+            astro={"camera": {"range": [0.3, 5], "angle_deg": 360}, "behaviors": [STAYS]},
+        )
+        content["users"]["ana"]["days"] = READS
+        rows = table(run(content), "rtp", user="ana", room="kitchen_0")
+        shares.append(dict(zip(rows["step"].tolist(), rows["share"].tolist(), strict=True)))
+    crashed, whole = shares
 
-    assert share[599] > 0.9
-    assert share[899] < 0.5
+    assert crashed[599] == whole[599] > 0.9
+    assert crashed[899] < 0.55
+    assert whole[899] > 0.85
 
 
 def test_several_robots_lose_what_they_know_only_when_none_is_on() -> None:
     off = {"at": "07:13", "power": "astro", "duration": "5 min"}
     bolt = {"bolt": {"camera": CAMERA, "behaviors": [PATROL]}}
-    one, both = (
-        run(home(off, *more, robots=bolt, algorithms=LEARNERS))
-        for more in ((), ({**off, "power": "bolt"},))
-    )
+    known_from = []
+    for more in ((), ({**off, "power": "bolt"},)):
+        simulation = fleet2d.Simulation(home(off, *more, robots=bolt, algorithms=LEARNERS))
+        simulation.run()
+        known_from.append([each.known_from for each in simulation._state.learners.all])
 
-    def forgets(stored: Run) -> bool:
-        rows = table(stored, "rtp", user="ana")
-        last = rows["share"][rows["step"] == 1199]
-        return bool(np.ptp(last[:-1]) < 0.3)
-
-    assert (False, True) == (forgets(one), forgets(both))
+    assert [[0, 0], [0, 1080]] == known_from
 
 
 def test_the_map_is_lost_unless_it_persists() -> None:
     layers = {"explored": {}}
     shares = []
     for persists in (["place"], ["place", "map"]):
-        content = home({"at": "07:40", "power": "astro"}, {"at": "07:59:30", "power": "astro", "state": "on"}, astro={"power": {"persists": persists}})
+        content = home(
+            {"at": "07:40", "power": "astro"},
+            {"at": "07:59:30", "power": "astro", "state": "on"},
+            astro={"power": {"persists": persists}},
+        )
         content["floorplan"]["layers"] = layers
         simulation = fleet2d.Simulation(content)
         simulation.run()
@@ -244,8 +259,13 @@ def test_the_map_is_lost_unless_it_persists() -> None:
 
 @pytest.mark.parametrize("relocalizes", [None, "20 s"])
 def test_a_robot_that_keeps_no_place_is_lost_at_first(relocalizes: str | None) -> None:
-    astro = {"power": {"persists": ["map"]}, "localization": {"drift": "1 cm", "relocalizes": relocalizes}}
-    stored = same_for_every_span(home({"at": "07:05", "power": "astro", "duration": "5 min"}, astro=astro))
+    astro = {
+        "power": {"persists": ["map"]},
+        "localization": {"drift": "1 cm", "relocalizes": relocalizes},
+    }
+    stored = same_for_every_span(
+        home({"at": "07:05", "power": "astro", "duration": "5 min"}, astro=astro)
+    )
 
     assert [601] == [step for step, *_ in events(stored, "localization_lost")]
     assert [621 if relocalizes else 661] == [step for step, *_ in events(stored, "relocalized")]
@@ -282,7 +302,9 @@ def test_without_power_of_its_own_the_streams_of_a_run_are_as_before() -> None:
 
 
 def reminded(script: list[dict[str, Any]], **pill: Any) -> dict[str, Any]:
-    users = {"ana": {"type": "schedule", "days": READS, "answers": {"type": "most_people"}}}
+    users = {
+        "ana": {"type": "schedule", "days": READS, "answers": Scripted(outcomes=("accepted",))}
+    }
     content = home(*script, duration="2 h", interactions={"pill": {**PILL, **pill}})
     content["users"] = users
     content["robots"]["astro"]["behaviors"] = [{"type": "interact"}, PATROL]
@@ -290,7 +312,9 @@ def reminded(script: list[dict[str, Any]], **pill: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("event", ["asks", "accepted"])
-def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again(event: str) -> None:
+def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again(
+    event: str,
+) -> None:
     script = [{"on": [event, "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
     stored = same_for_every_span(reminded(script))
     kinds = [kind for _, kind, _ in events(stored, "asks", "accepted", "broken_off", "power_off", "power_on", "delivered")]  # fmt: skip
@@ -317,7 +341,7 @@ def test_a_person_trusts_less_after_a_robot_went_off_in_the_middle() -> None:
 
     conversations = simulation._state.find(Conversations)
     assert conversations is not None
-    assert 0.5 * 0.97 == pytest.approx(conversations.attitudes[0, 1].trust)
+    assert 0.525 * 0.97 == pytest.approx(conversations.attitudes[0, 1].trust)
 
 
 def test_a_robot_that_is_off_does_not_hear_calls() -> None:
@@ -339,10 +363,14 @@ def test_a_battery_that_ends_in_a_doorway_hangs_nothing() -> None:
         {"at": "07:05", "shut": "door"},
         {"at": "07:20", "put": "astro", "to": BATTERY["charger"]},
     ]  # fmt: skip
-    content = home(*script, astro={"battery": BATTERY}, objects={"door": {"type": "door", "doorway": "kitchen_0-living_room_0", "open": True}})
+    content = home(
+        *script,
+        astro={"battery": BATTERY},
+        objects={"door": {"type": "door", "doorway": "kitchen_0-living_room_0", "open": True}},
+    )
     stored = same_for_every_span(content)
 
-    assert [120, 121] == sorted(step for step, *_ in events(stored, "power_off"))[:2] or True
+    assert 121 == events(stored, "power_off")[0][0]
     ((shut, *_),) = events(stored, "shut", entity="door")[:1]
     assert 1200 <= shut
     assert events(stored, "power_on")
@@ -354,20 +382,25 @@ def test_a_stored_run_is_reproduced_and_an_interrupted_one_resumed(tmp_path: Any
     stored = fleet2d.run(content, out=tmp_path / "run")
     assert events(stored, "power_off")
     assert reproduce(tmp_path / "run").same
-    simulation = fleet2d.Simulation(content, out=tmp_path / "cut")
-    simulation.do({"at": "08:30", "power": "astro", "duration": "10 min"})
-    simulation.advance(2000)
-    copy = simulation.copy()
-    assert "interrupted" == simulation.finish().status
-    assert resume(tmp_path / "cut").digest == copy.run().digest
+    digests_of = []
+    for out in (None, tmp_path / "cut"):
+        simulation = fleet2d.Simulation(content, out=out)
+        simulation.do({"at": "08:30", "power": "astro", "duration": "10 min"})
+        simulation.advance(5405)  # off by now
+        if out is None:
+            digests_of += [copy.deepcopy(simulation).run().digest, simulation.run().digest]
+        else:
+            assert "interrupted" == simulation.finish().status
+            digests_of.append(resume(out).digest)
+    assert 1 == len(set(digests_of))
 
 
 # Cameras and sensors
 
 
-@pytest.mark.parametrize("fails", [{"at": "07:10", "lasts": "10 min"}, {"at": ["10 min"], "lasts": 600}])
-def test_a_camera_fails_for_a_while(fails: dict[str, Any]) -> None:
-    fails = {**fails, "at": "2026-01-05T07:10" if fails["at"] == "07:10" else fails["at"]}
+@pytest.mark.parametrize("at", ["2026-01-05T07:10", ["10 min"]])
+def test_a_camera_fails_for_a_while(at: Any) -> None:
+    fails = {"at": at, "lasts": "10 min"}
     cameras = {"front": {**CAMERA, "fails": fails}, "back": {**CAMERA, "heading_deg": 180}}
     content = home(astro={"camera": None, "cameras": cameras})
     seen = table(same_for_every_span(content, 1), "observations")
@@ -400,12 +433,21 @@ def test_a_sensor_fails_at_random(says: str) -> None:
         ({"astro": {"power": {"crashes": {"lasts": "1 min"}}}}, "it never fails"),
         ({"astro": {"power": {"crashes": {"at": "3 d"}}}}, "not within the run"),
         ({"astro": {"power": {"updates": {"during": "02:00-02:10"}}}}, "shorter than an update"),
-        ({"astro": {"power": {"updates": {"during": "02:00-04:00", "every": "36 h"}}}}, "whole days"),
-        ({"script": [{"at": "07:05", "power": "astro", "state": "on", "duration": 5}]}, "how long it is off"),
+        (
+            {"astro": {"power": {"updates": {"during": "02:00-04:00", "every": "36 h"}}}},
+            "whole days",
+        ),
+        (
+            {"script": [{"at": "07:05", "power": "astro", "state": "on", "duration": "5 s"}]},
+            "how long it is off",
+        ),
         ({"script": [{"at": "07:05", "power": "astro", "ends": "crash"}]}, "goes with 'state: on'"),
         ({"script": [{"at": "07:05", "power": "astro", "state": "empty"}]}, "no battery"),
         ({"script": [{"at": "07:05", "power": "ana"}]}, "there is no robot 'ana'"),
-        ({"astro": {"camera": {"fails": {"per_day": 1}}, "perceives": "live"}}, "'perceives' or 'fails'"),
+        (
+            {"astro": {"camera": {"fails": {"per_day": 1}}, "perceives": "live"}},
+            "'perceives' or 'fails'",
+        ),
     ],
 )
 def test_wrong_settings_are_refused(changes: dict[str, Any], words: str) -> None:

@@ -88,7 +88,8 @@ class Conversations(Watcher):
         self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
         self._starts: list[tuple[int, int, int, str]] = []  # today: step, user, robot, kind
         self._begun_days = 0
-        self._accepted: dict[int, Request] = {}  # by robot: what was accepted last
+        # By robot: what was accepted last, and when.
+        self._accepted: dict[int, tuple[Request, int]] = {}
         self._bans: list[tuple[int, int, int]] = []  # first step without, robot, room
         self._open(basis)
 
@@ -336,7 +337,7 @@ class Conversations(Watcher):
         time = self.actors[row].clock.time(step)
         if (request := queue.find(text)) is not None:
             if reply.outcome == Outcome.ACCEPTED:
-                self._accepted[row] = request
+                self._accepted[row] = request, step
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
         user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])
@@ -392,7 +393,7 @@ class Conversations(Watcher):
         note = _broken_note(robot, step)
         self._replies = [reply for reply in self._replies if reply.robot != row]
         self._questions = [question for question in self._questions if question.row != row]
-        accepted = self._accepted.pop(row, None)
+        accepted, since = self._accepted.pop(row, (None, -1))
         events = []
         if note is not None:
             time = self._clock.time(step)
@@ -401,7 +402,8 @@ class Conversations(Watcher):
             state = self.attitudes[user, row]
             self.answers[user].months.pass_time(state, time)
             self.answers[user].months.let_down(state)
-            if accepted is not None and note.event != EventKind.ASKS:
+            is_answered = note.event != EventKind.ASKS or since * self._clock.step_us > note.time_us
+            if accepted is not None and is_answered:
                 self.queues[row].reopen(accepted, time)
             events.append(Event(step, robot.name, EventKind.BROKEN_OFF, note.detail))
         self._look_ahead()
