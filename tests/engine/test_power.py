@@ -1,12 +1,14 @@
 """Power: robots that are switched off, crash, update or run empty, and what they know afterwards."""
 
 import copy
+import random
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.entities.robots.test_interact import Scripted
-from tests.scenes import AGENDA, digests, path, run, scenario, table
+from tests.scenes import AGENDA, digests, everything, path, run, scenario, table
+from tests.thorough import some
 
 import fleet2d
 from fleet2d.engine.repeat import reproduce, resume
@@ -454,3 +456,41 @@ def test_wrong_settings_are_refused(changes: dict[str, Any], words: str) -> None
     script = changes.pop("script", [])
     with pytest.raises(ScenarioError, match=words):
         fleet2d.Simulation(home(*script, **changes))
+
+
+# All at random
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", some(range(40), 8))
+def test_robots_that_go_off_and_on_at_any_time_have_the_same_run_for_every_span(seed: int) -> None:
+    chance = random.Random(seed)
+    content = everything("1 h")
+    for robot in content["robots"].values():
+        if chance.random() < 0.5:
+            charge = chance.choice([0.2, 0.5, 1])
+            robot["battery"] = {
+                **BATTERY,
+                "driving": f"{chance.randint(3, 30)} min",
+                "charge": charge,
+            }
+        crashes = {"per_day": chance.choice([10, 100]), "lasts": f"{chance.randint(1, 400)} s"}
+        persists = chance.choice([None, ["place"], ["map", "share"], []])
+        robot["power"] = {"crashes": crashes, "persists": persists}
+        if robot.get("camera"):
+            fails = {"per_day": 50, "lasts": "3 min"}
+            robot["camera"] = {**robot["camera"], "fails": fails, "latency": "2 s"}
+    content["script"] = []
+    for _ in range(12):
+        who = chance.choice(list(content["robots"]))
+        more: dict[str, Any] = chance.choice([
+            {"power": who, "duration": f"{chance.randint(1, 900)} s"}, {"power": who},
+            {"power": who, "state": "crash"}, {"power": who, "state": "update"},
+            {"power": who, "state": "on"}, {"put": who, "to": [1.0, 3.0]}, {"restore": who},
+            {"kidnap": who, "to": "bathroom"}, {"fault": who, "lost": True, "duration": "4 min"},
+            {"send": who, "to": "kitchen"}, {"release": who}, {"replan": who},
+        ])  # fmt: skip
+        content["script"].append({"at": f"{chance.randint(0, 3599)} s", **more})
+    stored = same_for_every_span(content, 1, chance.randint(2, 500))
+
+    assert "complete" == stored.status
