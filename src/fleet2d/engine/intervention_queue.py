@@ -296,7 +296,7 @@ def _kinds_of(
     if may_block:
         kinds.add(EventKind.WAY_BLOCKED)
     if actor.requests is not None:
-        kinds |= REQUEST_EVENTS
+        kinds |= {*REQUEST_EVENTS, EventKind.BROKEN_OFF}
     for behavior in actor.behaviors:
         kinds |= behavior.records
     if _is_own(actor):

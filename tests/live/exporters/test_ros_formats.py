@@ -202,7 +202,8 @@ def test_the_log_of_a_robot_is_that_of_its_events_and_moves(messages: Messages) 
     levels = {"INFO": 2, "WARN": 3, "ERROR": 4}
     entries = robot_log(day(), "astro", FIRST, END)
     found = [
-        (step_of(m.timestamp), m.level, m.file, m.message, m.name) for _, m in messages["/astro/log"]
+        (step_of(m.timestamp), m.level, m.file, m.message, m.name)
+        for _, m in messages["/astro/log"]
     ]
 
     assert [(e.step, levels[e.level], e.source, e.text, "astro") for e in entries] == found
