@@ -300,6 +300,26 @@ def test_without_power_of_its_own_the_streams_of_a_run_are_as_before() -> None:
     assert digests(run(home())) == digests(run(home(astro={"power": {"persists": ["map"]}})))
 
 
+def test_behaviors_that_hold_much_of_the_run_begin_anew() -> None:
+    """They were copied with all that they referred to, as far as what no run can copy."""
+    crash = {"at": "2 h", "power": "astro", "state": "crash"}
+    content = {"extends": "bundled:paper", "simulation": {"duration": "3 h"}, "script": [crash]}
+
+    assert [7200, 7260] == [step for step, *_ in events(run(content), *POWER)]
+
+
+def test_a_changed_behavior_keeps_its_keys_when_it_begins_anew() -> None:
+    keys = {"rooms": ["kitchen"]}
+    script = [
+        {"at": "07:02", "configure": "astro", "behavior": "patrol", "keys": keys},
+        {"at": "07:05", "power": "astro", "state": "crash"},
+    ]
+    simulation = fleet2d.Simulation(home(*script))
+    simulation.run()
+
+    assert (("kitchen",),) == tuple(simulation.actors["astro"].behaviors[0].rooms)
+
+
 # People
 
 

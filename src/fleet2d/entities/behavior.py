@@ -426,9 +426,10 @@ class Actor(Body):
         super().__post_init__()
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set if it has cameras
         self.recall: Callable[[], Any] = dict  # set if it remembers
-        behaviors = getattr(self.entity, "behaviors", ())
+        # Before they start, to begin anew with.
+        self._declared = list(getattr(self.entity, "behaviors", ()))
         self.requests: RequestQueue | None = None  # set if the scenario has interactions
-        self.behaviors = [behavior.model_copy(deep=True) for behavior in behaviors]
+        self.behaviors = [behavior.model_copy(deep=True) for behavior in self._declared]
         self.displacements: list[Displacement] = []
         with blame(self.path, None):
             self._state = self._first_pose()
@@ -450,8 +451,15 @@ class Actor(Body):
         self._attentive = next((pair for pair in claims if pair[1] is not None), None)
 
     def replace(self, number: int, behavior: Behavior) -> None:
-        """Replace a behavior, by its number, with another one that was started."""
-        self.behaviors[number] = behavior
+        """Replace a behavior, by its number, with another one, which starts.
+
+        Raises:
+            InputError: It can't start; the present one stays.
+        """
+        started = behavior.model_copy(deep=True)
+        started.start(self)
+        self.behaviors[number] = started
+        self._declared[number] = behavior
         self._find_attention()
 
     @property

@@ -451,13 +451,9 @@ class DecidingActor(Actor):
     def reboot(self, step: int) -> None:
         """Begin anew after having been off: what its behaviors were in the middle of is lost."""
         off = self.arbiter.off
-        for number, behavior in enumerate(self.behaviors):
-            fresh = behavior.model_copy(deep=True)
-            for name in vars(fresh).keys() - type(fresh).model_fields.keys():
-                del fresh.__dict__[name]
+        for number in range(len(self.behaviors)):
             with suppress(InputError):  # the home may lack by now what it needs to begin
-                fresh.start(self)
-                self.replace(number, fresh)
+                self.replace(number, self._declared[number])
         self.arbiter = Arbiter(self.behaviors)
         self.arbiter.off = off
         self.command = None

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import timedelta
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -63,6 +62,8 @@ _UNWANTED = frozenset({"crash", "empty"})
 # What the robot can't notice: deceived cameras, and what is done to it from outside.
 _FAULTS = frozenset({"fault", "switch_off"})
 _FIELDS_OF_RECORDS = frozenset({"do", "step", "entity", "by", "duration"})
+# The order at one step: what a decision is about comes before it, what comes of it after it.
+_ORDER = {name: i for i, name in enumerate(("power", "fault", "place", "sight", "decision"))}
 # A move shorter than this is a turn on the spot [m].
 LEAST_MOVE_M = 0.05
 
@@ -141,7 +142,7 @@ def robot_log(
     if "key_frames" in run.tables:
         for move in moves_of(run, robot, first, end):
             entries += _of_move(move, run.clock)
-    return sorted(entries, key=attrgetter("step"))
+    return sorted(entries, key=lambda entry: (entry.step, _ORDER.get(entry.source, len(_ORDER))))
 
 
 def day_of(run: Run, number: int) -> tuple[int, int]:
@@ -221,7 +222,7 @@ def decision_text(row: Mapping[str, Any]) -> str:
     """Return a row of the table of decisions in words: who decided, and why."""
     behavior = row["behavior"] or "no behavior"
     reason = row["reason"]
-    is_told = not reason or reason.startswith(f"{EventKind.BATTERY} ")
+    is_told = reason in ("", behavior) or reason.startswith(f"{EventKind.BATTERY} ")
     return str(behavior) if is_told else f"{behavior}: {reason}"
 
 
