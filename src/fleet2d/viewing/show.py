@@ -117,12 +117,11 @@ def show(  # noqa: PLR0913 - options of the command line
     radius: Radius = BODY_RADIUS_M,
     trust: Trust = False,
 ) -> None:
-    """Draw a floor plan, a stored run or a persona's diary, or print the log of a robot.
+    """Draw a floor plan, a run or a diary; print a robot's log.
 
     Examples:
       fleet2d show family_home --out home.svg
       fleet2d show runs/home-001 --at 'day 3 18:30'
-      fleet2d show retired --diary --days 3
       fleet2d show runs/home-001 --log astro --day 3
     """
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
