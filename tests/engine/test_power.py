@@ -11,8 +11,13 @@ from tests.scenes import AGENDA, digests, everything, path, run, scenario, table
 from tests.thorough import some
 
 import fleet2d
+from fleet2d import Algorithm
+from fleet2d.algorithms.algorithm import Present
+from fleet2d.algorithms.history import History
 from fleet2d.engine.repeat import reproduce, resume
+from fleet2d.entities.plan import data_of
 from fleet2d.errors import ScenarioError
+from fleet2d.interventions import Decide
 from fleet2d.runs.run import Run
 
 PATROL = {"type": "patrol", "dwell": "10 s"}
@@ -415,6 +420,67 @@ def test_a_stored_run_is_reproduced_and_an_interrupted_one_resumed(tmp_path: Any
             assert "interrupted" == simulation.finish().status
             digests_of.append(resume(out).digest)
     assert 1 == len(set(digests_of))
+
+
+class Watched(Algorithm):
+    """How much was in view in each minute."""
+
+    needs = frozenset({"evidence"})
+
+    def update(self, history: History, state: Present) -> Any:
+        return {"watched": history.evidence.watched.sum(axis=1)}
+
+
+def test_nothing_counts_as_watched_while_it_is_off() -> None:
+    algorithms = {"watched": {"type": "tests.engine.test_power:Watched", "period": "10 min"}}
+    content = home({"at": "07:05", "power": "astro", "duration": "20 min"}, algorithms=algorithms)
+    watched = table(same_for_every_span(content, 1), "watched")["watched"]
+
+    assert 60 == len(watched)
+    assert (watched[:5] > 0).all()
+    assert 0 == watched[5:25].max()
+    assert (watched[25:] > 0).all()
+
+
+def test_a_test_can_expect_and_ask_why_it_is_off() -> None:
+    script = [
+        {"at": "07:05", "power": "astro", "state": "update", "duration": "10 min"},
+        {"at": "07:25", "power": "astro", "duration": "10 min"},
+    ]
+    simulation = fleet2d.Simulation(home(*script))
+    expected = {
+        "still": "never(holds_for(power(astro) != on, 2 s) and moving(astro))",
+        "updates": "share(power(astro) == update, of=during(07:00-07:20)) == 50 %",
+        "off": "after(during(07:25-07:26), always(power(astro) == off, within=9 min))",
+        "wrong": "always(power(astro) == on)",
+    }
+    for name, text in expected.items():
+        simulation.expect(text, name)
+    simulation.run_until("07:06")
+    assert "update" == simulation.state["astro"]["off"]
+    simulation.run_until("07:16")
+    assert "off" not in simulation.state["astro"]
+    simulation.run()
+
+    holds = {name: verdict.holds for name, verdict in simulation.verdicts().items()}
+    assert {"still": True, "updates": True, "off": True, "wrong": False} == holds
+    with pytest.raises(ScenarioError, match="did you mean 'update'"):
+        simulation.expect("never(power(astro) == updat)")
+
+
+def test_a_robot_that_is_driven_from_outside_follows_no_plan_while_it_is_off() -> None:
+    simulation = fleet2d.Simulation(home(duration="20 min"))
+    simulation.do({"drive": "astro"})
+    simulation.do({"at": "07:05", "power": "astro", "duration": "5 min"})
+    simulation.run_until("07:06")
+    at = simulation.state["astro"]
+    simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen").stay())))
+    simulation.run_until("07:09")
+    assert at == simulation.state["astro"]
+    simulation.run_until("07:11")
+    simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen").stay())))
+    assert "complete" == simulation.run().status
+    assert "kitchen_0" == simulation.state["astro"]["room"]
 
 
 # Cameras and sensors

@@ -1,7 +1,7 @@
 """Power of robots: when they crash and update, and what they keep while they are off."""
 
 from datetime import timedelta
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fleet2d.runtime.clock import DAY, Clock, midnights
 from fleet2d.runtime.determinism import Draws
 from fleet2d.sight.failures import Failures
 
+PowerState = Literal["off", "crash", "update", "empty", "on"]
 EMPTY = "empty"
 """Why a robot is off whose battery is empty."""
 MAP = "map"

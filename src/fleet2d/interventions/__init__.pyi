@@ -3,6 +3,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
 
+from fleet2d.entities.power import PowerState
 from fleet2d.entities.sensor import SensorFault
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.placed_objects import Posture
@@ -89,8 +90,8 @@ class SetPower(robots.SetPower):
         entity: str,
         *,
         duration: Time | None = ...,
-        state: robots.PowerState = ...,
-        ends: robots.PowerState | None = ...,
+        state: PowerState = ...,
+        ends: PowerState | None = ...,
     ) -> None: ...
 
 class SwitchOff(robots.SwitchOff):

@@ -1,7 +1,6 @@
 """Interventions on robots: calls, batteries, faults, and what they perceive."""
 
 from datetime import timedelta
-from typing import Literal
 
 from pydantic import Field
 
@@ -13,7 +12,7 @@ from fleet2d.entities.body import NEVER
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import Place
-from fleet2d.entities.power import EMPTY, PLACE, power_of
+from fleet2d.entities.power import EMPTY, PLACE, PowerState, power_of
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
 from fleet2d.interventions.bodies import BodyIntervention, Put, behavior_number, heading_of
@@ -347,7 +346,6 @@ def relocalizes_after(actor: Actor) -> timedelta | None:
     return None if settings is None else settings.relocalizes
 
 
-PowerState = Literal["off", "crash", "update", "empty", "on"]
 # How long a crash or an update lasts, if neither the intervention nor the robot says so.
 CRASH_LASTS = timedelta(minutes=1)
 UPDATE_LASTS = timedelta(minutes=15)
