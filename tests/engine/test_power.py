@@ -352,6 +352,19 @@ def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again
     assert "delivered" == kinds[-1]
 
 
+@pytest.mark.parametrize("period", ["1 h", "10 min 10 s"])
+def test_what_was_broken_off_counts_once_when_it_is_carried_out(period: str) -> None:
+    """The second period ends between the question and the moment when power is lost."""
+    script = [{"on": ["accepted", "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
+    content = reminded(script)
+    content["metrics"] = {"interactions": {"period": period}, "timing_regret": {"period": period}}
+    stored = run(content)
+    numbers = stored.metrics["interactions"]["astro"]["ana"]
+
+    assert {"asked": 2, "kept": 1.0, "broken_off": 1, "accepted": 1.0}.items() <= numbers.items()
+    assert 4.0 == numbers["value"]
+
+
 def test_what_was_accepted_too_late_is_not_made_again() -> None:
     script = [{"on": ["accepted", "astro"], "delay": "1 s", "power": "astro", "duration": "1 h"}]
     stored = run(reminded(script, within="20 min"))
