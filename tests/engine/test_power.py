@@ -125,6 +125,15 @@ def test_it_goes_on_where_it_stopped_and_has_forgotten_what_it_was_doing() -> No
             ],
             [300, 1200],
         ),
+        # The first crash, which somebody ends early, doesn't end the second one.
+        (
+            [
+                {"at": "07:05", "power": "astro", "state": "crash"},
+                {"at": "07:05:30", "power": "astro", "state": "on"},
+                {"at": "07:05:40", "power": "astro", "state": "crash"},
+            ],
+            [300, 330, 340, 400],
+        ),
         # An outage at the first step.
         ([{"at": "0 s", "power": "astro", "duration": "1 min"}], [0, 60]),
         ([{"on": ["power_off", "astro"], "delay": "30 s", "power": "astro", "state": "on"}, {"at": "07:05", "power": "astro"}], [300, 330]),
@@ -276,6 +285,25 @@ def test_a_robot_that_keeps_no_place_is_lost_at_first(relocalizes: str | None) -
 
     assert [601] == [step for step, *_ in events(stored, "localization_lost")]
     assert [621 if relocalizes else 661] == [step for step, *_ in events(stored, "relocalized")]
+
+
+def test_carried_while_off_it_believes_to_be_where_it_went_off() -> None:
+    script = [
+        {"at": "07:05", "power": "astro", "duration": "5 min"},
+        {"at": "07:07", "put": "astro", "to": "bathroom"},
+    ]
+    simulation = fleet2d.Simulation(home(*script, astro={"localization": {"left": "1 cm"}}))
+    simulation.run_until("07:05")
+    before = simulation.state["astro"]
+    simulation.run_until("07:12")
+    after = simulation.state["astro"]
+    (off,) = simulation.actors["astro"].displacements
+    units = simulation.home.plan.lattice.units_per_m
+
+    assert "bathroom_0" == after["room"] != before["room"]
+    assert (600, 661) == (off.first, off.end), "until it is relocalized"
+    moved = (before["x"] - after["x"], before["y"] - after["y"])
+    assert (off.x / units, off.y / units) == pytest.approx(moved, abs=1e-6)
 
 
 def test_crashes_come_from_the_robots_own_stream() -> None:

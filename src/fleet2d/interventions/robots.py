@@ -1,6 +1,7 @@
 """Interventions on robots: calls, batteries, faults, and what they perceive."""
 
 from datetime import timedelta
+from typing import TypeGuard
 
 from pydantic import Field
 
@@ -193,7 +194,7 @@ class SetBattery(RobotIntervention):
         charge.level = self.charge
         actor.decide_again(world.step)
         if not charge.is_empty:
-            world.undo(lambda act: is_off(act, self.entity) and act.state == EMPTY)  # type: ignore[attr-defined]
+            world.undo(lambda act: is_off(act, self.entity) and act.state == EMPTY)
 
 
 def battery_of(actor: Actor) -> Charge:
@@ -401,8 +402,8 @@ class SetPower(Trouble):
         if self.state == EMPTY and not battery_of(actor).is_empty:
             raise ScenarioError(f"the battery of {self.entity} isn't empty: set its charge instead")
 
-    def lasting_for(self, actor: Actor) -> timedelta | None:
-        """Return how long it lasts; None: until it is switched on."""
+    def _lasts(self, actor: Actor) -> timedelta | None:
+        """Return how long it lasts; None: until the robot is switched on."""
         power = power_of(actor.entity)
         if self.duration is not None or self.state not in ("crash", "update"):
             return self.duration
@@ -417,11 +418,8 @@ class SetPower(Trouble):
             is_empty = actor.charge is not None and actor.charge.is_empty
             world.undo(lambda act: self._switches(act, is_empty=is_empty))
             return
-        if self.duration is None:
-            lasts = self.lasting_for(actor)
-            if lasts is not None:
-                ends = SetPower(entity=self.entity, state="on", ends=self.state)
-                world.later(ends, lasts)
+        # What begins is a copy of what was asked for: it may say how long it lasts.
+        vars(self)["duration"] = self._lasts(actor)
         was_on = not actor.is_off
         actor.off_for = actor.off_for or self.state
         super().begin(world)
@@ -435,7 +433,7 @@ class SetPower(Trouble):
             return
         reasons = [act for act in world.lasting if is_off(act, self.entity)]
         if reasons:
-            actor.off_for = reasons[0].state  # type: ignore[attr-defined]
+            actor.off_for = reasons[0].state
             return
         reason = actor.off_for or self.state
         actor.off_for = None
@@ -449,14 +447,14 @@ class SetPower(Trouble):
 
     def _switches(self, act: object, *, is_empty: bool) -> bool:
         """Return whether it ends what a robot is off for."""
-        if not isinstance(act, SetPower) or not is_off(act, self.entity):
+        if not is_off(act, self.entity):
             return False
         if self.ends is not None:
             return act.state == self.ends
         return act.state != EMPTY or not is_empty
 
 
-def is_off(act: object, name: str) -> bool:
+def is_off(act: object, name: str) -> "TypeGuard[SetPower]":
     """Return whether because of an active intervention a robot is off."""
     return isinstance(act, SetPower) and act.state != "on" and act.entity == name
 
