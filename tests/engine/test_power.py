@@ -295,8 +295,9 @@ def test_carried_while_off_it_believes_to_be_where_it_went_off() -> None:
     simulation = fleet2d.Simulation(home(*script, astro={"localization": {"left": "1 cm"}}))
     simulation.run_until("07:05")
     before = simulation.state["astro"]
-    simulation.run_until("07:12")
+    simulation.run_until("07:10:30")
     after = simulation.state["astro"]
+    simulation.run_until("07:12")
     (off,) = simulation.actors["astro"].displacements
     units = simulation.home.plan.lattice.units_per_m
 
