@@ -334,6 +334,17 @@ def test_without_power_of_its_own_the_streams_of_a_run_are_as_before() -> None:
     assert digests(run(home())) == digests(run(home(astro={"power": {"persists": ["map"]}})))
 
 
+def test_a_search_that_was_cut_off_begins_again() -> None:
+    crash = {"on": ["find_begins", "astro"], "delay": "3 s", "power": "astro", "state": "crash"}
+    content = home(crash, {"at": "0 s", "hold": "ana"})
+    find = {"type": "find", "user": "ana", "every": "20 min"}
+    content["robots"]["astro"] |= {"start": "kitchen", "behaviors": [find]}
+    happened = events(run(content), "find_begins", "found", *POWER)
+
+    kinds = ["find_begins", "power_off", "power_on", "find_begins", "found"]
+    assert kinds == [kind for _, kind, _ in happened[:5]]
+
+
 def test_behaviors_that_hold_much_of_the_run_begin_anew() -> None:
     """They were copied with all that they referred to, as far as what no run can copy."""
     crash = {"at": "2 h", "power": "astro", "state": "crash"}
