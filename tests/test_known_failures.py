@@ -331,6 +331,8 @@ ELSEWHERE = {
     (User, "answers"): "tests/interactions: no robot wants anything here",
     (User, "height"): "tests/engine/test_heights: there is no furniture here",
     (Robot, "keep_out"): "tests/entities/robots/test_keep_out",
+    (Robot, "power"): "tests/engine/test_power",
+    (Camera, "fails"): "tests/engine/test_power",
     (Robot, "height"): "tests/engine/test_heights: there is no furniture here",
     (Camera, "height"): "tests/engine/test_heights: there is no furniture here",
     (SightSettings, "heights"): "tests/engine/test_heights: there is no furniture here",

@@ -202,7 +202,11 @@ class Chance:
                 "of": self.one(self.one(*KINDS), self.one(*self.rooms), [*KINDS[:3]]),
                 **self.lasting(),
             },
-            "battery": lambda: {"battery": "astro", "charge": self.random.random()},
+            "battery": lambda: {"battery": "astro", "charge": self.one(0, self.random.random())},
+            "power": lambda: {
+                "power": self.robot(),
+                **self.one({"state": "on"}, {"state": "crash"}, {"state": "update", **self.lasting()}, self.lasting()),
+            },
             "switch_off": lambda: {
                 "switch_off": self.body(),
                 **self.one({"camera": True}, {"behavior": self.one("patrol", "routine", "dock")}),

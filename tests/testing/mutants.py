@@ -10,10 +10,11 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.dock import Dock
 from fleet2d.entities.robots.find import Find
 from fleet2d.entities.robots.follow import Come, Follow
-from fleet2d.entities.robots.interact import Opportunistic
+from fleet2d.entities.robots.interact import Interact, Opportunistic
 from fleet2d.entities.robots.patrol import Patrol, Scheduled
 
 LATE = timedelta(seconds=30)
+MUCH_LATER = timedelta(minutes=30)
 
 
 class OtherSettings:
@@ -234,3 +235,20 @@ class VisitDaily(Scheduled):
     @classmethod
     def _change(cls, data: Any) -> Any:
         return {**data, "visits": [{**visit, "on": "daily"} for visit in data["visits"]]}
+
+
+class AskLate(Interact):
+    """Does nothing for a request that is between half an hour and two and a half hours old."""
+
+    def decide(self, now: Situation) -> Plan | None:
+        is_left = now.requests is not None and any(
+            request.since + timedelta(hours=2, minutes=30) > now.time > request.since + MUCH_LATER
+            for request in now.requests.open
+        )
+        return None if is_left else super().decide(now)
+
+
+class AskWithoutSeeking(OtherSettings, Interact):
+    """Asks only people who come by."""
+
+    settings: ClassVar = {"seek": False}

@@ -68,6 +68,8 @@ MUTANTS = {
     "fall_alarm": ["FindOther", "FindRarely"],
     "medicine": ["VisitLate", "VisitNextRoom", "VisitDaily"],
     "sleeping_baby": ["PatrolAnytime", "PatrolEverywhere"],
+    "power_cut": ["AskLate", "AskWithoutSeeking"],
+    "update_night": ["VisitLate", "VisitNextRoom"],
 }
 
 
@@ -79,7 +81,7 @@ def verdicts(scenario: str, home: int, *changes: str) -> dict[str, Verdict]:
     return simulation.verdicts()
 
 
-def test_there_are_ten_scenarios_of_at_most_twenty_lines_and_twenty_mutants() -> None:
+def test_there_are_twelve_scenarios_of_at_most_twenty_lines_and_twenty_mutants() -> None:
     assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
     assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20
     assert len({name for names in MUTANTS.values() for name in names}) >= 20

@@ -152,6 +152,11 @@ def test_report_escapes_what_a_scenario_names(report: str) -> None:
         (["--at", "day 1 03:00", "--layer", "dust"], "one picture at a time"),
         (["--from", "day 1 05:00", "--to", "day 1 04:00"], "is not before"),
         (["--fov", "1,1,0"], "for a floor plan"),
+        (["--day", "2"], "give --log ROBOT"),
+        (["--log", "astr"], "did you mean 'astro'"),
+        (["--log", "astro", "--day", "9"], "no day 9: its days are"),
+        (["--log", "astro", "--day", "1", "--from", "2 h"], "not both"),
+        (["--log", "astro", "--layer", "dust"], "leave out the options of pictures"),
     ],
 )
 def test_show_refuses_what_is_no_picture(
@@ -160,6 +165,18 @@ def test_show_refuses_what_is_no_picture(
     code, _, err = fleet2d("show", run_dir, *words)
     assert 2 == code
     assert message in err
+
+
+def test_the_log_of_a_robot_is_printed_or_written(
+    fleet2d: Cli, run_dir: Path, tmp_path: Path
+) -> None:
+    words = ("show", run_dir, "--log", "astro", "--from", "2 h", "--to", "4 h")
+    code, out, _ = fleet2d(*words)
+    assert 0 == code
+    assert out.startswith("-- day 1, ")
+    assert "  decision  " in out
+    assert (0, "astro.log\n") == fleet2d(*words, "--out", "astro.log")[:2]
+    assert out == (tmp_path / "astro.log").read_text()
 
 
 def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path: Path) -> None:

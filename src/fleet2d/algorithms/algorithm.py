@@ -370,6 +370,8 @@ class Algorithm(Component):
     kind = "algorithm"
     # How far before its period it reads the history; timedelta.max: all of it.
     looks_back: ClassVar[timedelta] = timedelta(0)
+    # Whether it is about the present: what it knows is lost while no robot is on.
+    is_real_time: ClassVar[bool] = False
     # The data that it needs computed: evidence, exposure, explored, first_seen, last_seen …
     needs: ClassVar[Set[str]] = frozenset()
 
@@ -398,6 +400,10 @@ class Algorithm(Component):
         check_shapes(run_state(self), learned, type(self).__name__)
         for name, value in learned.items():
             setattr(self, name, value)
+
+    def long_term_state(self) -> Mapping[str, Any]:
+        """Return what a real-time algorithm keeps while no robot is on; see `remember`."""
+        return self.remember()
 
     def check_times(self, clock: Clock) -> None:
         """Refuse input whose times are all outside of the run; called before the run begins.

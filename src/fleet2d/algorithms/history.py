@@ -341,8 +341,10 @@ class Log:
         self._next_bin = begin + len(bins)
         self._bins.append(begin, self._next_bin, bins)
 
-    def evidence(self, first: int, end: int) -> Evidence:
+    def evidence(self, first: int, end: int, known_from: int = 0) -> Evidence:
         """Return the evidence of the steps from `first` to `end` - 1.
+
+        Bins that begin before `known_from` are as if nobody had looked.
 
         Raises:
             ComponentError: The steps aren't whole bins.
@@ -359,7 +361,13 @@ class Log:
         bins = bins[begin - since : last - since]
         if self._nearest_patches is None:
             self._nearest_patches = NearestRooms(self.home.plan, self.patches.of_cell)
-        seen = self.observations(first, end)
+        blank = (
+            min(-(-known_from // self.bin_steps), last) - begin
+        )  # bins of which it knows nothing
+        if blank > 0:
+            bins = bins.copy()
+            bins[:blank] = 0
+        seen = self.observations(first + max(blank, 0) * self.bin_steps, end)
         patch = seen.room_in(self._nearest_patches).astype(np.int64)
         observed = (seen.step, seen.user.astype(np.int64), patch)
         users = self.activities.users
@@ -420,6 +428,7 @@ class History:
     visible: frozenset[str]  # names of the bodies whose poses the component may read
     oldest: int = 0  # the first step that is stored for components that look back
     needs: frozenset[str] = frozenset()  # `needs` of the component's class
+    known_from: int = 0  # the first step of which it knows anything; see `Learner`
 
     def between(self, first: int, end: int) -> "History":
         """Return the history of the steps from `first` to `end` - 1.
@@ -459,12 +468,13 @@ class History:
     @cached_property
     def observations(self) -> Observations:
         """The sightings of the robots."""
-        return self.log.observations(self.first, self.end)
+        return self.log.observations(max(self.first, min(self.known_from, self.end)), self.end)
 
     @cached_property
     def readings(self) -> Readings:
         """The readings of sensors."""
-        rows = [row for row in self.log.readings if self.first <= row.step < self.end]
+        first = max(self.first, self.known_from)
+        rows = [row for row in self.log.readings if first <= row.step < self.end]
         return Readings(
             frozen(np.array([row.step for row in rows], np.int64)),
             frozen(np.array([row.sensor for row in rows], np.int32)),
@@ -474,7 +484,7 @@ class History:
     @cached_property
     def events(self) -> list[Event]:
         """The events of the visible bodies, in order of step; for algorithms those of robots."""
-        events = self.log.events(self.first, self.end)
+        events = self.log.events(max(self.first, self.known_from), self.end)
         return [event for event in events if event.entity in self.visible]
 
     @cached_property
@@ -544,7 +554,7 @@ class History:
                 whole number of minutes.
         """
         self._check_needs("evidence")
-        return self.log.evidence(self.first, self.end)
+        return self.log.evidence(self.first, self.end, self.known_from)
 
     def _check_needs(self, need: str) -> None:
         if need not in self.needs:

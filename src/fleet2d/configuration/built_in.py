@@ -98,6 +98,7 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "time_to_find": "fleet2d.metrics.robots:TimeToFind",
         "timing_regret": "fleet2d.metrics.interactions:TimingRegret",
         "travel": "fleet2d.metrics.bodies:Travel",
+        "uptime": "fleet2d.metrics.bodies:Uptime",
     },
     "interrupt": {
         "home_empty": "fleet2d.engine.interrupt:HomeEmpty",
@@ -136,6 +137,7 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "move": "fleet2d.interventions.home:MoveFurniture",
         "open": "fleet2d.interventions.home:OpenDoor",
         "perceive": "fleet2d.interventions.robots:Perceive",
+        "power": "fleet2d.interventions.robots:SetPower",
         "put": "fleet2d.interventions.bodies:Put",
         "release": "fleet2d.interventions.bodies:Release",
         "relocalize": "fleet2d.interventions.robots:Relocalize",

@@ -167,6 +167,14 @@ class Cameras(Watcher):
         memory = self._inject() if others[0] == others[1] else self._set_up()
         self.memory = carry_over(memory, self.memory, self._forced())
 
+    def forget(self) -> list[str]:
+        """Forget who is in view, and looks that aren't known yet; return who was in view."""
+        names = [self.name_of(i) for i, is_seen in enumerate(self.memory.seen.tolist()) if is_seen]
+        self.memory.seen[:] = 0
+        self.memory.noticed[:] = -1
+        self.memory.waiting[:] = 0
+        return names
+
     def _disturbed(self) -> Iterator[tuple[int, Disturbance]]:
         """Yield the number of each camera with each of its disturbances, in order."""
         for c, name in enumerate(self.names):

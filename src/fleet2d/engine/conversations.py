@@ -15,7 +15,8 @@ from fleet2d.engine.basis import Basis, PlannedNote, Watcher, notes_of
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.entities.behavior import Command, SightEvent
 from fleet2d.entities.body import NEVER, Bodies
-from fleet2d.entities.decisions import DecidingActor, StandStill
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.plan import Note
 from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.interactions.answers import (
@@ -28,7 +29,7 @@ from fleet2d.interactions.answers import (
     Wanted,
 )
 from fleet2d.interactions.attitude import AttitudeState
-from fleet2d.interactions.interaction import Interaction, Outcome, RequestQueue
+from fleet2d.interactions.interaction import Interaction, Outcome, Request, RequestQueue
 from fleet2d.kernels import TURN, PoseBlock, heading_of, line_of_sight, locate
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -68,7 +69,7 @@ class Conversations(Watcher):
 
         Args:
             basis: The basis of the run.
-            interventions: Where cameras of robots that are switched off are switched off, too.
+            interventions: By which people switch robots off.
         """
         self.actors, self.users, self._clock = basis.actors, basis.bodies.users, basis.clock
         self.queues: dict[int, RequestQueue] = {}
@@ -87,7 +88,8 @@ class Conversations(Watcher):
         self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
         self._starts: list[tuple[int, int, int, str]] = []  # today: step, user, robot, kind
         self._begun_days = 0
-        self._off_until: dict[int, int] = {}  # by robot: the first step at which it is on again
+        # By robot: what was accepted last, and when.
+        self._accepted: dict[int, tuple[Request, int]] = {}
         self._bans: list[tuple[int, int, int]] = []  # first step without, robot, room
         self._open(basis)
 
@@ -334,6 +336,8 @@ class Conversations(Watcher):
         queue = self.queues[row]
         time = self.actors[row].clock.time(step)
         if (request := queue.find(text)) is not None:
+            if reply.outcome == Outcome.ACCEPTED:
+                self._accepted[row] = request, step
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
         user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])
@@ -374,14 +378,36 @@ class Conversations(Watcher):
         return Event(step, robot.name, str(outcome), text)
 
     def _switch_off(self, robot: DecidingActor, lasts: timedelta, step: int, by: str) -> None:
-        """Let a robot stand still from a step on, and neither see nor hear."""
-        robot.follow_order(StandStill(lasts), step)
-        self._off_until[robot.row] = step + self._steps_in(lasts)
-        if robot.entity.eyes:
-            from fleet2d.interventions.robots import SwitchOff  # few robots are switched off
+        """Switch a robot off from a step on."""
+        from fleet2d.interventions.robots import SetPower  # few robots are switched off
 
-            off = SwitchOff(entity=robot.name, camera=True, duration=lasts)
-            self._interventions.follow(off, step, by)
+        off = SetPower(entity=robot.name, state="off", duration=lasts)
+        self._interventions.follow(off, step, by)
+
+    def break_off(self, row: int, step: int) -> list[Event]:
+        """End what a robot does with a person, as it goes off at a step; return the event, if any.
+
+        Nobody hears the answer; what was accepted, but not carried out, is wanted again.
+        """
+        robot = self.actors[row]
+        note = _broken_note(robot, step)
+        self._replies = [reply for reply in self._replies if reply.robot != row]
+        self._questions = [question for question in self._questions if question.row != row]
+        accepted, since = self._accepted.pop(row, (None, -1))
+        events = []
+        if note is not None:
+            time = self._clock.time(step)
+            person = note.detail.rpartition(" ")[2]
+            user = next(actor.row for actor in self.actors if actor.name == person)
+            state = self.attitudes[user, row]
+            self.answers[user].months.pass_time(state, time)
+            self.answers[user].months.let_down(state)
+            is_answered = note.event != EventKind.ASKS or since * self._clock.step_us > note.time_us
+            if accepted is not None and is_answered:
+                self.queues[row].reopen(accepted, time)
+            events.append(Event(step, robot.name, EventKind.BROKEN_OFF, note.detail))
+        self._look_ahead()
+        return events
 
     def _end_bans(self, step: int) -> list[Event]:
         """End the bans of rooms that are over at a step."""
@@ -423,8 +449,7 @@ class Conversations(Watcher):
         person = self.actors[user]
         robot = self.actors[row]
         block = bodies.block(step, step + 1)
-        is_off = step < self._off_until.get(row, 0)
-        if is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
+        if robot.is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
             return None
         lattice = robot.home.plan.lattice
         point = (int(block.x[user, 0]), int(block.y[user, 0]))
@@ -449,6 +474,22 @@ class Conversations(Watcher):
         if outcome is None:
             return None
         return self._obey(row, user, outcome, person.name, step, bodies)
+
+
+def _broken_note(robot: DecidingActor, step: int) -> Note | None:
+    """Return what a robot is in the middle of with a person at a step, as its plan notes it.
+
+    That is a question that it waits to be answered, or what was accepted and isn't carried out.
+    """
+    now_us = step * robot.clock.step_us
+    if robot.plan.is_over(step):
+        return None
+    for note in robot.plan.notes:
+        is_asked = note.event == EventKind.ASKS and note.time_us < now_us
+        is_undone = note.event in (EventKind.COLLECTS, EventKind.DELIVERED)
+        if is_asked or (is_undone and note.time_us >= now_us):
+            return note
+    return None
 
 
 def _check_answers_calls(person: DecidingActor, robot: DecidingActor, answers: Answers) -> None:

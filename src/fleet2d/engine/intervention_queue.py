@@ -39,7 +39,7 @@ PERSON_EVENTS = frozenset(
 ROBOT_EVENTS = frozenset(
     {
         EventKind.ALLOWED, EventKind.BANNED, EventKind.CALLED, EventKind.LOCALIZATION_LOST,
-        EventKind.RELOCALIZED, EventKind.WITHDRAWS,
+        EventKind.POWER_OFF, EventKind.POWER_ON, EventKind.RELOCALIZED, EventKind.WITHDRAWS,
     }
 )  # fmt: skip
 DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
@@ -58,6 +58,7 @@ ABOUT_ROBOTS = (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST)
 OF_REQUESTS = (
     EventKind.DUE, EventKind.EXPIRED, EventKind.ASKS, EventKind.ACCEPTED, EventKind.DECLINED,
     EventKind.DEFERRED, EventKind.IGNORED, EventKind.MISTAKEN, EventKind.DELIVERED,
+    EventKind.BROKEN_OFF,
 )  # fmt: skip
 
 
@@ -295,7 +296,7 @@ def _kinds_of(
     if may_block:
         kinds.add(EventKind.WAY_BLOCKED)
     if actor.requests is not None:
-        kinds |= REQUEST_EVENTS
+        kinds |= {*REQUEST_EVENTS, EventKind.BROKEN_OFF}
     for behavior in actor.behaviors:
         kinds |= behavior.records
     if _is_own(actor):

@@ -149,6 +149,14 @@ class SeenArea(Watcher):
                 self._collect_bins(first, bins)
         return ()
 
+    def forget(self) -> None:
+        """Forget which cells were seen, and when; what the evidence counts stays."""
+        self.catch_up()
+        self._settle()
+        self._record.first[:] = NEVER
+        self._record.last[:] = NEVER
+        self._set_walls(self.robot.home.walls)
+
     def catch_up(self) -> None:
         """Look up to the present step."""
         self.take(self._bodies, self._bodies.step)

@@ -46,6 +46,7 @@ class Learner:
         since: First step of its next history.
         back: Number of steps before that which it may also read.
         is_updated: Whether it has been updated.
+        known_from: The first step of which it knows anything: it lost all before.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Learner:
     since: int = 0
     back: int = 0
     is_updated: bool = False
+    known_from: int = 0
 
     @property
     def oldest(self) -> int:
@@ -150,6 +152,26 @@ class Learners:
         """
         learner = next(learner for learner in self.all if learner.path == f"algorithms.{name}")
         learner.component = self._start(learner.path, learner.origin, learned)
+
+    def reboot(self, step: int, keeps: Callable[[str], bool]) -> None:
+        """Let algorithms lose at a step what doesn't outlast the time in which no robot was on.
+
+        Args:
+            step: The step.
+            keeps: Whether an algorithm, by its name, keeps what it has learned.
+        """
+        for learner in self.all:
+            old = learner.component
+            if not isinstance(old, Algorithm) or (keeps(learner.name) and not old.is_real_time):
+                continue
+            learned = getattr(learner.origin, "learned", None)
+            learner.component = self._start(learner.path, learner.origin, learned)
+            if keeps(learner.name) and isinstance(learner.component, Algorithm):
+                with blame(learner.path, step):
+                    learner.component.recall(old.long_term_state())
+            learner.known_from = step
+            self.outputs = {name: o for name, o in self.outputs.items() if name != learner.name}
+        self._show_outputs()
 
     def _start(
         self, path: str, origin: Algorithm | Metric, learned: Path | None
@@ -254,7 +276,9 @@ class Learners:
         visible = frozenset((*self.users, *self.robots) if is_metric else self.robots)
         step_s = self.clock.step_us / 1e6
         needs = frozenset(learner.component.needs)
-        history = History(log, learner.since, end, step_s, visible, learner.oldest, needs)
+        history = History(
+            log, learner.since, end, step_s, visible, learner.oldest, needs, learner.known_from
+        )
         state = Present(
             learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
             self.users, self.robots, Outputs({**outputs}, self.known), self.seed

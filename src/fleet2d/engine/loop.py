@@ -20,6 +20,7 @@ from fleet2d.algorithms.history import Log
 from fleet2d.configuration.trust import may_run_code, running_code
 from fleet2d.engine.basis import Watcher
 from fleet2d.engine.checkpoint import CheckpointWriter
+from fleet2d.engine.power import follow_charge
 from fleet2d.engine.state import State
 from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
@@ -107,6 +108,8 @@ def decide(state: State, span: Span) -> None:
             state.end_plan(row, step)
             actor.decide(situation)
             _follow_plan(state, row)
+        if actor.charge is not None:
+            follow_charge(state.interventions, actor, step)
         for watcher in state.steering:
             if row in watcher.steered:
                 begins |= _evade(state, watcher, row, step, begins=begins)

@@ -65,6 +65,8 @@ class RealSight(Cameras):
             self.memory.noticed[:], self.memory.seen[:] = old_memory[:2]
         with blame(f"{self.owner.path}.perceives", first):
             rows = self.source.sightings(first, looked)
+        if self.owner.is_off:
+            rows = rows[:0]
         if self.source.relative and len(rows):
             rows = self._on_map(rows, bodies, first, looked)
         if self.source.besides_cameras:

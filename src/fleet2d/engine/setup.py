@@ -18,6 +18,7 @@ from fleet2d.engine.interrupt import WATCHED_EVENTS, Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
+from fleet2d.engine.power import schedule_failures
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import EventStream, InView, Recall, State
@@ -91,6 +92,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         group.owner.in_view = InView(state, group)
     _remember(state, basis)
     state.wait_for(state.requested)
+    schedule_failures(state, scenario, clock, seed)
     # Entries that wait for an event come last: another entry may cause the event.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"

@@ -210,7 +210,9 @@ class Simulation:
 
     @property
     def state(self) -> dict[str, dict[str, Any]]:
-        """The state at the next step by name, of bodies: x, y [m], heading [rad], room, away.
+        """The state at the next step by name, of bodies: x, y [m], heading [rad], room, away, off.
+
+        `off` is why a robot is off, if it is.
 
         Of doors it is whether they are open and locked, of sensors whether they are on.
         """
@@ -318,6 +320,7 @@ class Simulation:
             "heading": in_radians(state.heading),
             "room": room.name if room else None,
             "away": bool(state.away),
+            **({"off": actor.off_for} if actor.is_off else {}),
         }
 
     # Running

@@ -396,6 +396,14 @@ class State:
             self.log.forget(before)
         self.bodies.forget(min(before, self.settled))
 
+    def renew_memory(self, actor: DecidingActor) -> None:
+        """Let a robot forget its sightings, if it has a memory of them."""
+        if isinstance(actor.recall, Recall):
+            old = actor.recall
+            actor.recall = Recall(self, old.cameras, old.memory.emptied())
+            if old.cameras is not None:
+                old.cameras.remembered = actor.recall.memory
+
     def _observations(self) -> SightingTable:
         """Return the sightings of all robots, in order of step and robot."""
         blocks = [cameras.collect() for cameras in self.cameras] or [NOTHING]

@@ -12,6 +12,7 @@ from typing import Any
 
 from fleet2d.configuration.problems import check_known, did_you_mean, suggest
 from fleet2d.configuration.units import format_duration, micros
+from fleet2d.engine import power
 from fleet2d.engine.intervention_queue import (
     OUTSIDE,
     SCRIPT,
@@ -132,6 +133,14 @@ class EngineWorld:
         queue = self._state.interventions
         steps = max(1, self.clock.step_at_or_after(micros(delay)))
         queue.follow(act, self.step + steps)
+
+    def switch_off(self, actor: DecidingActor) -> None:
+        """Let a robot lose its power at the present step."""
+        power.switch_off(self._state, actor, self.step)
+
+    def switch_on(self, actor: DecidingActor) -> bool:
+        """Let a robot begin anew at the present step; return whether it was carried elsewhere."""
+        return power.switch_on(self._state, actor, self.step)
 
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""

@@ -417,6 +417,7 @@ class Actor(Body):
         plan: The plan that it follows.
         motion: The motion of that plan.
         planned_at: The step at which it began the plan.
+        off_for: Why it is off, as `SetPower.state` says; None: it is on.
     """
 
     behaviors: list[Behavior] = field(init=False)
@@ -425,9 +426,10 @@ class Actor(Body):
         super().__post_init__()
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set if it has cameras
         self.recall: Callable[[], Any] = dict  # set if it remembers
-        behaviors = getattr(self.entity, "behaviors", ())
+        # Before they start, to begin anew with.
+        self._declared = list(getattr(self.entity, "behaviors", ()))
         self.requests: RequestQueue | None = None  # set if the scenario has interactions
-        self.behaviors = [behavior.model_copy(deep=True) for behavior in behaviors]
+        self.behaviors = [behavior.model_copy(deep=True) for behavior in self._declared]
         self.displacements: list[Displacement] = []
         with blame(self.path, None):
             self._state = self._first_pose()
@@ -438,6 +440,7 @@ class Actor(Body):
                 behavior.start(self)
             self._find_attention()
         self.command: Command | None = None
+        self.off_for: str | None = None
         self.bans: dict[int, int] = {}
         self.plan: Plan = Plan(self, 0).stay()
         self.motion: Motion = self.plan.finish()
@@ -448,9 +451,21 @@ class Actor(Body):
         self._attentive = next((pair for pair in claims if pair[1] is not None), None)
 
     def replace(self, number: int, behavior: Behavior) -> None:
-        """Replace a behavior, by its number, with another one that was started."""
-        self.behaviors[number] = behavior
+        """Replace a behavior, by its number, with another one, which starts.
+
+        Raises:
+            InputError: It can't start; the present one stays.
+        """
+        started = behavior.model_copy(deep=True)
+        started.start(self)
+        self.behaviors[number] = started
+        self._declared[number] = behavior
         self._find_attention()
+
+    @property
+    def is_off(self) -> bool:
+        """Whether it is off: it neither moves, nor sees, nor hears."""
+        return self.off_for is not None
 
     def banned(self, step: int) -> frozenset[int]:
         """Return the indices of the rooms that it is told to keep out of at a step."""

@@ -12,6 +12,7 @@ ends after its duration, with the next order, or on release.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from typing import Protocol
@@ -31,7 +32,8 @@ from fleet2d.entities.body import Pose
 from fleet2d.entities.giving_way import GivesWay, Surroundings, WaitForPeople
 from fleet2d.entities.place import Point, RoomChoice
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import ComponentError, NoWayError, PlacementError, blame
+from fleet2d.entities.power import EMPTY
+from fleet2d.errors import ComponentError, InputError, NoWayError, PlacementError, blame
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.runtime.events import EventKind
 
@@ -351,6 +353,7 @@ class DecidingActor(Actor):
         order: The order that decides in place of its behaviors; None: there is none.
         waiting: Its wait, if it has stopped in front of a person.
         is_stuck: Whether it can't move, whatever its behaviors or an order want.
+        off_at: Where it was when it was off last.
         is_displaced: Whether it was ever put somewhere: it may be where no way leads out.
         passes_until: Before that step it goes round people, and may come near without touching.
     """
@@ -360,6 +363,7 @@ class DecidingActor(Actor):
         self.arbiter = Arbiter(self.behaviors)
         self.order: Order | None = None
         self.is_stuck = self.is_displaced = False
+        self.off_at = self.state
         self.passes_until = 0
         self._chosen: Plan | None = None  # by `choose` or `keeps_plan`, for the next `decide`
         self.waiting: WaitForPeople | None = None
@@ -432,8 +436,11 @@ class DecidingActor(Actor):
     def receive(self, command: Command, step: int) -> bool:
         """Keep a command until a behavior takes it up; return whether one is asked at once.
 
-        A behavior that comes after the active one has to wait for its turn.
+        A behavior that comes after the active one has to wait for its turn; nobody hears a command
+        while off.
         """
+        if self.is_off:
+            return False
         self.command = command
         takers = (i for i, behavior in enumerate(self.behaviors) if behavior.takes(command))
         first = next(takers, None)
@@ -449,6 +456,20 @@ class DecidingActor(Actor):
         for behavior in self.behaviors:
             behavior.dismiss()
         self.decide_again(step)
+
+    def reboot(self, step: int) -> None:
+        """Begin anew after having been off: what its behaviors were in the middle of is lost."""
+        off = self.arbiter.off
+        for number in range(len(self.behaviors)):
+            with suppress(InputError):  # the home may lack by now what it needs to begin
+                self.replace(number, self._declared[number])
+        self.arbiter = Arbiter(self.behaviors)
+        self.arbiter.off = off
+        self.command = None
+        self._waited = (0, -1)
+        self._blocked = ("", -1)
+        self.passes_until = 0
+        self.follow_order(None, step)
 
     def reacts_to(self, event: SightEvent, step: int) -> bool:
         """Return whether it reacts to an action of a robot."""
@@ -530,6 +551,8 @@ class DecidingActor(Actor):
 
     def reason(self) -> tuple[str, str]:
         """Return what its plan comes from, a behavior or `order`, and the last note of the plan."""
+        if self.off_for is not None:
+            return "off", self.off_for
         active = self.arbiter.active
         notes = self.plan.notes
         note = f"{notes[-1].event} {notes[-1].detail}".strip() if notes else ""
@@ -594,8 +617,8 @@ class DecidingActor(Actor):
 
     def _set_next_decision(self, now: Situation, *, fresh: bool) -> None:
         """Set when it decides next: the plan is over, or another behavior may interrupt it."""
-        if self.charge is not None and self.charge.is_empty:
-            self.ask(None)  # it stands still for good
+        if self.is_off or (self.charge is not None and self.charge.is_empty):
+            self.ask(self._wakes_at(now))
             return
         if self.order is None and not self.is_stuck:
             self.arbiter.watch(now, self.plan, fresh=fresh)
@@ -605,6 +628,16 @@ class DecidingActor(Actor):
             if empty_us is not None:
                 steps.append(max(self.clock.step_at_or_after(empty_us), now.step + 1))
         self.ask(min(steps, default=None))
+
+    def _wakes_at(self, now: Situation) -> int | None:
+        """Return when its battery, which was empty, lets it be on again; None: never."""
+        if self.charge is None or self.off_for not in (None, EMPTY):
+            return None
+        wakes_after_us = self.charge.wakes_after(self.motion)
+        if wakes_after_us is None:
+            return None
+        moment_us = now.step * self.clock.step_us + wakes_after_us
+        return max(self.clock.step_at_or_after(moment_us), now.step + 1)
 
     def _ask_behavior(self, behavior: Behavior | Order, now: Situation) -> Plan | None:
         """Return the plan of a behavior or an order.

@@ -15,6 +15,7 @@ from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
+from fleet2d.entities.power import Power
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.kernels import I64
@@ -128,9 +129,10 @@ class User(Entity):
     uses_portals = True
 
     def model_post_init(self, _: object, /) -> None:
-        """Refuse errors of perception."""
-        if self.camera is not None and self.camera.perception is not None:
-            raise problem_at(("camera", "perception"), "users see robots as they are: leave it out")
+        """Refuse errors of perception, and failures."""
+        for key in ("perception", "fails"):
+            if getattr(self.camera, key, None) is not None:
+                raise problem_at(("camera", key), "users see robots as they are: leave it out")
 
     @property
     def tall(self) -> float:
@@ -160,6 +162,8 @@ class Robot(Entity):
         battery: Its battery, for the behavior dock; null: its charge never ends.
         gives_way: How it keeps clear of people; null: it drives on, and people go round it.
         localization: The error of its estimate of its own pose; null: there is none.
+        power: When it crashes or updates, and what it forgets while it is off; null: never, and
+            nothing that it has learned.
         keep_out: Rooms, or kinds of rooms if the home has them, that it never enters: it starts,
             stops, passes and follows nowhere there. Put there by a person, it leaves.
     """
@@ -179,6 +183,7 @@ class Robot(Entity):
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None
+    power: Power | None = None
     keep_out: tuple[str, ...] = ()
     sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
     request_events = REQUEST_EVENTS
@@ -207,12 +212,15 @@ class Robot(Entity):
             raise problem_at(
                 ("perceives",), "it needs a camera, from whose view follows what it watched"
             )
-        errs = self.perception is not None or any(c.perception for c in self.eyes.values())
-        if errs and not self.perceives.besides_cameras:
-            raise problem_at(
-                ("perceives",),
-                "give 'perceives' or 'perception', not both, or perceives.besides_cameras: true",
-            )
+        own = {"perception": self.perception is not None}
+        for key in ("perception", "fails"):
+            own[key] = own.get(key, False) or any(getattr(c, key) for c in self.eyes.values())
+        for key in (key for key, is_given in own.items() if is_given):
+            if not self.perceives.besides_cameras:
+                raise problem_at(
+                    ("perceives",),
+                    f"give 'perceives' or '{key}', not both, or perceives.besides_cameras: true",
+                )
 
     @property
     def eyes(self) -> dict[str, Camera]:

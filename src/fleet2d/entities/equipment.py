@@ -35,6 +35,8 @@ class Battery(Settings):
         charging: How long it takes to charge from empty to full.
         charger: Where the charger is: a point, or a room, at the point farthest from its walls.
         charge: Charge when the run begins.
+        wakes_at: Charge at which the robot, whose battery was empty, is on again: it charges when
+            somebody puts it to its charger.
     """
 
     driving: PositiveDuration
@@ -42,6 +44,7 @@ class Battery(Settings):
     charging: PositiveDuration
     charger: Place
     charge: Share = 1.0
+    wakes_at: Share = Field(default=0.05, gt=0)
 
 
 class ChargeCurve(NamedTuple):
@@ -72,12 +75,16 @@ class Charge:
         level: Charge at the last decision, 0 to 1.
         charger: Where the charger is [lattice].
         is_broken: Whether the charger doesn't charge.
+        is_off: Whether the robot is off: its charge doesn't fall.
+        wakes_at: Charge at which it is on again after its battery was empty.
     """
 
     is_broken = False
+    is_off = False
 
     def __init__(self, battery: Battery, body: Body) -> None:
         self.level = battery.charge
+        self.wakes_at = battery.wakes_at
         self._gain = 1 / micros(battery.charging)  # per us
         self._rates = -1 / micros(battery.driving), -1 / micros(battery.standing), self._gain
         self.charger = stop_at(body, battery.charger)
@@ -97,13 +104,21 @@ class Charge:
     def follow(self, motion: Motion, until_us: int) -> None:
         """Update the charge: a motion was followed from the last decision to a moment.
 
-        Before `level` or `is_broken` is set at that moment, this is to be called.
+        Before `level`, `is_broken` or `is_off` is set at that moment, this is to be called.
         """
-        self.level = kernels.charge_at(_track(motion), self._state, until_us)
+        if self.is_off:
+            self.level = float(self.course(motion).levels(np.array([until_us]))[0])
+        else:
+            self.level = kernels.charge_at(_track(motion), self._state, until_us)
         self._since_us = until_us
 
     def course(self, motion: Motion) -> ChargeCurve:
         """Return the charge from the last decision on, if a motion is followed."""
+        if self.is_off:  # at rest
+            track = _track(motion)
+            ends = [(int(x), int(y)) for x, y in zip(track.x[-1:], track.y[-1:], strict=True)]
+            rate = self._gain if self.charger in ends and not self.is_broken else 0.0
+            return ChargeCurve(np.array([self._since_us]), np.array([self.level]), np.array([rate]))
         return ChargeCurve(*kernels.charge_pieces(_track(motion), self._state))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
@@ -113,6 +128,11 @@ class Charge:
     def time_to_charge(self, level: float) -> int:
         """Return how long it takes to charge to a level [us]."""
         return max(0, int((level - self.level) / self._gain) + 1)
+
+    def wakes_after(self, motion: Motion) -> int | None:
+        """Return how long a robot at rest charges until it is on again [us]; None: it doesn't."""
+        is_charging = self.is_off and self.course(motion).rates[0] > 0
+        return self.time_to_charge(self.wakes_at) if is_charging else None
 
     def record(self, plan: Plan) -> None:
         """Note the charge at the beginning of a plan, if it differs from the last one noted."""

@@ -11,9 +11,20 @@ from fleet2d.configuration.units import Duration, micros
 from fleet2d.entities.home_object import HomeObject
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, Bool
+from fleet2d.sight.failures import Failures
 
 SensorFault = Literal["on", "off", "silent"]
 """How a sensor fails: it is always triggered, never triggered, or reports nothing."""
+
+
+class SensorFailures(Failures):
+    """When a sensor fails, and how.
+
+    Attributes:
+        says: It reports nothing (`silent`), or is always or never triggered (`on`, `off`).
+    """
+
+    says: SensorFault = "silent"
 
 
 class SensorReading(NamedTuple):
@@ -63,9 +74,11 @@ class Sensor(HomeObject):
 
     Attributes:
         room: The room that its readings name; left out: where it is.
+        fails: When it fails; null: never.
     """
 
     room: str | None = Field(default=None, min_length=1)
+    fails: SensorFailures | None = None
 
     # Names of its two states in the table of readings.
     words: ClassVar[tuple[str, str]] = ("ON", "OFF")

@@ -7,7 +7,7 @@ values. It can be written in texts and imported from `fleet2d.expectations` at o
 
 from collections.abc import Collection, Iterator
 from dataclasses import field
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -16,6 +16,7 @@ from fleet2d.algorithms.observations import ROBOT
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_time_of_day, weekdays_of
 from fleet2d.entities.behavior import Actor
+from fleet2d.entities.power import PowerState
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.expectations.expectation import (
     RunSignals,
@@ -296,6 +297,33 @@ class activity(WordSignal):
             (event.step, _code(event.detail, gauge))
             for event in block.events
             if event.event == EventKind.ACTIVITY and event.entity == self.user
+        ]
+        return gauge.switched(block, changes)
+
+
+class power(WordSignal):
+    """Whether a robot is on, for `power("astro") == "on"`; else why it went off: its state."""
+
+    robot: str
+
+    of = ("robot", "robots")
+    noun = "state of power"
+
+    def check_word(self, word: str, scene: Scene) -> None:
+        """Refuse another state than those of the intervention `power`."""
+        scene.check_name("state of power", word, get_args(PowerState), self)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Begin with the code of the present state."""
+        gauge.now = _code(run.actors[run.row(self.robot)].off_for or "on", gauge)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the code of the state at each step."""
+        changes = [
+            (event.step, _code("on" if event.event == EventKind.POWER_ON else event.detail, gauge))
+            for event in block.events
+            if event.event in (EventKind.POWER_OFF, EventKind.POWER_ON)
+            and event.entity == self.robot
         ]
         return gauge.switched(block, changes)
 

@@ -113,6 +113,10 @@ class Attitude(Component):
         elif outcome in (Outcome.DECLINED, Outcome.SENT_AWAY):
             state.trust *= 1 - LOSES / 10
 
+    def let_down(self, state: AttitudeState) -> None:
+        """Learn from a robot that goes off in the middle of an interaction: all was for nothing."""
+        state.trust *= 1 - LOSES / 10
+
 
 class SteadyAttitude(Attitude):
     """A person whose interest doesn't fade, and who is soon at peace: about a quarter of people."""

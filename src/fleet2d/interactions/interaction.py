@@ -260,6 +260,14 @@ class RequestQueue:
         """Return when a request that has to wait may be tried again; None: none has to."""
         return min((r.not_before for r in self.open if r.not_before > time), default=None)
 
+    def reopen(self, request: Request, time: datetime) -> None:
+        """Want again what was accepted, as it wasn't carried out, unless it is too late."""
+        if request.is_fetched and any(each is request for each in self.open):
+            request.is_fetched = False
+        elif request.until > time:
+            request.not_before = time
+            self.open = sorted([*self.open, request], key=lambda each: (each.since, each.name))
+
     def settle(self, request: Request, outcome: Outcome, time: datetime, later: datetime) -> None:
         """Note what came of addressing the person.
 

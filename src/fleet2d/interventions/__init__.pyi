@@ -3,6 +3,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
 
+from fleet2d.entities.power import PowerState
 from fleet2d.entities.sensor import SensorFault
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.placed_objects import Posture
@@ -93,6 +94,16 @@ class Steer(steering.Steer):
 
 class SetBattery(robots.SetBattery):
     def __init__(self, entity: str, charge: float | str) -> None: ...
+
+class SetPower(robots.SetPower):
+    def __init__(
+        self,
+        entity: str,
+        *,
+        duration: Time | None = ...,
+        state: PowerState = ...,
+        ends: PowerState | None = ...,
+    ) -> None: ...
 
 class SwitchOff(robots.SwitchOff):
     def __init__(

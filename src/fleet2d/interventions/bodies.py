@@ -217,9 +217,7 @@ class Configure(BodyIntervention):
     def begin(self, world: World) -> None:
         """Replace the behavior."""
         actor = self.actor(world)
-        behavior = self._behavior(actor)
-        behavior.start(actor)
-        actor.replace(behavior_number(actor, self.behavior), behavior)
+        actor.replace(behavior_number(actor, self.behavior), self._behavior(actor))
         actor.decide_again(world.step)
 
     def _behavior(self, actor: Actor) -> Behavior:

@@ -108,6 +108,12 @@ class World(Protocol):
     def later(self, act: "Intervention", delay: timedelta) -> None:
         """Apply an intervention that follows from this one, after a time."""
 
+    def switch_off(self, actor: DecidingActor) -> None:
+        """Let a robot lose its power at the present step."""
+
+    def switch_on(self, actor: DecidingActor) -> bool:
+        """Let a robot begin anew at the present step; return whether it was carried elsewhere."""
+
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""
 

@@ -1,6 +1,7 @@
 """Interventions on robots: calls, batteries, faults, and what they perceive."""
 
 from datetime import timedelta
+from typing import TypeGuard
 
 from pydantic import Field
 
@@ -12,6 +13,7 @@ from fleet2d.entities.body import NEVER
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import Place
+from fleet2d.entities.power import EMPTY, PLACE, PowerState, power_of
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
 from fleet2d.interventions.bodies import BodyIntervention, Put, behavior_number, heading_of
@@ -93,6 +95,8 @@ class Call(RobotIntervention):
     def begin(self, world: World) -> None:
         """Pass the command to its behaviors."""
         command = self.order
+        if self.actor(world).is_off:
+            return
         world.emit(self.entity, EventKind.CALLED, command.text)
         self.actor(world).receive(command, world.step)
 
@@ -166,7 +170,7 @@ class KeepOut(RobotIntervention, Lasting):
 
 
 class SetBattery(RobotIntervention):
-    """Set the charge of a robot's battery.
+    """Set the charge of a robot's battery; a robot that was off because it was empty is on again.
 
     Attributes:
         charge: The charge at that moment, 0 to 1.
@@ -189,6 +193,8 @@ class SetBattery(RobotIntervention):
         charge.follow(actor.motion, world.step * world.clock.step_us)
         charge.level = self.charge
         actor.decide_again(world.step)
+        if not charge.is_empty:
+            world.undo(lambda act: is_off(act, self.entity) and act.state == EMPTY)
 
 
 def battery_of(actor: Actor) -> Charge:
@@ -339,6 +345,118 @@ def relocalizes_after(actor: Actor) -> timedelta | None:
     """Return for how long a robot has to see the home to know its place; None: it can't."""
     settings = getattr(actor.entity, "localization", None)
     return None if settings is None else settings.relocalizes
+
+
+# How long a crash or an update lasts, if neither the intervention nor the robot says so.
+CRASH_LASTS = timedelta(minutes=1)
+UPDATE_LASTS = timedelta(minutes=15)
+# How long a robot that is on again needs to find out where it is, unless its localization says so.
+LOST_AFTER_BOOT = timedelta(minutes=1)
+
+
+class SetPower(Trouble):
+    """Switch a robot off or on, or let it crash or update.
+
+    While it is off it stands where it is, sees and hears nothing, and its charge doesn't fall. When
+    it is on again, it begins anew there, with what it `persists` (see `Power`). If somebody has
+    carried it elsewhere meanwhile, or it keeps no place, it is lost at first. Events: `power_off`,
+    with the state, `broken_off`, with what it wanted of a person just then, and `power_on`.
+
+    Attributes:
+        entity: The robot.
+        state: `off`: switched off, or its power is cut; `crash` and `update`: it is on again by
+            itself; `on`. A robot with an `empty` battery is off by itself (`battery` sets the
+            charge).
+        ends: With `on`: only what it is off for; left out: all but an empty battery.
+        duration: How long it is off; left out: until it is switched on, for a crash 1 min, and for
+            an update 15 min, unless the robot's `power` says otherwise.
+
+    Example:
+        >>> SetPower("astro", state="off", duration="2 h").state
+        'off'
+    """
+
+    state: PowerState = "off"
+    ends: PowerState | None = None
+
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse keys that don't go together."""
+        if self.state == "on" and self.duration is not None:
+            raise problem("'duration' is how long it is off: it doesn't go with 'state: on'")
+        if self.ends is not None and self.state != "on":
+            raise problem("'ends' goes with 'state: on'")
+
+    @property
+    def disturbance(self) -> Disturbance | None:
+        """The effect on cameras."""
+        return None if self.state == "on" else Disturbance(dark=True)
+
+    @property
+    def immobilizes(self) -> bool:
+        """Whether the robot can't drive."""
+        return self.state != "on"
+
+    def check(self, world: World) -> None:
+        """Refuse an unknown robot, and an empty battery that isn't."""
+        actor = self.actor(world)
+        if self.state == EMPTY and not battery_of(actor).is_empty:
+            raise ScenarioError(f"the battery of {self.entity} isn't empty: set its charge instead")
+
+    def _lasts(self, actor: Actor) -> timedelta | None:
+        """Return how long it lasts; None: until the robot is switched on."""
+        power = power_of(actor.entity)
+        if self.duration is not None or self.state not in ("crash", "update"):
+            return self.duration
+        if self.state == "crash":
+            return CRASH_LASTS if power.crashes is None else power.crashes.lasts
+        return UPDATE_LASTS if power.updates is None else power.updates.lasts
+
+    def begin(self, world: World) -> None:
+        """Switch it, at once."""
+        actor = self.actor(world)
+        if self.state == "on":
+            is_empty = actor.charge is not None and actor.charge.is_empty
+            world.undo(lambda act: self._switches(act, is_empty=is_empty))
+            return
+        # What begins is a copy of what was asked for: it may say how long it lasts.
+        vars(self)["duration"] = self._lasts(actor)
+        was_on = not actor.is_off
+        actor.off_for = actor.off_for or self.state
+        super().begin(world)
+        if was_on:
+            world.switch_off(actor)
+
+    def end(self, world: World) -> None:
+        """Let it begin anew, unless it is off for another reason."""
+        actor = self.actor(world)
+        if self.state == "on" or not actor.is_off:
+            return
+        reasons = [act for act in world.lasting if is_off(act, self.entity)]
+        if reasons:
+            actor.off_for = reasons[0].state
+            return
+        reason = actor.off_for or self.state
+        actor.off_for = None
+        self._apply(world)
+        was_carried = world.switch_on(actor)
+        world.emit(self.entity, EventKind.POWER_ON, reason)
+        if was_carried or not power_of(actor.entity).keeps(PLACE):
+            actor.is_stuck = True  # until the next step, when it notices
+            lasts = None if relocalizes_after(actor) else LOST_AFTER_BOOT
+            world.later(Fault(entity=self.entity, lost=True, duration=lasts), timedelta(0))
+
+    def _switches(self, act: object, *, is_empty: bool) -> bool:
+        """Return whether it ends what a robot is off for."""
+        if not is_off(act, self.entity):
+            return False
+        if self.ends is not None:
+            return act.state == self.ends
+        return act.state != EMPTY or not is_empty
+
+
+def is_off(act: object, name: str) -> "TypeGuard[SetPower]":
+    """Return whether because of an active intervention a robot is off."""
+    return isinstance(act, SetPower) and act.state != "on" and act.entity == name
 
 
 class Fault(Trouble):

@@ -162,6 +162,64 @@ class BatteryUse(Metric):
         return numbers
 
 
+class Uptime(Metric):
+    """Share of time that each robot is on, how often a day it is off and why, and for how long.
+
+    From the events `power_off` and `power_on`: while it is off, a robot sees and does nothing, so
+    what other metrics say of its time with people includes that time. `longest` is the longest time
+    off [s]; `off`, `crash`, `update` and `empty` count how often a day each of them happens.
+    """
+
+    unit = "a day"
+    units = {"on": "share of time", "longest": "s"}
+    least = {"": 0}
+    better = {"on": "higher", "longest": "lower"}
+
+    def start(self, home: Home) -> None:
+        """Begin counting."""
+        self.times: dict[str, dict[str, int]] = {}  # by robot and reason
+        self.off_at: dict[str, int] = {}
+        self.steps_off: dict[str, list[int]] = {}
+        self.end = 0
+        self.days = 0.0
+        self.step_s = 1.0
+
+    def update(self, history: History, state: Present) -> Any:
+        """Read the events; return the share of the period in which each robot was on."""
+        off = dict.fromkeys(state.robots, 0)
+        for robot in state.robots:
+            self.times.setdefault(robot, {})
+            self.steps_off.setdefault(robot, [])
+        for event in history.events:
+            name = event.entity
+            if event.event == EventKind.POWER_OFF:
+                self.times[name][event.detail] = self.times[name].get(event.detail, 0) + 1
+                self.off_at[name] = event.step
+            elif event.event == EventKind.POWER_ON:
+                began = self.off_at.pop(name)
+                self.steps_off[name].append(event.step - began)
+                off[name] += event.step - max(began, history.first)
+        for name, began in self.off_at.items():
+            off[name] += history.end - max(began, history.first)
+        self.end = history.end
+        self.days += history.days
+        self.step_s = history.step_s
+        shares = [1 - steps / len(history) for steps in off.values()]
+        return {"robot": np.array(list(off), dtype=object), "on": np.array(shares)}
+
+    def result(self) -> dict[str, Any]:
+        """Return {robot: {on, longest, and how often a day for each reason}}."""
+        numbers: dict[str, Any] = {}
+        for name, times in self.times.items():
+            still_off = [self.end - self.off_at[name]] if name in self.off_at else []
+            steps = [*self.steps_off[name], *still_off]
+            numbers[name] = {"on": 1 - sum(steps) / self.end}
+            if steps:
+                numbers[name]["longest"] = max(steps) * self.step_s
+            numbers[name] |= {reason: count / self.days for reason, count in times.items()}
+        return numbers
+
+
 class RoomShare(Metric):
     """Share of time that each user spends in each room, and away.
 

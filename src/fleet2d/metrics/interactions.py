@@ -16,13 +16,13 @@ from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.metrics.metric import Metric, columns_of, nested
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.events import Event, EventKind
 
 # What happens between a person and a robot without a request.
 TOLD = frozenset(
     {
         EventKind.CALLED, EventKind.QUESTION, EventKind.REPLIES, EventKind.SENT_AWAY,
-        EventKind.BANNED, EventKind.SWITCHED_OFF,
+        EventKind.BANNED, EventKind.SWITCHED_OFF, EventKind.BROKEN_OFF,
     }
 )  # fmt: skip
 
@@ -34,12 +34,13 @@ class Interactions(Metric):
 
     - `wanted`: requests that came up; `asked`: times that the person was addressed for them;
     - `answered`, `accepted`: shares of `asked`; `kept`: share of `wanted` accepted in time;
-    - `value`: value of what was accepted; `missed`: the worth of all requests minus that;
+    - `value`: value of what was accepted, without what the robot broke off as it went off;
+      `missed`: the worth of all requests minus that;
     - `wait_s`: mean time to an answer; `woke`: times that it woke the person;
     - `interrupted`: how often each activity was interrupted at a bad time: the probability of being
       available was below a half;
-    - `called`, `question`, `replies`, `sent_away`, `banned`, `switched_off`: how often each of them
-      happened, if ever, whoever began;
+    - `called`, `question`, `replies`, `sent_away`, `banned`, `switched_off`, `broken_off`: how
+      often each of them happened, if ever, whoever began;
     - `annoyance`, `trust`: at the end, and `mean_annoyance`, over the times of being addressed.
 
     Its table has a row for each time that a person was addressed, with the truth of it.
@@ -82,10 +83,20 @@ class Interactions(Metric):
         for record in records:
             key = record.robot, _person(record.text)
             self.records.setdefault(key, []).append(record)
+        for event in history.events:
+            if event.event == EventKind.BROKEN_OFF:
+                self._break_off(event)
         columns = columns_of(AnswerRecord._fields, records)
         if columns is not None:
             columns["asked_at"] = columns.pop("step")
         return columns
+
+    def _break_off(self, event: Event) -> None:
+        """Take back the value of what was accepted last, as it was not carried out."""
+        records = self.records.get((event.entity, _person(event.detail)), [])
+        before = [i for i, r in enumerate(records) if r.step < event.step]
+        if before and records[before[-1]].text == event.detail:
+            records[before[-1]] = records[before[-1]]._replace(value=0.0)
 
     def result(self) -> dict[str, Any]:
         """Return {robot: {user: {number: value}}}."""
@@ -194,7 +205,9 @@ class TimingRegret(Metric):
         """Compare the times of the history; return a row for each request that is over."""
         life = _LifeOfPeriod(history, state, self.activities)
         every = max(1, round(self.every.total_seconds() / history.step_s))
-        happened: list[tuple[int, int, Wanted | AnswerRecord | None]] = [
+        broken = (each for each in history.events if each.event == EventKind.BROKEN_OFF)
+        happened: list[tuple[int, int, Wanted | AnswerRecord | Event | None]] = [
+            *((event.step, 1, event) for event in broken),
             *((wanted.step, 0, wanted) for wanted in history.wanted),
             *((record.step, 1, record) for record in history.answers),
         ]
@@ -207,6 +220,10 @@ class TimingRegret(Metric):
             self.open = [each for each in self.open if each.deadline >= step]
             if isinstance(event, Wanted):
                 self._open(event, life)
+            elif isinstance(event, Event):
+                for request in self.open:
+                    if (request.wanted.robot, request.wanted.text) == (event.entity, event.detail):
+                        request.value = 0.0  # what was accepted wasn't carried out
             elif event is not None:
                 self._take_answer(event, life)
             else:

@@ -21,6 +21,7 @@ from fleet2d.kernels import BELL_STD, I64, ONE, TURN, UNIT, ErrorTables, Lenses,
 from fleet2d.runtime.clock import HOUR_US
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.sight import perception
+from fleet2d.sight.failures import Failures
 from fleet2d.sight.fov import FieldOfView, LineOfSight
 from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Identity, Perception
 
@@ -100,6 +101,7 @@ class Camera(Settings):
         body_points: Points on a circle of a user's radius that are looked at besides the centre:
             one in view is enough; 0: only the centre counts.
         perception: Its errors; null: the robot's `perception`.
+        fails: When it sees nothing, as it fails; null: never.
     """
 
     range: tuple[Length, Length] = Field(default=DEFAULT_RANGE_M, examples=[[0.3, 4.5]])
@@ -114,6 +116,7 @@ class Camera(Settings):
     latency: Duration = timedelta(0)
     body_points: int = Field(default=0, ge=0, le=MAX_POINTS)
     perception: Perception | None = None
+    fails: Failures | None = None
 
     def model_post_init(self, _: object, /) -> None:
         """Require a range and a position within a home, and looks more frequent than forgetting."""

@@ -28,6 +28,17 @@ VISION_TYPES = {
 }
 """The definitions of ROS's vision_msgs, which the library of types doesn't have."""
 
+LOG_TYPE = "foxglove_msgs/msg/Log"
+LOG_LEVELS = {"INFO": 2, "WARN": 3, "ERROR": 4}
+"""The levels of Foxglove's message of a log."""
+LOG_TYPES = {
+    LOG_TYPE: (
+        "builtin_interfaces/Time timestamp\nuint8 UNKNOWN=0\nuint8 DEBUG=1\nuint8 INFO=2\n"
+        "uint8 WARNING=3\nuint8 ERROR=4\nuint8 FATAL=5\nuint8 level\nstring message\n"
+        "string name\nstring file\nuint32 line\n"
+    ),
+}
+
 LATEST_SIMULATED_NS = 10**17
 """Stamps below are of a simulated clock [ns]: three years."""
 
@@ -57,7 +68,7 @@ def ros_types(need: str) -> Any:
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     types = get_typestore(Stores.ROS2_HUMBLE)
-    for name, definition in VISION_TYPES.items():
+    for name, definition in {**VISION_TYPES, **LOG_TYPES}.items():
         types.register(get_types_from_msg(definition, name))
     return types
 

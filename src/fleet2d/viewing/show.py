@@ -7,7 +7,7 @@ import typer
 
 from fleet2d.cli.results import print_verdict
 from fleet2d.configuration.problems import suggest, validating
-from fleet2d.errors import InputError, RunDirectoryError
+from fleet2d.errors import Fleet2DError, InputError, RunDirectoryError, os_errors_as
 from fleet2d.options import (
     BODY_RADIUS_M,
     Radius,
@@ -104,18 +104,33 @@ def show(  # noqa: PLR0913 - options of the command line
     checkup: Annotated[
         bool, typer.Option("--checkup", help="Of a floor plan: mark what `validate` finds.")
     ] = False,
+    log: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="Of a run: the log of a robot as text: decisions, moves, people, battery, faults.",
+        ),
+    ] = None,
+    day: Annotated[
+        int | None, typer.Option(help="With --log: only this day; day 1 is the first.")
+    ] = None,
     radius: Radius = BODY_RADIUS_M,
     trust: Trust = False,
 ) -> None:
-    """Draw a floor plan, a stored run or a persona's diary.
+    """Draw a floor plan, a run or a diary; print a robot's log.
 
     Examples:
       fleet2d show family_home --out home.svg
       fleet2d show runs/home-001 --at 'day 3 18:30'
-      fleet2d show retired --diary --days 3
+      fleet2d show runs/home-001 --log astro --day 3
     """
     picture = RunPicture(layer, step, reliability, at, begin, end, figure)
-    if checkup:
+    if day is not None and log is None:
+        raise InputError("--day is the day of a robot's log: give --log ROBOT, too")
+    if log is not None:
+        _check_alone(picture, checkup=checkup, diary=diary, fov=fov)
+        show_log(source, log, day, (begin, end), out, trust=trust)
+    elif checkup:
         typer.echo(_draw_checkup(source, out, radius, resolution=resolution, scale=scale))
     elif diary:
         for line in show_diary(None if source is None else str(source), out, days, seed):
@@ -124,6 +139,66 @@ def show(  # noqa: PLR0913 - options of the command line
         typer.echo(
             _draw(source, out, picture, fov, trust=trust, resolution=resolution, scale=scale)
         )
+
+
+def show_log(
+    source: Path | None,
+    robot: str,
+    day: int | None,
+    part: tuple[str | None, str | None],
+    out: Path | None,
+    *,
+    trust: bool,
+) -> None:
+    """Print the log of a robot, or write it to a file.
+
+    Args:
+        source: The directory of a run.
+        robot: The robot.
+        day: The day of the run; None: all days.
+        part: Where it begins and ends instead, as texts; None: at those of the run.
+        out: The file to write; None: standard output.
+        trust: Whether code of the run may be run.
+
+    Raises:
+        InputError: There is no such run, robot or day.
+    """
+    from fleet2d.engine.repeat import decisions_of
+    from fleet2d.runs.moments import steps_of
+    from fleet2d.runs.robot_log import day_of, log_lines, robot_log
+    from fleet2d.runs.run import open_run
+
+    if source is None:
+        raise InputError("--log needs the directory of a run: fleet2d show RUN_DIR --log ROBOT")
+    if day is not None and part != (None, None):
+        raise InputError("give --day, or --from and --to, not both")
+    run = open_run(source, trust=trust)
+    first, end = steps_of(run, *part) if day is None else day_of(run, day)
+    decisions = None
+    if "decisions" not in run.tables:
+        try:
+            decisions = decisions_of(run)
+        except Fleet2DError as error:
+            typer.echo(f"the log lacks decisions, as the run can't be repeated: {error}", err=True)
+    lines = log_lines(robot_log(run, robot, first, end, decisions), run.clock)
+    if out is None:
+        for line in lines:
+            typer.echo(line)
+        return
+    with os_errors_as(RunDirectoryError, f"{out} can't be written"):
+        out.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    typer.echo(out)
+
+
+def _check_alone(picture: "RunPicture", **others: object) -> None:
+    """Refuse options of pictures beside those of a log.
+
+    Raises:
+        InputError: One is given.
+    """
+    pictures = picture._replace(begin=None, end=None)
+    if pictures != RunPicture() or any(others.values()):
+        raise InputError("--log prints text: leave out the options of pictures")
 
 
 class RunPicture(NamedTuple):

@@ -54,8 +54,10 @@ def test_a_robot_that_never_docks_stands_still_when_it_is_empty() -> None:
     # 6 m at 0.6 m/s, and turns, at four times the rate; then two hours for the rest.
     assert 7100 < step < 7200
     meandering = run(charged(["meander"], "1 h"))
-    assert "0.0 %" == events(meandering)[-1][2]
-    assert 1801 == pytest.approx(events(meandering)[-1][0], abs=1)
+    empty, off = events(meandering)[-2:]
+    assert "0.0 %" == empty[2]
+    assert 1801 == pytest.approx(empty[0], abs=1)
+    assert (empty[0] + 1, "power_off", "empty") == off
     poses = path(meandering, "astro")
     assert 1 == len(set(poses.x[1802:].tolist()))
 

@@ -176,7 +176,7 @@ def test_a_robot_that_is_switched_off_neither_sees_nor_hears() -> None:
     assert (seen == off).any()
     assert [step for step, _ in heard if step > off + 3600]
     (done,) = run.manifest["interventions"]
-    assert {"do": "switch_off", "step": off + 1, "by": "users.ana"}.items() <= done.items()
+    assert {"do": "power", "step": off + 1, "by": "users.ana"}.items() <= done.items()
 
 
 @pytest.mark.parametrize(

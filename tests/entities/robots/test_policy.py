@@ -239,3 +239,18 @@ def test_memory_counts_looks_by_room_hour_and_person() -> None:
     assert 1 == memory.rooms.looks[2, room, 7]
     assert [3, 1] == memory.rooms.looks[3, room, 7:9].tolist()
     assert [3, 0, 1, 4] == memory.rooms.total[:, room].tolist()
+
+
+def test_a_robot_that_was_off_remembers_no_sightings() -> None:
+    act = {"at": "08:00", "power": "astro", "state": "crash"}
+    content = home_with([policy()], "3 h")
+    content["script"] = [act]
+    assert_same_for_every_max_span(content, 61)
+    simulation = Simulation(content)
+    simulation.run_until("08:02")
+    memory: Any = simulation.actors["astro"].recall()
+    last = int(memory.rooms[0].max())
+    assert last < 0 or last >= 3660
+    simulation.run()
+    assert memory is simulation.actors["astro"].recall()
+    assert int(memory.rooms[0].max()) > 3660

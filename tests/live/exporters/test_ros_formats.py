@@ -14,6 +14,7 @@ from tests.scenes import process
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.live.exporters.bags import export_mcap, export_rosbag2
+from fleet2d.runs.robot_log import robot_log
 
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 BEGIN_NS = 1_767_571_200 * 1_000_000_000  # 2026-01-05T00:00, taken as UTC
@@ -195,6 +196,18 @@ def test_events_and_beliefs_are_the_rows_of_the_tables(messages: Messages) -> No
     assert [(row["room"], row["share"]) for row in rows("ltp")] == [
         (row["room"], row["share"]) for row in beliefs
     ]
+
+
+def test_the_log_of_a_robot_is_that_of_its_events_and_moves(messages: Messages) -> None:
+    levels = {"INFO": 2, "WARN": 3, "ERROR": 4}
+    entries = robot_log(day(), "astro", FIRST, END)
+    found = [
+        (step_of(m.timestamp), m.level, m.file, m.message, m.name)
+        for _, m in messages["/astro/log"]
+    ]
+
+    assert [(e.step, levels[e.level], e.source, e.text, "astro") for e in entries] == found
+    assert {"drive", "sight"} <= {e.source for e in entries}
 
 
 def test_messages_are_in_order_of_time(messages: Messages) -> None:

@@ -189,6 +189,8 @@ class RealTimePresence(PresenceAlgorithm):
             so that scenarios without the key have the same runs in each version.
     """
 
+    is_real_time = True
+
     period: PositiveDuration = timedelta(minutes=5)
     model: OneOf[Model] = cast("Any", "hmm")
 
@@ -314,8 +316,14 @@ class ToldPresence(Algorithm):
         half_life: Time after which an answer counts half.
     """
 
+    is_real_time = True
+
     period: PositiveDuration = timedelta(minutes=5)
     half_life: PositiveDuration = timedelta(hours=1)
+
+    def long_term_state(self) -> Mapping[str, Any]:
+        """Return nothing: answers are about the present."""
+        return {}
 
     def start(self, home: Home) -> None:
         """Begin without answers."""

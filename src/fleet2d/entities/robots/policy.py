@@ -8,6 +8,7 @@ robot's sightings (`SightingMemory`).
 """
 
 from collections.abc import Sequence
+from copy import copy
 from datetime import datetime, timedelta
 from typing import Any, Literal, NamedTuple
 
@@ -102,20 +103,32 @@ class SightingMemory:
 
     def __init__(self, plan: FloorPlan, people: int, clock: Clock) -> None:
         shape = people + 2, len(plan.rooms)
-        self.rooms = RoomMemory(
-            np.full(shape, NEVER, np.int64),
-            np.zeros((*shape, HOURS), np.int64),
-            np.zeros(shape, np.int64),
-        )
+        self.rooms = _no_sightings(shape)
         self._room_of_place = plan.room_of_place
         self._step_us = clock.step_us
         self._start_us = (clock.start - midnight_of(clock.start)) // MICROSECOND
+
+    def emptied(self) -> "SightingMemory":
+        """Return the same memory without sightings."""
+        empty = copy(self)
+        shape = self.rooms[0].shape
+        empty.rooms = _no_sightings(shape)
+        return empty
 
     def take(self, step: I64, index: I32, distinct: I64) -> None:
         """Add sightings; see `fleet2d.algorithms.observations.SightingTable`."""
         room = kernels.rooms_at(self._room_of_place, distinct[:, Column.X], distinct[:, Column.Y])
         identity = distinct[:, Column.IDENTITY]
         kernels.remember(step, index, identity, room, self._start_us, self._step_us, self.rooms)
+
+
+def _no_sightings(shape: tuple[int, int]) -> RoomMemory:
+    """Return the memory of so many people and rooms before any sighting."""
+    return RoomMemory(
+        np.full(shape, NEVER, np.int64),
+        np.zeros((*shape, HOURS), np.int64),
+        np.zeros(shape, np.int64),
+    )
 
 
 class WaitingPoses:

@@ -85,10 +85,12 @@ class Chunk:
     Attributes:
         poses: The poses of each user and robot, by name.
         tables: The rows of each table, by name, by step.
+        steps: Its first step, and the step after its last one.
     """
 
     poses: dict[str, Trajectory]
     tables: "dict[str, pa.Table]"
+    steps: tuple[int, int]
 
     @cached_property
     def rows(self) -> dict[str, list[dict[str, Any]]]:
@@ -150,7 +152,8 @@ class Records:
         for first in range(self.part.first, self.part.end, steps):
             end = min(first + steps, self.part.end)
             paths = {n: reader.read(first, end, self.part.every) for n, reader in readers.items()}
-            yield Chunk(paths, {n: _between(*table, first, end) for n, table in rows.items()})
+            cut = {name: _between(*table, first, end) for name, table in rows.items()}
+            yield Chunk(paths, cut, (first, end))
 
 
 def _by_step(table: "pa.Table") -> "tuple[pa.Table, I64]":
@@ -191,6 +194,11 @@ _FORMATS = {
     "mcap": (
         "bags",
         "ROS 2 messages in an MCAP file, for Foxglove, PlotJuggler and ROS: needs the extra `ros`.",
+    ),
+    "perfetto": (
+        "perfetto",
+        "Trace events as JSON for Perfetto (ui.perfetto.dev): plans, moves, interactions, power and"
+        " battery of each body.",
     ),
     "rerun": ("rerun", "A recording for the viewer of Rerun: needs the extra `rerun`."),
     "rosbag2": (

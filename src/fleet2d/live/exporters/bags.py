@@ -15,7 +15,7 @@ from fleet2d.kernels import I64, U8
 from fleet2d.live.exporters import Records, Selection, new_file
 from fleet2d.live.exporters.ros import Block, RosMessages, Topic
 from fleet2d.runs.run import Run
-from fleet2d.storage.bags import METADATA
+from fleet2d.storage.bags import LOG_TYPE, METADATA
 from fleet2d.storage.files import new_folder
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -262,9 +262,11 @@ def _numbers(values: Mapping[int, int]) -> bytes:
 
 
 def foxglove_layout(messages: RosMessages) -> dict[str, object]:
-    """Return a layout of Foxglove's panels: the home with all bodies, the events, the speeds."""
+    """Return a layout of Foxglove's panels: the home, the first robot's log, events, speeds."""
     robots = [name for name in messages.topics if name.endswith("/odom")]
     detections = [name for name in messages.topics if name.endswith("/detections")]
+    logs = [topic.name for topic in messages.topics.values() if topic.type == LOG_TYPE]
+    logs = [*logs, "/events"][:1]
     visible = {name: {"visible": True} for name in ("/map", *robots, *detections)}
     plots = [{"value": f"{name}.twist.twist.linear.x", "enabled": True} for name in robots]
     return {
@@ -275,6 +277,7 @@ def foxglove_layout(messages: RosMessages) -> dict[str, object]:
                 "topics": visible,
             },
             "RosOut!events": {"topicToRender": "/events"},
+            "RosOut!log": {"topicToRender": logs[0]},
             "Plot!speed": {"paths": plots, "title": "speed [m/s]"},
         },
         "globalVariables": {},
@@ -282,7 +285,11 @@ def foxglove_layout(messages: RosMessages) -> dict[str, object]:
         "layout": {
             "direction": "row",
             "first": "3D!home",
-            "second": {"direction": "column", "first": "RosOut!events", "second": "Plot!speed"},
+            "second": {
+                "direction": "column",
+                "first": "RosOut!log",
+                "second": {"direction": "column", "first": "RosOut!events", "second": "Plot!speed"},
+            },
             "splitPercentage": 65,
         },
     }

@@ -7,16 +7,18 @@ local times of the run, taken as UTC, because scenarios have no time zone.
 
 import json
 import struct
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fleet2d.kernels import F64, I64, U8
 from fleet2d.live.exporters import Chunk, Records
-from fleet2d.storage.bags import ros_types
+from fleet2d.runs.robot_log import LogEntry, robot_log
+from fleet2d.storage.bags import LOG_LEVELS, LOG_TYPE, ros_types
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -103,6 +105,8 @@ class RosMessages:
         if "observations" in records.tables:
             kind = "vision_msgs/msg/Detection3DArray"
             topics += [Topic(f"/{robot}/detections", kind) for robot in records.robots]
+        if "events" in records.tables:
+            topics += [Topic(f"/{robot}/log", LOG_TYPE) for robot in records.robots]
         tables = [name for name in records.tables if name != "observations"]
         topics += [Topic(f"/{name}", self._encoder(name)[0]) for name in tables]
         self.topics = {topic.name: topic for topic in topics}
@@ -137,6 +141,7 @@ class RosMessages:
         once = [(MAP, self._map(begin)), (STATIC, self._static_transforms(begin))]
         yield [self._block(topic, [begin], [data]) for topic, data in once]
         last: dict[str, tuple[float, float, float]] = {}
+        logs = self._logs()
         for chunk in self._records.chunks():
             blocks: list[Block] = []
             if chunk.poses:
@@ -148,6 +153,7 @@ class RosMessages:
                     blocks += self._detections(table)
                 else:
                     blocks.append(self._rows(name, table.to_pylist()))
+            blocks += [self._log_block(robot, logs[robot], chunk) for robot in logs]
             yield [block for block in blocks if len(block.times)]
 
     def _block(self, topic: str, times: Sequence[int], messages: Sequence[bytes]) -> Block:
@@ -339,6 +345,25 @@ class RosMessages:
         _, encode = self._encoder(name)
         times = [self._time(row["step"]) for row in rows]
         return self._block(f"/{name}", times, [encode(row) for row in rows])
+
+    def _logs(self) -> dict[str, list[LogEntry]]:
+        """Return the log of each robot, if the run stored events."""
+        part = self._records.part
+        robots = self._records.robots if "events" in self._records.tables else []
+        return {robot: robot_log(self._run, robot, part.first, part.end) for robot in robots}
+
+    def _log_block(self, robot: str, entries: list[LogEntry], chunk: Chunk) -> Block:
+        """Return the lines of a log in the steps of a chunk."""
+        first, end = (bisect_left(entries, step, key=attrgetter("step")) for step in chunk.steps)
+        own = entries[first:end]
+        times = [self._time(entry.step) for entry in own]
+        return self._block(f"/{robot}/log", times, [self._log(robot, entry) for entry in own])
+
+    def _log(self, robot: str, entry: LogEntry) -> bytes:
+        """Return a line of a robot's log as a message of Foxglove."""
+        stamp = self._header(self._time(entry.step), "").stamp
+        level = LOG_LEVELS[entry.level]
+        return self._data(self._new(LOG_TYPE, stamp, level, entry.text, robot, entry.source, 0))
 
     def log_entry(self, row: dict[str, Any]) -> bytes:
         """Return an event as an entry of a log: who, what, details."""

@@ -1,0 +1,102 @@
+"""Power of robots: when they crash and update, and what they keep while they are off."""
+
+from datetime import timedelta
+from typing import Any, Literal
+
+import numpy as np
+
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import problem, problem_at
+from fleet2d.configuration.units import PositiveDuration
+from fleet2d.entities.behavior import Hours
+from fleet2d.runtime.clock import DAY, Clock, midnights
+from fleet2d.runtime.determinism import Draws
+from fleet2d.sight.failures import Failures
+
+PowerState = Literal["off", "crash", "update", "empty", "on"]
+EMPTY = "empty"
+"""Why a robot is off whose battery is empty."""
+MAP = "map"
+PLACE = "place"
+KEPT = (MAP, PLACE)
+"""What a robot may keep beside what algorithms have learned: the map, and where it is."""
+
+
+class Updates(Settings):
+    """Updates of a robot's software, while which it is off: at a drawn time within some hours.
+
+    Attributes:
+        during: The hours, like 02:00-04:00; on the days of the week that they name.
+        lasts: How long the robot is off.
+        every: Time from one to the next, in whole days; the first is in the first such hours.
+
+    Example:
+        >>> Updates(during="02:00-04:00", every="7 d").lasts
+        datetime.timedelta(seconds=900)
+    """
+
+    during: Hours
+    lasts: PositiveDuration = timedelta(minutes=15)
+    every: PositiveDuration = DAY
+
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse hours that are several or too short, and parts of days."""
+        if len(self.during) != 1:
+            raise problem_at(("during",), "give the hours of one span, like '02:00-04:00'")
+        if self.lasts > self.during[0].end - self.during[0].begin:
+            raise problem("'during' is shorter than an update 'lasts'")
+        if self.every % DAY:
+            raise problem_at(("every",), "updates are whole days apart, like '7 d'")
+
+    def steps(self, clock: Clock, key: np.uint64) -> list[int]:
+        """Return the steps of a run at which an update begins, in order."""
+        hours = self.during[0]
+        free = hours.end - hours.begin - self.lasts
+        steps: list[int] = []
+        due = None
+        for number, midnight in enumerate(midnights(clock.start, clock.time(clock.steps))):
+            if midnight.weekday() not in hours.days or (due is not None and midnight < due):
+                continue
+            moment = midnight + hours.begin + Draws(key, number).uniform() * free
+            step = clock.step_at_or_after(clock.elapsed(moment))
+            if 0 <= step < clock.steps:
+                steps.append(step)
+                due = midnight + self.every
+        return steps
+
+
+class Power(Settings):
+    """When a robot crashes or updates, and what it still knows when it is on again.
+
+    Without it, a robot is off when its battery is empty, or when somebody switches it off; then it
+    keeps all that it has learned and loses what is about the present.
+
+    Attributes:
+        persists: What outlasts its time off: names of algorithms, `map` (which cells it has seen)
+            and `place` (where it is); left out: all. All others begin anew. Algorithms of the
+            present, such as `rtp`, keep only what they have learned in any case.
+        crashes: When it crashes, and how long until it is on again.
+        updates: When its software is updated.
+
+    Example:
+        >>> Power(persists=["ltp", "map"], crashes={"per_day": 0.2, "lasts": "1 min"}).persists
+        ('ltp', 'map')
+    """
+
+    persists: tuple[str, ...] | None = None
+    crashes: Failures | None = None
+    updates: Updates | None = None
+
+    def keeps(self, name: str) -> bool:
+        """Whether something outlasts its time off."""
+        return self.persists is None or name in self.persists
+
+
+KEEPS_ALL = Power()
+"""The power of a robot whose scenario says nothing about it."""
+
+
+def power_of(entity: Any) -> Power:
+    """Return how a body keeps its power."""
+    power: Power | None = getattr(entity, "power", None)
+    return power or KEEPS_ALL

@@ -1,0 +1,108 @@
+"""The log of a robot: what it decided, did, perceived, and what failed, as its own would say it."""
+
+import itertools
+from functools import cache
+from typing import Any
+
+import pytest
+from tests.engine.test_power import BATTERY, PATROL, home
+from tests.scenes import path, table
+
+import fleet2d
+from fleet2d.engine.repeat import decisions_of
+from fleet2d.errors import InputError
+from fleet2d.runs.robot_log import LogEntry, day_of, log_lines, moves_of, robot_log
+from fleet2d.runs.run import Run
+
+SCRIPT = (
+    {"at": "07:05", "power": "astro", "state": "crash", "duration": "2 min"},
+    {"at": "07:20", "fault": "astro", "wheels": True, "duration": "5 min"},
+    {"at": "07:22", "suppress": "astro", "user": "ana"},
+    {"at": "07:50", "power": "astro", "duration": "10 min"},
+)
+
+
+@cache
+def stored(*, decisions: bool = True) -> Run:
+    content = home(
+        *SCRIPT, duration="40 h", astro={"battery": BATTERY, "behaviors": ["dock", PATROL]}
+    )
+    content["artifacts"] = {"trajectories": "off", "decisions": decisions}
+    return fleet2d.run(content)
+
+
+def log(first: int = 0, end: int = 7200, source: str = "", **more: Any) -> list[LogEntry]:
+    entries = robot_log(stored(), "astro", first, end, **more)
+    return [entry for entry in entries if source in ("", entry.source)]
+
+
+def test_it_has_each_event_of_the_robot_and_of_nobody_else() -> None:
+    rows = table(stored(), "events", entity="astro")
+    told = [(e.step, e.text.split()[0]) for e in log(end=3600) if e.source not in ("decision", "drive", "fault")]  # fmt: skip
+
+    expected = zip(rows["step"].tolist(), map(str, rows["event"]), strict=True)
+    assert [pair for pair in expected if pair[0] < 3600] == told
+    assert told
+
+
+def test_power_and_faults_stand_out_and_say_how_long_they_lasted() -> None:
+    assert [
+        LogEntry(300, "ERROR", "power", "power_off crash"),
+        LogEntry(420, "INFO", "power", "power_on crash, was off for 2 min"),
+        LogEntry(3000, "WARN", "power", "power_off off"),
+        LogEntry(3600, "INFO", "power", "power_on off, was off for 10 min"),
+    ] == log(source="power")
+    assert [LogEntry(1200, "ERROR", "fault", "fault wheels for 5 min")] == log(source="fault")
+
+
+def test_a_stretch_that_begins_while_it_is_off_knows_since_when() -> None:
+    assert ["power_on off, was off for 10 min"] == [e.text for e in log(3100, source="power")]
+
+
+def test_moves_are_those_of_its_path_whatever_part_is_read() -> None:
+    poses = path(stored(), "astro")
+    moves = list(moves_of(stored(), "astro", 0, 40 * 3600))
+    moved = sum(move.metres for move in moves)
+
+    assert abs(moved - sum(map(float, abs(complex_steps(poses))))) < 0.05 * len(moves)
+    assert all(move.first < move.end for move in moves)
+    assert all(a.end < b.first for a, b in itertools.pairwise(moves))
+    begins, ends = ([e.text.split()[0] for e in log(source="drive")].count(word) for word in ("sets", "stops"))  # fmt: skip
+    assert begins == ends > 5
+
+
+def complex_steps(poses: Any) -> Any:
+    """The steps of a path as complex numbers, whose absolute values are lengths."""
+    places = poses.x + 1j * poses.y
+    return places[1:] - places[:-1]
+
+
+def test_decisions_that_were_not_stored_come_from_the_repeated_run() -> None:
+    run = stored(decisions=False)
+    again = robot_log(run, "astro", 0, 7200, decisions_of(run))
+
+    assert log() == again
+    assert {"decision"} == {e.source for e in set(again) - set(robot_log(run, "astro", 0, 7200))}
+    assert {"patrol", "dock", "off"} <= {
+        e.text.split(":")[0] for e in again if e.source == "decision"
+    }
+
+
+def test_days_are_those_of_the_calendar() -> None:
+    hour = 3600
+    assert [(0, 17 * hour), (17 * hour, 40 * hour)] == [day_of(stored(), day) for day in (1, 2)]
+    with pytest.raises(InputError, match="no day 3: its days are 1 to 2"):
+        day_of(stored(), 3)
+
+
+def test_as_text_it_has_a_head_for_each_day() -> None:
+    lines = list(log_lines(log(0, 40 * 3600), stored().clock))
+
+    assert "-- day 1, Monday 2026-01-05" == lines[0]
+    assert "07:05:00  ERROR  power     power_off crash" in lines
+    assert 1 == lines.count("-- day 2, Tuesday 2026-01-06")
+
+
+def test_an_unknown_robot_is_refused() -> None:
+    with pytest.raises(InputError, match="no robot 'astr': did you mean 'astro'"):
+        robot_log(stored(), "astr", 0, 10)
