@@ -24,6 +24,7 @@ from fleet2d.kernels import (
 )
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import Sun
+from fleet2d.runtime.local_time import readings_of
 from fleet2d.sight.perception import DARK_NIGHT, DARKEST, Curve, Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 
@@ -90,8 +91,8 @@ class Darkness(PerceptionError):
         if self.sun is None:
             shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
         else:
-            since = (sightings.step * round(1e6 * sightings.step_s)).astype("m8[us]")
-            by_day = self.sun.shares(np.datetime64(sightings.start, "us") + since)
+            elapsed_us = sightings.step * round(1e6 * sightings.step_s)
+            by_day = self.sun.shares(readings_of(sightings.start, elapsed_us).view("M8[us]"))
             shares = DARKEST + (1 - DARKEST) * by_day
         is_hidden = is_dark & (sightings.uniform("noticed") >= shares)
         return sightings.replace(noticed=sightings.noticed & ~is_hidden)

@@ -829,6 +829,8 @@ class Simulation:
         manifest = self._store.manifest
         scenario = self.scenario.resolved()
         scenario["simulation"]["seed"] = self.seed
+        if self.clock.zone is not None:
+            scenario["simulation"]["time_zone"] = self.clock.zone.record
         manifest.scenario, manifest.seed = scenario, self.seed
         manifest.step_us, manifest.start = self.clock.step_us, self.clock.start.isoformat()
         users = list(self.scenario.users)
@@ -839,7 +841,14 @@ class Simulation:
         manifest.interventions = interventions
         idle = [actor.path for actor in self._state.actors if not actor.behaviors]
         still = [f"{path} has no behavior: it stays where it is" for path in idle]
-        manifest.notes = [*self.notes, *still]
+        manifest.notes = [*self.notes, *still, *self._odd_moments()]
+
+    def _odd_moments(self) -> list[str]:
+        """Return a note for each dated moment that the clock of the home reads twice, or never."""
+        zone = self.clock.zone
+        moments = self.scenario.moments() if zone else ()
+        odd = ((where, zone.oddity(moment)) for where, moment in moments if zone)
+        return [f"{section}.{number}.at: {text}" for (section, number), text in odd if text]
 
     def _describe_end(self, results: Mapping[str, Any]) -> None:
         """Set the fields that are known after the last step; tables and digest are set already."""

@@ -30,7 +30,9 @@ from fleet2d.expectations.signals import Scene, Signal
 from fleet2d.expectations.vocabulary import during, events
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import I64, Bool
+from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import next_reading, written
 
 ANSWERS = (*Outcome, EventKind.DELIVERED)
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
@@ -569,13 +571,19 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
         return []
     clock = run.clock
     length = PERIODS[per]
-    boundary = clock.time(run.first).replace(minute=0, second=0, microsecond=0)
-    if per != "hour":
-        boundary = boundary.replace(hour=0)
-    if per == "week":
-        boundary -= timedelta(days=boundary.weekday())
+    moment = clock.time(run.first)
     steps = []
-    while (step := clock.step_at_or_after(clock.elapsed(boundary := boundary + length))) < run.end:
-        if step > run.first:
+    while True:
+        reading = written(moment)
+        begun = reading.replace(minute=0, second=0, microsecond=0)
+        if per != "hour":
+            begun = midnight_of(reading)
+        if per == "week":
+            begun -= timedelta(days=begun.weekday())
+        moment = next_reading(moment, begun + length)
+        if (step := clock.step_at_or_after(clock.elapsed(moment))) >= run.end:
+            return steps
+        # The clock may have been changed before.
+        is_new = written(moment) == begun + length or (per == "hour" and not moment.minute)
+        if is_new and step > run.first:
             steps.append(step)
-    return steps
