@@ -346,7 +346,7 @@ class LayerBook:
         named = Column("row", "int32", description="of the cell; -1: all cells not named")
         columns = {
             Column("step", "step", description="the layer as it was after this step"): step,
-            time_column(self._clock.zone): self._clock.stamps(np.int64(step)),
+            time_column(self._clock.zone): self._clock.stamp(step),
             named: np.concatenate([[ALL_CELLS], row]),
             Column("column", "int32"): np.concatenate([[ALL_CELLS], column]),
             Column("value", kind, layer.unit, kind == "float64", (), layer.description): value,

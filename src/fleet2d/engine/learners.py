@@ -277,9 +277,7 @@ class Learners:
         _check_kinds(learner, kinds)
         rows = {
             Column("step", "step"): step,
-            replace(time_column(self.clock.zone), description=""): self.clock.stamps(
-                np.int64(step)
-            ),
+            replace(time_column(self.clock.zone), description=""): self.clock.stamp(step),
             **{Column(name, kind): columns[name] for name, kind in learner.kinds.items()},
         }
         self.store.add_rows(learner.table, rows)

@@ -186,7 +186,15 @@ class Simulation:
         of_sensors = self._state.find(Sensors)
         sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
-        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
+        return [
+            *wrong,
+            *self._odd_moments(),
+            *plan,
+            *sources,
+            *sensors,
+            *self._unused_heights,
+            *bodies,
+        ]
 
     @property
     def _unused_heights(self) -> Iterator[str]:
@@ -841,7 +849,7 @@ class Simulation:
         manifest.interventions = interventions
         idle = [actor.path for actor in self._state.actors if not actor.behaviors]
         still = [f"{path} has no behavior: it stays where it is" for path in idle]
-        manifest.notes = [*self.notes, *still, *self._odd_moments()]
+        manifest.notes = [*self.notes, *still]
 
     def _odd_moments(self) -> list[str]:
         """Return a note for each dated moment that the clock of the home reads twice, or never."""

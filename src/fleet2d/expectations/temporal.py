@@ -572,7 +572,7 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
     clock = run.clock
     length = PERIODS[per]
     moment = clock.time(run.first)
-    steps = []
+    steps: list[int] = []
     while True:
         reading = written(moment)
         begun = reading.replace(minute=0, second=0, microsecond=0)

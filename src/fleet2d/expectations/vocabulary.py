@@ -580,12 +580,13 @@ class during(Condition):
     def trace(self, run: RunSignals) -> Trace:
         """Return 1 where the time is within these hours, 0 elsewhere."""
         clock = run.clock
+        span: HoursSpan = vars(self)["_span"]
         moment = clock.time(run.first)
         end = clock.time(run.end)
         changes = []
         while moment < end:
-            over = self._span.end_at(moment)
+            over = span.end_at(moment)
             changes.append((clock.step_at_or_after(clock.elapsed(moment)), float(over is not None)))
-            moment = over or self._span.next_begin(moment)
+            moment = over or span.next_begin(moment)
         changes = [change for change in changes if change[0] < run.end]
         return stepwise(run.first, 0.0, changes, run.end)

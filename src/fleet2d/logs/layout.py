@@ -4,13 +4,16 @@ import re
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+import numpy as np
+
 from fleet2d.bounds import one_line
+from fleet2d.errors import errors_as
 from fleet2d.logs.log import (
     AWAY,
     ActivityLog,
@@ -22,7 +25,9 @@ from fleet2d.logs.log import (
     parse_time,
     since,
 )
+from fleet2d.logs.times import moments_in_file
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
+from fleet2d.runtime.local_time import Zone, wall_us
 from fleet2d.storage.bags import is_bag
 
 CASAS_LINE = re.compile(r"(\d{4}-\d\d?-\d\d?)\s+(\d+:\S+)\s+(\S+)\s+(\S+)\s+(\S+)(?:\s+(.*))?")
@@ -351,7 +356,7 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
     id: str | None = None,  # noqa: A002 - the name of the column
     frame: str | None = None,
     columns: Mapping[str, str] | None = None,
-    time_zone: str | None = None,
+    time_zone: Zone | str | None = None,
     sort: bool = False,
     decimal_comma: bool | None = None,
     day_first: bool | None = None,
@@ -401,11 +406,32 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
         from fleet2d.logs.bags import read_bag
 
         return read_bag(path, id=id, frame=frame or "map", time_zone=time_zone, sort=sort)
-    if id is not None or time_zone is not None:
+    if id is not None or isinstance(time_zone, str):
         raise LogError(
             f"{path} is of the layout {layout}: id and time_zone are for positions and bags"
         )
-    return LAYOUTS[layout].read(path, sort=sort)
+    log = LAYOUTS[layout].read(path, sort=sort)
+    return log if time_zone is None or isinstance(time_zone, str) else by_clock(log, time_zone)
+
+
+def by_clock(log: ActivityLog, zone: Zone) -> ActivityLog:
+    """Return a log whose times are local times of a home in real time since its first midnight."""
+    if log.first_day is None:
+        return log
+    midnight_us = wall_us(datetime.combine(log.first_day, datetime.min.time()))
+    begins_us, ends_us = (midnight_us + times for times in log.moments())
+    with errors_as(LogError, f"{log.path}: there are no rules of the time zone", of=KeyError):
+        zone = zone.over(int(begins_us.min()), int(ends_us.max()))
+    notes = list(log.notes)
+    begins_us = moments_in_file(begins_us, zone, log.noun, notes)
+    ends_us = np.maximum(zone.moments(ends_us), begins_us)
+    since_us = zone.utc_us(midnight_us)
+    times = zip((begins_us - since_us).tolist(), (ends_us - since_us).tolist(), strict=True)
+    readings = [
+        reading._replace(begin_us=begin, end_us=end)
+        for reading, (begin, end) in zip(log.readings, times, strict=True)
+    ]
+    return replace(log, readings=tuple(readings), notes=tuple(notes))
 
 
 def _recognize(path: Path) -> str:

@@ -79,8 +79,12 @@ class Clock:
         """Return what the clock reads at steps, datetime64[us]."""
         return readings_of(self.start, steps * self.step_us).view("M8[us]")
 
+    def stamp(self, step: int) -> np.datetime64:
+        """Return the time of a step as tables hold it: UTC if the home has a time zone."""
+        return np.datetime64(self._start_us + step * self.step_us, "us")
+
     def stamps(self, steps: I64) -> NDArray[np.datetime64]:
-        """Return the times of steps as tables hold them: UTC if the home has a time zone."""
+        """Return the times of steps as tables hold them."""
         return self.moments(steps * self.step_us)
 
     def moments(self, elapsed_us: I64) -> NDArray[np.datetime64]:
@@ -107,8 +111,8 @@ class Clock:
 
     def next_change(self, step: int) -> int | None:
         """Return the first step after another one at which the offset from UTC is a new one."""
-        zone = self.zone
-        change = zone.next_change(self.time(step)) if zone else None
+        time = self.time(step)
+        change = time.zone.next_change(time) if isinstance(time, LocalTime) else None
         return None if change is None else self.step_at_or_after(self.elapsed(change))
 
     def step_at_or_after(self, elapsed_us: int) -> int:

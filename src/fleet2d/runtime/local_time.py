@@ -34,6 +34,7 @@ class Zone(tzinfo):
         standard_us: Its offset without summer time [us].
         changes_us: When the offset changes [us since 1970 UTC], in order.
         offsets_us: The offset before the first change, and after each [us].
+        covers_us: The time whose changes it knows [us since 1970 UTC].
 
     Example:
         >>> berlin = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))
@@ -48,17 +49,19 @@ class Zone(tzinfo):
         standard_us: int,
         changes_us: tuple[int, ...],
         offsets_us: tuple[int, ...],
+        covers_us: tuple[int, int] = (0, 0),
     ) -> None:
         self.label = label
         self.standard_us = standard_us
         self.changes_us = changes_us
         self.offsets_us = offsets_us
+        self.covers_us = covers_us
         # What the clock reads when a part of constant offset is over, and when the next begins.
         self._over = [at + offsets_us[i] for i, at in enumerate(changes_us)]
         self._begins = [at + offsets_us[i + 1] for i, at in enumerate(changes_us)]
 
     @classmethod
-    def of_record(cls, record: Mapping[str, Any]) -> Self:
+    def of_record(cls, record: Mapping[str, Any], covers_us: tuple[int, int] = (0, 0)) -> Self:
         """Return the clock that a record of it describes.
 
         Raises:
@@ -72,7 +75,7 @@ class Zone(tzinfo):
         if any(abs(offset) >= _LARGEST_OFFSET_S for offset in offsets):
             raise ValueError("an offset is a day or more")
         in_us = tuple(offset * _SECOND_US for offset in offsets)
-        return cls(record["name"], record["standard_s"] * _SECOND_US, changes, in_us)
+        return cls(record["name"], record["standard_s"] * _SECOND_US, changes, in_us, covers_us)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -89,7 +92,8 @@ class Zone(tzinfo):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to make it again, as for a checkpoint."""
-        return Zone, (self.label, self.standard_us, self.changes_us, self.offsets_us)
+        of_clock = self.label, self.standard_us, self.changes_us, self.offsets_us
+        return Zone, (*of_clock, self.covers_us)
 
     def __eq__(self, other: object) -> bool:
         """Return whether it is the same clock."""
@@ -167,6 +171,22 @@ class Zone(tzinfo):
         utc_us = readings_us - np.array(self.offsets_us, np.int64)[part]
         return np.maximum(utc_us, earliest[part])
 
+    def over(self, first_us: int, last_us: int) -> "Zone":
+        """Return the clock for a log: this one, or by this machine's rules if it is of other years.
+
+        Args:
+            first_us: The beginning of the log [us since 1970].
+            last_us: Its end.
+
+        Raises:
+            KeyError: The machine has no rules for the time zone.
+        """
+        begin_us, end_us = self.covers_us
+        if begin_us <= last_us and first_us <= end_us:
+            return self
+        first, last = (EPOCH + timedelta(microseconds=at) for at in (first_us, last_us))
+        return zone_of(self.label, first, last)
+
     def next_change(self, time: "LocalTime") -> "LocalTime | None":
         """Return when the clock is changed next after a moment."""
         later = bisect_right(self.changes_us, time.utc_us)
@@ -234,7 +254,7 @@ class LocalTime(datetime):
         """A datetime of the standard library, with the same fields."""
         return datetime.combine(self.date(), self.timetz())
 
-    def __add__(self, duration: timedelta) -> "LocalTime":  # type: ignore[override]
+    def __add__(self, duration: timedelta) -> "LocalTime":
         """Return the moment after a duration."""
         if not isinstance(duration, timedelta):
             return NotImplemented
@@ -258,29 +278,29 @@ class LocalTime(datetime):
         """Return whether it is the same moment."""
         return isinstance(other, datetime) and self.utc_us == self.zone.utc_of(other)
 
+    def __ne__(self, other: object) -> bool:
+        """Return whether it is another moment."""
+        return not self == other
+
     def __hash__(self) -> int:
         return hash(self.utc_us)
 
-    def __lt__(self, other: datetime) -> bool:
+    def __lt__(self, other: datetime) -> bool:  # type: ignore[override]
         return self.utc_us < self.zone.utc_of(other)
 
-    def __le__(self, other: datetime) -> bool:
+    def __le__(self, other: datetime) -> bool:  # type: ignore[override]
         return self.utc_us <= self.zone.utc_of(other)
 
-    def __gt__(self, other: datetime) -> bool:
+    def __gt__(self, other: datetime) -> bool:  # type: ignore[override]
         return self.utc_us > self.zone.utc_of(other)
 
-    def __ge__(self, other: datetime) -> bool:
+    def __ge__(self, other: datetime) -> bool:  # type: ignore[override]
         return self.utc_us >= self.zone.utc_of(other)
 
-    def replace(self, *args: Any, **fields: Any) -> datetime:  # type: ignore[override]
+    def replace(self, *args: Any, **fields: Any) -> Any:
         """Return the moment with other fields; with another time zone, a plain datetime."""
         other = self.plain.replace(*args, **fields)
-        return (
-            self.zone.moment(self.zone.utc_us(wall_us(other), other.fold))
-            if (other.tzinfo is self.tzinfo)
-            else other
-        )
+        return other if other.tzinfo is not self.tzinfo else self.zone.at(written(other))
 
     def astimezone(self, tz: tzinfo | None = None) -> datetime:  # type: ignore[override]
         """Return it as a datetime of the standard library in another time zone."""
@@ -299,7 +319,7 @@ def wall_us(time: datetime) -> int:
 
 def written(time: datetime) -> datetime:
     """Return what the clock reads at a time, as a datetime without offset."""
-    return datetime.combine(time.date(), time.time())
+    return datetime.combine(time.date(), time.time())  # which keep `fold`
 
 
 def at_reading(time: datetime, reading: datetime) -> datetime:
@@ -359,7 +379,12 @@ def zone_of(name: str, begin: datetime, end: datetime) -> Zone:
     Raises:
         KeyError: There is no such time zone.
     """
-    return _zone_of(name, written(begin - _MARGIN), written(end + _MARGIN), begin.year)
+    return _zone_of(name, written(begin) - _MARGIN, written(end) + _MARGIN, begin.year)
+
+
+def span_us(begin: datetime, end: datetime) -> tuple[int, int]:
+    """Return what clocks read at the beginning and the end of a time [us since 1970]."""
+    return wall_us(begin), wall_us(end)
 
 
 @lru_cache(64)
@@ -396,4 +421,5 @@ def _zone_of(name: str, begin: datetime, end: datetime, year: int) -> Zone:
         standard * _SECOND_US,
         tuple(at * _SECOND_US for at in changes),
         tuple(offset * _SECOND_US for offset in offsets),
+        span_us(begin, end),
     )

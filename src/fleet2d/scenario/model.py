@@ -1,6 +1,7 @@
 """The scenario: everything that defines a run."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from datetime import date, datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -49,7 +50,7 @@ from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
 from fleet2d.routines.activity import SchemaForms
 from fleet2d.runtime.clock import Clock, Sun
-from fleet2d.runtime.local_time import Zone, zone_of
+from fleet2d.runtime.local_time import Zone, span_us, zone_of
 from fleet2d.sight.camera import SightSettings
 
 
@@ -140,7 +141,7 @@ class TimeZone(Settings):
             KeyError: There is no such time zone.
         """
         if self.changes is not None:
-            return Zone.of_record(self.model_dump())
+            return Zone.of_record(self.model_dump(), span_us(begin, end))
         return zone_of(self.name, begin, end)
 
 
@@ -181,9 +182,8 @@ class SimulationSettings(Settings):
         elif self.start.tzinfo is not None:
             raise problem_at(
                 ("start",),
-                "expected a local time without a time zone, since a simulated day has 24 hours"
-                " unless simulation.time_zone says where the home is, got"
-                f" {self.start.isoformat()}",
+                "expected a local time without a time zone, since a simulated day has 24 hours, got"
+                f" {self.start.isoformat()}; or say where the home is, by simulation.time_zone",
             )
         if self.duration < self.step:
             raise problem_at(
@@ -225,8 +225,10 @@ class SimulationSettings(Settings):
         if self.time_zone is not None:
             zone = self.time_zone.zone(start, start + self.duration)
             start = zone.at(start)
-        sun = self.daylight and Sun(self.daylight.latitude, self.daylight.noon, zone)
-        return Clock(start, self.step_us, self.steps, sun)
+        clock = Clock(start, self.step_us, self.steps)
+        if self.daylight is None:
+            return clock
+        return replace(clock, sun=Sun(self.daylight.latitude, self.daylight.noon, zone))
 
 
 class Scenario(Settings):
@@ -340,8 +342,8 @@ class Scenario(Settings):
 
     def moments(self) -> Iterator[tuple[tuple[str, int], datetime]]:
         """Yield the dated moments of its changes and its script, and the entry of each."""
-        for section, entries in (("changes", self.changes), ("script", self.script)):
-            for number, entry in enumerate(entries):
+        for section in ("changes", "script"):
+            for number, entry in enumerate(getattr(self, section)):
                 if isinstance(entry.at, datetime):
                     yield (section, number), entry.at
 
