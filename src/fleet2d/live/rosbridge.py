@@ -7,7 +7,6 @@ the frames of `fleet2d export`. Subscribed, for each body: `/NAME/goal_pose` and
 
 import math
 from collections.abc import Iterator
-from datetime import UTC
 from functools import cache
 from typing import Any
 
@@ -22,6 +21,7 @@ from fleet2d.live.bridge import Content, LiveStep, Peer, PeerFault, Post, lose
 from fleet2d.live.messages import first_fault
 from fleet2d.logs.frames import MAP, frame_name, is_named
 from fleet2d.runs.run import Run
+from fleet2d.runtime.local_time import stamp_us
 from fleet2d.storage.bags import LATEST_SIMULATED_NS, headings_of
 
 WAIT_S = 5
@@ -58,7 +58,7 @@ class RosbridgePeer(Peer):
     def open(self, simulation: Simulation, post: Post) -> None:
         """Advertise and subscribe."""
         self._robots = list(simulation.scenario.robots)
-        self._start = simulation.clock.start.replace(tzinfo=UTC)
+        self._start_s = stamp_us(simulation.clock.start) // 1_000_000
         self._last: dict[str, tuple[float, float, float]] = {}
         self._step_s = simulation.clock.step_us / 1e6
         self._simulation = simulation
@@ -180,7 +180,7 @@ class RosbridgePeer(Peer):
         return {"header": header, "detections": detections}
 
     def _stamp(self, step: int) -> dict[str, int]:
-        ns = int(self._start.timestamp()) * 10**9 + round(step * self._step_s * 1e9)
+        ns = self._start_s * 10**9 + round(step * self._step_s * 1e9)
         return {"sec": ns // 10**9, "nanosec": ns % 10**9}
 
     def _header(self, step: int, frame: str) -> dict[str, Any]:

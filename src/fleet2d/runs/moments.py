@@ -197,7 +197,7 @@ def positions(run: Run, name: str, interval: timedelta) -> Any:
     return pa.table(
         {
             "step": path.step,
-            "time": path.time.astype("M8[us]"),
+            "time": run.clock.stamps(path.step),
             "entity": pa.array([name] * count, pa.string()),
             "kind": pa.array(["track"] * count, pa.string()),
             "x": path.x,

@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date, datetime, time, timedelta
+from datetime import date, datetime, time, timedelta, timezone
 from functools import cached_property, lru_cache
 from math import isqrt
 
@@ -91,6 +91,17 @@ class Clock:
         """Return moments given in microseconds since the start, as tables hold them."""
         return np.datetime64(self._start_us, "us") + elapsed_us.astype("m8[us]")
 
+    def texts(self, steps: I64) -> list[str]:
+        """Return the local times of steps as ISO 8601, with offsets if the home has a time zone."""
+        readings = self.times(steps)
+        texts = [time.isoformat() for time in readings.tolist()]
+        if self.zone is None:
+            return texts
+        offsets_us, which = np.unique(readings - self.stamps(steps), return_inverse=True)
+        zones = [timezone(offset) for offset in offsets_us.tolist()]
+        suffixes = [datetime.min.replace(tzinfo=zone).isoformat()[19:] for zone in zones]
+        return [text + suffixes[k] for text, k in zip(texts, which.tolist(), strict=True)]
+
     def elapsed(self, moment: datetime) -> int:
         """Return the microseconds from the start to a local time; negative before the start."""
         return (moment - self.start) // MICROSECOND
@@ -135,12 +146,15 @@ def next_midnight(moment: datetime) -> datetime:
 def midnights(begin: datetime, end: datetime | None = None) -> Iterator[datetime]:
     """Yield the midnight that begins the day of a moment, and all later ones before `end`.
 
+    A date that a time zone left out, as islands that changed sides of the date line did, has none.
+
     >>> [midnight.day for midnight in midnights(datetime(2026, 1, 5, 8), datetime(2026, 1, 7, 1))]
     [5, 6, 7]
     """
     midnight = midnight_of(begin)
     while end is None or midnight < end:
-        yield midnight
+        if at_reading(begin, midnight).date() == midnight.date():
+            yield midnight
         midnight += DAY
 
 

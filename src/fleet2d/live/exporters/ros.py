@@ -2,13 +2,12 @@
 
 Frames: `map` is the floor plan's; a robot has `NAME/odom` and `NAME/base_link`, and a user, whose
 pose is the truth, `NAME`. A body that is away from home has no transform meanwhile. Stamps are the
-local times of the run, taken as UTC, because scenarios have no time zone.
+local times of the run, taken as UTC; of a home with a time zone they are UTC.
 """
 
 import json
 import struct
 from collections.abc import Callable, Iterator, Sequence
-from datetime import UTC
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from fleet2d.kernels import F64, I64, U8
 from fleet2d.live.exporters import Chunk, Records
+from fleet2d.runtime.local_time import stamp_us
 from fleet2d.storage.bags import ros_types
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class RosMessages:
         self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
         clock = self._run.clock
-        self._start_ns = int(clock.start.replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        self._start_ns = stamp_us(clock.start) // 1_000_000 * 1_000_000_000
         self._step_ns = clock.step_us * 1000
         topics = [
             Topic(MAP, "nav_msgs/msg/OccupancyGrid", latched=True),
