@@ -109,11 +109,8 @@ class Zone(tzinfo):
         """Return the name of the time zone."""
         return self.label
 
-    def dst(self, moment: datetime | None) -> timedelta | None:
-        """Return how much later than standard time it is."""
-        if moment is None:
-            return None
-        return self.utcoffset(moment) - timedelta(microseconds=self.standard_us)
+    def dst(self, _: datetime | None) -> None:
+        """Return nothing: which part of an offset is summer time isn't known."""
 
     def utcoffset(self, moment: datetime | None) -> timedelta:
         """Return the offset of what the clock reads, the first or (`fold`) the second time."""
