@@ -31,7 +31,8 @@ export class Clock {
 
   /** The moment in local time. */
   private local(us: number): number {
-    return us + (this.offsets.findLast(([from]) => from <= us) ?? this.offsets[0] ?? [0, 0])[1];
+    const since = this.offsets.filter(([from], i) => i === 0 || from <= us);
+    return us + (since.length ? since[since.length - 1]![1] : 0);
   }
 
   /** The first moment at which the clock reads a local time, or is put past it. */
