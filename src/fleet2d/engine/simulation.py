@@ -482,7 +482,7 @@ class Simulation:
         if isinstance(when, str):
             when = self._moment(when)
         if isinstance(when, datetime):
-            when = when - self.clock.start
+            when = timedelta(microseconds=self.clock.elapsed(when))
         if isinstance(when, timedelta):
             return self.clock.step_at_or_after(micros(when))
         return operator.index(when)

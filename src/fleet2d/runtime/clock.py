@@ -10,6 +10,7 @@ from math import isqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64, TURN, UNIT, half_sines
 from fleet2d.runtime.local_time import (
     EPOCH,
@@ -103,7 +104,16 @@ class Clock:
         return [text + suffixes[k] for text, k in zip(texts, which.tolist(), strict=True)]
 
     def elapsed(self, moment: datetime) -> int:
-        """Return the microseconds from the start to a local time; negative before the start."""
+        """Return the microseconds from the start to a local time; negative before the start.
+
+        Raises:
+            InputError: It has an offset, and the home has no time zone.
+        """
+        if moment.tzinfo is not None and self.zone is None:
+            raise InputError(
+                f"{moment.isoformat()} has an offset, and the home has no time zone: leave it out,"
+                " or set simulation.time_zone"
+            )
         return (moment - self.start) // MICROSECOND
 
     def reading(self, ordinal: int, second: int) -> int:
