@@ -70,7 +70,9 @@ def test_schedule_door_log_and_expectation_are_in_local_time(night: Night, tmp_p
         moment = night.begin + row["step"] * MINUTE
         assert row["time"].astimezone(UTC) == moment
         assert row["time"].utcoffset() == night.reading(row["step"]).utcoffset()
-    done = sorted((e["step"], e["detail"]) for e in events if e["event"] == "activity" and e["step"])
+    done = sorted(
+        (e["step"], e["detail"]) for e in events if e["event"] == "activity" and e["step"]
+    )
     assert done == sorted((step, f"n{k}") for step, k in expected)
     turned = [(e["step"], e["event"]) for e in events if e["entity"] == "door" and e["step"]]
     words = [(step, "shut" if k % 2 else "opened") for step, k in expected]

@@ -216,6 +216,15 @@ class VisitLate(Scheduled):
         yield from ((due + LATE, number) for due, number in super()._due(since - LATE))
 
 
+class VisitTwice(Scheduled):
+    """Comes back an hour later."""
+
+    def _due(self, since: Any) -> Any:
+        hour = timedelta(hours=1)
+        again = [(due + hour, number) for due, number in super()._due(since - hour)]
+        yield from sorted([*super()._due(since), *again])
+
+
 class VisitNextRoom(Scheduled):
     """Goes to the next room."""
 
