@@ -1,6 +1,6 @@
 """Runs over nights in which clocks change: each minute is as the standard library has it."""
 
-from datetime import UTC, datetime, time, timedelta
+from datetime import UTC, datetime, time
 from pathlib import Path
 from typing import Any
 
