@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from pydantic import InstanceOf
 
 from fleet2d.errors import ComponentError, blame
 from fleet2d.floorplan.lattice import Lattice
@@ -82,7 +83,7 @@ class Darkness(PerceptionError):
     """
 
     unlit: Curve
-    sun: Sun | None = None
+    sun: InstanceOf[Sun] | None = None
 
     def distort(self, sightings: CameraSightings) -> CameraSightings:
         """Return the sightings without those that the darkness hides."""
