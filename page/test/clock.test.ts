@@ -29,6 +29,13 @@ describe("a clock that is changed", () => {
     expect(changed.parse(text)).toBe(us);
   });
 
+  it("is exact in addresses, which may also name local time", () => {
+    for (const hours of [4.5, 5.5]) expect(changed.ofStamp(changed.stampText(hours * 3600e6))).toBe(hours * 3600e6);
+    expect(changed.stampText(5.5 * 3600e6)).toBe("2026-10-25T01:30:00Z");
+    expect(changed.ofStamp("2026-10-25T02:30:00")).toBe(4.5 * 3600e6);
+    expect(clock.ofStamp(clock.stampText(90e6))).toBe(90e6);
+  });
+
   it("goes past a gap", () => {
     const spring = new Clock("2026-03-28T23:00:00", 1e6, 10 * 3600, [
       [0, 3600e6],

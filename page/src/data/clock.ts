@@ -110,6 +110,19 @@ export class Clock {
     return this.date(us).toISOString().slice(0, 19);
   }
 
+  /** A moment exactly, as in an address: in local time, or in UTC, with a Z, if the home has a time zone. */
+  stampText(us: number): string {
+    const text = new Date(this.startMs + us / 1000).toISOString().slice(0, 23).replace(".000", "");
+    return this.offsets.length ? `${text}Z` : text;
+  }
+
+  /** The moment that an address names; without a Z in local time. Null where it names none. */
+  ofStamp(text: string): number | null {
+    const ms = Date.parse(text.endsWith("Z") ? text : `${text}Z`);
+    const us = (ms - this.startMs) * 1000;
+    return Number.isNaN(ms) ? null : text.endsWith("Z") ? us : this.moment(us);
+  }
+
   /**
    * The moment that a text names: "2026-01-07T18:30", "Wed 7 Jan 18:30", "day 3 18:30", "18:30" on the
    * day of `nearUs`, "2 d 14 h" since the start, or "step 5000". Null where it names none.
