@@ -218,7 +218,7 @@ def test_log_of_a_summer_is_replayed_in_winter_by_the_local_time_of_its_own_date
 def test_rooms_of_a_smart_home_are_in_local_time_on_both_sides_of_the_change(
     tmp_path: Path,
 ) -> None:
-    """CASAS writes no offsets; the hour of which one can't know is told."""
+    """CASAS writes no offsets: the second time begins where readings run backwards, else it is told."""
     path = tmp_path / "home.txt"
     lines = ["00:30:00 kitchen", "02:30:00 bedroom", "04:30:00 kitchen"]
     rows = [f"2026-10-25 {time} {room} M1 ON" for time, room in map(str.split, lines)]
@@ -229,12 +229,49 @@ def test_rooms_of_a_smart_home_are_in_local_time_on_both_sides_of_the_change(
     hours = [reading.begin_us / 3.6e9 for reading in log.readings]
     assert hours == [0.5, 2.5, 5.5]  # of a day of 25 hours
     assert "1 readings of 2026-10-25 02:00 on, which the clock reads twice" in log.notes[-1]
+    path.write_text("\n".join([*rows[:2], rows[1].replace("02:30", "02:10"), rows[2]]) + "\n")
+    told = read_log(path, "casas", time_zone=zone)
+    assert isinstance(told, ActivityLog)
+    assert [reading.begin_us / 60e6 for reading in told.readings] == [30, 150, 190, 330]
+    assert not told.notes
+
+
+def test_questions_about_a_run_are_in_local_time() -> None:
+    """Of an assistant, by DuckDB."""
+    pytest.importorskip("duckdb")
+    from fleet2d.live.questions import answer
+
+    run = fleet2d.run("bundled:family", BERLIN, AUTUMN, "simulation.duration=5 h", seed=4)
+    query = "SELECT step, time FROM key_frames WHERE hour(time) = 2 ORDER BY step"
+    rows = answer(dict(run.tables), query, 500)["shown"]
+    assert rows
+    assert all(str(row["time"]).replace("T", " ").startswith("2026-10-25 02:") for row in rows)
+
+
+def test_beliefs_of_a_run_are_replayed_at_their_moments(tmp_path: Path) -> None:
+    """Its own table has instants, which need no time zone."""
+    keys = [BERLIN, AUTUMN, "simulation.duration=5 h", "algorithms.ltp.period=30 min"]
+    first = fleet2d.run("bundled:family", *keys, seed=4, out=tmp_path / "run")
+    again = "algorithms.old={type: replay, path: %s, user: anyone, period: 30 min}"
+    table = tmp_path / "run" / "ltp.parquet"
+    run = fleet2d.run("bundled:family", *keys, again % table, seed=4)
+
+    old = {(row["step"], row["room"]): row["share"] for row in run.arrow("old").to_pylist()}
+    rows = [row for row in first.arrow("ltp").to_pylist() if row["user"] == "anyone"]
+    assert rows
+    assert {row["step"] for row in rows} == {step for step, _ in old}
+    for row in rows:
+        if row["room"] != "away":
+            assert old[row["step"], row["room"]] == pytest.approx(row["share"])
 
 
 @pytest.mark.parametrize("month", range(1, 13))
 def test_sun_rises_and_sets_an_hour_later_by_the_clock_in_summer_time(month: int) -> None:
     """And not in winter, nor in the south the other way round."""
-    for zone, summer in (("Europe/Berlin", range(4, 11)), ("Australia/Sydney", [10, 11, 12, 1, 2, 3])):
+    for zone, summer in (
+        ("Europe/Berlin", range(4, 11)),
+        ("Australia/Sydney", [10, 11, 12, 1, 2, 3]),
+    ):
         start = f"simulation.start=2026-{month:02}-20"
         keys = [
             start,

@@ -4,7 +4,7 @@ import re
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from itertools import islice
 from pathlib import Path
@@ -60,7 +60,36 @@ def _shows_casas(line: str) -> bool:
     return match[5].upper() in ON | OFF or NUMBER.fullmatch(match[5]) is not None
 
 
-def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
+def by_clock(
+    readings: list[Reading], first_day: date | None, zone: Zone | None, path: Path
+) -> tuple[list[Reading], list[str]]:
+    """Return readings in real time since their first midnight, and notes.
+
+    Args:
+        readings: Readings in local time without offset, in the order of the file.
+        first_day: The date of the first.
+        zone: The clock of the home; None: its days have 24 hours.
+        path: The file.
+    """
+    if zone is None or first_day is None or not readings:
+        return readings, []
+    midnight_us = wall_us(datetime.combine(first_day, datetime.min.time()))
+    times = np.array([(r.begin_us, r.end_us) for r in readings], np.int64) + midnight_us
+    with errors_as(LogError, f"{path}: there are no rules of the time zone", of=KeyError):
+        zone = zone.over(int(times.min()), int(times.max()))
+    notes: list[str] = []
+    begins_us = moments_in_file(times[:, 0], zone, "readings", notes)
+    ends_us = begins_us + zone.moments(times[:, 1]) - zone.moments(times[:, 0])
+    since_us = zone.utc_us(midnight_us)
+    moments = zip((begins_us - since_us).tolist(), (ends_us - since_us).tolist(), strict=True)
+    placed = [
+        reading._replace(begin_us=begin, end_us=end)
+        for reading, (begin, end) in zip(readings, moments, strict=True)
+    ]
+    return placed, notes
+
+
+def read_casas(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read the events of a home; those that switch on become readings of an instant.
 
     ::
@@ -91,7 +120,9 @@ def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
             readings.append(Reading(at, at, room, (activity or "").strip(), number))
         elif value.upper() not in OFF:
             others[value] += 1
+    readings, clock_notes = by_clock(readings, first_day, zone, path)
     readings, notes = in_order(readings, path, sort=sort)
+    notes = [*clock_notes, *notes]
     if others:
         values = one_line(", ".join(sorted(others)[:5]), 200)
         notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")
@@ -117,7 +148,12 @@ class _ScriptedActivity:
     steps: list[tuple[int, list[tuple[str, int]], int]] = field(default_factory=list)
 
 
-def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_homer(
+    path: Path,
+    *,
+    sort: bool = False,
+    zone: Zone | None = None,  # noqa: ARG001 - its days have no dates
+) -> ActivityLog:
     """Read the days of a household: one file, or a folder whose files follow each other by name.
 
     ::
@@ -247,7 +283,7 @@ class _Row(NamedTuple):
         return Reading(begin_us, end_us, room, activity, self.line)
 
 
-def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_uci_adl(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read a home's sensors and activities.
 
     ::
@@ -268,8 +304,9 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
     parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
     for kind, (file, rows) in files.items():
         readings = [row.reading(first_day) for row in rows]
+        readings, clock_notes = by_clock(readings, first_day, zone, file)
         parts[kind], order_notes = in_order(readings, file, sort=sort)
-        notes += [f"{file.name}: {note}" for note in order_notes]
+        notes += [f"{file.name}: {note}" for note in [*clock_notes, *order_notes]]
     readings = parts["activities"]
     if parts["sensors"]:
         readings = _with_activities(parts["sensors"], readings)
@@ -410,28 +447,7 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
         raise LogError(
             f"{path} is of the layout {layout}: id and time_zone are for positions and bags"
         )
-    log = LAYOUTS[layout].read(path, sort=sort)
-    return log if time_zone is None or isinstance(time_zone, str) else by_clock(log, time_zone)
-
-
-def by_clock(log: ActivityLog, zone: Zone) -> ActivityLog:
-    """Return a log whose times are local times of a home in real time since its first midnight."""
-    if log.first_day is None:
-        return log
-    midnight_us = wall_us(datetime.combine(log.first_day, datetime.min.time()))
-    begins_us, ends_us = (midnight_us + times for times in log.moments())
-    with errors_as(LogError, f"{log.path}: there are no rules of the time zone", of=KeyError):
-        zone = zone.over(int(begins_us.min()), int(ends_us.max()))
-    notes = list(log.notes)
-    begins_us = moments_in_file(begins_us, zone, log.noun, notes)
-    ends_us = np.maximum(zone.moments(ends_us), begins_us)
-    since_us = zone.utc_us(midnight_us)
-    times = zip((begins_us - since_us).tolist(), (ends_us - since_us).tolist(), strict=True)
-    readings = [
-        reading._replace(begin_us=begin, end_us=end)
-        for reading, (begin, end) in zip(log.readings, times, strict=True)
-    ]
-    return replace(log, readings=tuple(readings), notes=tuple(notes))
+    return LAYOUTS[layout].read(path, sort=sort, zone=time_zone)
 
 
 def _recognize(path: Path) -> str:

@@ -132,8 +132,8 @@ class Clock:
 
     def next_change(self, step: int) -> int | None:
         """Return the first step after another one at which the offset from UTC is a new one."""
-        time = self.time(step)
-        change = time.zone.next_change(time) if isinstance(time, LocalTime) else None
+        zone = self.zone
+        change = zone.next_change(zone.at(self.time(step))) if zone else None
         return None if change is None else self.step_at_or_after(self.elapsed(change))
 
     def step_at_or_after(self, elapsed_us: int) -> int:
