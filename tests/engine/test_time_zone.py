@@ -309,6 +309,7 @@ def test_dated_moment_that_is_not_one_is_noted_and_one_with_an_offset_is_exact()
     [
         (["simulation.time_zone=Europe/Berln"], "no time zone 'Europe/Berln': did you mean 'Europe/Berlin'"),
         (["simulation.time_zone=../etc/passwd"], "there is no time zone '../etc/passwd'"),
+        (["simulation.time_zone={name: Own/Zone, standard_s: 0, offset_s: 0, changes: []}"], "there is no time zone 'Own/Zone'"),
         ([BERLIN, "simulation.start=2026-03-29T02:10"], "2026-03-29 02:10 doesn't exist in Europe/Berlin"),
         (["simulation.start=2026-03-29T02:10Z"], "say where the home is, by simulation.time_zone"),
         (['script=[{at: "2026-01-05T02:10Z", open: x}]'], "as there is no simulation.time_zone"),

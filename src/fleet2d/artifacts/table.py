@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, Bool
-from fleet2d.runtime.local_time import Zone
+from fleet2d.runtime.local_time import Zone, rules_of
 
 Kind = Literal["step", "time", "int32", "int64", "float64", "bool", "category", "string"]
 
@@ -507,9 +507,7 @@ def _datetimes(column: Column, times: NDArray[Any], count: int) -> list[datetime
     values = np.broadcast_to(times, count).tolist()
     if not column.unit:
         return values
-    from zoneinfo import ZoneInfo  # few runs have a time zone
-
-    zone = ZoneInfo(column.unit)
+    zone = rules_of(column.unit)
     return [value.replace(tzinfo=UTC).astimezone(zone) for value in values]
 
 

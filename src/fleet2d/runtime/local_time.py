@@ -384,14 +384,23 @@ def span_us(begin: datetime, end: datetime) -> tuple[int, int]:
     return wall_us(begin), wall_us(end)
 
 
-@lru_cache(64)
-def _zone_of(name: str, begin: datetime, end: datetime, year: int) -> Zone:
+def rules_of(name: str) -> tzinfo:
+    """Return what this machine knows of a time zone.
+
+    Raises:
+        KeyError: There is no such time zone.
+    """
     from zoneinfo import ZoneInfo  # few runs have a time zone
 
     try:
-        rules = ZoneInfo(name)
+        return ZoneInfo(name)
     except (ValueError, OSError) as error:  # such as '../x', or a folder
         raise KeyError(name) from error
+
+
+@lru_cache(64)
+def _zone_of(name: str, begin: datetime, end: datetime, year: int) -> Zone:
+    rules = rules_of(name)
     epoch = EPOCH.replace(tzinfo=UTC)
 
     def offset_s(second: int) -> int:

@@ -50,7 +50,7 @@ from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
 from fleet2d.routines.activity import SchemaForms
 from fleet2d.runtime.clock import Clock, Sun
-from fleet2d.runtime.local_time import Zone, span_us, zone_of
+from fleet2d.runtime.local_time import Zone, rules_of, span_us, zone_of
 from fleet2d.sight.camera import SightSettings
 
 
@@ -195,6 +195,7 @@ class SimulationSettings(Settings):
     def _check_time_zone(self, time_zone: TimeZone) -> None:
         """Refuse an unknown time zone, and a start that its clock never reads."""
         try:
+            rules_of(time_zone.name)  # also if it has offsets: those who read its tables need them
             zone = time_zone.zone(self.start, self.start)
         except KeyError:
             from zoneinfo import available_timezones

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
-from zoneinfo import ZoneInfo
 
 import matplotlib.dates as mdates
 import numpy as np
@@ -24,6 +23,7 @@ from fleet2d.runs.moments import part_of_run
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.local_time import rules_of
 from fleet2d.viewing.contract import BodyFacts
 from fleet2d.viewing.home_facts import WallsHistory
 from fleet2d.viewing.pictures.charts import AskedTime, asked_of
@@ -104,7 +104,7 @@ def _mark_sightings(run: Run, names: Sequence[str], axes: Axes) -> None:
 
 
 def _label(axes: Axes, bodies: Sequence[BodyFacts], clock: Clock) -> None:
-    zone = clock.zone and ZoneInfo(clock.zone.label)
+    zone = clock.zone and rules_of(clock.zone.label)
     locator = mdates.AutoDateLocator(tz=zone, minticks=3, maxticks=10)
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator, tz=zone))
