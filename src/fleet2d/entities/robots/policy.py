@@ -118,9 +118,10 @@ class SightingMemory:
         identity = distinct[:, Column.IDENTITY]
         if not len(step):
             return
-        first_us, end_us = int(step[0]) * self._step_us, (int(step[-1]) + 1) * self._step_us
-        for begin, end, start_us in even_parts(self._start, first_us, end_us):
-            part = slice(*np.searchsorted(step * self._step_us, (begin, end)).tolist())
+        at_us = step * self._step_us
+        first_us, last_us = int(at_us.min()), int(at_us.max())
+        for begin, end, start_us in even_parts(self._start, first_us, last_us + 1):
+            part = (begin <= at_us) & (at_us < end)
             of_day_us = start_us % DAY_US
             kernels.remember(
                 step[part], index[part], identity, room, of_day_us, self._step_us, self.rooms
