@@ -328,3 +328,27 @@ def test_offset_in_a_call_without_time_zone_is_refused() -> None:
     simulation = Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
     with pytest.raises(InputError, match="has an offset, and the home has no time zone"):
         simulation.run_until("2026-01-05T00:10+01:00")
+
+
+@pytest.mark.parametrize(
+    ("start", "expected"),
+    [
+        (AUTUMN, ["02:30:00+02:00 pill ana", "02:00:00+01:00 pill ana", "03:00:00+01:00 chat ben"]),
+        (SPRING, ["03:00:00+02:00 pill ana", "03:30:00+02:00 pill ana", "05:00:00+02:00 chat ben"]),
+    ],
+)
+def test_what_robots_want_at_a_time_is_once_a_night_and_intervals_are_of_real_time(
+    start: str, expected: list[str]
+) -> None:
+    """A reminder at 02:30, its deadline half an hour later, and a greeting every five hours."""
+    wants = "{pill: {do: remind, to: ana, at: ['02:30'], within: 30 min}, chat: {do: greet, to: ben, every: 5 h, within: 10 min}}"
+    keys = [BERLIN, start, "simulation.duration=7 h", f"interactions={wants}"]
+    run = fleet2d.run("bundled:family", *keys, seed=4)
+    rows = [r for r in run.arrow("events").to_pylist() if r["step"] > 3600]
+    told = [(r, r["event"]) for r in rows if r["event"] in ("due", "expired")]
+    texts = [
+        f"{r['time'].isoformat()[11:]} {r['detail']}"
+        for r, event in told
+        if r["detail"] != "chat ben" or event == "due"
+    ]
+    assert [text for text in texts if "vitamins" not in text] == expected

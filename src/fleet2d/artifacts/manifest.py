@@ -232,8 +232,6 @@ def start_of(manifest: Mapping[str, Any]) -> dt.datetime:
     """Return the start of a run, by the clock of its home."""
     start = dt.datetime.fromisoformat(manifest["start"])
     record = manifest["scenario"].get("simulation", {}).get("time_zone")
-    if (start.tzinfo is None) == bool(record):
-        raise ValueError("a start has an offset if the home has a time zone")
     return Zone.of_record(record).at(start) if record else start
 
 
@@ -246,10 +244,14 @@ def time_problem(manifest: Mapping[str, Any]) -> str:
         '1000000 steps from 9999-12-31T00:00:00 end after the year 9999'
     """
     start, step_us, steps = (manifest[name] for name in ("start", "step_us", "steps"))
+    has_zone = bool(manifest["scenario"].get("simulation", {}).get("time_zone"))
     if not step_us:
         return "step_us is 0"
     if not start:
         return "start is empty"
+    if (dt.datetime.fromisoformat(start).tzinfo is not None) != has_zone:
+        expected = "with its offset" if has_zone else "without a time zone"
+        return f"start: it should be a local time, {expected}, and is {start}"
     try:
         _ = start_of(manifest) + dt.timedelta(microseconds=steps * step_us)
     except OverflowError:

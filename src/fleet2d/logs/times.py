@@ -115,7 +115,8 @@ class Stamps(NamedTuple):
         self, path: Path, noun: str, usable: Bool, notes: list[str], zone: Zone, *, sort: bool
     ) -> "LocalTimes":
         """Return the same by the clock of the home, which may be changed: in real time."""
-        first_us, last_us = int(self.time_us.min()), int(self.time_us.max())
+        first_us = int(self.time_us.min())
+        last_us = int(self.time_us.max())
         with errors_as(LogError, f"{path}: there are no rules of the time zone", of=KeyError):
             zone = zone.over(first_us, last_us)
         utc_us = self.time_us if self.has_zone else moments_in_file(self.time_us, zone, noun, notes)

@@ -119,8 +119,8 @@ class SightingMemory:
         if not len(step):
             return
         at_us = step * self._step_us
-        first_us, last_us = int(at_us.min()), int(at_us.max())
-        for begin, end, start_us in even_parts(self._start, first_us, last_us + 1):
+        end_us = int(at_us.max()) + 1
+        for begin, end, start_us in even_parts(self._start, int(at_us.min()), end_us):
             part = (begin <= at_us) & (at_us < end)
             of_day_us = start_us % DAY_US
             kernels.remember(

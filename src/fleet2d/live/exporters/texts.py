@@ -164,7 +164,8 @@ class _Ways:
     """The movements of a body, each from its last rest to its next, also from chunk to chunk."""
 
     def __init__(self, name: str, clock: Clock) -> None:
-        self._name, self._clock = name, clock
+        self._name = name
+        self._clock = clock
         self._line: list[list[float]] = []  # of a movement that isn't over
         self._from = self._to = ""
         self._last: tuple[Any, Any, Any] | None = None  # the last pose: place, whether away, time
