@@ -11,6 +11,7 @@ from tests.change_nights import CHANGED_RULES, DAY, MINUTE, ZONES, Night, nights
 
 from fleet2d.entities.behavior import parse_span
 from fleet2d.expectations.expectation import RunSignals
+from fleet2d.expectations.temporal import _period_begins
 from fleet2d.expectations.vocabulary import during
 from fleet2d.interventions.intervention import parse_when
 from fleet2d.runtime.clock import Clock, midnight_of, next_midnight
@@ -108,6 +109,28 @@ def test_hours_hold_while_the_clock_reads_a_time_within_them(night: Night) -> No
         condition = during(window.split()[-1], days=days)
         trace = condition.trace(RunSignals({}, {}, 0, MINUTES, True, clock))
         assert trace.values(np.arange(MINUTES)).tolist() == [float(each) for each in inside]
+
+
+@pytest.mark.parametrize("night", NIGHTS, ids=str)
+def test_hours_days_and_weeks_of_expectations_begin_by_the_clock(night: Night) -> None:
+    """A day that is begun again, as a clock is put back, is the same one; an hour is another."""
+    clock = clock_of(night)
+    readings = [night.reading(minute).replace(tzinfo=None) for minute in range(MINUTES)]
+    midnights = [datetime.combine(reading, time()) for reading in readings]
+    periods = {
+        "hour": [reading.replace(minute=0) for reading in readings],
+        "day": midnights,
+        "week": [midnight - midnight.weekday() * DAY for midnight in midnights],
+    }
+    for per, begun in periods.items():
+        expected = []
+        latest = begun[0]
+        for k in range(1, MINUTES):
+            is_hour = per == "hour" and not readings[k].minute
+            if begun[k] > latest or is_hour:
+                expected.append(k)
+            latest = max(latest, begun[k])
+        assert _period_begins(RunSignals({}, {}, 0, MINUTES, True, clock), per) == expected, per
 
 
 @pytest.mark.parametrize("night", NIGHTS, ids=str)

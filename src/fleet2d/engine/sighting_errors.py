@@ -93,7 +93,7 @@ class Darkness(PerceptionError):
             shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
         else:
             elapsed_us = sightings.step * round(1e6 * sightings.step_s)
-            by_day = self.sun.shares(readings_of(sightings.start, elapsed_us).view("M8[us]"))
+            by_day = self.sun.shares(readings_of(sightings.start, elapsed_us).astype("M8[us]"))
             shares = DARKEST + (1 - DARKEST) * by_day
         is_hidden = is_dark & (sightings.uniform("noticed") >= shares)
         return sightings.replace(noticed=sightings.noticed & ~is_hidden)

@@ -3,7 +3,7 @@
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -570,20 +570,24 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
     if per is None:
         return []
     clock = run.clock
-    length = PERIODS[per]
     moment = clock.time(run.first)
+    latest = _period_of(moment, per)
     steps: list[int] = []
     while True:
-        reading = written(moment)
-        begun = reading.replace(minute=0, second=0, microsecond=0)
-        if per != "hour":
-            begun = midnight_of(reading)
-        if per == "week":
-            begun -= timedelta(days=begun.weekday())
-        moment = next_reading(moment, begun + length)
+        moment = next_reading(moment, _period_of(moment, per) + PERIODS[per])
         if (step := clock.step_at_or_after(clock.elapsed(moment))) >= run.end:
             return steps
-        # The clock may have been changed before.
-        is_new = written(moment) == begun + length or (per == "hour" and not moment.minute)
+        # The clock may have been changed before: back into a period, or into the next one.
+        period = _period_of(moment, per)
+        is_new = period > latest or (per == "hour" and not moment.minute)
+        latest = max(latest, period)
         if is_new and step > run.first:
             steps.append(step)
+
+
+def _period_of(moment: datetime, per: str) -> datetime:
+    """Return what the clock read as the hour, day or week of a moment began."""
+    if per == "hour":
+        return written(moment).replace(minute=0, second=0, microsecond=0)
+    midnight = midnight_of(moment)
+    return midnight - timedelta(days=midnight.weekday()) if per == "week" else midnight

@@ -78,7 +78,7 @@ class Clock:
 
     def times(self, steps: I64) -> NDArray[np.datetime64]:
         """Return what the clock reads at steps, datetime64[us]."""
-        return readings_of(self.start, steps * self.step_us).view("M8[us]")
+        return readings_of(self.start, steps * self.step_us).astype("M8[us]")
 
     def stamp(self, step: int) -> np.datetime64:
         """Return the time of a step as tables hold it: UTC if the home has a time zone."""
@@ -210,7 +210,7 @@ class Sun:
         """
         days, which = np.unique(times.astype("M8[D]"), return_inverse=True)
         ends = [map(wall_us, self.day(day.toordinal())) for day in days.tolist()]
-        rise, fall = np.array([*map(list, ends)], np.int64).view("M8[us]").reshape(-1, 2).T
+        rise, fall = np.array([*map(list, ends)], np.int64).astype("M8[us]").reshape(-1, 2).T
         twilight = np.timedelta64(TWILIGHT)
         risen = (times - rise[which] + twilight) / (2 * twilight)
         left = (fall[which] - times + twilight) / (2 * twilight)
