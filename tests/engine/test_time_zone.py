@@ -14,6 +14,7 @@ from fleet2d import InputError, Simulation
 from fleet2d.engine.repeat import reproduce
 from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog
+from fleet2d.runs.moments import step_of
 from fleet2d.runtime import local_time
 from fleet2d.runtime.clock import Sun
 from fleet2d.scenario.load import load_scenario
@@ -352,3 +353,21 @@ def test_what_robots_want_at_a_time_is_once_a_night_and_intervals_are_of_real_ti
         if r["detail"] != "chat ben" or event == "due"
     ]
     assert [text for text in texts if "vitamins" not in text] == expected
+
+
+def test_moments_of_commands_are_local_or_exact() -> None:
+    """As `--from` and `--at` take them, in words, in local time, and with an offset."""
+    clock = load_scenario(
+        "bundled:paper", BERLIN, AUTUMN, "simulation.duration=2 d"
+    ).simulation.clock
+    words = {
+        "day 2 02:30": 3.5,
+        "2026-10-25T02:30": 3.5,
+        "2026-10-25T02:30+01:00": 4.5,
+        "2026-10-25T01:30Z": 4.5,
+        "day 2 03:00": 5,
+        "day 3": 26,
+        "26 h": 26,
+    }
+    for text, hours in words.items():
+        assert step_of(text, clock) == hours * 3600, text

@@ -112,10 +112,11 @@ class Zone(tzinfo):
     def dst(self, _: datetime | None) -> None:
         """Return nothing: which part of an offset is summer time isn't known."""
 
-    def utcoffset(self, moment: datetime | None) -> timedelta:
+    def utcoffset(self, moment: datetime | None) -> timedelta | None:
         """Return the offset of what the clock reads, the first or (`fold`) the second time."""
-        reading_us = 0 if moment is None else wall_us(moment)
-        utc_us = self.utc_us(reading_us, fold=0 if moment is None else moment.fold)
+        if moment is None:
+            return None
+        utc_us = self.utc_us(wall_us(moment), moment.fold)
         return timedelta(microseconds=self.offset_us(utc_us))
 
     def fromutc(self, moment: datetime) -> datetime:
