@@ -11,10 +11,10 @@ export function addressOf(run: Run): string {
   const { clock } = run;
   const [from, to] = state.range.value;
   const words = new URLSearchParams();
-  words.set("at", momentText(clock.startMs, state.moment.value));
+  words.set("at", clock.stampText(state.moment.value));
   if (from > state.beginUs.value || to < state.endUs.value) {
-    words.set("from", momentText(clock.startMs, from));
-    words.set("to", momentText(clock.startMs, to));
+    words.set("from", clock.stampText(from));
+    words.set("to", clock.stampText(to));
   }
   words.set("show", state.SWITCHES.filter((name) => state.shown.value.has(name)).join(","));
   words.set("panel", state.panel.value);
@@ -37,8 +37,7 @@ export function applyAddress(text: string, run: Run): void {
   const words = new URLSearchParams(text.replace(/^#/, ""));
   const us = (name: string): number | null => {
     const value = words.get(name);
-    const ms = value === null ? NaN : Date.parse(`${value}Z`);
-    return Number.isNaN(ms) ? null : (ms - run.clock.startMs) * 1000;
+    return value === null ? null : run.clock.ofStamp(value);
   };
   const [from, to, at] = [us("from"), us("to"), us("at")];
   if (from !== null && to !== null && to > from) state.setRange(from, to);
@@ -93,8 +92,4 @@ export function followAddress(run: Run): void {
   addEventListener("hashchange", () => {
     if (location.hash !== lastHash) applyAddress(location.hash, run);
   });
-}
-
-function momentText(startMs: number, us: number): string {
-  return new Date(startMs + us / 1000).toISOString().slice(0, 23).replace(".000", "");
 }

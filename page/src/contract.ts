@@ -163,12 +163,13 @@ export interface SightingFacts {
   false: boolean[];
 }
 
-/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. `verdict` sums up the `verdicts`, of which violated ones come first. `skies` has for each day the hours until which it is dark, from which and until which it is light, and from which it is dark again; the last holds for the days that follow, too. */
+/** Everything about a run but its tables; steps `first_step` to `end_step` - 1 are shown. With `starts_unlit` all lights are off at first; its events switch them. `event_kinds` are all that Fleet2D records, also those that the run has none of. `verdict` sums up the `verdicts`, of which violated ones come first. `skies` has for each day the hours until which it is dark, from which and until which it is light, and from which it is dark again; the last holds for the days that follow, too. `start` is UTC if the home has a time zone; `offsets` has then from when on [us since the start] which offset [us] holds, else nothing. */
 export interface RunFacts {
   title: string;
   status: string;
   notes: string[];
   start: string;
+  offsets: [number, number][];
   step_us: number;
   steps: number;
   first_step: number;

@@ -3,6 +3,48 @@ import { Clock, durationText } from "../src/data/clock";
 
 const clock = new Clock("2026-01-05T06:00:00", 1e6, 10 * 86_400);
 
+// From 22:00 in Berlin on, over the night in which clocks are put back.
+const changed = new Clock("2026-10-24T20:00:00", 1e6, 34 * 3600, [
+  [0, 7200e6],
+  [5 * 3600e6, 3600e6],
+]);
+
+describe("a clock that is changed", () => {
+  it("reads an hour twice, with the offset", () => {
+    expect(changed.text(4.5 * 3600e6)).toBe("Sun 25 Oct 02:30:00 +02:00");
+    expect(changed.text(5.5 * 3600e6)).toBe("Sun 25 Oct 02:30:00 +01:00");
+    expect(changed.hourAt(5.5 * 3600e6)).toBe(2.5);
+  });
+
+  it("has a day of 25 hours", () => {
+    expect([changed.dayStart(2), changed.dayStart(3)]).toEqual([2 * 3600e6, 27 * 3600e6]);
+    expect([changed.day(27 * 3600e6 - 1), changed.day(27 * 3600e6)]).toEqual([2, 3]);
+  });
+
+  it.each([
+    ["2026-10-25T02:30", 4.5 * 3600e6],
+    ["day 2 03:00", 6 * 3600e6],
+    ["Sun 25 Oct 07:00", 10 * 3600e6],
+  ])("reads %s, the first of two", (text, us) => {
+    expect(changed.parse(text)).toBe(us);
+  });
+
+  it("is exact in addresses, which may also name local time", () => {
+    for (const hours of [4.5, 5.5]) expect(changed.ofStamp(changed.stampText(hours * 3600e6))).toBe(hours * 3600e6);
+    expect(changed.stampText(5.5 * 3600e6)).toBe("2026-10-25T01:30:00Z");
+    expect(changed.ofStamp("2026-10-25T02:30:00")).toBe(4.5 * 3600e6);
+    expect(clock.ofStamp(clock.stampText(90e6))).toBe(90e6);
+  });
+
+  it("goes past a gap", () => {
+    const spring = new Clock("2026-03-28T23:00:00", 1e6, 10 * 3600, [
+      [0, 3600e6],
+      [2 * 3600e6, 7200e6],
+    ]);
+    expect([spring.parse("02:30", 3600e6), spring.parse("03:30", 3600e6)]).toEqual([2 * 3600e6, 2.5 * 3600e6]);
+  });
+});
+
 describe("a clock", () => {
   it("writes local time, whatever the time zone of the browser", () => {
     expect(clock.text(30e6)).toBe("Mon 5 Jan 06:00:30");

@@ -18,6 +18,9 @@ inline constexpr i64 DAY_HOURS = 24;
 inline constexpr f64 LONG_AGO = -1e9;         // [min]
 inline constexpr f64 LONGEST_GAP = 2 * 1440;  // [min]
 
+// Minutes since an earlier time, up to the longest that count; 0 while a clock that was put back reads times again.
+inline f64 gap_of(f64 time, f64 before) { return std::clamp(time - before, 0.0, LONGEST_GAP); }
+
 // The natural logarithm of a number above 0, to about 1e-9.
 inline f64 ln(f64 x) {
     int exponent = 0;
@@ -115,7 +118,7 @@ inline void trace_bin(Traces& traces, const TracedRooms& home, const TracedEvide
         empty_floor += home.share[r] * traces.empty_sum[r];
         most_empty = std::max(most_empty, traces.empty_most[r]);
     }
-    const f64 gap = std::min(time - *traces.last_time, LONGEST_GAP), log_gap = ln(1 + gap);
+    const f64 gap = gap_of(time, *traces.last_time), log_gap = ln(1 + gap);
     traces.gone[hour] += cover > 0.6 && gap > 5 ? 1 : 0, traces.bins[hour] += 1;
 
     // Over all hours, and in this one and its neighbours.
@@ -140,9 +143,9 @@ inline void trace_bin(Traces& traces, const TracedRooms& home, const TracedEvide
         const auto at = static_cast<std::size_t>(r);
         const bool is_last = r == last;
         row(r, 0) = is_last, row(r, 1) = is_last ? log_gap : 0;
-        row(r, 2) = ln(1 + std::min(time - traces.seen_at[r], LONGEST_GAP));
+        row(r, 2) = ln(1 + gap_of(time, traces.seen_at[r]));
         row(r, 3) = seen[r];
-        row(r, 4) = ln(1 + std::min(time - traces.looked_at[r], LONGEST_GAP));
+        row(r, 4) = ln(1 + gap_of(time, traces.looked_at[r]));
         row(r, 5) = traces.empty_most[r];
         row(r, 6) = ln(1 + traces.empty_sum[r]);
         row(r, 7) = ln(1 + traces.empty_10[r]), row(r, 8) = ln(1 + traces.empty_60[r]);
@@ -160,7 +163,7 @@ inline void trace_bin(Traces& traces, const TracedRooms& home, const TracedEvide
     // don't.
     const std::array<f64, 6> shared{log_gap,
                                     cover,
-                                    ln(1 + (time - *traces.first_time) / 1440),
+                                    ln(1 + std::max(time - *traces.first_time, 0.0) / 1440),
                                     is_seen ? 1.0 : 0.0,
                                     most_empty,
                                     ln(1 + empty_floor)};

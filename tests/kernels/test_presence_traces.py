@@ -20,8 +20,11 @@ def rooms_of(random: np.random.Generator, count: int) -> TracedRooms:
     return TracedRooms(random.dirichlet(np.ones(count)), np.abs(at[:, None] - at).sum(axis=2) / 10)
 
 
-def evidence_of(random: np.random.Generator, bins: int, rooms: int, first: int) -> TracedEvidence:
+def evidence_of(
+    random: np.random.Generator, bins: int, rooms: int, first: int, put_back: int = 0
+) -> TracedEvidence:
     minute = first + np.arange(bins) * 37  # more than a day
+    minute[bins // 2 :] -= put_back  # as a clock is, in the middle
     watched = random.random((bins, rooms)) * (random.random((bins, rooms)) < 0.5)
     seen = random.random((bins, rooms)) * (random.random((bins, rooms)) < 0.1)
     unknown = (random.random((bins, rooms)) < 0.1).astype(np.uint8)
@@ -30,11 +33,13 @@ def evidence_of(random: np.random.Generator, bins: int, rooms: int, first: int) 
     return TracedEvidence(day, minute, watched, seen, unknown, belief)
 
 
+@pytest.mark.parametrize("put_back", [0, 60, 120])
 @pytest.mark.parametrize("seed", range(12))
-def test_features_equal_those_of_the_twin(seed: int) -> None:
+def test_features_equal_those_of_the_twin(seed: int, put_back: int) -> None:
     random = np.random.default_rng(seed)
     count = [1, 2, 3, 7, 40][seed % 5]
-    home, evidence = rooms_of(random, count), evidence_of(random, 150, count, 100 * seed)
+    home = rooms_of(random, count)
+    evidence = evidence_of(random, 150, count, 100 * seed, put_back)
     twin = slow.Traces(count)
     expected = [
         twin.add(

@@ -154,7 +154,9 @@ def verdict(variant: Variant) -> str:
     try:
         loaded = fleet2d.load_scenario(scenario)
         replay: Any = loaded.users["ana"].behaviors[0]
-        log = read_log(replay.path, replay.format, id=replay.id, **replay.reading)
+        log = read_log(
+            replay.path, replay.format, id=replay.id, **replay.reading(loaded.simulation.clock)
+        )
         assert isinstance(log, PositionLog)
         plan = replay.frame.in_unit(log.unit_m).to_plan(log.xy)
         begin_us, _ = begin_of_run(log, replay.day, loaded.simulation.clock)

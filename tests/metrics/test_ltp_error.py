@@ -35,6 +35,7 @@ from fleet2d.metrics.rtp_score import (
     skill,
     top_k,
 )
+from fleet2d.runtime.local_time import zone_of
 
 weights = st.lists(st.integers(0, 20), min_size=1, max_size=9).filter(any)
 
@@ -248,14 +249,19 @@ class History:
 rooms_of_user = st.lists(st.integers(-1, ROOMS - 1), min_size=STEPS, max_size=STEPS)
 
 
-@given(st.lists(rooms_of_user, max_size=4), st.integers(0, 7 * 24 * 60), st.integers(0, 99))
+zones = st.sampled_from(["", "Europe/Berlin", "Australia/Lord_Howe", "America/St_Johns"])
+
+
+@given(st.lists(rooms_of_user, max_size=4), st.integers(0, 7 * 24 * 60), st.integers(0, 99), zones)
 def test_steps_are_counted_by_place_and_hour(
-    users: list[list[int]], minute: int, first: int
+    users: list[list[int]], minute: int, first: int, zone: str
 ) -> None:
-    """As they are one by one, in runs that begin at any minute of a week."""
+    """As they are one by one, in runs that begin at any minute of a week, also as clocks change."""
     names = tuple(map(str, range(len(users))))
     home = SimpleNamespace(rooms=range(ROOMS))
-    start = datetime(2026, 3, 2) + timedelta(minutes=minute)
+    start = datetime(2010, 11, 2) + timedelta(minutes=minute)
+    if zone:
+        start = zone_of(zone, start, start + timedelta(days=9)).at(start)
     state: Any = SimpleNamespace(home=home, users=names, start=start)
     history: Any = History(users, first)
     expected = np.zeros((168, len(users) + 1, ROOMS + 1), np.int64)

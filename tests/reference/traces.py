@@ -8,6 +8,11 @@ import numpy as np
 CAP = 2880.0
 
 
+def since(time: float, before: float) -> float:
+    """Return the minutes since an earlier time that count; none where a clock was put back."""
+    return min(max(time - before, 0.0), CAP)
+
+
 class Traces:
     """What the evidence of one person leaves behind in each room."""
 
@@ -46,7 +51,7 @@ class Traces:
             self.seen[hour][r] += seen[r]
             self.watched[hour][r] += watched[r]
         cover = sum(home.share[r] * self.most[r] for r in rooms)
-        gap = min(time - self.last_time, CAP)
+        gap = since(time, self.last_time)
         self.gone[hour] += cover > 0.6 and gap > 5
         self.bins[hour] += 1
         return self._rows(home, hour, time, gap, cover, watched, seen, unknown, belief)
@@ -75,9 +80,9 @@ class Traces:
             [
                 float(r == self.last),
                 math.log1p(gap) if r == self.last else 0.0,
-                math.log1p(min(time - self.seen_at[r], CAP)),
+                math.log1p(since(time, self.seen_at[r])),
                 seen[r],
-                math.log1p(min(time - self.looked_at[r], CAP)),
+                math.log1p(since(time, self.looked_at[r])),
                 self.most[r],
                 math.log1p(self.sum[r]),
                 math.log1p(self.recent_10[r]),

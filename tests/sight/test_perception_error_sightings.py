@@ -1,5 +1,8 @@
 """The sightings of a camera: what errors read of them, draw for them and change."""
 
+from dataclasses import replace
+from datetime import datetime
+
 import numpy as np
 import pytest
 from tests.sight.sightings import sightings
@@ -7,6 +10,7 @@ from tests.sight.sightings import sightings
 import fleet2d
 from fleet2d.kernels import random_bell
 from fleet2d.runtime.determinism import stream_key
+from fleet2d.runtime.local_time import zone_of
 from fleet2d.sight.perception_error import PerceptionError
 
 AT = np.linspace(0, 5, 7)
@@ -133,3 +137,11 @@ def test_hour_is_the_time_of_day_also_after_midnight() -> None:
     late = sightings([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], step=[0, 1800, 2 * 3600])
 
     assert [23.0, 23.5, 1.0] == late.hour.tolist()
+
+
+def test_hour_is_what_the_clock_reads_also_where_it_is_changed() -> None:
+    zone = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))
+    late = sightings([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], step=[0, 3 * 3600, 4 * 3600])
+
+    at = replace(late, start=zone.at(datetime(2026, 10, 25)))
+    assert [0.0, 2.0, 3.0] == at.hour.tolist()

@@ -12,6 +12,7 @@ from fleet2d.entities.robots.find import Find
 from fleet2d.entities.robots.follow import Come, Follow
 from fleet2d.entities.robots.interact import Interact, Opportunistic
 from fleet2d.entities.robots.patrol import Patrol, Scheduled
+from fleet2d.runtime.clock import midnight_of
 
 LATE = timedelta(seconds=30)
 MUCH_LATER = timedelta(minutes=30)
@@ -215,6 +216,15 @@ class VisitLate(Scheduled):
 
     def _due(self, since: Any) -> Any:
         yield from ((due + LATE, number) for due, number in super()._due(since - LATE))
+
+
+class VisitTwice(Scheduled):
+    """Comes back an hour later."""
+
+    def _due(self, since: Any) -> Any:
+        hour = timedelta(hours=1)
+        again = [(due + hour, number) for due, number in super()._due(midnight_of(since))]
+        yield from sorted([*super()._due(since), *(due for due in again if due[0] > since)])
 
 
 class VisitNextRoom(Scheduled):

@@ -1,4 +1,4 @@
-/** Steps and local times of a run. Times are microseconds since its start. */
+/** Steps and local times of a run. Times are microseconds since its start; local ones, of the offset added. */
 
 const DAY_MS = 86_400_000;
 const WEEKDAYS = ["Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"];
@@ -7,13 +7,15 @@ const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "
 const two = (value: number): string => String(value).padStart(2, "0");
 
 export class Clock {
-  /** Local time of the start, in milliseconds as if local time were UTC. */
+  /** The start as tables have it, in milliseconds since 1970: UTC, or local time if the home has no time zone. */
   readonly startMs: number;
 
+  /** `offsets`: from when on which offset from UTC holds; none if the home has no time zone. */
   constructor(
     start: string,
     readonly stepUs: number,
     public steps: number,
+    private readonly offsets: readonly [number, number][] = [],
   ) {
     this.startMs = Date.parse(start.endsWith("Z") ? start : `${start}Z`);
   }
@@ -27,25 +29,56 @@ export class Clock {
     return Math.max(0, Math.min(this.steps - 1, Math.floor(us / this.stepUs)));
   }
 
+  /** The moment in local time. */
+  private local(us: number): number {
+    const since = this.offsets.filter(([from], i) => i === 0 || from <= us);
+    return us + (since.length ? since[since.length - 1]![1] : 0);
+  }
+
+  /** The first moment at which the clock reads a local time, or is put past it. */
+  private moment(local: number): number {
+    for (const [i, [from, offset]] of this.offsets.entries()) {
+      const us = local - offset;
+      if (us < (this.offsets[i + 1]?.[0] ?? Infinity)) return i ? Math.max(us, from) : us;
+    }
+    return local;
+  }
+
   date(us: number): Date {
-    return new Date(this.startMs + us / 1000);
+    return new Date(this.startMs + this.local(us) / 1000);
   }
 
   /** The day of the run that a moment is in: 1 is the date it starts on. */
   day(us: number): number {
-    const first = Math.floor(this.startMs / DAY_MS);
-    return Math.floor((this.startMs + us / 1000) / DAY_MS) - first + 1;
+    return Math.floor(this.date(us).getTime() / DAY_MS) - this.firstDay + 1;
   }
 
   /** Midnight that begins a day of the run; the first may lie before the start. */
   dayStart(day: number): number {
-    const first = Math.floor(this.startMs / DAY_MS);
-    return ((first + day - 1) * DAY_MS - this.startMs) * 1000;
+    return this.moment(this.localDayStart(day));
   }
 
-  /** The hours since midnight. */
+  /** Where in a day a moment is by what the clock reads, from 0 to 1 at the next midnight. */
+  share(us: number, day: number): number {
+    return (this.local(us) - this.localDayStart(day)) / (DAY_MS * 1000);
+  }
+
+  /** The moment at a share of a day. */
+  ofShare(share: number, day: number): number {
+    return this.moment(this.localDayStart(day) + share * DAY_MS * 1000);
+  }
+
+  private get firstDay(): number {
+    return Math.floor(this.date(0).getTime() / DAY_MS);
+  }
+
+  private localDayStart(day: number): number {
+    return ((this.firstDay + day - 1) * DAY_MS - this.startMs) * 1000;
+  }
+
+  /** The time of day in hours. */
   hourAt(us: number): number {
-    return (us - this.dayStart(this.day(us))) / 3600e6;
+    return (this.local(us) - this.localDayStart(this.day(us))) / 3600e6;
   }
 
   timeText(us: number, seconds = true): string {
@@ -61,12 +94,33 @@ export class Clock {
   }
 
   text(us: number): string {
-    return `${this.dateText(us)} ${this.timeText(us)}`;
+    return `${this.dateText(us)} ${this.timeText(us)}${this.offsetText(us)}`;
+  }
+
+  /** The offset from UTC, as " +02:00"; empty if the home has no time zone. */
+  private offsetText(us: number): string {
+    if (!this.offsets.length) return "";
+    const minutes = Math.round((this.local(us) - us) / 60e6);
+    const size = Math.abs(minutes);
+    return ` ${minutes < 0 ? "-" : "+"}${two(Math.floor(size / 60))}:${two(size % 60)}`;
   }
 
   /** Local time as ISO 8601, without a time zone. */
   iso(us: number): string {
     return this.date(us).toISOString().slice(0, 19);
+  }
+
+  /** A moment exactly, as in an address: in local time, or in UTC, with a Z, if the home has a time zone. */
+  stampText(us: number): string {
+    const text = new Date(this.startMs + us / 1000).toISOString().slice(0, 23).replace(".000", "");
+    return this.offsets.length ? `${text}Z` : text;
+  }
+
+  /** The moment that an address names; without a Z in local time. Null where it names none. */
+  ofStamp(text: string): number | null {
+    const ms = Date.parse(text.endsWith("Z") ? text : `${text}Z`);
+    const us = (ms - this.startMs) * 1000;
+    return Number.isNaN(ms) ? null : text.endsWith("Z") ? us : this.moment(us);
   }
 
   /**
@@ -80,7 +134,7 @@ export class Clock {
     const iso = /^(\d{4}-\d{2}-\d{2})(?:[t ](\d{1,2}:\d{2}(?::\d{2})?))?$/.exec(words);
     if (iso) {
       const ms = Date.parse(`${iso[1]}T${(iso[2] ?? "00:00").padStart(5, "0")}Z`);
-      return Number.isNaN(ms) ? null : this.inside((ms - this.startMs) * 1000);
+      return Number.isNaN(ms) ? null : this.inside(this.moment((ms - this.startMs) * 1000));
     }
     const since = /^(?:(\d+) ?d)? ?(?:(\d+) ?h)? ?(?:(\d+) ?min)? ?(?:(\d+) ?s)?$/.exec(words);
     if (since && words) {
@@ -95,7 +149,7 @@ export class Clock {
     const [hours, minutes, seconds] = [day[2], day[3], day[4]].map((part) => Number(part ?? 0));
     if (hours! > 23 || minutes! > 59 || seconds! > 59) return null;
     const us = ((hours! * 60 + minutes!) * 60 + seconds!) * 1e6;
-    return this.inside(this.dayStart(number) + us);
+    return this.inside(this.moment(this.localDayStart(number) + us));
   }
 
   /** The moment of a day and month: in a year, or in the first year in which the run has it. */

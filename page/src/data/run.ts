@@ -67,7 +67,7 @@ export class Run {
     readonly facts: RunFacts,
     private readonly source: RunSource,
   ) {
-    this.clock = new Clock(facts.start, facts.step_us, facts.steps);
+    this.clock = new Clock(facts.start, facts.step_us, facts.steps, facts.offsets);
     this.home = new Home(facts.home);
   }
 

@@ -11,7 +11,6 @@ import * as state from "../state";
 import { colors } from "../theme";
 import { type Strip, stripsOf, timeWithin } from "./days";
 
-const DAY_US = 86_400e6;
 const HEAD = 22;
 const LEFT = 96;
 const RIGHT = 118;
@@ -102,7 +101,7 @@ function Days({ run }: { run: Run }) {
     const share = Math.max(0, Math.min(0.99999, (x - LEFT) / (sheet.width - LEFT - sheet.right)));
     const inRow = (y - dayTop(sheet, i)) / (sheet.rowHeight - GAP);
     const strip = shown.value[Math.min(shown.value.length - 1, Math.floor(inRow * shown.value.length))];
-    return { us: clock.dayStart(firstDay + i) + share * DAY_US, day: firstDay + i, strip };
+    return { us: clock.ofShare(share, firstDay + i), day: firstDay + i, strip };
   };
   useEffect(() => {
     const paint = oncePerFrame(() => {
@@ -121,7 +120,7 @@ function Days({ run }: { run: Run }) {
       const day = clock.day(us);
       const top = dayTop(sheet, day - firstDay);
       if (top < HEAD - rowHeight) return;
-      const x = LEFT + ((us - clock.dayStart(day)) / DAY_US) * (sheet.width - LEFT - sheet.right);
+      const x = LEFT + clock.share(us, day) * (sheet.width - LEFT - sheet.right);
       context.strokeStyle = colors.value.text;
       context.lineWidth = 1.5;
       context.strokeRect(LEFT - 1, top - 1, sheet.width - LEFT - sheet.right + 2, rowHeight - GAP + 2);
@@ -213,9 +212,10 @@ function drawHours(context: CanvasRenderingContext2D, sheet: Sheet): void {
 function drawDay(context: CanvasRenderingContext2D, run: Run, strips: readonly Strip[], sheet: Sheet, top: number, day: number): void {
   const { clock } = run;
   const begin = clock.dayStart(day);
+  const end = clock.dayStart(day + 1);
   const tall = sheet.rowHeight - GAP;
   const wide = sheet.width - LEFT - sheet.right;
-  const x = (us: number): number => LEFT + ((us - begin) / DAY_US) * wide;
+  const x = (us: number): number => LEFT + (us < end ? clock.share(us, day) : 1) * wide;
   const date = clock.dateText(begin);
   const isWeekend = /^S[au]/.test(date);
   const size = Math.min(11.5, sheet.rowHeight);
@@ -228,20 +228,20 @@ function drawDay(context: CanvasRenderingContext2D, run: Run, strips: readonly S
   strips.forEach((strip, k) => {
     const y = top + k * height;
     const { from, to, value } = strip.stretches;
-    for (let i = firstAtLeast(to, begin + 1); i < from.length && from[i]! < begin + DAY_US; i++) {
+    for (let i = firstAtLeast(to, begin + 1); i < from.length && from[i]! < end; i++) {
       const left = x(Math.max(begin, from[i]!));
       context.fillStyle = strip.color(value[i]!);
-      context.fillRect(left, y, Math.max(0.6, x(Math.min(begin + DAY_US, to[i]!)) - left), height - 0.6);
+      context.fillRect(left, y, Math.max(0.6, x(Math.min(end, to[i]!)) - left), height - 0.6);
     }
     context.fillStyle = colors.value.viewEdge;
     const { seen } = strip;
-    for (let i = firstAtLeast(seen.to, begin + 1); i < seen.from.length && seen.from[i]! < begin + DAY_US; i++) {
+    for (let i = firstAtLeast(seen.to, begin + 1); i < seen.from.length && seen.from[i]! < end; i++) {
       const left = x(Math.max(begin, seen.from[i]!));
-      context.fillRect(left, y + height - 1.6, Math.max(1, x(Math.min(begin + DAY_US, seen.to[i]!)) - left), 1.4);
+      context.fillRect(left, y + height - 1.6, Math.max(1, x(Math.min(end, seen.to[i]!)) - left), 1.4);
     }
   });
   if (sheet.right !== RIGHT) return;
-  const hours = strips.reduce((sum, strip) => sum + timeWithin(strip.seen, begin, begin + DAY_US), 0) / 3600e6;
+  const hours = strips.reduce((sum, strip) => sum + timeWithin(strip.seen, begin, end), 0) / 3600e6;
   const start = sheet.width - RIGHT + 12;
   context.fillStyle = colors.value.hatch;
   context.fillRect(start, top + tall / 2 - 2.5, 56, 5);
@@ -267,9 +267,8 @@ function drawFrame(context: CanvasRenderingContext2D, run: Run, sheet: Sheet, da
   context.strokeStyle = color;
   context.lineWidth = 1.6;
   for (let day = clock.day(from); day <= clock.day(Math.max(from, to - 1)); day++) {
-    const begin = clock.dayStart(day);
-    const left = LEFT + (Math.max(0, from - begin) / DAY_US) * wide;
-    const right = LEFT + (Math.min(DAY_US, to - begin) / DAY_US) * wide;
+    const left = LEFT + (day > clock.day(from) ? 0 : clock.share(from, day)) * wide;
+    const right = LEFT + (to < clock.dayStart(day + 1) ? clock.share(to, day) : 1) * wide;
     context.strokeRect(left, dayTop(day) - 1, Math.max(3, right - left), sheet.rowHeight - GAP + 2);
   }
 }

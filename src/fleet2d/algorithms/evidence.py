@@ -5,7 +5,6 @@ counts are what algorithms learn presence from.
 """
 
 from dataclasses import dataclass, replace
-from datetime import datetime
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple, Self
@@ -25,7 +24,8 @@ from fleet2d.kernels import (
     list_sightings,
     rasterize_cells,
 )
-from fleet2d.runtime.clock import DAY_US, MICROSECOND, Clock
+from fleet2d.runtime.clock import DAY_US, Clock
+from fleet2d.runtime.local_time import EPOCH, readings_of
 
 # Side of a patch [m], approximately; larger where a room would have more than about MAX_PATCHES.
 SIDE_M = 1.0
@@ -369,6 +369,5 @@ def gather(
 def times_of_bins(clock: Clock, begin: int, bin_steps: int, bins: int) -> tuple[I64, I64]:
     """Return the day of each bin, as `date.toordinal` counts, and its first minute of the day."""
     steps = begin + np.arange(bins, dtype=np.int64) * bin_steps
-    start_us = (clock.start - datetime.min) // MICROSECOND
-    day, time_us = np.divmod(start_us + steps * clock.step_us, DAY_US)
-    return datetime.min.toordinal() + day, time_us // 60_000_000
+    day, time_us = np.divmod(readings_of(clock.start, steps * clock.step_us), DAY_US)
+    return EPOCH.toordinal() + day, time_us // 60_000_000

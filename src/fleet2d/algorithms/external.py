@@ -21,6 +21,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.logs.log import AWAY, LogError, LogKeys
 from fleet2d.logs.tables import LogTable
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.local_time import at_reading
 from fleet2d.runtime.program import ExternalProgram
 
 # The end of an Arrow IPC stream: no further message.
@@ -222,23 +223,23 @@ class ReplayedOutput(Algorithm, LogKeys):
         for name in pc.unique(texts).to_pylist():
             check_known(name, "room", rooms, LogError, f"{self.path}: ")
         room = pc.index_in(texts, value_set=pa.array(rooms)).to_numpy(zero_copy_only=False)
-        share = table.numbers("share")
-        stamps = table.stamps()
-        zone = self.time_zone
+        self._columns = table.stamps(), room, table.numbers("share"), len(rooms)
+
+    def check_times(self, clock: Clock) -> None:
+        """Place the table in the run, and refuse one of another time.
+
+        Raises:
+            LogError: Its times are wrong, or it ends before the run begins or begins after its end.
+        """
+        stamps, room, share, rooms = self._columns
+        zone = self.zone_of(clock)
         usable = np.isfinite(share)
         local = stamps.local(self.path, "shares", usable, [], time_zone=zone, sort=self.sort)
         is_new = np.append(True, np.diff(local.time_us) > 0)
         self._times = local.time_us[is_new]
         self._day = local.first_day
-        self._shares = np.zeros((len(self._times), len(rooms)))
+        self._shares = np.zeros((len(self._times), rooms))
         np.add.at(self._shares, (np.cumsum(is_new) - 1, room[local.row]), share[local.row])
-
-    def check_times(self, clock: Clock) -> None:
-        """Refuse a table of another time.
-
-        Raises:
-            LogError: It ends before the run begins, or begins after the run's end.
-        """
         midnight = self._midnight(clock.start)
         first, last = (midnight + timedelta(microseconds=int(t)) for t in self._times[[0, -1]])
         end = clock.time(clock.steps)
@@ -250,7 +251,8 @@ class ReplayedOutput(Algorithm, LogKeys):
 
     def _midnight(self, start: datetime) -> datetime:
         """Return the moment from which its times count, by the start of the run."""
-        return datetime.combine(self._day or start.date(), datetime.min.time())
+        midnight = datetime.combine(self._day or start.date(), datetime.min.time())
+        return at_reading(start, midnight)
 
     def update(self, history: History, state: Present) -> Any:
         """Return the newest shares; None before the first."""

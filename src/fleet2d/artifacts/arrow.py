@@ -46,9 +46,15 @@ _TYPES = {
 }
 
 
+def _type_of(column: Column) -> pa.DataType:
+    """Return the type of a column; times of a time zone are instants."""
+    has_zone = column.kind == "time" and column.unit
+    return pa.timestamp("us", column.unit) if has_zone else _TYPES[column.kind]
+
+
 def schema_of(spec: TableSpec) -> pa.Schema:
     """Return the Arrow schema of a table; its metadata holds the whole spec."""
-    fields = [pa.field(c.name, _TYPES[c.kind], c.nullable, _metadata(c)) for c in spec.columns]
+    fields = [pa.field(c.name, _type_of(c), c.nullable, _metadata(c)) for c in spec.columns]
     return pa.schema(fields, {"fleet2d.table": spec.name, "description": spec.description})
 
 
@@ -96,7 +102,7 @@ def table_of(
         names = words[column.name].in_order() if column.is_growing else column.categories
         dictionary = string_array(names) if column.kind == "category" else None
         parts = [_array_of(chunk[column.name], column, dictionary) for chunk, _ in chunks]
-        columns.append(pa.chunked_array(parts, _TYPES[column.kind]))
+        columns.append(pa.chunked_array(parts, _type_of(column)))
     return pa.Table.from_arrays(columns, schema=schema or schema_of(spec))
 
 
@@ -117,7 +123,7 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
     if dictionary is not None:
         codes = number_array(chunk.values, pa.int32(), missing)
         return pa.DictionaryArray.from_arrays(codes, dictionary)
-    return number_array(chunk.values, _TYPES[column.kind], missing)
+    return number_array(chunk.values, _type_of(column), missing)
 
 
 def number_array(values: NDArray[Any], kind: pa.DataType, missing: Bool | None = None) -> pa.Array:
@@ -169,7 +175,7 @@ def _chunk_of(array: pa.Array, column: Column, words: Words) -> ColumnChunk:
         text = np.empty(0, np.uint8) if data is None else np.frombuffer(data, np.uint8)
         return ColumnChunk(text[ends[0] : ends[-1]], valid, np.diff(ends))
     if column.kind == "time":
-        array = array.cast(pa.timestamp("us")).cast(pa.int64())
+        array = array.cast(pa.timestamp("us", array.type.tz)).cast(pa.int64())
     if array.null_count:
         array = array.fill_null(False if column.kind == "bool" else 0)
     values = array.to_numpy(zero_copy_only=False)
@@ -219,7 +225,8 @@ def _values_of(array: pa.Array) -> NDArray[Any]:
     if pa.types.is_boolean(array.type):
         flags = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
         return flags[array.offset :][: len(array)].astype(bool)
-    dtype = next(DTYPES[kind] for kind, stored in _TYPES.items() if stored == array.type)
+    stored = pa.timestamp("us") if pa.types.is_timestamp(array.type) else array.type
+    dtype = next(DTYPES[kind] for kind, each in _TYPES.items() if each == stored)
     return np.frombuffer(array.buffers()[1], dtype, len(array), array.offset * dtype.itemsize)
 
 
@@ -310,7 +317,10 @@ def _check_columns(path: Path, schema: pa.Schema, kinds: Mapping[str, Kind]) -> 
             " the file was changed"
         )
     for field, kind in zip(schema, kinds.values(), strict=True):
-        if field.type != _TYPES[kind]:
+        is_zoned = kind == "time" and field.type == pa.timestamp(
+            "us", getattr(field.type, "tz", None)
+        )
+        if field.type != _TYPES[kind] and not is_zoned:
             raise ArtifactError(
                 f"{path}: the column {field.name} is {field.type}, but {_TYPES[kind]} was stored:"
                 " the file was changed"

@@ -22,6 +22,7 @@ from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import RunDirectoryError, printable
 from fleet2d.inputs import sha256_of_file
+from fleet2d.runtime.local_time import Zone
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.storage.files import path_in, write_atomically
 
@@ -227,21 +228,36 @@ class ManifestParts(_StoredPart):
     expectations: dict[str, _StoredVerdict] = {}
 
 
-def time_problem(start: str, step_us: int, steps: int) -> str:
+def start_of(manifest: Mapping[str, Any]) -> dt.datetime:
+    """Return the start of a run, by the clock of its home."""
+    start = dt.datetime.fromisoformat(manifest["start"])
+    record = manifest["scenario"].get("simulation", {}).get("time_zone")
+    return Zone.of_record(record).at(start) if record else start
+
+
+def time_problem(manifest: Mapping[str, Any]) -> str:
     """Return why the steps of a run have no times; empty if they have.
 
     Example:
-        >>> time_problem("9999-12-31T00:00:00", 1_000_000, 10**6)
+        >>> start = "9999-12-31T00:00:00"
+        >>> time_problem({"start": start, "step_us": 1_000_000, "steps": 10**6, "scenario": {}})
         '1000000 steps from 9999-12-31T00:00:00 end after the year 9999'
     """
+    start, step_us, steps = (manifest[name] for name in ("start", "step_us", "steps"))
+    has_zone = bool(manifest["scenario"].get("simulation", {}).get("time_zone"))
     if not step_us:
         return "step_us is 0"
     if not start:
         return "start is empty"
+    if (dt.datetime.fromisoformat(start).tzinfo is not None) != has_zone:
+        expected = "with its offset" if has_zone else "without a time zone"
+        return f"start: it should be a local time, {expected}, and is {start}"
     try:
-        _ = dt.datetime.fromisoformat(start) + dt.timedelta(microseconds=steps * step_us)
+        _ = start_of(manifest) + dt.timedelta(microseconds=steps * step_us)
     except OverflowError:
         return f"{steps} steps from {start} end after the year 9999"
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return f"scenario.simulation.time_zone does not fit the start, {start}"
     return ""
 
 
@@ -270,9 +286,9 @@ VARIES = "varies"
 
 
 def _check_time(text: str) -> str:
-    """Refuse text that is not a local time."""
-    if text and dt.datetime.fromisoformat(text).tzinfo is not None:
-        raise ValueError("it should be a local time, without a time zone")
+    """Refuse text that is not a time."""
+    if text:
+        dt.datetime.fromisoformat(text)
     return text
 
 
@@ -358,7 +374,7 @@ class Manifest(BaseModel):
         seed: The seed of the scenario, or the one that was drawn.
         steps: Number of steps simulated.
         step_us: Length of a step [us].
-        start: Simulated start, ISO 8601.
+        start: Simulated start, ISO 8601; with its offset if the home has a time zone.
         simulated_s: Simulated time [s].
         entities: Names of the users and robots.
         versions: Versions of the software that ran it; see `versions`.
@@ -484,7 +500,7 @@ class Manifest(BaseModel):
         except ValidationError as error:
             raise _damaged(path, problems_of(error)) from None
         # Tables that no simulation stored have no scenario, and no times.
-        reason = time_problem(manifest.start, manifest.step_us, manifest.steps)
+        reason = time_problem(content)
         if manifest.scenario and reason:
             raise _damaged(path, reason)
         return manifest

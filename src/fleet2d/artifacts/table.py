@@ -6,8 +6,8 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import datetime, timedelta
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, Bool
+from fleet2d.runtime.local_time import Zone, rules_of
 
 Kind = Literal["step", "time", "int32", "int64", "float64", "bool", "category", "string"]
 
@@ -47,7 +48,8 @@ class Column:
         name: Its name, with the unit in it where the unit isn't SI.
         kind: `step` int64 · `time` timestamp[us] · `int32` · `int64` · `float64` · `bool` ·
             `category` dictionary<int32, string> · `string`.
-        unit: Its unit, such as "m" or "rad"; empty where there is none.
+        unit: Its unit, such as "m" or "rad"; empty where there is none. Of times, which are UTC
+            then, the time zone.
         nullable: Whether a value may be missing. Missing values are NaN in float64, NaT in time,
             code -1 or None in category, None in string, and what a masked array masks.
         categories: The words that the codes of a category column stand for. Empty: the column
@@ -91,6 +93,11 @@ Columns = dict[Column, Any]
 """Columns and their values, which make a table and rows of it."""
 STEP = Column("step", "step", description="step at which the row takes effect")
 TIME = Column("time", "time", description="local time")
+
+
+def time_column(zone: Zone | None) -> Column:
+    """Return the column of times of a run: of UTC, with the time zone of the home if it has one."""
+    return TIME if zone is None else replace(TIME, unit=zone.label, description="time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -495,7 +502,13 @@ def categories(column: Any) -> tuple[I64, list[str]]:
     return numbers, encoded.dictionary.to_pylist()
 
 
-_EPOCH = datetime(1970, 1, 1)
+def _datetimes(column: Column, times: NDArray[Any], count: int) -> list[datetime]:
+    """Return times, with the offset of their time zone if the column has one."""
+    values = np.broadcast_to(times, count).tolist()
+    if not column.unit:
+        return values
+    zone = rules_of(column.unit)
+    return [value.replace(tzinfo=UTC).astimezone(zone) for value in values]
 
 
 def rows_of(spec: TableSpec, columns: Mapping[str, Any], count: int) -> Iterator[dict[str, Any]]:
@@ -518,8 +531,8 @@ def rows_of(spec: TableSpec, columns: Mapping[str, Any], count: int) -> Iterator
         values: list[Any] = array.tolist() if array.ndim else [array.item()] * count
         if column.kind == "category" and array.dtype.kind in "iu":
             values = [column.categories[v] if v >= 0 else None for v in values]
-        elif column.kind == "time" and array.dtype.kind in "iu":
-            values = [_EPOCH + timedelta(microseconds=v) for v in values]
+        elif column.kind == "time":
+            values = _datetimes(column, array.astype("M8[us]").ravel(), count)
         elif array.dtype.kind == "f":
             values = [None if math.isnan(v) else v for v in values]
         lists.append(values)

@@ -58,7 +58,7 @@ def validate(
         f"{verdict}: {counted(len(simulation.scenario.users), 'user')} and"
         f" {counted(len(simulation.scenario.robots), 'robot')} in {plan.name}"
         f" ({plan.area_m2:.1f} m2, {len(plan.rooms)} rooms),"
-        f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.start}"
+        f" {settings.steps} steps of {settings.step_us / 1e6:g} s from {settings.clock.start}"
     )
     for note in simulation.notes:
         typer.echo(note if note.startswith("wrong: ") else f"note: {note}")

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fleet2d.algorithms.observations import OBSERVATION, ActivitySense, SightingTable
-from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Watcher
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
@@ -43,9 +42,10 @@ from fleet2d.kernels import (
     view_queries,
 )
 from fleet2d.kernels import ViewQueryColumn as Query
-from fleet2d.runtime.clock import midnight_of
+from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event, new_event
+from fleet2d.runtime.local_time import even_parts, stamp_us
 from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.perception import Perception
@@ -253,7 +253,7 @@ class Cameras(Watcher):
         self.rule = DetectionRule(
             patience=self._patience,
             step_us=clock.step_us,
-            start_us=micros(clock.start - midnight_of(clock.start)),
+            start_us=stamp_us(clock.start) % DAY_US,
             burst=int(bursts.sum()),
             stop_lost=False,
             stop_seen=False,
@@ -395,6 +395,11 @@ class Cameras(Watcher):
         home = self.owner.home
         window = bodies.window(self.next_step, end)
         points = None
+        clock = self.owner.clock
+        if clock.zone is not None:
+            now_us = self.next_step * clock.step_us
+            _, _, start_us = next(even_parts(clock.start, now_us, now_us + 1))
+            self.rule = self.rule._replace(start_us=start_us % DAY_US)
         if self.method is not None:
             block = bodies.block(self.next_step, end)
             others = slice(self._first, self._first + len(self.others))

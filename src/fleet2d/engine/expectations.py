@@ -9,7 +9,7 @@ import numpy as np
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
-from fleet2d.artifacts.table import STEP, TIME, Column
+from fleet2d.artifacts.table import STEP, Column, time_column
 from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.basis import Watcher
 from fleet2d.engine.intervention_queue import InterventionQueue, possible_details, possible_events
@@ -220,7 +220,7 @@ class RunExpectations(Watcher):
         value = Column("robustness", "float64", nullable=True, description="missing: infinite")
         columns = {
             STEP: step,
-            TIME: self.clock.times(step),
+            time_column(self.clock.zone): self.clock.stamps(step),
             Column("expectation", "category", categories=names): [code for _, code in rows],
             last: [violation.last for violation, _ in rows],
             worst: [violation.worst for violation, _ in rows],

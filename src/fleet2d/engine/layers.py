@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.history import Log
-from fleet2d.artifacts.table import DTYPES, KINDS, TIME, Column
+from fleet2d.artifacts.table import DTYPES, KINDS, Column, time_column
 from fleet2d.configuration.problems import suggest
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, Watcher
@@ -354,7 +354,7 @@ class LayerBook:
         named = Column("row", "int32", description="of the cell; -1: all cells not named")
         columns = {
             Column("step", "step", description="the layer as it was after this step"): step,
-            TIME: np.datetime64(self._clock.time(step)),
+            time_column(self._clock.zone): self._clock.stamp(step),
             named: np.concatenate([[ALL_CELLS], row]),
             Column("column", "int32"): np.concatenate([[ALL_CELLS], column]),
             Column("value", kind, layer.unit, kind == "float64", (), layer.description): value,

@@ -3,7 +3,7 @@
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from fleet2d.algorithms.algorithm import (
     to_columns,
 )
 from fleet2d.algorithms.history import History, Log
-from fleet2d.artifacts.table import KINDS, Column, Kind
+from fleet2d.artifacts.table import KINDS, Column, Kind, time_column
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
@@ -301,7 +301,7 @@ class Learners:
         _check_kinds(learner, kinds)
         rows = {
             Column("step", "step"): step,
-            Column("time", "time"): np.datetime64(self.clock.time(step)),
+            replace(time_column(self.clock.zone), description=""): self.clock.stamp(step),
             **{Column(name, kind): columns[name] for name, kind in learner.kinds.items()},
         }
         self.store.add_rows(learner.table, rows)

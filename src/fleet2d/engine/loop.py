@@ -160,7 +160,9 @@ def move(state: State, span: Span) -> None:
     if state.max_span is not None:
         end = min(end, span.first + state.max_span)
     queues = state.learners, state.changes, state.interventions
-    for due in (state.layers.next_due(span.first), *[queue.next_due() for queue in queues]):
+    clock_change = state.changes.clock.next_change(span.first)
+    dues = *[queue.next_due() for queue in queues], clock_change
+    for due in (state.layers.next_due(span.first), *dues):
         if due is not None:
             end = min(end, max(due, span.first + 1))
     awaited = state.learners.awaited | state.awaited
@@ -184,7 +186,8 @@ def watch(state: State, span: Span) -> None:
 
 def record(state: State, span: Span) -> None:
     """Let watchers process the spans so far, if an algorithm or layer needs them at this end."""
-    due = (state.learners.next_due(), state.layers.next_due(span.first))
+    clock_change = state.changes.clock.next_change(span.first)
+    due = (state.learners.next_due(), state.layers.next_due(span.first), clock_change)
     span.settles = (
         state.max_span is not None
         or span.end in due

@@ -20,7 +20,7 @@ from fleet2d.algorithms.observations import (
     SightingTable,
     Truth,
 )
-from fleet2d.artifacts.table import STEP, TIME, Column, Columns, TableSpec
+from fleet2d.artifacts.table import STEP, Column, Columns, TableSpec, time_column
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sensors import Sensors
@@ -216,7 +216,7 @@ class Recorder:
         user = Column("user", "category", nullable=has_cameras, categories=self._user_names)
         columns: Columns = {
             STEP: o.step,
-            TIME: self.clock.times(o.step),
+            time_column(self.clock.zone): self.clock.stamps(o.step),
             Column("robot", "category", categories=self._robot_names): o.robot,
             user: o.user,
             X: o.x,
@@ -275,7 +275,7 @@ class Recorder:
             details[i] = ""
         columns: Columns = {
             STEP: steps[order],
-            TIME: self.clock.times(steps[order]),
+            time_column(self.clock.zone): self.clock.stamps(steps[order]),
             self._event_entity: rows[order],
             Column("event", "category"): list(map(str, kinds)),
         }
@@ -297,7 +297,7 @@ class Recorder:
         next_steps = np.ma.array([at or 0 for at in next_step], np.int64, mask=missing)
         return {
             STEP: steps,
-            TIME: self.clock.times(steps),
+            time_column(self.clock.zone): self.clock.stamps(steps),
             self._entity: np.array(row, np.int32),
             Column("behavior", "category", nullable=True, description=who): behaviors,
             Column("reason", "string", description="the last note of the plan"): list(reason),
@@ -316,7 +316,7 @@ class Recorder:
         said = "what the person does, if known"
         return {
             STEP: steps,
-            TIME: self.clock.times(steps),
+            time_column(self.clock.zone): self.clock.stamps(steps),
             Column("room", "category"): [rooms[number] for number in sensor],
             Column("sensor", "category", categories=names): np.array(sensor, np.int32),
             Column("state", "category"): states,

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from pydantic import InstanceOf
 
 from fleet2d.errors import ComponentError, blame
 from fleet2d.floorplan.lattice import Lattice
@@ -24,6 +25,7 @@ from fleet2d.kernels import (
 )
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.runtime.clock import Sun
+from fleet2d.runtime.local_time import readings_of
 from fleet2d.sight.perception import DARK_NIGHT, DARKEST, Curve, Detection, Perception
 from fleet2d.sight.perception_error import CameraSightings, ErrorStream, PerceptionError
 
@@ -81,7 +83,7 @@ class Darkness(PerceptionError):
     """
 
     unlit: Curve
-    sun: Sun | None = None
+    sun: InstanceOf[Sun] | None = None
 
     def distort(self, sightings: CameraSightings) -> CameraSightings:
         """Return the sightings without those that the darkness hides."""
@@ -90,8 +92,8 @@ class Darkness(PerceptionError):
         if self.sun is None:
             shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
         else:
-            since = (sightings.step * round(1e6 * sightings.step_s)).astype("m8[us]")
-            by_day = self.sun.shares(np.datetime64(sightings.start, "us") + since)
+            elapsed_us = sightings.step * round(1e6 * sightings.step_s)
+            by_day = self.sun.shares(readings_of(sightings.start, elapsed_us).astype("M8[us]"))
             shares = DARKEST + (1 - DARKEST) * by_day
         is_hidden = is_dark & (sightings.uniform("noticed") >= shares)
         return sightings.replace(noticed=sightings.noticed & ~is_hidden)

@@ -186,7 +186,15 @@ class Simulation:
         of_sensors = self._state.find(Sensors)
         sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
-        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
+        return [
+            *wrong,
+            *self._odd_moments(),
+            *plan,
+            *sources,
+            *sensors,
+            *self._unused_heights,
+            *bodies,
+        ]
 
     @property
     def _unused_heights(self) -> Iterator[str]:
@@ -477,7 +485,7 @@ class Simulation:
         if isinstance(when, str):
             when = self._moment(when)
         if isinstance(when, datetime):
-            when = when - self.clock.start
+            when = timedelta(microseconds=self.clock.elapsed(when))
         if isinstance(when, timedelta):
             return self.clock.step_at_or_after(micros(when))
         return operator.index(when)
@@ -832,6 +840,8 @@ class Simulation:
         manifest = self._store.manifest
         scenario = self.scenario.resolved()
         scenario["simulation"]["seed"] = self.seed
+        if self.clock.zone is not None:
+            scenario["simulation"]["time_zone"] = self.clock.zone.record
         manifest.scenario, manifest.seed = scenario, self.seed
         manifest.step_us, manifest.start = self.clock.step_us, self.clock.start.isoformat()
         users = list(self.scenario.users)
@@ -843,6 +853,13 @@ class Simulation:
         idle = [actor.path for actor in self._state.actors if not actor.behaviors]
         still = [f"{path} has no behavior: it stays where it is" for path in idle]
         manifest.notes = [*self.notes, *still]
+
+    def _odd_moments(self) -> list[str]:
+        """Return a note for each dated moment that the clock of the home reads twice, or never."""
+        zone = self.clock.zone
+        moments = self.scenario.moments() if zone else ()
+        odd = ((where, zone.oddity(moment)) for where, moment in moments if zone)
+        return [f"{section}.{number}.at: {text}" for (section, number), text in odd if text]
 
     def _describe_end(self, results: Mapping[str, Any]) -> None:
         """Set the fields that are known after the last step; tables and digest are set already."""

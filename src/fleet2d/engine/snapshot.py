@@ -40,6 +40,7 @@ from fleet2d.inputs import open_input
 from fleet2d.kernels import Mesh, Timelines
 from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
+from fleet2d.runtime.local_time import LocalTime, Zone
 from fleet2d.storage.files import partial_file
 from fleet2d.storage.secret_files import SIGNATURE_CHARACTERS, signature
 
@@ -53,7 +54,7 @@ _SHARED = frozenset(
         *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, KeySegment, Mesh, Note),
         *(Persona, PlacedObject, Polygon, RandomWalk, Room, SightingTable, Space, TableSpec, Track),
         UsePlace,
-        *(datetime, timedelta, *_DTYPES),
+        *(datetime, timedelta, LocalTime, Zone, *_DTYPES),
     }
 )
 # Types that are copied by `copy.copy`, as their parts never change.

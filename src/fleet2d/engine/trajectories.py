@@ -7,7 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.artifacts.table import KEY_KINDS, PLANNED, STEP, TIME, TRACK, WALK, Column, Columns
+from fleet2d.artifacts.table import (
+    KEY_KINDS,
+    PLANNED,
+    STEP,
+    TRACK,
+    WALK,
+    Column,
+    Columns,
+    time_column,
+)
 from fleet2d.configuration.units import whole_steps
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.entities.body import Bodies, Pose, Track
@@ -90,7 +99,7 @@ class Samples:
         away_text = "not at home: x, y and room are missing"
         return {
             STEP: step,
-            TIME: self._clock.times(step),
+            time_column(self._clock.zone): self._clock.stamps(step),
             self._entity: entity.astype(np.int32),
             X: xy[:, 0],
             Y: xy[:, 1],
@@ -261,7 +270,7 @@ class KeyFrames:
         away_text = "not at home: x and y are where it left"
         return {
             STEP: step[order],
-            TIME: self._clock.moments(time[order]),
+            time_column(self._clock.zone): self._clock.moments(time[order]),
             self._entity: entity[order].astype(np.int32),
             Column("kind", "category", categories=KEY_KINDS): kind[order].astype(np.int32),
             X: xy[:, 0],

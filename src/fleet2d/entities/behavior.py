@@ -21,8 +21,9 @@ from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.interactions.interaction import RequestQueue
 from fleet2d.kernels import TURN
-from fleet2d.runtime.clock import DAY, Sun, midnight_of
+from fleet2d.runtime.clock import DAY, MICROSECOND, Sun, midnight_of
 from fleet2d.runtime.determinism import Draws
+from fleet2d.runtime.local_time import next_reading, written
 
 # After this time, a body tries again to pass a shut door.
 DOOR_WAIT = timedelta(seconds=10)
@@ -30,6 +31,9 @@ DOOR_WAIT = timedelta(seconds=10)
 
 class HoursSpan(NamedTuple):
     """Hours of some days of the week; those that end before they begin last past midnight.
+
+    They hold whenever the clock reads a time within them: hours that it reads twice, as clocks are
+    put back, last longer on that day.
 
     Attributes:
         days: The days on which the hours begin, 0 is Monday.
@@ -45,18 +49,36 @@ class HoursSpan(NamedTuple):
 
     def end_at(self, time: datetime) -> datetime | None:
         """Return the end of the hours that a moment lies in; None if it lies outside."""
-        midnight = midnight_of(time)
-        for day in (midnight - DAY, midnight):
-            if day.weekday() in self.days and day + self.begin <= time < day + self.end:
-                return day + self.end
-        return None
+        moment = time
+        end = self._end_of(written(time))
+        while end is not None:
+            moment = next_reading(moment, end)
+            if written(moment) == end:
+                return moment
+            end = self._end_of(written(moment))  # the clock was changed before
+        return None if moment is time else moment
 
     def next_begin(self, time: datetime) -> datetime:
         """Return when the hours begin next after a moment."""
-        midnight = midnight_of(time)
-        days = (midnight + i * DAY for i in range(8))
-        begins = (day + self.begin for day in days if day.weekday() in self.days)
-        return next(begin for begin in begins if begin > time)
+        while True:
+            reading = written(time)
+            days = (midnight_of(reading) + i * DAY for i in range(8))
+            begins = (day + self.begin for day in days if day.weekday() in self.days)
+            begin = next(begin for begin in begins if begin > reading)
+            time = next_reading(time, begin)
+            if written(time) == begin:
+                return time
+            # The clock was changed before, and may read these hours since then.
+            if self._end_of(written(time)) and not self._end_of(written(time - MICROSECOND)):
+                return time
+
+    def _end_of(self, reading: datetime) -> datetime | None:
+        """Return the end of the hours that the clock reads; None outside of them."""
+        midnight = midnight_of(reading)
+        for day in (midnight - DAY, midnight):
+            if day.weekday() in self.days and day + self.begin <= reading < day + self.end:
+                return day + self.end
+        return None
 
 
 def parse_span(value: object) -> HoursSpan:

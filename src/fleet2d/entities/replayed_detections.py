@@ -76,7 +76,9 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         is_robots = self.relative and is_bag(self.path)
         with errors_as(LogError, f"{actor.path}.perceives", of=LogError):
             frame = self.frame.name or ("base_link" if is_robots else None)
-            log = read_detections(self.path, topic=self.topic, frame=frame, **self.reading)
+            log = read_detections(
+                self.path, topic=self.topic, frame=frame, **self.reading(actor.clock)
+            )
             self._rows = self._place(log, actor, users)
 
     def sightings(self, first: int, end: int) -> I64:

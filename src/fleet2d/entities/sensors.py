@@ -247,7 +247,7 @@ class ReplaySensor(Sensor, LogKeys):
             day_first=self.day_first,
         )
         stamps = table.stamps()
-        zone = self.time_zone
+        zone = self.zone_of(clock)
         count = len(table.line)
         chosen = np.ones(count, bool)
         if "sensor" in table.named:
@@ -259,7 +259,9 @@ class ReplaySensor(Sensor, LogKeys):
             self.path, "readings", whole.first_day, whole.time_us, nothing, nothing[:, 0]
         )
         begin_us, notes = begin_of_run(log, self.day, clock)
-        local = stamps.local(self.path, "readings", chosen, [], time_zone=zone, sort=self.sort)
+        said: list[str] = []
+        local = stamps.local(self.path, "readings", chosen, said, time_zone=zone, sort=self.sort)
+        notes = (*notes, *(said if clock.zone else ()))
         states = table.column("state").to_pylist()
         on = [_is_on(states[row], self.path, table.line[row]) for row in local.row.tolist()]
         self._steps = (local.time_us - begin_us) // clock.step_us

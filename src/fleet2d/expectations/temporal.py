@@ -3,7 +3,7 @@
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -30,7 +30,9 @@ from fleet2d.expectations.signals import Scene, Signal
 from fleet2d.expectations.vocabulary import during, events
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import I64, Bool
+from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import next_reading, written
 
 ANSWERS = (*Outcome, EventKind.DELIVERED)
 PERIODS = {"hour": timedelta(hours=1), "day": timedelta(days=1), "week": timedelta(weeks=1)}
@@ -568,14 +570,24 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
     if per is None:
         return []
     clock = run.clock
-    length = PERIODS[per]
-    boundary = clock.time(run.first).replace(minute=0, second=0, microsecond=0)
-    if per != "hour":
-        boundary = boundary.replace(hour=0)
-    if per == "week":
-        boundary -= timedelta(days=boundary.weekday())
-    steps = []
-    while (step := clock.step_at_or_after(clock.elapsed(boundary := boundary + length))) < run.end:
-        if step > run.first:
+    moment = clock.time(run.first)
+    latest = _period_of(moment, per)
+    steps: list[int] = []
+    while True:
+        moment = next_reading(moment, _period_of(moment, per) + PERIODS[per])
+        if (step := clock.step_at_or_after(clock.elapsed(moment))) >= run.end:
+            return steps
+        # The clock may have been changed before: back into a period, or into the next one.
+        period = _period_of(moment, per)
+        is_new = period > latest or (per == "hour" and not moment.minute)
+        latest = max(latest, period)
+        if is_new and step > run.first:
             steps.append(step)
-    return steps
+
+
+def _period_of(moment: datetime, per: str) -> datetime:
+    """Return what the clock read as the hour, day or week of a moment began."""
+    if per == "hour":
+        return written(moment).replace(minute=0, second=0, microsecond=0)
+    midnight = midnight_of(moment)
+    return midnight - timedelta(days=midnight.weekday()) if per == "week" else midnight

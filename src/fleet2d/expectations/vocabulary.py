@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 from fleet2d.algorithms.observations import ROBOT
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_time_of_day, weekdays_of
-from fleet2d.entities.behavior import Actor
+from fleet2d.entities.behavior import Actor, HoursSpan
 from fleet2d.entities.power import PowerState
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.expectations.expectation import (
@@ -51,7 +51,7 @@ from fleet2d.kernels import (
     rooms_at,
     speeds,
 )
-from fleet2d.runtime.clock import DAY, midnights
+from fleet2d.runtime.clock import DAY
 from fleet2d.runtime.events import SIGHTS, EventKind
 
 Target = str | tuple[float, float] | WordSignal
@@ -598,7 +598,8 @@ class during(Condition):
                     f"during: {self.hours} has no length: write 00:00-24:00 for the whole day"
                 )
             length = last - first if last > first else last + DAY - first
-            self._set(_begin=first, _length=length, _weekdays=frozenset(weekdays_of(names)))
+            days = tuple(sorted(weekdays_of(names)))
+            self._set(_span=HoursSpan(days, first, first + length, self.hours))
 
     def measures(self) -> Iterator[Measurement]:
         """Yield nothing: it follows from the clock."""
@@ -607,11 +608,13 @@ class during(Condition):
     def trace(self, run: RunSignals) -> Trace:
         """Return 1 where the time is within these hours, 0 elsewhere."""
         clock = run.clock
-        begin, length, weekdays = (vars(self)[n] for n in ("_begin", "_length", "_weekdays"))
-        changes = [
-            (clock.step_at_or_after(clock.elapsed(midnight + offset)), is_within)
-            for midnight in midnights(clock.time(run.first) - DAY, clock.time(run.end))
-            if midnight.weekday() in weekdays
-            for offset, is_within in ((begin, 1.0), (begin + length, 0.0))
-        ]
-        return stepwise(run.first, 0.0, (c for c in changes if c[0] < run.end), run.end)
+        span: HoursSpan = vars(self)["_span"]
+        moment = clock.time(run.first)
+        end = clock.time(run.end)
+        changes = []
+        while moment < end:
+            over = span.end_at(moment)
+            changes.append((clock.step_at_or_after(clock.elapsed(moment)), float(over is not None)))
+            moment = over or span.next_begin(moment)
+        changes = [change for change in changes if change[0] < run.end]
+        return stepwise(run.first, 0.0, changes, run.end)

@@ -352,7 +352,7 @@ def _solid(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
 
 
 def parse_moment(value: Any) -> datetime | timedelta:
-    """Parse a local time, or the time since the start."""
+    """Parse a local time, which may have an offset in a time zone, or the time since the start."""
     try:
         moment = datetime.fromisoformat(value) if isinstance(value, str) else value
     except ValueError:
@@ -361,8 +361,6 @@ def parse_moment(value: Any) -> datetime | timedelta:
         moment = datetime(moment.year, moment.month, moment.day)
     if not isinstance(moment, datetime):
         return parse_duration(value)
-    if moment.tzinfo is not None:
-        raise problem("expected a local time of the home, without a time zone")
     return moment
 
 

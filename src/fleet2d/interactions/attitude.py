@@ -14,6 +14,7 @@ from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.runtime.clock import DAY, DAY_S, midnight_of
 from fleet2d.runtime.determinism import exp2
+from fleet2d.runtime.local_time import written
 
 # Time over which prompts are averaged.
 BURDEN_OVER = timedelta(days=7)
@@ -51,7 +52,7 @@ class AttitudeState:
     def expects(self, name: str, time: datetime, window: timedelta) -> float:
         """Return how much an interaction is expected at a time, 0 to 1."""
         strength, usual_s = self.habits.get(name, (0.0, 0.0))
-        off_s = abs((time - midnight_of(time)).total_seconds() - usual_s)
+        off_s = abs((written(time) - midnight_of(time)).total_seconds() - usual_s)
         return strength if min(off_s, DAY_S - off_s) <= window.total_seconds() else 0.0
 
 
@@ -105,7 +106,7 @@ class Attitude(Component):
         if outcome == Outcome.ACCEPTED:
             state.trust += GAINS * (1 - state.trust)
             strength, usual_s = state.habits.get(name, (0.0, 0.0))
-            time_s = (state.time - midnight_of(state.time)).total_seconds()
+            time_s = (written(state.time) - midnight_of(state.time)).total_seconds()
             is_usual = state.expects(name, state.time, timedelta(hours=1)) > 0
             usual_s = usual_s + 0.3 * (time_s - usual_s) if is_usual else time_s
             strength = strength if is_usual else 0.0

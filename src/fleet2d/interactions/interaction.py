@@ -15,6 +15,7 @@ from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import Duration, Length, OnDays, PositiveDuration, Share, TimeOfDay
 from fleet2d.runtime.clock import midnights
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import at_reading
 
 InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_report"]
 
@@ -128,7 +129,8 @@ class Interaction(Settings):
                 yield start + number * self.every
         for midnight in midnights(after):
             if midnight.weekday() in units.weekdays_of(self.on):
-                yield from (midnight + at for at in sorted(self.at) if midnight + at >= after)
+                moments = (at_reading(start, midnight + at) for at in sorted(self.at))
+                yield from (moment for moment in moments if moment >= after)
 
 
 @dataclass

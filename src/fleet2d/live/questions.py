@@ -166,9 +166,19 @@ def _checked(
         if node.get("class") == "COLUMN_REF" and _last_name(node) not in given:
             check_known(_last_name(node), "column", columns, InputError)
     for name, table in used.items():
-        connection.register(name, table)
+        connection.register(name, _in_local_time(table))
     select = connection.execute("SELECT json_deserialize_sql(?)", [json.dumps(tree)])
     return str(select.fetchall()[0][0])
+
+
+def _in_local_time(table: "pa.Table") -> "pa.Table":
+    """Return a table with the times of a time zone as the home's clock reads them."""
+    for number, field in enumerate(table.schema):
+        if getattr(field.type, "tz", None):
+            import pyarrow.compute as pc  # few runs have a time zone
+
+            table = table.set_column(number, field.name, pc.local_timestamp(table[field.name]))
+    return table
 
 
 def _nodes(tree: Any) -> Iterator[Node]:

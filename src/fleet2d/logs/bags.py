@@ -12,6 +12,7 @@ from fleet2d.logs.frames import MAP, FrameTree, RigidMotions, StampedPoses, fram
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes, localize
 from fleet2d.logs.times import Stamps
+from fleet2d.runtime.local_time import Zone
 from fleet2d.storage.apart import apart
 from fleet2d.storage.bags import check_bag, headings_of, numbers_of, open_bag, stamp_ns, times_of
 
@@ -38,7 +39,7 @@ def read_bag(
     *,
     id: str | None = None,  # noqa: A002 - what positions call it
     frame: str = MAP,
-    time_zone: str | None = None,
+    time_zone: Zone | str | None = None,
     sort: bool = False,
 ) -> PositionLog:
     """Read the poses of one topic or frame.

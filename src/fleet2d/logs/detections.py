@@ -19,6 +19,7 @@ from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.positions import RawFixes
 from fleet2d.logs.tables import NAMES, LogTable
 from fleet2d.logs.times import Stamps
+from fleet2d.runtime.local_time import Zone
 from fleet2d.storage.apart import apart
 from fleet2d.storage.bags import check_bag, headings_of, is_bag, open_bag, stamp_ns, times_of
 
@@ -72,7 +73,7 @@ def read_detections(
     topic: str | None = None,
     frame: str | None = None,
     columns: Mapping[str, str] | None = None,
-    time_zone: str | None = None,
+    time_zone: Zone | str | None = None,
     sort: bool = False,
     decimal_comma: bool | None = None,
     day_first: bool | None = None,

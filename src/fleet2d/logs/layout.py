@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from fleet2d.bounds import one_line
 from fleet2d.logs.layouts import aras, kasteren, mit, openshs, states
 from fleet2d.logs.layouts.casas import read_casas, shows_casas
+from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.layouts.intervals import is_leaving, label_by_activities
 from fleet2d.logs.log import (
     AWAY,
@@ -25,6 +26,7 @@ from fleet2d.logs.log import (
     since,
 )
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
+from fleet2d.runtime.local_time import Zone
 from fleet2d.storage.bags import is_bag
 
 AGENDA = re.compile(r"(\w+) \((\d{1,9}):(\d\d) - (?:(\d{1,9})\s?days? - )?(\d{1,9}):(\d\d)\)")
@@ -62,7 +64,12 @@ class _ScriptedActivity:
     steps: list[tuple[int, list[tuple[str, int]], int]] = field(default_factory=list)
 
 
-def read_homer(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_homer(
+    path: Path,
+    *,
+    sort: bool = False,
+    zone: Zone | None = None,  # noqa: ARG001 - its days have no dates
+) -> ActivityLog:
     """Read the days of a household: one file, or a folder whose files follow each other by name.
 
     ::
@@ -192,7 +199,7 @@ class _Row(NamedTuple):
         return Reading(begin_us, end_us, room, activity, self.line)
 
 
-def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_uci_adl(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read a home's sensors and activities.
 
     ::
@@ -213,8 +220,9 @@ def read_uci_adl(path: Path, *, sort: bool = False) -> ActivityLog:
     parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
     for kind, (file, rows) in files.items():
         readings = [row.reading(first_day) for row in rows]
+        readings, clock_notes = by_clock(readings, first_day, zone, file)
         parts[kind], order_notes = in_order(readings, file, sort=sort)
-        notes += [f"{file.name}: {note}" for note in order_notes]
+        notes += [f"{file.name}: {note}" for note in [*clock_notes, *order_notes]]
     readings = parts["activities"]
     if parts["sensors"]:
         readings = label_by_activities(parts["sensors"], readings)
@@ -296,7 +304,7 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
     id: str | None = None,  # noqa: A002 - the name of the column
     frame: str | None = None,
     columns: Mapping[str, str] | None = None,
-    time_zone: str | None = None,
+    time_zone: Zone | str | None = None,
     sort: bool = False,
     decimal_comma: bool | None = None,
     day_first: bool | None = None,
@@ -348,14 +356,15 @@ def read_log(  # noqa: PLR0913 - each is a key of a scenario
 
         return read_bag(path, id=id, frame=frame or "map", time_zone=time_zone, sort=sort)
     chosen = LAYOUTS[layout]
-    given = {"id": id, "time_zone": time_zone}
+    is_zone = isinstance(time_zone, Zone)
+    given = {"id": id, "time_zone": None if is_zone else time_zone}
     keys = {name: value for name, value in given.items() if value is not None}
     if unused := [name for name in keys if name not in chosen.keys]:
         raise LogError(
             f"{path} is of the layout {layout}, which takes no {' or '.join(unused)}: that is for"
             " positions, bags and a few layouts"
         )
-    return chosen.read(path, sort=sort, **keys)
+    return chosen.read(path, sort=sort, zone=time_zone if is_zone else None, **keys)
 
 
 def _recognize(path: Path) -> str:

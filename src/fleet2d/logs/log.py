@@ -22,6 +22,7 @@ from fleet2d.errors import InputError, os_errors_as
 from fleet2d.inputs import open_input
 from fleet2d.kernels import F64, I64
 from fleet2d.runtime.clock import DAY_US, Clock, midnight_of
+from fleet2d.runtime.local_time import Zone, at_reading
 from fleet2d.storage.bags import is_bag
 
 # Maximum number of lines that a note lists.
@@ -85,7 +86,8 @@ class LogKeys(Settings):
         decimal_comma: Whether numbers of a table have a comma as decimal mark; left out: as the
             table shows.
         day_first: Whether 03/04/2026 is in April; left out: as other dates of the table show.
-        time_zone: The time zone of the home, if times have one or count from 1970.
+        time_zone: The time zone of the home, if times have one or count from 1970; left out where
+            the scenario has `simulation.time_zone`.
         sort: Sort lines whose time runs backwards; else they are refused.
     """
 
@@ -95,17 +97,31 @@ class LogKeys(Settings):
     time_zone: str | None = None
     sort: bool = False
 
-    @property
-    def reading(self) -> dict[str, Any]:
-        """The keys as arguments of `read_log`."""
-        return {name: getattr(self, name) for name in LogKeys.model_fields}
+    def reading(self, clock: Clock) -> dict[str, Any]:
+        """Return the keys as arguments of `read_log`, for a run."""
+        keys = {name: getattr(self, name) for name in LogKeys.model_fields}
+        return {**keys, "time_zone": self.zone_of(clock)}
+
+    def zone_of(self, clock: Clock) -> Zone | str | None:
+        """Return the time zone of the home: that of the run, if it has one.
+
+        Raises:
+            LogError: It has two.
+        """
+        zone = clock.zone
+        if zone is not None and self.time_zone not in (None, zone.label):
+            raise LogError(
+                f"time_zone: the home is in {zone.label}, as simulation.time_zone says, and not in"
+                f" {self.time_zone}: leave it out here"
+            )
+        return zone or self.time_zone
 
 
 class Reading(NamedTuple):
     """A person is in a room, at an instant or for a while.
 
     Attributes:
-        begin_us: Local time since the midnight that begins the log's first day [us].
+        begin_us: Time since the midnight that begins the log's first day [us].
         end_us: The end, likewise; equal to `begin_us` for an instant.
         room: The room's label in the log, or `AWAY`.
         activity: What is done there, "" if the log doesn't say.
@@ -167,7 +183,7 @@ class PositionLog:
         path: The file that it was read from.
         layout: "positions".
         first_day: The date of its first day; None where the log has no dates.
-        time_us: Local time since the midnight that begins the first day, int64 (n,) [us].
+        time_us: Time since the midnight that begins the first day, int64 (n,) [us].
         xy: Positions in the log's own frame, float64 (n, 2).
         heading: Headings in the log's own frame, float64 (n,) [rad]; NaN where it has none.
         notes: Anomalies in the log, and how they were resolved.
@@ -225,7 +241,11 @@ def begin_of_run(
             raise LogError(f"day: {day} needs a log with dates, and this one has none")
         ahead = (start.date() - log.first_day).days
         day = ahead if day == "date" else ahead % 7
-    begin_us = day * DAY_US + micros(start - midnight_of(start))
+    midnight = at_reading(start, midnight_of(start))
+    begin_us = day * DAY_US + micros(start - midnight)
+    if log.first_day and day == (start.date() - log.first_day).days:
+        first_midnight = datetime.combine(log.first_day, datetime.min.time())
+        begin_us = micros(start - at_reading(start, first_midnight))
     end_us = begin_us + clock.steps * clock.step_us
     first, last = int(begins.min()), int(ends.max())
     if last < begin_us or first >= end_us:

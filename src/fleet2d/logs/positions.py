@@ -10,6 +10,7 @@ from fleet2d.kernels import F64, Bool
 from fleet2d.logs.log import LogError, PositionLog
 from fleet2d.logs.tables import LogTable
 from fleet2d.logs.times import LocalTimes, Stamps
+from fleet2d.runtime.local_time import Zone
 
 
 def read_positions(
@@ -17,7 +18,7 @@ def read_positions(
     *,
     id: str | None = None,  # noqa: A002 - the name of the column
     columns: Mapping[str, str] | None = None,
-    time_zone: str | None = None,
+    time_zone: Zone | str | None = None,
     sort: bool = False,
     decimal_comma: bool | None = None,
     day_first: bool | None = None,
@@ -79,7 +80,9 @@ class RawFixes(NamedTuple):
             notes.append(f"{np.count_nonzero(~chosen)} fixes of other ids were left out")
         return cls(table.stamps(), x, y, table.headings(), notes, table.unit_m, chosen)
 
-    def local(self, path: Path, noun: str, *, time_zone: str | None, sort: bool) -> LocalTimes:
+    def local(
+        self, path: Path, noun: str, *, time_zone: Zone | str | None, sort: bool
+    ) -> LocalTimes:
         """Return the local times of those with a position; see `Stamps.local`."""
         chosen = self.chosen
         is_placed = np.isfinite(self.x) & np.isfinite(self.y)
@@ -94,7 +97,7 @@ class RawFixes(NamedTuple):
 
 
 def localize(
-    path: Path, layout: str, fixes: RawFixes, *, time_zone: str | None, sort: bool
+    path: Path, layout: str, fixes: RawFixes, *, time_zone: Zone | str | None, sort: bool
 ) -> PositionLog:
     """Return fixes as a log in the local time of the home.
 

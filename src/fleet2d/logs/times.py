@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from fleet2d.bounds import LOG_DAYS, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import micros
+from fleet2d.errors import errors_as
 from fleet2d.kernels import I64, Bool
 from fleet2d.logs.log import DAY_AND_MONTH, LogError, parse_time
 from fleet2d.runtime.clock import DAY_US
+from fleet2d.runtime.local_time import EPOCH, Zone
 from fleet2d.storage.bags import LATEST_SIMULATED_NS
 
 # A longer step forward is one of the clock, or a log of two stays [us].
@@ -60,7 +62,7 @@ class Stamps(NamedTuple):
         usable: Bool,
         notes: list[str],
         *,
-        time_zone: str | None,
+        time_zone: Zone | str | None,
         sort: bool,
     ) -> "LocalTimes":
         """Return the usable rows of the file in order of their local times.
@@ -70,7 +72,7 @@ class Stamps(NamedTuple):
             noun: What its rows are called in notes, in the plural.
             usable: Whether each row counts, bool (n,).
             notes: Gets a line for each kind of anomaly.
-            time_zone: The time zone of the home.
+            time_zone: The time zone of the home; by its name, days have 24 hours.
             sort: Put rows in order of time instead of refusing times that run backwards.
 
         Raises:
@@ -81,14 +83,16 @@ class Stamps(NamedTuple):
         if not len(time_us):
             raise LogError(f"{path} holds no position")
         _check_times(time_us, path, line, has_date=has_date)
+        if isinstance(time_zone, Zone) and has_date:
+            return self._by_clock(path, noun, usable, notes, time_zone, sort=sort)
         repeated = np.zeros(len(time_us), bool)
         if has_zone:
             if time_zone is None:
                 raise LogError(
                     f"{path}: its times are of a time zone; say which local time the home has by"
-                    " time_zone, like 'Europe/Berlin' or 'UTC'"
+                    " time_zone, like 'Europe/Berlin' or 'UTC', or by simulation.time_zone"
                 )
-            time_us, repeated = _in_zone(time_us, time_zone)
+            time_us, repeated = _in_zone(time_us, str(time_zone))
         twice = np.count_nonzero(repeated & usable)
         if twice:
             notes.append(
@@ -107,12 +111,31 @@ class Stamps(NamedTuple):
         since_us = time_us - first_day * DAY_US
         return LocalTimes(since_us, row, date(1970, 1, 1) + timedelta(days=first_day))
 
+    def _by_clock(
+        self, path: Path, noun: str, usable: Bool, notes: list[str], zone: Zone, *, sort: bool
+    ) -> "LocalTimes":
+        """Return the same by the clock of the home, which may be changed: in real time."""
+        first_us = int(self.time_us.min())
+        last_us = int(self.time_us.max())
+        with errors_as(LogError, f"{path}: there are no rules of the time zone", of=KeyError):
+            zone = zone.over(first_us, last_us)
+        utc_us = self.time_us if self.has_zone else moments_in_file(self.time_us, zone, noun, notes)
+        row = np.flatnonzero(usable)
+        if not len(row):
+            raise LogError(f"{path} has no row with a position")
+        first_day = int(zone.readings(utc_us).min()) // DAY_US
+        utc_us, row, order_notes = _in_order(utc_us[row], row, path, self.line, sort=sort)
+        notes.extend([*order_notes, *_jumps(utc_us, self.line[row])])
+        since_us = utc_us - zone.utc_us(first_day * DAY_US)
+        return LocalTimes(since_us, row, date(1970, 1, 1) + timedelta(days=first_day))
+
 
 class LocalTimes(NamedTuple):
     """The usable rows of a file in the local time of the home, in order.
 
     Attributes:
-        time_us: Local times since the midnight that begins the first day, int64 (m,) [us].
+        time_us: Times since the midnight that begins the first day, int64 (m,) [us]: what a clock
+            reads that is never changed, or real time if the scenario has a time zone.
         row: Which row of the file each is, from 0, int64 (m,).
         first_day: The date of the first day; None where the log has no dates.
     """
@@ -120,6 +143,38 @@ class LocalTimes(NamedTuple):
     time_us: I64
     row: I64
     first_day: date | None
+
+
+def moments_in_file(readings_us: I64, zone: Zone, noun: str, notes: list[str]) -> I64:
+    """Return the moments of readings of a clock, in the order of a file.
+
+    Within an hour that the clock reads twice, the second time begins where readings run backwards.
+
+    Args:
+        readings_us: What the clock read, without offset [us since 1970], int64 (n,).
+        zone: The clock.
+        noun: What they are called in notes, in the plural.
+        notes: Gets a line if the first and the second time can't be told apart.
+
+    Returns:
+        Moments [us since 1970 UTC], int64 (n,).
+    """
+    utc_us = zone.moments(readings_us)
+    for change_us, before_us, after_us in zip(
+        zone.changes_us, zone.offsets_us, zone.offsets_us[1:], strict=False
+    ):
+        is_twice = (utc_us >= change_us - (before_us - after_us)) & (utc_us < change_us)
+        rows = np.flatnonzero(is_twice)
+        runs_back = readings_us[rows] < np.maximum.accumulate(readings_us[rows])
+        second = rows[np.logical_or.accumulate(runs_back)]
+        utc_us[second] += before_us - after_us
+        if len(rows) and not len(second):
+            hour = EPOCH + timedelta(microseconds=change_us + after_us)
+            notes.append(
+                f"{len(rows)} {noun} of {hour:%Y-%m-%d %H:%M} on, which the clock reads twice,"
+                " count as of the first time: they have no offset, and never run backwards"
+            )
+    return utc_us
 
 
 def _in_order(

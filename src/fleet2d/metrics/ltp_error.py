@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from typing import Any, Literal
 
 import numpy as np
@@ -12,20 +11,23 @@ from fleet2d.algorithms.history import History
 from fleet2d.algorithms.observations import NOWHERE
 from fleet2d.algorithms.presence.belief import ANYONE, HOURS, Presence, presence_of
 from fleet2d.algorithms.presence.estimator import LN_2, natural_log
-from fleet2d.configuration.units import PositiveDuration, micros
+from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
 from fleet2d.kernels import F64, I64, SUB
 from fleet2d.kernels import earth_mover as minimal_cost
 from fleet2d.metrics.metric import Metric
-from fleet2d.runtime.clock import HOUR_US
+from fleet2d.runtime.clock import DAY_US, HOUR_US
+from fleet2d.runtime.local_time import EPOCH, even_parts
 
 # Clearance that a person needs to walk from room to room [m].
 RADIUS = 0.2
 # Total variation at which burn-in ends.
 BURN_IN = 0.1
 MEAN = "mean"
+# From the Monday before the epoch to the epoch.
+MONDAY_US = EPOCH.weekday() * DAY_US
 
 
 def total_variation(truth: F64, estimate: F64) -> F64:
@@ -133,9 +135,15 @@ def steps_by_hour(history: History, state: Present) -> I64:
     """Return the same by hour of the week: int64 (168, users + 1, rooms + 1)."""
     steps = len(history)
     step_us = round(history.step_s * 1e6)
-    first_us = micros(state.start - datetime.min) + history.first * step_us  # since a Monday
-    hours = np.arange(first_us // HOUR_US, -(-(first_us + steps * step_us) // HOUR_US))
-    hour_begins = np.maximum(-((first_us - hours * HOUR_US) // step_us), 0)
+    begin_us = history.first * step_us
+    # Of each part between two changes of the clock: its hours, and the steps at which they begin.
+    hours, hour_begins = np.zeros((2, 0), np.int64)
+    for since, until, start_us in even_parts(state.start, begin_us, begin_us + steps * step_us):
+        zero_us = start_us + MONDAY_US  # on the clock at the start, since a Monday
+        of_part = np.arange((zero_us + since) // HOUR_US, -(-(zero_us + until) // HOUR_US))
+        at_us = np.maximum(of_part * HOUR_US - zero_us, since) - begin_us
+        hours = np.append(hours, of_part)
+        hour_begins = np.append(hour_begins, -(-at_us // step_us))
     nobody = np.array([0]), np.array([steps]), np.array([NOWHERE])
     visits = [*(history.poses(user).visits for user in state.users), nobody]
     begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))

@@ -82,10 +82,10 @@ def _elapsed_us(text: str, clock: Clock) -> int | None:
             return None
         midnight = midnight_of(clock.start)
         since = timedelta(days=int(day[1]) - 1, hours=parts[0], minutes=parts[1], seconds=parts[2])
-        return clock.elapsed(midnight) + micros(since)
+        return clock.elapsed(midnight + since)
     with suppress(ValueError):
         moment = datetime.fromisoformat(text)
-        return None if moment.tzinfo is not None else clock.elapsed(moment)
+        return None if moment.tzinfo and not clock.zone else clock.elapsed(moment)
     with suppress(ValueError):
         return micros(parse_duration(text))
     return None
@@ -197,7 +197,7 @@ def positions(run: Run, name: str, interval: timedelta) -> Any:
     return pa.table(
         {
             "step": path.step,
-            "time": path.time.astype("M8[us]"),
+            "time": run.clock.stamps(path.step),
             "entity": pa.array([name] * count, pa.string()),
             "kind": pa.array(["track"] * count, pa.string()),
             "x": path.x,

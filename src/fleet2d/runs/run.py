@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from datetime import datetime, timedelta
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest
+from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest, start_of
 from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
 from fleet2d.artifacts.unfinished import FOLDER, JOURNAL_NAME, last_commit, read_committed
 from fleet2d.configuration.problems import suggest
@@ -122,8 +122,7 @@ class Run:
     def clock(self) -> Clock:
         """Its steps and their local times."""
         manifest = self.manifest
-        start = datetime.fromisoformat(manifest["start"])
-        return Clock(start, manifest["step_us"], manifest["steps"])
+        return Clock(start_of(manifest), manifest["step_us"], manifest["steps"])
 
     @property
     def metrics(self) -> dict[str, Any]:

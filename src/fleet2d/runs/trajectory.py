@@ -226,10 +226,10 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     numbers = {name: number for number, name in enumerate(KEY_KINDS)}
     kind = np.array([numbers[name] for name in column["kind"].tolist()], np.int64)
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
-    start = np.datetime64(run.manifest["start"], "us")
+    start_us = int(run.clock.stamp(0).astype(np.int64))
     return {
         "step": column["step"],
-        "time": column["time"] - start.astype(np.int64),
+        "time": column["time"] - start_us,
         "kind": kind,
         "x": np.ascontiguousarray(xy[:, 0]),
         "y": np.ascontiguousarray(xy[:, 1]),

@@ -1,6 +1,6 @@
 """The scenario: everything that defines a run."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import date, datetime, timedelta
 from functools import partial
@@ -27,6 +27,7 @@ from fleet2d.configuration.components import (
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import (
     check_known,
+    did_you_mean,
     problem,
     problem_at,
 )
@@ -40,13 +41,16 @@ from fleet2d.configuration.units import (
 from fleet2d.entities.behavior import DARK
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
+from fleet2d.errors import errors_as
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
+from fleet2d.routines.activity import SchemaForms
 from fleet2d.runtime.clock import Clock, Sun
+from fleet2d.runtime.local_time import Zone, rules_of, span_us, zone_of
 from fleet2d.sight.camera import SightSettings
 
 
@@ -68,19 +72,13 @@ ExpectationField = Annotated[
 
 
 def _parse_local_time(value: Any) -> Any:
-    """Refuse what pydantic would read as seconds since 1970, and time zones."""
+    """Refuse what pydantic would read as seconds since 1970."""
     if not isinstance(value, str | date):
         raise problem(f"expected a date and time like 2026-01-05T08:00, got {value}")
     try:
-        moment = datetime.fromisoformat(value) if isinstance(value, str) else value
+        return datetime.fromisoformat(value) if isinstance(value, str) else value
     except ValueError:
         raise problem(f"expected a date and time like 2026-01-05T08:00, got '{value}'") from None
-    if isinstance(moment, datetime) and moment.tzinfo is not None:
-        raise problem(
-            "expected a local time without a time zone, since a simulated day has 24 hours, got"
-            f" {moment.isoformat()}"
-        )
-    return moment
 
 
 def _refuse_file_as_type(value: Any) -> Any:
@@ -97,18 +95,61 @@ class Daylight(Settings):
     Attributes:
         latitude: Its latitude, north is positive [deg].
         noon: When the sun is highest by the clock, in the mean of the year; 12:10 with summer time
-            is 13:10.
+            is 13:10. In a time zone, summer time is added to it.
     """
 
     latitude: float = Field(ge=-65, le=65, examples=[52.5])
     noon: TimeOfDay = timedelta(hours=12)
 
 
+class TimeZone(Settings):
+    """The time zone of a home; short form: its name, like Europe/Berlin.
+
+    A stored run has its offsets, too: they count in place of this machine's rules.
+
+    Attributes:
+        name: Its name.
+        standard_s: Its offset from UTC without summer time.
+        offset_s: Its offset before the first change.
+        changes: When the offset changes, in order, and the offset from then on [s].
+    """
+
+    name: str = Field(min_length=1, examples=["Europe/Berlin"])
+    standard_s: int | None = None
+    offset_s: int | None = None
+    changes: tuple[tuple[str, int], ...] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_short_form(cls, data: Any) -> Any:
+        return {"name": data} if isinstance(data, str) else data
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        given = {self.standard_s is None, self.offset_s is None, self.changes is None}
+        if len(given) > 1:
+            raise problem("give standard_s, offset_s and changes, or none of them")
+        if self.changes is not None:
+            with errors_as(problem, of=(KeyError, TypeError, ValueError)):
+                Zone.of_record(self.model_dump())
+        return self
+
+    def zone(self, begin: datetime, end: datetime) -> Zone:
+        """Return the clock of the home from about `begin` to about `end`.
+
+        Raises:
+            KeyError: There is no such time zone.
+        """
+        if self.changes is not None:
+            return Zone.of_record(self.model_dump(), span_us(begin, end))
+        return zone_of(self.name, begin, end)
+
+
 class SimulationSettings(Settings):
     """When a run starts, how long it lasts, and how fast it goes.
 
     Attributes:
-        start: The home's local time at step 0.
+        start: The home's local time at step 0; in a time zone it may have an offset.
         duration: Simulated time. A run stops at its last full step within it.
         step: The length of a step.
         seed: The seed of all random draws; null: one is drawn and stored.
@@ -118,6 +159,7 @@ class SimulationSettings(Settings):
         speedup: Run at this many times real time; null: as fast as possible.
         daylight: Where the home is, if nights are to be longer in winter; null: lights and
             detection go by the time of day alone.
+        time_zone: The time zone of the home, whose clocks may change; null: each day has 24 hours.
     """
 
     start: Annotated[datetime, BeforeValidator(_parse_local_time)] = datetime(2026, 1, 5)
@@ -128,18 +170,43 @@ class SimulationSettings(Settings):
     people_block: PositiveDuration | None = Field(default=None, examples=["3 s"])
     speedup: float | None = Field(default=None, ge=0.001)
     daylight: Daylight | None = None
+    time_zone: Annotated[TimeZone, SchemaForms("text")] | None = None
 
     def model_post_init(self, _: object, /) -> None:
         """Require a start that calendars know, and at least one step."""
         # Agendas look a week back and a day ahead.
         if not 1900 <= self.start.year <= 7900:
             raise problem_at(("start",), f"expected a year from 1900 to 7900, got {self.start}")
+        if self.time_zone is not None:
+            self._check_time_zone(self.time_zone)
+        elif self.start.tzinfo is not None:
+            raise problem_at(
+                ("start",),
+                "expected a local time without a time zone, since a simulated day has 24 hours, got"
+                f" {self.start.isoformat()}; or say where the home is, by simulation.time_zone",
+            )
         if self.duration < self.step:
             raise problem_at(
                 ("duration",),
                 f"{format_duration(self.duration)} is shorter than one step, "
                 f"{format_duration(self.step)}",
             )
+
+    def _check_time_zone(self, time_zone: TimeZone) -> None:
+        """Refuse an unknown time zone, and a start that its clock never reads."""
+        try:
+            rules_of(time_zone.name)  # also if it has offsets: those who read its tables need them
+            zone = time_zone.zone(self.start, self.start)
+        except KeyError:
+            from zoneinfo import available_timezones
+
+            names = available_timezones()
+            hint = did_you_mean(time_zone.name, names)
+            hint = hint if names else ": this machine has no time zones: pip install tzdata"
+            text = f"there is no time zone {time_zone.name!r}{hint}"
+            raise problem_at(("time_zone",), text, time_zone.name) from None
+        if zone.skips(self.start):
+            raise problem_at(("start",), zone.oddity(self.start))
 
     @property
     def steps(self) -> int:
@@ -154,10 +221,15 @@ class SimulationSettings(Settings):
     @property
     def clock(self) -> Clock:
         """The steps of the run, and the sun over the home."""
-        clock = Clock(self.start, self.step_us, self.steps)
+        start = self.start
+        zone = None
+        if self.time_zone is not None:
+            zone = self.time_zone.zone(start, start + self.duration)
+            start = zone.at(start)
+        clock = Clock(start, self.step_us, self.steps)
         if self.daylight is None:
             return clock
-        return replace(clock, sun=Sun(self.daylight.latitude, self.daylight.noon))
+        return replace(clock, sun=Sun(self.daylight.latitude, self.daylight.noon, zone))
 
 
 class Scenario(Settings):
@@ -220,6 +292,18 @@ class Scenario(Settings):
         return self
 
     @model_validator(mode="after")
+    def _offsets_have_a_time_zone(self) -> Self:
+        if self.simulation.time_zone is None:
+            for where, moment in self.moments():
+                if moment.tzinfo is not None:
+                    raise problem_at(
+                        (*where, "at"),
+                        "expected a local time of the home, without a time zone, as there is no"
+                        f" simulation.time_zone, got {moment.isoformat()}",
+                    )
+        return self
+
+    @model_validator(mode="after")
     def _behaviors_name_users(self) -> Self:
         for robot, entity in self.robots.items():
             for i, behavior in enumerate(entity.behaviors):
@@ -256,6 +340,13 @@ class Scenario(Settings):
                         f" `by: {robot}` in its entries if there are several robots",
                     )
         return self
+
+    def moments(self) -> Iterator[tuple[tuple[str, int], datetime]]:
+        """Yield the dated moments of its changes and its script, and the entry of each."""
+        for section in ("changes", "script"):
+            for number, entry in enumerate(getattr(self, section)):
+                if isinstance(entry.at, datetime):
+                    yield (section, number), entry.at
 
     def set_origin(self, folder: Path, document: Document) -> None:
         """Keep the folder of the file that it was read from, and the places of its keys."""

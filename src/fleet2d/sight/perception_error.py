@@ -19,8 +19,9 @@ from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import BELL_STD, F64, I16, I64, NOBODY, ONE, QUARTER, TURN, UNIT, Bool
-from fleet2d.runtime.clock import DAY_US, HOUR_US, midnight_of
+from fleet2d.runtime.clock import DAY_US, HOUR_US
 from fleet2d.runtime.determinism import stream_key
+from fleet2d.runtime.local_time import readings_of
 
 MAX_DISTANCE_M = 10_000.0
 """Largest coordinate of a perceived position [m]."""
@@ -120,9 +121,8 @@ class CameraSightings:
     @property
     def hour(self) -> F64:
         """Time of day of the look [hours], from 0 to 24: float64 (n,)."""
-        midnight_us = micros(self.start - midnight_of(self.start))
-        day_us = (midnight_us + self.step * round(self.step_s * 1e6)) % DAY_US
-        return day_us / HOUR_US
+        elapsed_us = self.step * round(self.step_s * 1e6)
+        return readings_of(self.start, elapsed_us) % DAY_US / HOUR_US
 
     @property
     def true_room(self) -> I16:

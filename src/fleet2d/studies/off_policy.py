@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64
 from fleet2d.runs.run import Run
-from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.events import EventKind
 from fleet2d.studies.intervals import MeanEstimate, estimate
 
@@ -75,15 +74,15 @@ def read_opportunities(run: Run) -> LoggedOpportunities:
         rewards.append(0.0)
     texts, steps, asked, chances = zip(*logged, strict=True) if logged else ((), (), (), ())
     clock = run.clock
-    first = midnight_of(clock.start)
+    first = clock.start.toordinal()
     return LoggedOpportunities(
         list(texts),
         np.array(steps, np.int64),
         np.array(asked, bool),
         np.array(chances),
         np.array(rewards),
-        np.array([(clock.time(step) - first) // DAY for step in steps], np.int64),
-        (clock.time(clock.steps - 1) - first) // DAY + 1,
+        np.array([clock.time(step).toordinal() - first for step in steps], np.int64),
+        clock.time(clock.steps - 1).toordinal() - first + 1,
     )
 
 

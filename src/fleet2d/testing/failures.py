@@ -51,13 +51,12 @@ class FailingCase(NamedTuple):
     def text(self) -> str:
         """A summary: the time, the people, and the number of interventions."""
         simulation = self.variant.scenario.simulation
-        end = simulation.start + simulation.duration
+        start = simulation.clock.start
+        end = start + simulation.duration
         people = ", ".join(self.variant.scenario.users) or "nobody"
         number = len(self.result.acts)
         shown = f", {number - len(self.without)} of {number} interventions" if number else ""
-        return (
-            f"{simulation.start:%a %d %b %H:%M:%S} to {end:%a %d %b %H:%M:%S}, with {people}{shown}"
-        )
+        return f"{start:%a %d %b %H:%M:%S} to {end:%a %d %b %H:%M:%S}, with {people}{shown}"
 
     @property
     def step(self) -> int:
@@ -100,7 +99,7 @@ class Shrinker:
         if case.step + 1 >= simulation.steps or case.failure.kind == MISSED_BY_THE_END:
             return case
         length = (case.step + 1) * simulation.step
-        return self._within(case, simulation.start, simulation.start + length) or case
+        return self._within(case, simulation.clock.start, simulation.clock.start + length) or case
 
     def _unlearned(self, case: FailingCase) -> FailingCase:
         """Leave out the algorithms and metrics that aren't needed to fail."""
@@ -132,10 +131,10 @@ class Shrinker:
     def _started(self, case: FailingCase, lead: timedelta) -> FailingCase | None:
         """Return the run that begins some time before the failure, if it fails, too."""
         simulation = case.variant.scenario.simulation
-        end = simulation.start + simulation.duration
-        failing = simulation.start + case.step * simulation.step
+        end = simulation.clock.start + simulation.duration
+        failing = simulation.clock.start + case.step * simulation.step
         start = (failing - lead).replace(second=0, microsecond=0)
-        if not simulation.start < start < end:
+        if not simulation.clock.start < start < end:
             return None
         smaller = self._within(case, start, end)
         return smaller and self._sooner(smaller)
@@ -219,7 +218,7 @@ def _script_within(
         at = entry.at
         is_in = True
         if isinstance(at, timedelta):  # from the start on
-            at = at - (start - simulation.start)
+            at = at - (start - simulation.clock.start)
             is_in = timedelta(0) <= at < end - start
             content = {**content, "at": at}
         elif isinstance(at, datetime):
@@ -309,7 +308,7 @@ def _by_expectation(result: ClaimResult) -> Iterable[str]:
 def _failures(trial: TrialResult) -> Iterable[str]:
     """Yield a line for each failure of a run: what failed, when, by how much."""
     simulation = trial.variant.scenario.simulation
-    clock = Clock(simulation.start, simulation.step_us, simulation.steps)
+    clock = simulation.clock
     for failure in trial.failures:
         at = ""
         if failure.step is not None:

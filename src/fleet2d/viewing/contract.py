@@ -241,13 +241,15 @@ class RunFacts(TypedDict):
     that Fleet2D records, also those that the run has none of. `verdict` sums up the
     `verdicts`, of which violated ones come first. `skies` has for each day the hours until which it
     is dark, from which and until which it is light, and from which it is dark again; the last holds
-    for the days that follow, too.
+    for the days that follow, too. `start` is UTC if the home has a time zone; `offsets` has then
+    from when on [us since the start] which offset [us] holds, else nothing.
     """
 
     title: str
     status: str
     notes: list[str]
     start: str
+    offsets: list[tuple[int, int]]
     step_us: int
     steps: int
     first_step: int

@@ -179,7 +179,7 @@ class PageData:
         home = self.facts["home"]
         origin = home["origin_units"]
         units = home["units_per_m"]
-        start = np.datetime64(run.manifest["start"], "us")
+        start = run.clock.stamp(0)
         time = (table["time"].to_numpy().astype("M8[us]") - start).astype(np.float64)
         x, y = (
             np.floor(table[axis].to_numpy() * units + 0.5) - origin[i]

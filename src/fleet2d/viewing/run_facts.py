@@ -22,6 +22,7 @@ from fleet2d.runs.run import LAYER_PREFIX, Run
 from fleet2d.runs.verdicts import verdict_line, verdicts_of, violations_of
 from fleet2d.runtime.clock import TWILIGHT, Clock, Sun
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import EPOCH, even_parts, stamp_us, written
 from fleet2d.scenario.model import Daylight
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.sight.perception import DARK_NIGHT
@@ -256,7 +257,8 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         title=run_title(run),
         status=run.status,
         notes=list(run.notes),
-        start=manifest["start"],
+        start=(EPOCH + timedelta(microseconds=stamp_us(run.clock.start))).isoformat(),
+        offsets=offsets_of(run.clock),
         step_us=manifest["step_us"],
         steps=manifest["steps"],
         first_step=0,
@@ -284,6 +286,13 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
     )
 
 
+def offsets_of(clock: Clock) -> list[tuple[int, int]]:
+    """Return the offsets from UTC over a run; see `RunFacts`."""
+    start_us = stamp_us(clock.start)
+    parts = even_parts(clock.start, 0, clock.steps * clock.step_us) if clock.zone else ()
+    return [(begin_us, zero_us - start_us) for begin_us, _, zero_us in parts]
+
+
 def skies_of(scenario: Mapping[str, Any], clock: Clock) -> list[tuple[float, float, float, float]]:
     """Return when it gets light and dark on each day; see `RunFacts`.
 
@@ -294,7 +303,7 @@ def skies_of(scenario: Mapping[str, Any], clock: Clock) -> list[tuple[float, flo
         (dark_until, _), (light_from, _), (light_until, _), (dark_from, _) = DARK_NIGHT.points
         return [(dark_until, light_from, light_until, dark_from)]
     settings = Daylight(**daylight)
-    sun = Sun(settings.latitude, settings.noon)
+    sun = Sun(settings.latitude, settings.noon, clock.zone)
     first = clock.start.toordinal()
     last = clock.time(clock.steps - 1).toordinal()
     return [_sky(*sun.day(ordinal)) for ordinal in range(first, last + 1)]
@@ -304,8 +313,8 @@ def _sky(rise: datetime, fall: datetime) -> tuple[float, float, float, float]:
     """Return the hours of a day around which the sun rises and sets."""
     midnight = datetime.combine(rise.date(), time())
     hour = timedelta(hours=1)
-    rise_h = (rise - midnight) / hour
-    fall_h = (fall - midnight) / hour
+    rise_h = (written(rise) - midnight) / hour
+    fall_h = (written(fall) - midnight) / hour
     twilight_h = TWILIGHT / hour
     return rise_h - twilight_h, rise_h + twilight_h, fall_h - twilight_h, fall_h + twilight_h
 
@@ -419,7 +428,8 @@ def live_facts(simulation: Simulation) -> RunFacts:
         title=simulation.scenario.name or "live run",
         status="running",
         notes=[],
-        start=clock.start.isoformat(),
+        start=(EPOCH + timedelta(microseconds=stamp_us(clock.start))).isoformat(),
+        offsets=offsets_of(clock),
         step_us=clock.step_us,
         steps=clock.steps,
         first_step=0,

@@ -22,6 +22,8 @@ from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, dee
 from fleet2d.runs.moments import part_of_run
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
+from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.local_time import rules_of
 from fleet2d.viewing.contract import BodyFacts
 from fleet2d.viewing.home_facts import WallsHistory
 from fleet2d.viewing.pictures.charts import AskedTime, asked_of
@@ -57,11 +59,11 @@ def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axe
     """
     clock = run.clock
     interval = timedelta(microseconds=clock.step_us * -(-clock.steps // MAX_SAMPLES))
-    begin, end = mdates.date2num([clock.start, clock.time(clock.steps)]).tolist()
+    begin, end = mdates.date2num(clock.stamps(np.array([0, clock.steps]))).tolist()
     boxes: list[F64] = []
     faces: list[tuple[float, float, float]] = []
     for number, body in enumerate(bodies):
-        for start, stop, room in _stretches(run.path(body["name"], interval), end):
+        for start, stop, room in _stretches(run.path(body["name"], interval), clock, end):
             low, high = number, number + ROW_PART
             boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
@@ -73,20 +75,20 @@ def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axe
     axes.add_collection(PolyCollection(boxes, facecolors=faces, lw=0, zorder=1), autolim=False)
     _mark_sightings(run, [body["name"] for body in bodies], axes)
     axes.set(xlim=(begin, end), ylim=(len(bodies), -0.05))
-    _label(axes, bodies)
+    _label(axes, bodies, clock)
 
 
-def _stretches(path: Trajectory, end: float) -> list[tuple[float, float, int]]:
+def _stretches(path: Trajectory, clock: Clock, end: float) -> list[tuple[float, float, int]]:
     """Return start, end and room, -1 while away, of the stretches in rooms; matplotlib's times."""
     cuts = np.append(0, np.flatnonzero(np.diff(path.room)) + 1)
-    begins = mdates.date2num(path.time[cuts]).tolist()
+    begins = mdates.date2num(clock.stamps(path.step[cuts])).tolist()
     ends = [*begins[1:], end]
     return list(zip(begins, ends, path.room[cuts].tolist(), strict=True))
 
 
 def _mark_sightings(run: Run, names: Sequence[str], axes: Axes) -> None:
     """Mark at the foot of a user's row when robots noticed the user."""
-    start = np.datetime64(run.manifest["start"], "us")
+    start = run.clock.stamp(0)
     step = np.timedelta64(run.manifest["step_us"], "us")
     boxes = []
     for lane in sightings_of(run):
@@ -101,10 +103,11 @@ def _mark_sightings(run: Run, names: Sequence[str], axes: Axes) -> None:
     axes.add_collection(PolyCollection(boxes, facecolors=TEXT_COLOR, lw=0, zorder=2), autolim=False)
 
 
-def _label(axes: Axes, bodies: Sequence[BodyFacts]) -> None:
-    locator = mdates.AutoDateLocator(minticks=3, maxticks=10)
+def _label(axes: Axes, bodies: Sequence[BodyFacts], clock: Clock) -> None:
+    zone = clock.zone and rules_of(clock.zone.label)
+    locator = mdates.AutoDateLocator(tz=zone, minticks=3, maxticks=10)
     axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator))
+    axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator, tz=zone))
     axes.xaxis.get_offset_text().set_visible(False)
     axes.set_yticks(np.arange(len(bodies)) + ROW_PART / 2, [body["name"] for body in bodies])
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)

@@ -16,6 +16,7 @@ from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioE
 from fleet2d.interventions import Send
 from fleet2d.kernels import F32, SUB, Bool, SightingColumn
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.local_time import zone_of
 
 AT = {name: number for number, name in enumerate(COLUMNS)}
 CLASS = "tests.entities.robots.test_policy:Farthest"
@@ -254,3 +255,19 @@ def test_a_robot_that_was_off_remembers_no_sightings() -> None:
     simulation.run()
     assert memory is simulation.actors["astro"].recall()
     assert int(memory.rooms[0].max()) > 3660
+
+
+def test_memory_counts_looks_by_the_hour_that_the_clock_reads() -> None:
+    """Four hours over the night in which it reads an hour twice: a look each minute."""
+    plan = fleet2d.load_floorplan("family_home")
+    zone = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))
+    start = zone.at(datetime(2026, 10, 25, 1))
+    memory = SightingMemory(plan, 1, Clock(start, 60_000_000, 240))
+    row, column = np.argwhere(plan.room_of_cell >= 0)[0]
+    rows = np.zeros((240, len(SightingColumn)), np.int64)
+    rows[:, SightingColumn.STEP] = np.arange(240)
+    rows[:, SightingColumn.X], rows[:, SightingColumn.Y] = column * SUB, row * SUB
+    memory.take(rows[:, SightingColumn.STEP], np.arange(240, dtype=np.int32), rows)
+
+    room = int(plan.room_of_cell[row, column])
+    assert [60, 120, 60, 0] == memory.rooms.looks[0, room, 1:5].tolist()

@@ -5,6 +5,7 @@ import re
 from datetime import datetime
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import fleet2d
 from fleet2d import Run, Simulation, open_run
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.runs.run import FLOORPLAN_NAME
+from fleet2d.runtime.local_time import zone_of
 
 pytest.importorskip("matplotlib")
 
@@ -230,6 +232,28 @@ def test_no_sightings_leave_no_marks() -> None:
     marks = marks_by_day(np.zeros(0, np.int64), START, 1_000_000, 3)
     assert (3, 288) == marks.shape
     assert 0 == len(mark_boxes(marks))
+
+
+@pytest.mark.parametrize(
+    ("noon", "expected"),
+    [
+        # Minutes of the night, and the hours since noon: what is read twice is drawn once.
+        (datetime(2026, 10, 24, 12), {150: 14, 179: 14, 180: 16, 1439: 36}),
+        # What is never read is left out.
+        (datetime(2026, 3, 28, 12), {119: 13, 120: -2, 179: -2, 180: 14, 1439: 34}),
+    ],
+)
+def test_day_is_drawn_by_what_the_clock_reads(noon: datetime, expected: dict[int, int]) -> None:
+    zone = zone_of("Europe/Berlin", noon, noon)
+    hours: Any = SimpleNamespace(room=np.arange(50), every_us=3_600_000_000)
+    rooms = rooms_by_day(hours, zone.at(noon), 60_000_000, 50 * 60)
+
+    assert 3 == len(rooms)
+    assert expected == {minute: int(rooms[1, minute]) for minute in expected}
+    marks = marks_by_day(np.arange(50 * 60), zone.at(noon), 60_000_000, 3)
+    is_read = rooms.reshape(3, -1, 5)[..., 0] >= 0
+    assert is_read.tolist() == (marks > 0).tolist()
+    assert marks.max() <= 1
 
 
 def test_ink_of_the_marks_is_in_proportion_to_the_time_seen() -> None:

@@ -231,7 +231,7 @@ class Likelihood(Estimator):
         """
         hours, sums = self._by_hour(places, day, unknown)
         by_hour = np.zeros((24, *sums.shape[1:]))
-        by_hour[hours] = sums
+        np.add.at(by_hour, hours, sums)
         return by_hour
 
     def _end_day(self, next_day: int, people: People) -> None:

@@ -37,6 +37,7 @@ from fleet2d.kernels import F64, TURN
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import at_reading
 
 # The part of a room to be shown by its viewpoints, if there are few enough of them.
 SHARE_TO_SHOW = 0.9
@@ -356,4 +357,5 @@ class Find(BeliefBehavior):
             return None
         midnight = midnight_of(after)
         times = sorted(midnight + i * DAY + at for i in range(2) for at in self.at)
-        return next(time for time in times if time > after)
+        moments = (at_reading(start, time) for time in times)
+        return next(moment for moment in moments if moment > after)

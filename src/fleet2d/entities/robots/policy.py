@@ -29,8 +29,9 @@ from fleet2d.floorplan.plan import FloorPlan, Room, read_only
 from fleet2d.floorplan.space import PointDistances
 from fleet2d.kernels import F32, F64, I32, I64, TURN, UNIT, Bool, RoomMemory, ShownMemory
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.runtime.clock import DAY_MINUTES, HOUR_S, MICROSECOND, Clock, midnight_of
+from fleet2d.runtime.clock import DAY_MINUTES, DAY_US, HOUR_S, Clock
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import even_parts
 
 # How many people have columns of their own, in the order of the scenario.
 PEOPLE = 4
@@ -106,7 +107,7 @@ class SightingMemory:
         self.rooms = _no_sightings(shape)
         self._room_of_place = plan.room_of_place
         self._step_us = clock.step_us
-        self._start_us = (clock.start - midnight_of(clock.start)) // MICROSECOND
+        self._start = clock.start
 
     def emptied(self) -> "SightingMemory":
         """Return the same memory without sightings."""
@@ -119,7 +120,16 @@ class SightingMemory:
         """Add sightings; see `fleet2d.algorithms.observations.SightingTable`."""
         room = kernels.rooms_at(self._room_of_place, distinct[:, Column.X], distinct[:, Column.Y])
         identity = distinct[:, Column.IDENTITY]
-        kernels.remember(step, index, identity, room, self._start_us, self._step_us, self.rooms)
+        if not len(step):
+            return
+        at_us = step * self._step_us
+        end_us = int(at_us.max()) + 1
+        for begin, end, start_us in even_parts(self._start, int(at_us.min()), end_us):
+            part = (begin <= at_us) & (at_us < end)
+            of_day_us = start_us % DAY_US
+            kernels.remember(
+                step[part], index[part], identity, room, of_day_us, self._step_us, self.rooms
+            )
 
 
 def _no_sightings(shape: tuple[int, int]) -> RoomMemory:

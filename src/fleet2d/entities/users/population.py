@@ -12,6 +12,7 @@ from fleet2d.routines.activity import catalogue
 from fleet2d.routines.distributions import draw_weighted
 from fleet2d.routines.planner import REST, Episode
 from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.runtime.local_time import written
 
 
 class Population(ResidentBehavior):
@@ -58,6 +59,7 @@ class Population(ResidentBehavior):
         draws = Draws(stream_key(0, "", "likely"), 0)
         known = catalogue()
         people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
+        time = written(time)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()
         state = survey.first_state(people, draws, ordinal)
         episodes, _ = survey.draw_episodes(people, draws, ordinal, state)

@@ -493,7 +493,11 @@ class Replay(Behavior, LogKeys):
         self.visits: list[LoggedVisit] = []
         with errors_as(LogError, actor.path, of=LogError):
             log = read_log(
-                self.path, self.format, id=self.id, frame=self.frame.name, **self.reading
+                self.path,
+                self.format,
+                id=self.id,
+                frame=self.frame.name,
+                **self.reading(actor.clock),
             )
             begin_us, outside_notes = begin_of_run(log, self.day, actor.clock)
             if isinstance(log, ActivityLog):

@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Set
-from datetime import datetime, timedelta
+from datetime import datetime
 from functools import lru_cache, partial
 from operator import attrgetter
 from typing import NamedTuple, TypeVar
@@ -23,7 +23,7 @@ from fleet2d.kernels import ANY_ROOM, NO_GAP_S, CoreVenue, Resident
 from fleet2d.routines.activity import NOT_LIVED_IN, Activity, seconds
 from fleet2d.routines.distributions import Distribution, exponential
 from fleet2d.routines.planner import REST, SLEEP, Episode
-from fleet2d.runtime.clock import SECOND_US, Clock
+from fleet2d.runtime.clock import SECOND_US, Clock, next_midnight
 from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.events import EventKind
 
@@ -500,14 +500,14 @@ class ResidentBehavior(Behavior):
         plan = now.plan()
         clock = now.actor.clock
         self.is_hindered = now.home.may_block_routes  # by shut doors, for all of the plan
-        midnight_us = clock.elapsed(datetime.fromordinal(now.time.toordinal() + 1))
+        midnight_us = clock.elapsed(next_midnight(now.time))
         last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
         self.known_home.update()
         stints = []
-        for which, day_us, episode in self._episodes(now.time):
-            if day_us + episode.begin * SECOND_US >= last_us:
+        for which, episode in self._episodes(now.time):
+            if clock.reading(which[0], episode.begin) >= last_us:
                 break
-            end_us = min(day_us + episode.end * SECOND_US, midnight_us)
+            end_us = min(clock.reading(which[0], episode.end), midnight_us)
             stints.append(self._stint(episode, which, end_us))
         self.known_home.live(plan, stints, last_us, continues=now.step == self.planned_until)
         self.planned_until = clock.step_at_or_after(plan.time_us)
@@ -526,24 +526,26 @@ class ResidentBehavior(Behavior):
         """Rest for the remaining time of the present episode, from the next plan on."""
         self.given_up = next(self._episodes(now.time))[0]
 
-    def _episodes(self, time: datetime) -> Iterator[tuple[tuple[int, int], int, Episode]]:
+    def _episodes(self, time: datetime) -> Iterator[tuple[tuple[int, int], Episode]]:
         """Yield the episodes that are not over at a time.
 
         Yields:
-            The day's ordinal and the number in it, the midnight of that day [us since the start],
-            and the episode.
+            The day's ordinal and the number in it, and the episode.
         """
         ordinal = time.toordinal()
         now_us = self.clock.elapsed(time)
-        if time < datetime.fromordinal(ordinal) + timedelta(seconds=self.day(ordinal)[0].begin):
+        if now_us < self.clock.reading(ordinal, self.day(ordinal)[0].begin):
             ordinal -= 1
         while True:
             day = self.day(ordinal)
-            day_us = self.clock.elapsed(datetime.fromordinal(ordinal))
-            first = bisect_right(day, (now_us - day_us) // SECOND_US, key=END)
+            first = bisect_right(day, now_us, key=partial(self._end_us, ordinal))
             for i in range(first, len(day)):
-                yield (ordinal, i), day_us, day[i]
+                yield (ordinal, i), day[i]
             ordinal += 1
+
+    def _end_us(self, ordinal: int, episode: Episode) -> int:
+        """Return when an episode of a day is over [us since the start]."""
+        return self.clock.reading(ordinal, episode.end)
 
     def _stint(self, episode: Episode, which: tuple[int, int], end_us: int) -> Stint:
         """Return an episode as the core needs it; `which` is the address of its random draws."""

@@ -8,6 +8,7 @@ from itertools import islice
 from typing import NamedTuple
 
 from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
 from fleet2d.entities.users import resident
@@ -22,8 +23,9 @@ from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household,
 from fleet2d.routines.life import CACHED_DAYS, WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
 from fleet2d.routines.planner import PLANNED, REST, RESUMES, SLEEP, Episode
-from fleet2d.runtime.clock import DAY_S, SECOND_US, Clock
+from fleet2d.runtime.clock import DAY_S, SECOND_US, Clock, midnight_of
 from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.runtime.local_time import written
 
 # All members must get the same rooms, whatever their radius: those of a body of this radius [m].
 DEFAULT_RADIUS = 0.2
@@ -391,7 +393,7 @@ class Routine(ResidentBehavior):
         """Return the rooms of a likely activity at that time."""
         likely_day = Life(self.resolved_persona, 0, "").day
         today = time.toordinal()
-        time_s = (time - datetime.fromordinal(today)) // timedelta(seconds=1)
+        time_s = (written(time) - midnight_of(time)) // timedelta(seconds=1)
         if time_s < likely_day(today)[0].begin:
             today = today - 1
             time_s = time_s + DAY_S
@@ -423,7 +425,7 @@ class Routine(ResidentBehavior):
         if ends_us - begins_us > TURN_US:
             return None
         date = clock.start + timedelta(microseconds=begins_us)
-        midnight_us = clock.elapsed(datetime.fromordinal(date.toordinal()))
+        midnight_us = begins_us - micros(written(date) - midnight_of(date))  # by the present offset
         first = (begins_us - WAY_US - midnight_us) // SECOND_US
         last = -((midnight_us - ends_us) // SECOND_US)  # rounded up
         if self.lives.in_use(date.toordinal(), self.name, room, first, last):

@@ -11,7 +11,7 @@ from fleet2d.configuration.units import Duration, OnDays, TimeOfDay, format_time
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import Place, Point, RoomChoice, available_places, is_point, seat_at
 from fleet2d.entities.plan import Plan
-from fleet2d.runtime.clock import DAY, midnight_of, midnights
+from fleet2d.runtime.clock import DAY, midnight_of, midnights, next_midnight
 from fleet2d.runtime.events import EventKind
 
 AWAY: tuple[()] = ()
@@ -119,7 +119,7 @@ class Schedule(Behavior):
             seat = seat_at(now.actor, entry.place) if entry.place else None
             if now.step or now.actor.entity.start or seat is not None:
                 _add(plan, entry)
-        self.until = midnight_of(now.time) + DAY
+        self.until = next_midnight(now.time)
         for midnight in midnights(since, self.until):
             for entry in self.week[midnight.weekday()]:
                 if midnight + entry.begins >= since:

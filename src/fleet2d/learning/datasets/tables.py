@@ -70,7 +70,8 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
     """
     manifest = run.manifest
     rooms = run.plan.rooms
-    start = np.datetime64(manifest["start"], "us")
+    clock = run.clock
+    start = clock.times(np.zeros(1, np.int64))[0]
     step_us = int(manifest["step_us"])
     users = list(manifest["scenario"]["users"])
     every = max(1, labels // timedelta(microseconds=step_us))
@@ -94,7 +95,7 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         rows = len(next(iter(columns.values())))
         columns["run"] = np.full(rows, planned.number, np.int32)
         if "step" in columns:
-            columns["time"] = start + np.asarray(columns["step"], np.int64) * step_us
+            columns["time"] = clock.times(np.asarray(columns["step"], np.int64))
     return {name: _table(name, of_table) for name, of_table in parts.items()}
 
 

@@ -140,6 +140,11 @@ class _Dense:
         midnight = start.astype("datetime64[D]")
         since_us = (start - midnight) / MICROSECOND
         time = int(since_us) + (self.step + 1 - self.bin_steps) * step_us
+        # The clock may have been changed since the start.
+        own = labels["user"] == labels["user"][0]
+        steps = labels["step"][own].astype(np.int64)
+        shift_us = (labels["time"][own] - start).astype("m8[us]").astype(np.int64) - steps * step_us
+        time += shift_us[np.searchsorted(steps, self.step).clip(0, len(steps) - 1)]
         ordinal = int((midnight - FIRST_DAY) / np.timedelta64(1, "D")) + 1
         self.day = ordinal + time // DAY_US
         self.minute = time // 60_000_000 % DAY_MINUTES

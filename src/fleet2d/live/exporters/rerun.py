@@ -90,7 +90,8 @@ class _Writer:
         )
         self._stream.log("home/rooms", anchors, static=True)
 
-    def _times(self, steps: I64, times: Any) -> list[Any]:
+    def _times(self, steps: I64) -> list[Any]:
+        times = self._records.run.clock.stamps(steps)
         return [
             self._rr.TimeColumn("time", timestamp=times.astype("datetime64[ns]")),
             self._rr.TimeColumn("step", sequence=steps),
@@ -120,7 +121,7 @@ class _Writer:
             radii=np.full(len(xyz), _BODY),
             labels=[name] * len(xyz),
         )
-        times = self._times(way.step[at], way.time[at])
+        times = self._times(way.step[at])
         for place, columns in ((name, points), (f"{name}/heading", arrows)):
             parts = columns.partition(home.astype(np.int64))
             self._rr.send_columns(f"bodies/{place}", times, parts, recording=self._stream)
@@ -152,9 +153,8 @@ class _Writer:
         self._send(place, looks, points.partition(counts))
 
     def _send(self, place: str, rows: list[dict[str, Any]], columns: Any) -> None:
-        times = np.array([row["time"] for row in rows], "datetime64[us]")
         steps = np.array([row["step"] for row in rows], np.int64)
-        self._rr.send_columns(place, self._times(steps, times), columns, recording=self._stream)
+        self._rr.send_columns(place, self._times(steps), columns, recording=self._stream)
 
 
 def _grouped(rows: list[dict[str, Any]], *keys: str) -> dict[Any, list[dict[str, Any]]]:

@@ -2,14 +2,13 @@
 
 Frames: `map` is the floor plan's; a robot has `NAME/odom` and `NAME/base_link`, and a user, whose
 pose is the truth, `NAME`. A body that is away from home has no transform meanwhile. Stamps are the
-local times of the run, taken as UTC, because scenarios have no time zone.
+local times of the run, taken as UTC; of a home with a time zone they are UTC.
 """
 
 import json
 import struct
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
-from datetime import UTC
 from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,6 +17,7 @@ import numpy as np
 from fleet2d.kernels import F64, I64, U8
 from fleet2d.live.exporters import Chunk, Records
 from fleet2d.runs.robot_log import LogEntry, robot_log
+from fleet2d.runtime.local_time import stamp_us
 from fleet2d.storage.bags import LOG_LEVELS, LOG_TYPE, ros_types
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class RosMessages:
         self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
         clock = self._run.clock
-        self._start_ns = int(clock.start.replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        self._start_ns = stamp_us(clock.start) // 1_000_000 * 1_000_000_000
         self._step_ns = clock.step_us * 1000
         topics = [
             Topic(MAP, "nav_msgs/msg/OccupancyGrid", latched=True),

@@ -13,6 +13,7 @@ from fleet2d.floorplan.load import source_type
 from fleet2d.live.exporters import Chunk, Records, Selection, new_file
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
+from fleet2d.runtime.clock import Clock
 
 # The activity that CASAS writes where none is known.
 OTHER = "Other_Activity"
@@ -42,7 +43,8 @@ def export_csv(run: Run, path: Path, part: Selection) -> str:
     with new_file(path) as file:
         writer = None
         for chunk in Records(run, part).chunks(tables=()):
-            tables = [_table(name, way, rooms) for name, way in chunk.poses.items()]
+            clock = run.clock
+            tables = [_table(name, way, rooms, clock) for name, way in chunk.poses.items()]
             rows = pa.concat_tables(tables).sort_by([("step", "ascending")])
             writer = writer or csv.CSVWriter(file, rows.schema)
             writer.write_table(rows)
@@ -52,12 +54,12 @@ def export_csv(run: Run, path: Path, part: Selection) -> str:
     return f"{count:,} poses in {path}"
 
 
-def _table(name: str, way: Trajectory, rooms: Any) -> Any:
+def _table(name: str, way: Trajectory, rooms: Any, clock: Clock) -> Any:
     import pyarrow as pa
 
     columns = {
         "step": pa.array(way.step),
-        "time": pa.array(way.time),
+        "time": pa.array(clock.texts(way.step) if clock.zone else way.time),
         "entity": pa.repeat(name, len(way.step)),
         "x": pa.array(way.x, mask=way.away),
         "y": pa.array(way.y, mask=way.away),
@@ -89,17 +91,18 @@ def export_jsonl(run: Run, path: Path, part: Selection) -> str:
     count = 0
     with new_file(path) as file:
         for chunk in Records(run, part).chunks():
-            rows = sorted((*_poses(chunk, rooms), *_rows(chunk)), key=itemgetter("step"))
+            poses = _poses(chunk, rooms, run.clock)
+            rows = sorted((*poses, *_rows(chunk)), key=itemgetter("step"))
             file.writelines(f"{json.dumps(row, default=str)}\n".encode() for row in rows)
             count += len(rows)
     return f"{count:,} objects in {path}"
 
 
-def _poses(chunk: Chunk, rooms: list[str]) -> Iterator[dict[str, Any]]:
+def _poses(chunk: Chunk, rooms: list[str], clock: Clock) -> Iterator[dict[str, Any]]:
     for name, way in chunk.poses.items():
-        times = way.time.astype("datetime64[us]").tolist()
+        times = clock.texts(way.step)
         for i, (step, away) in enumerate(zip(way.step.tolist(), way.away.tolist(), strict=True)):
-            row = {"step": step, "time": times[i].isoformat(), "record": "pose", "entity": name}
+            row = {"step": step, "time": times[i], "record": "pose", "entity": name}
             if not away:
                 row |= {"x": float(way.x[i]), "y": float(way.y[i])}
                 row |= {"heading": float(way.heading[i])}
@@ -151,7 +154,7 @@ def _features(records: Records, tables: list[str]) -> Iterator[dict[str, Any]]:
     ways: dict[str, _Ways] = {}
     for chunk in records.chunks(tables=tables):
         for name, path in chunk.poses.items():
-            yield from ways.setdefault(name, _Ways(name)).take(path)
+            yield from ways.setdefault(name, _Ways(name, records.run.clock)).take(path)
         yield from (_event(row, chunk.poses) for rows in chunk.rows.values() for row in rows)
     for body in ways.values():
         yield from body.finish()
@@ -160,8 +163,9 @@ def _features(records: Records, tables: list[str]) -> Iterator[dict[str, Any]]:
 class _Ways:
     """The movements of a body, each from its last rest to its next, also from chunk to chunk."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, clock: Clock) -> None:
         self._name = name
+        self._clock = clock
         self._line: list[list[float]] = []  # of a movement that isn't over
         self._from = self._to = ""
         self._last: tuple[Any, Any, Any] | None = None  # the last pose: place, whether away, time
@@ -170,7 +174,7 @@ class _Ways:
         """Yield the movements that are over in the next poses."""
         xy = np.stack([path.x, path.y], axis=-1)
         away = path.away
-        times = np.datetime_as_string(path.time, unit="s")
+        times = np.array(self._clock.texts(path.step))
         if not len(xy):
             return
         if self._last is not None:

@@ -7,7 +7,6 @@ Frames and stamps are those of `fleet2d export`: the truth about bodies is in `/
 
 import math
 from collections.abc import Iterator, Mapping
-from datetime import UTC
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from fleet2d.engine.simulation import Simulation
 from fleet2d.kernels import F64, Mesh, region_outline, visible_region
 from fleet2d.live.bridge import LiveStep
+from fleet2d.runtime.local_time import stamp_us
 
 BEAMS = 360
 """Number of beams of a laser scan, over a whole turn."""
@@ -60,7 +60,7 @@ class RosTopics:
         """
         self._simulation = simulation
         self._root = root
-        self._start_ns = int(simulation.clock.start.replace(tzinfo=UTC).timestamp()) * 10**9
+        self._start_ns = stamp_us(simulation.clock.start) * 1000
         self._step_ns = simulation.clock.step_us * 1000
         self._last: dict[str, tuple[float, float, float]] = {}
         self._scans: dict[str, tuple[object, Any]] = {}

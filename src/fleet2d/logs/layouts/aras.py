@@ -15,6 +15,7 @@ from fleet2d.configuration.units import micros
 from fleet2d.logs.layouts.intervals import is_leaving
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines
 from fleet2d.runtime.clock import DAY_US
+from fleet2d.runtime.local_time import Zone
 
 LINE = re.compile(r"(?:[01]\s+){20}\d{1,2}\s+\d{1,2}")
 """A second."""
@@ -53,7 +54,13 @@ _DAY_S = 86_400
 _SECOND_US = micros(timedelta(seconds=1))
 
 
-def read_aras(path: Path, *, id: str | None = None, sort: bool = False) -> ActivityLog:  # noqa: A002
+def read_aras(
+    path: Path,
+    *,
+    id: str | None = None,  # noqa: A002 - the name of the key
+    sort: bool = False,
+    zone: Zone | None = None,  # noqa: ARG001 - its days have no dates
+) -> ActivityLog:
     """Read the activities of a resident: of a day, or of a folder of days in the order of numbers.
 
     Sensors are those of both residents, so each activity stands for the room that it is done in:
@@ -63,6 +70,7 @@ def read_aras(path: Path, *, id: str | None = None, sort: bool = False) -> Activ
         path: A file DAY_1.txt, or the folder.
         id: The resident, "1" or "2".
         sort: Without effect: seconds are in order.
+        zone: Without effect: days have no dates.
 
     Raises:
         LogError: A line is damaged, a day is longer than one, or the resident isn't named.

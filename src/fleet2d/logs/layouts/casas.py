@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fleet2d.bounds import one_line
+from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines, parse_time, since
+from fleet2d.runtime.local_time import Zone
 
 ON = frozenset({"ON", "OPEN", "PRESENT", "START"})
 OFF = frozenset({"OFF", "CLOSE", "CLOSED", "ABSENT", "STOP", "END"})
@@ -68,7 +70,7 @@ def shows_casas(line: str) -> bool:
     return _has_rooms(line) is not None
 
 
-def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_casas(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read the events of a home; those that switch on become readings of an instant.
 
     Only sensors that switch on show that somebody is there: a motion sensor switches off by itself,
@@ -99,7 +101,9 @@ def read_casas(path: Path, *, sort: bool = False) -> ActivityLog:
             readings.append(Reading(at, at, event.label, activity, number))
         elif event.value.upper() not in OFF:
             others[event.value] += 1
-    readings, notes = in_order(readings, path, sort=sort)
+    readings, notes = by_clock(readings, first_day, zone, path)
+    readings, order_notes = in_order(readings, path, sort=sort)
+    notes += order_notes
     if others:
         values = one_line(", ".join(sorted(others)[:5]), 200)
         notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")

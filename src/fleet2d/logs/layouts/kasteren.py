@@ -14,9 +14,11 @@ from datetime import date, datetime
 from pathlib import Path
 
 from fleet2d.bounds import one_line
+from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.layouts.intervals import is_leaving, label_by_activities
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines, since
 from fleet2d.runtime.clock import DAY_US
+from fleet2d.runtime.local_time import Zone
 
 _STAMP = r"(\d{1,2}-[A-Za-z]{3}-\d{4}\s+\d{1,2}:\d{2}:\d{2})"
 LINE = re.compile(rf"{_STAMP}\s+{_STAMP}\s+(\d+)")
@@ -31,7 +33,7 @@ _KINDS = {"-ss": "sensors", "-as": "activities"}
 _MAPS = {"sensors": "sensormap", "activities": "actionmap"}
 
 
-def read_kasteren(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_kasteren(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read the sensors and activities of a home, whichever of its files is named, or the folder.
 
     During an activity, somebody is where it is done. Else a door or a cupboard shows that somebody
@@ -47,14 +49,16 @@ def read_kasteren(path: Path, *, sort: bool = False) -> ActivityLog:
     activities: list[Reading] = []
     notes: list[str] = []
     for kind, file in files.items():
-        rows = _rows(file, first_day, _names(file, kind))
+        rows, clock_notes = by_clock(
+            _rows(file, first_day, _names(file, kind)), first_day, zone, file
+        )
         if kind == "sensors":
             readings = _switches(rows)
             sensors, order_notes = in_order(readings, file, sort=sort)
             notes += _stuck_notes(file, rows)
         else:
             activities, order_notes = in_order(rows, file, sort=sort)
-        notes += [f"{file.name}: {note}" for note in order_notes]
+        notes += [f"{file.name}: {note}" for note in (*clock_notes, *order_notes)]
     labelled = label_by_activities(sensors, activities)
     idle = [reading for reading in labelled if not reading.activity and reading.room != AWAY]
     readings = sorted([*activities, *idle], key=lambda reading: reading.begin_us)

@@ -19,8 +19,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from fleet2d.bounds import one_line
+from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.layouts.intervals import is_leaving
 from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines, since
+from fleet2d.runtime.local_time import Zone
 
 HEAD = re.compile(
     r"([^,]+),(\d{1,2})/(\d{1,2})/(\d{4}),(\d{1,2}:\d{2}:\d{2}),(\d{1,2}:\d{2}:\d{2})"
@@ -30,7 +32,7 @@ _SENSORS = "sensors.csv"
 _LINES = 5
 
 
-def read_mit(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_mit(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read the activities of a home, and the sensors that switched on during each.
 
     A switch shows that somebody is there at that instant. Labels are the rooms of `sensors.csv`;
@@ -56,7 +58,9 @@ def read_mit(path: Path, *, sort: bool = False) -> ActivityLog:
             at_us = since(first_day, time)
             readings.append(Reading(at_us, at_us, rooms.get(number, name), activity, line))
     # Within a block sensors are in no order, and blocks are in that of activities.
-    ordered, notes = in_order(sorted(readings), file, sort=sort)
+    ordered, notes = by_clock(sorted(readings), first_day, zone, file)
+    ordered, order_notes = in_order(ordered, file, sort=sort)
+    notes += order_notes
     return ActivityLog(path, "mit", first_day, tuple(ordered), tuple(notes))
 
 

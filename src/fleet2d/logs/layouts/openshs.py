@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 from fleet2d.bounds import one_line
+from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.layouts.intervals import is_leaving
 from fleet2d.logs.log import (
     AWAY,
@@ -22,6 +23,7 @@ from fleet2d.logs.log import (
     parse_time,
     since,
 )
+from fleet2d.runtime.local_time import Zone
 
 HEAD = re.compile(
     r"(?=.*\bactivity\b)(?=.*\btimestamp\b)(?=.*\w(?:Carp|Light|Door)\b).*", re.IGNORECASE
@@ -32,7 +34,7 @@ _STATES = {"0": False, "1": True, "false": False, "true": True}
 _PRESENCE = re.compile(r"carp(et)?$|^bed$|^couch$", re.IGNORECASE)
 
 
-def read_openshs(path: Path, *, sort: bool = False) -> ActivityLog:
+def read_openshs(path: Path, *, sort: bool = False, zone: Zone | None = None) -> ActivityLog:
     """Read the sensors of a home, and the activity of each moment.
 
     A carpet, a bed or a couch shows where somebody is as long as it is on; any other sensor when it
@@ -72,7 +74,9 @@ def read_openshs(path: Path, *, sort: bool = False) -> ActivityLog:
             elif before is not None and is_on != before[number]:
                 readings.append(reading)
         before = states
-    readings, notes = in_order(readings, path, sort=sort)
+    readings, notes = by_clock(readings, first_day, zone, path)
+    readings, order_notes = in_order(readings, path, sort=sort)
+    notes += order_notes
     assert first_day is not None  # else there is no reading, which is an error
     return ActivityLog(path, "openshs", first_day, tuple(readings), tuple(notes))
 

@@ -14,15 +14,17 @@ import re
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing
 from datetime import UTC, datetime
+from datetime import time as clock
 from pathlib import Path
 from typing import NamedTuple
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from fleet2d.bounds import LOG_BYTES, LOG_ROWS, check_file, one_line
 from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import micros
+from fleet2d.errors import errors_as
 from fleet2d.logs.log import (
     AWAY,
     ActivityLog,
@@ -31,8 +33,8 @@ from fleet2d.logs.log import (
     in_order,
     log_lines,
     parse_time,
-    since,
 )
+from fleet2d.runtime.local_time import Zone, rules_of, wall_us
 
 _ENTITIES = ("entity_id", "entity", "device", "sensor", "name", "item")
 _VALUES = ("state", "value", "status")
@@ -77,6 +79,7 @@ def read_states(
     *,
     id: str | None = None,  # noqa: A002 - the name of the key
     time_zone: str | None = None,
+    zone: Zone | None = None,
     sort: bool = False,
 ) -> ActivityLog:
     """Read the states of a home: what switches on shows that somebody is there at that instant.
@@ -88,22 +91,27 @@ def read_states(
         path: The table, or the database.
         id: The person's entity, if there are several.
         time_zone: The time zone of the home, if times have an offset or are of a database.
+        zone: The clock of a home whose days have 23 or 25 hours, too.
         sort: Put rows in order of time.
 
     Raises:
         LogError: A row is damaged, there are several people, or a time zone is missing or unknown.
     """
-    states = list(_local(path, _database(path) if is_database(path) else _table(path), time_zone))
+    rows = list(_database(path) if is_database(path) else _table(path))
+    zone = None if zone is None else _of_years(path, rows, zone)
+    states = list(_local(path, rows, zone or time_zone))
     if not states:
         raise LogError(f"{path} holds no reading: is it the right file?")
     person = _person(path, {s.entity for s in states}, id)
     states = _in_order(path, states, sort=sort)
+    first_midnight = datetime.combine(min(state.time for state in states).date(), clock.min)
+    begin = first_midnight if zone is None else zone.at(first_midnight)
     first_day = min(state.time for state in states).date()
     readings: list[Reading] = []
     others: Counter[str] = Counter()
     left: int | None = None  # the reading of being away that isn't over
     for state in states:
-        at = since(first_day, state.time)
+        at = micros(state.time - begin)
         word = state.state.strip().lower()
         if state.entity.startswith(_PEOPLE):
             is_out = word in _OUT and state.entity == person
@@ -219,26 +227,38 @@ def _moment(at: object, path: Path, row: int) -> datetime:
         raise LogError(f"{path}, row {row}: {at!r} is not a time") from None
 
 
+def _of_years(path: Path, rows: list[tuple[str, str, datetime, int]], zone: Zone) -> Zone:
+    """Return the clock of a home for the years of a log.
+
+    Raises:
+        LogError: This machine has no rules of its time zone.
+    """
+    times_us = [wall_us(moment.replace(tzinfo=None)) for _, _, moment, _ in rows] or [0]
+    with errors_as(LogError, f"{path}: there are no rules of the time zone", of=KeyError):
+        return zone.over(min(times_us), max(times_us))
+
+
 def _local(
-    path: Path, rows: Iterator[tuple[str, str, datetime, int]], time_zone: str | None
+    path: Path, rows: Iterable[tuple[str, str, datetime, int]], zone: Zone | str | None
 ) -> Iterator[_State]:
-    """Yield states with local times.
+    """Yield states with local times: of a clock that changes, if it is given.
 
     Raises:
         LogError: Times have an offset and there is no time zone, or it is unknown.
     """
-    zone = None
-    if time_zone is not None:
-        try:
-            zone = ZoneInfo(time_zone)
-        except (ZoneInfoNotFoundError, ValueError):
-            raise LogError(f"{path}: time_zone: there is no {time_zone!r}") from None
+    rules = None
+    if isinstance(zone, str):
+        with errors_as(LogError, f"{path}: time_zone", of=KeyError):
+            rules = rules_of(zone)
     for entity, state, moment, line in rows:
-        if moment.tzinfo is not None and zone is None:
+        local = moment
+        if isinstance(zone, Zone):
+            local = zone.at(moment)
+        elif moment.tzinfo is not None and rules is None:
             raise LogError(
                 f"{path}, line {line}: times have an offset: name the home's time_zone, such as"
                 " Europe/Berlin"
             )
-        is_local = moment.tzinfo is None
-        local = moment if is_local else moment.astimezone(zone).replace(tzinfo=None)
+        elif moment.tzinfo is not None:
+            local = moment.astimezone(rules).replace(tzinfo=None)
         yield _State(entity, state, local, line)

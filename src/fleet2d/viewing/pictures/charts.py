@@ -26,6 +26,7 @@ from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.runtime.clock import HOUR_S, midnight_of
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import written
 from fleet2d.viewing.pictures.floorplan import picture, write_picture
 
 MONDAY = date(2026, 1, 5)
@@ -313,9 +314,9 @@ def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
 
 def _hours_of(run: Run) -> Callable[[int], float]:
     """Return the function from steps to hours since the midnight before the run."""
-    start = run.clock.start
-    begin = (start - midnight_of(start)) / timedelta(hours=1)
-    return lambda step: begin + step * run.manifest["step_us"] / 1e6 / HOUR_S
+    clock = run.clock
+    midnight = midnight_of(clock.start)
+    return lambda step: (written(clock.time(step)) - midnight) / timedelta(hours=1)
 
 
 def answers_figure(run: Run) -> Figure:

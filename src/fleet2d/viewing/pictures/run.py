@@ -15,12 +15,12 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from fleet2d.artifacts.table import categories
-from fleet2d.configuration.units import micros
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, deep_color
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US, HOUR_US, midnight_of
+from fleet2d.runtime.local_time import LocalTime, readings_of, stamp_us, wall_us
 from fleet2d.viewing.pictures.floorplan import (
     DPI,
     drawing_style,
@@ -61,12 +61,19 @@ NOT_SIMULATED = -2
 
 def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) -> I16:
     """Return the room in each minute of each day, int16 (days, BINS); -1 away, -2 not simulated."""
-    midnight = micros(start - midnight_of(start))
-    days = -(-(midnight + steps * step_us) // DAY_US)
-    begins = np.arange(days * BINS) * (DAY_US // BINS) - midnight
+    midnight_us = wall_us(midnight_of(start))
+    over_us = int(readings_of(start, np.array([steps * step_us - 1]))[0]) + 1
+    days = -(-(over_us - midnight_us) // DAY_US)
+    readings_us = midnight_us + np.arange(days * BINS) * (DAY_US // BINS)
+    begins = readings_us - stamp_us(start)
+    is_read = True
+    if isinstance(start, LocalTime):  # of an hour that the clock reads twice, the first counts
+        begins = start.zone.moments(readings_us) - start.utc_us
+        is_read = readings_of(start, begins) == readings_us
     ends = begins + DAY_US // BINS
     sample = np.clip((begins + ends) // 2 // trace.every_us, 0, len(trace.room) - 1)
-    rooms = np.where((ends <= 0) | (begins >= steps * step_us), NOT_SIMULATED, trace.room[sample])
+    is_simulated = (ends > 0) & (begins < steps * step_us) & is_read
+    rooms = np.where(is_simulated, trace.room[sample], NOT_SIMULATED)
     return rooms.reshape(days, BINS).astype(np.int16)
 
 
@@ -79,8 +86,8 @@ def marks_by_day(seen: I64, start: datetime, step_us: int, days: int) -> F64:
         step_us: The length of a step [us].
         days: The number of days.
     """
-    midnight = midnight_of(start)
-    begins = np.unique(seen) * step_us + micros(start - midnight)
+    midnight_us = wall_us(midnight_of(start))
+    begins = np.unique(readings_of(start, seen * step_us)) - midnight_us
     edges = np.arange(days * MARKS + 1) * (DAY_US // MARKS)
     started = np.searchsorted(begins, edges)
     # All steps that start before an edge have ended by then, except possibly the last.
