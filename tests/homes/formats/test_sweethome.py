@@ -6,7 +6,7 @@ import shapely
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.homes.formats.features import choose_level
+from fleet2d.homes.formats.storeys import Storey, choose_storey
 from fleet2d.homes.formats.sweethome import SweetHome
 
 WALLS = """
@@ -143,10 +143,8 @@ def test_one_sees_through_low_windows_between_rooms_only(tmp_path: Path) -> None
 
 
 def test_levels_of_one_name_are_told_apart_by_their_ids() -> None:
-    levels, notes = [("a", "Floor", 0.0), ("b", "Floor", 262.0)], list[str]()
+    levels = [Storey("a", "Floor", 0.0), Storey("b", "Floor", 2.62)]
 
-    assert choose_level(levels, None, notes) == "a"
-    assert notes == ["of its levels, Floor (id a, at 0) is used, not Floor (id b, at 262)"]
-    assert choose_level(levels, "b", []) == "b"
+    assert choose_storey(levels, "b").key == "b"
     with pytest.raises(FloorPlanError, match="2 levels are called 'Floor'; its levels are: Floor"):
-        choose_level(levels, "Floor", [])
+        choose_storey(levels, "Floor")
