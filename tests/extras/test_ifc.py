@@ -115,7 +115,7 @@ def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path)
     model.add("IfcFurnishingElement", (4, 2, 5, 3), "Table", storey="Up", z=(0, 0.75))
     path = model.write(tmp_path)
 
-    assert [0.5] == [thing.height for thing in load_floorplan(path).objects]
+    assert [0.5] == [thing.height for thing in Ifc(path=path, level="Ground").load().objects]
     assert [0.9, None] == [thing.height for thing in Ifc(path=path, level="Up").load().objects]
 
 
@@ -123,7 +123,7 @@ def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path)
 def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     tmp_path: Path, schema: str
 ) -> None:
-    plan = load_floorplan(flat(schema).write(tmp_path))
+    plan = Ifc(path=flat(schema).write(tmp_path), level="Ground").load()
 
     assert [("Kitchen", "kitchen"), ("Schlafzimmer", "bedroom")] == [
         (room.name, room.type) for room in plan.rooms
@@ -134,13 +134,13 @@ def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     assert ["bed"] == [thing.type for thing in plan.objects]
     (pane,) = shapely.transform(plan.glass, plan.lattice.to_metres)
     assert (3.99, 2, 4.21, 3.5) == pytest.approx(pane.bounds, abs=0.002)
-    assert "of its levels, Ground is used, not Up, Cellar" in plan.notes
+    assert "of its storeys, Ground is read, not Cellar, Up" in plan.notes
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
 
 
 def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_path: Path) -> None:
     path = flat().write(tmp_path)
-    walls_only = load_floorplan(flat(spaces=False).write(tmp_path))
+    walls_only = Ifc(path=flat(spaces=False).write(tmp_path), level="Ground").load()
 
     assert 2 == len(walls_only.rooms)
     assert walls_only.area_m2 == pytest.approx(32.2, abs=0.1)
@@ -148,7 +148,7 @@ def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_pat
     assert [("Studio", 32.8)] == [
         (r.name, pytest.approx(r.area_m2, abs=0.2)) for r in upstairs.rooms
     ]
-    with pytest.raises(FloorPlanError, match="its levels are: Up, Ground, Cellar"):
+    with pytest.raises(FloorPlanError, match="its levels are: Cellar, Ground, Up"):
         Ifc(path=path, level="Roof").load()
 
 

@@ -50,12 +50,12 @@ def write(folder: Path, content: object) -> Path:
 def test_scan_becomes_a_home_with_its_longest_wall_along_x(tmp_path: Path, turn_deg: float) -> None:
     plan = load_floorplan(write(tmp_path, scan(turn_deg)))
 
-    assert plan.area_m2 == pytest.approx(2 * 3.9 * 3.9 + 0.1 * 0.9, abs=0.15)
+    assert plan.area_m2 == pytest.approx(2 * 3.95 * 4 + 0.1 * 0.9, abs=0.15)
     assert 2 == len(plan.rooms)
     assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
     assert 0.9 == pytest.approx(plan.doorways[0].width_m, abs=0.01)
     x0, y0, x1, y1 = plan.bounds
-    assert (7.9, 3.9) == pytest.approx((x1 - x0, y1 - y0), abs=0.02)
+    assert (8.0, 4.0) == pytest.approx((x1 - x0, y1 - y0), abs=0.02)
 
 
 def test_furniture_has_the_names_of_the_catalogue_and_its_place(tmp_path: Path) -> None:

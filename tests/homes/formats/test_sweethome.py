@@ -94,15 +94,18 @@ def test_walls_alone_enclose_the_home(tmp_path: Path) -> None:
     assert 2 == len(plan.rooms)
 
 
-def test_level_is_chosen_by_name_and_else_the_ground_floor(tmp_path: Path) -> None:
+def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path: Path) -> None:
     levels = (
         '<level id="a" name="Cellar" elevation="-250"/><level id="b" name="Ground" elevation="0"/>'
     )
     upper = WALLS.replace("<wall", '<wall level="a"').replace('"400"', '"500"')
     path = write(tmp_path, levels, upper, WALLS.replace("<wall", '<wall level="b"'))
 
-    assert SweetHome(path=path).load().bounds[1] == pytest.approx(-3.95)
+    assert SweetHome(path=path, level="Ground").load().bounds[1] == pytest.approx(-3.95)
     assert SweetHome(path=path, level="Cellar").load().bounds[1] == pytest.approx(-4.95)
+    both = SweetHome(path=path).load()
+    assert 4 == len(both.rooms)
+    assert "its storeys lie side by side: Cellar, Ground" in both.notes
     with pytest.raises(FloorPlanError, match="its levels are: Cellar, Ground"):
         SweetHome(path=path, level="Roof").load()
 

@@ -13,10 +13,12 @@ from fleet2d.runtime.determinism import sum_in_order
 
 # Widths of gaps in walls that are closed in turn to find what they enclose [m], and the share of
 # the largest space that it must keep.
-GAPS_M = (0.0, 0.05, 0.2, 0.5, 1.0)
+GAPS_M = (0.0, 0.05, 0.2, 0.5, 1.0, 1.4)
 KEPT_SHARE = 0.7
-# The share of the outlines of rooms along which a file that draws walls has some.
+# The share of the outlines of rooms, or of where they touch, along which a file that draws walls has
+# some.
 DRAWN_SHARE = 1 / 3
+DRAWN_BORDER_SHARE = 1 / 2
 # Widths of a gap in a wall that is a way [m]: people fit through, and wider outside is no doorway.
 LEAST_WAY_M = 0.5
 WIDEST_FRONT_DOOR_M = 1.3
@@ -84,6 +86,8 @@ def outer_gaps(walls: BaseGeometry, whole: MultiPolygon) -> list[Polygon]:
     pieces = []
     rims = shapely.get_parts(whole.boundary.difference(walls.buffer(TOUCH_M / 2))).tolist()
     for rim in rims:
+        if rim.is_empty:
+            continue
         ends = shapely.get_coordinates(rim)[[0, -1]]
         width = float(np.hypot(*(ends[1] - ends[0])))
         if width < LEAST_WAY_M / 2:
@@ -115,13 +119,29 @@ def _depth(walls: BaseGeometry, start: F64, normal: F64) -> float:
     return max((float(part.length) for part in near), default=0.0) + TOUCH_M / 2
 
 
-def draws_walls(walls: BaseGeometry, rooms: Sequence[MultiPolygon], wall_m: float) -> bool:
-    """Return whether a file that has rooms draws all walls that there are, too."""
+def draws_walls(
+    walls: BaseGeometry,
+    rooms: Sequence[MultiPolygon],
+    borders: Sequence[LineString],
+    wall_m: float,
+) -> bool:
+    """Return whether a file that has rooms draws all walls that there are, too.
+
+    Args:
+        walls: The walls [m].
+        rooms: The rooms.
+        borders: The lines along which rooms touch.
+        wall_m: Thickness of walls that are drawn as lines.
+    """
     if walls.is_empty:
         return False
+    near = grown(walls, TOUCH_M + wall_m / 2)
     outlines = shapely.union_all([room.boundary for room in rooms])
-    beside = outlines.intersection(grown(walls, TOUCH_M + wall_m / 2))
-    return bool(beside.length >= DRAWN_SHARE * outlines.length)
+    touching = shapely.union_all(borders)
+    return bool(
+        outlines.intersection(near).length >= DRAWN_SHARE * outlines.length
+        or touching.intersection(near).length >= max(DRAWN_BORDER_SHARE * touching.length, TOUCH_M)
+    )
 
 
 def within_walls(room: MultiPolygon, walls: BaseGeometry, whole: BaseGeometry) -> MultiPolygon:

@@ -218,7 +218,7 @@ class Draft:
         borders = shared_borders(self.rooms)
         # A gap within the precision of drawings is no wall.
         joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
-        if draws_walls(walls, self.rooms, wall_m):
+        if draws_walls(walls, self.rooms, borders, wall_m):
             self._fit_rooms(walls)
             return multi(shapely.union_all([*self.rooms, *joints]))
         free = areas_of(self._of("room"))

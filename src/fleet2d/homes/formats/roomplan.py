@@ -17,7 +17,6 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.configuration.units import InputPath, Length
-from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import Listed, in_file, parse_json, validate
 from fleet2d.floorplan.furniture import measured_height
@@ -297,8 +296,6 @@ def _rooms(scan: _Scan, place: Any, notes: list[str]) -> Iterator[Feature]:
         for k, (space, names) in enumerate(zip(spaces, labels, strict=True)):
             properties = {"labels": names, "type": names[0]} if names else {}
             yield Feature("room", f"room {k} of story {story}", space, properties, str(story))
-    if not scan.walls and not scan.floors:
-        raise FloorPlanError("it has no walls and no floors")
 
 
 def _spaces(
