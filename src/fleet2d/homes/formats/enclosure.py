@@ -15,8 +15,8 @@ from fleet2d.runtime.determinism import sum_in_order
 # the largest space that it must keep.
 GAPS_M = (0.0, 0.05, 0.2, 0.5, 1.0, 1.4)
 KEPT_SHARE = 0.7
-# The share of the outlines of rooms, or of where they touch, along which a file that draws walls has
-# some.
+# The share of the outlines of rooms, or of where they touch, along which a file that draws walls
+# has some.
 DRAWN_SHARE = 1 / 3
 DRAWN_BORDER_SHARE = 1 / 2
 # Widths of a gap in a wall that is a way [m]: people fit through, and wider outside is no doorway.
