@@ -134,7 +134,7 @@ def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     assert ["bed"] == [thing.type for thing in plan.objects]
     (pane,) = shapely.transform(plan.glass, plan.lattice.to_metres)
     assert (3.99, 2, 4.21, 3.5) == pytest.approx(pane.bounds, abs=0.002)
-    assert "of its storeys, Ground is read, not Cellar, Up" in plan.notes
+    assert "of its levels, Ground is used, not Cellar, Up" in plan.notes
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
 
 

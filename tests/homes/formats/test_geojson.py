@@ -372,9 +372,9 @@ FLOORS[0]["id"], FLOORS[1]["id"] = "b", "a"
 
 @pytest.mark.parametrize(
     ("level", "room"),
-    [(None, "Down"), ("0", "Down"), ("G", "Down"), ("a", "Down"), ("1", "Up"), ("Upstairs", "Up")],
+    [("0", "Down"), ("G", "Down"), ("a", "Down"), ("1", "Up"), ("Upstairs", "Up")],
 )
-def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
+def test_one_level_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
     plan = read(tmp_path, *FLOORS, units="m", level=level)
 
     assert [room] == [plan_room.name for plan_room in plan.rooms]
@@ -383,7 +383,7 @@ def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> Non
 
 
 def test_floor_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FloorPlanError, match="no level '7'; its levels are: b or 1 or Upstairs, a"):
+    with pytest.raises(FloorPlanError, match="no level '7'; its levels are: a or 0 or G, b or 1"):
         read(tmp_path, *FLOORS, units="m", level="7")
 
 

@@ -77,6 +77,14 @@ STANDING_M = 0.25
 PORTAL_S = 12.0
 
 _USES = ("category", "type", "usage", "use", "room", "room_type", "function")
+# Tags of OpenStreetMap that tell the use of a room, with the type that they mean.
+_OSM_USES = {
+    ("amenity", "toilets"): "toilet",
+    ("amenity", "kitchen"): "kitchen",
+    ("indoor", "corridor"): "hallway",
+    ("highway", "elevator"): "passenger_elevator",
+    ("stairs", "yes"): "stairs",
+}
 # IMDF's categories of units that have another name in the vocabulary.
 _IMDF_TYPES = {
     "restroom": "toilet",
@@ -425,7 +433,9 @@ def _width_of(door: Feature) -> float:
 
 def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     """Return a room's labels and type: by its use in the file, else by its name."""
-    use = room.text(*_USES) or UNKNOWN
+    tags = ((key, room.properties.get(key)) for key, _ in _OSM_USES)
+    tagged = (_OSM_USES[tag] for tag in tags if tag in _OSM_USES)
+    use = room.text(*_USES) or next(tagged, UNKNOWN)
     name = room.text("name")
     kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
     if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:

@@ -32,11 +32,13 @@ class Storey:
         key: What the features on it have as their level.
         name: Its name.
         elevation: How high its floor is [m]; also its rank.
+        also: Other names that it has.
     """
 
     key: str
     name: str
     elevation: float
+    also: tuple[str, ...] = ()
 
 
 def arrange(
@@ -68,7 +70,7 @@ def arrange(
         chosen = choose_storey(in_order, level)
         others = ", ".join(s.name for s in in_order if s is not chosen)
         if others:
-            notes.append(f"of its storeys, {chosen.name} is read, not {others}")
+            notes.append(f"of its levels, {chosen.name} is used, not {others}")
         return _alone(features, {None, chosen.key})
     of_storey = {storey.key: [f for f in features if f.level == storey.key] for storey in in_order}
     used = _used(in_order, of_storey)
@@ -147,11 +149,13 @@ def choose_storey(storeys: Sequence[Storey], level: str) -> Storey:
     """
     called = [storey.name for storey in storeys]
     names = [
-        s.name if called.count(s.name) == 1 else f"{s.name} (id {s.key}, at {s.elevation:g})"
+        " or ".join(dict.fromkeys((*s.also, s.name)))
+        if called.count(s.name) == 1
+        else f"{s.name} (id {s.key}, at {s.elevation:g})"
         for s in storeys
     ]
-    matches = [s for s in storeys if level == s.key] or [s for s in storeys if level == s.name]
-    matches = matches or [s for s in storeys if level == f"{s.elevation:g}"]
+    matches = [s for s in storeys if level == s.key]
+    matches = matches or [s for s in storeys if level in (s.name, *s.also)]
     if len(matches) == 1:
         return matches[0]
     known = ", ".join(names) or "none"
