@@ -170,9 +170,7 @@ def furniture_of(body: "Body", place: RoomChoice | Point) -> PlacedObject | None
     """
     if is_point(place):
         return None
-    rooms = {
-        name for room in body.reachable_rooms() for name in (room.name, room.type, *room.labels)
-    }
+    rooms = {word for room in body.reachable_rooms() for word in room.words}
     for name in place:
         if name == ANY or name in rooms:
             return None

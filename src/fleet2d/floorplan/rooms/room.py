@@ -300,6 +300,11 @@ class Room:
     anchor_xy: tuple[float, float]
     bounds: tuple[float, float, float, float]
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What it may be called by: its name, its type and its other functions, each once."""
+        return tuple(dict.fromkeys((self.name, self.type, *self.labels)))
+
     def is_called(self, name: str) -> bool:
         """Return whether a name is that of the room, of its type or of another of its functions."""
         return name in (self.name, self.type) or name in self.labels
