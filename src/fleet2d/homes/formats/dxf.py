@@ -39,6 +39,8 @@ DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE")
 LINE_M = 0.02
 NARROW_M = 0.5
 MIN_PART_M2 = 1.0
+# What is nearer to each other is one point [m].
+ROUNDED_M = 0.001
 # Largest distance between two lines of one window [m].
 WINDOW_LINES_M = 0.3
 # Doors are so wide [m]: less apart than any two units are, so that doors decide between these. They
@@ -188,6 +190,17 @@ def _panes(lines: Sequence[F64]) -> list[Feature]:
     return windows
 
 
+def _clean(line: F64) -> F64:
+    """Return a line without steps of less than a millimetre [m], and shut if its ends meet."""
+    kept = np.concatenate([[True], np.hypot(*np.diff(line, axis=0).T) > ROUNDED_M])
+    if not kept[1:].any():
+        return line
+    line = line[kept]
+    if len(line) > 2 and np.hypot(*(line[-1] - line[0])) <= ROUNDED_M:
+        line[-1] = line[0]
+    return line
+
+
 def _door_arcs(drawing: Any) -> F64:
     """Return the arcs of doors as their middle (x, y) and radius, float64 (n, 3), in units."""
     arcs = []
@@ -265,7 +278,7 @@ def _inside(lines: list[F64], notes: list[str]) -> tuple[MultiPolygon, list[tupl
 
     What is narrower than a person is the inside of a wall, and gaps in outer walls are shut.
     """
-    drawn = shapely.union_all([LineString(line) for line in lines])
+    drawn = shapely.union_all([LineString(_clean(line)) for line in lines])
     thick = drawn.buffer(NARROW_M / 2, cap_style="square", join_style="mitre")
     solid = grown(thick, -NARROW_M / 2)
     alone = drawn.difference(solid.buffer(LINE_M / 2))

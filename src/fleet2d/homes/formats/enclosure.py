@@ -9,12 +9,11 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.rooms.doorways import MAX_WALL_M, TOUCH_M
 from fleet2d.kernels import F64
-from fleet2d.runtime.determinism import sum_in_order
 
-# Widths of gaps in walls that are closed in turn to find what they enclose [m], and the share of
-# the largest space that it must keep.
-GAPS_M = (0.0, 0.05, 0.2, 0.5, 1.0, 1.4)
-KEPT_SHARE = 0.7
+# Widths of gaps in walls that are closed in turn to find what they enclose [m], none of them a usual
+# width of doors, and the share of the largest space that it must keep.
+GAPS_M = (0.0, 0.05, 0.2, 0.53, 1.07, 1.43)
+KEPT_SHARE = 0.97
 # The share of the outlines of rooms, or of where they touch, along which a file that draws walls
 # has some.
 DRAWN_SHARE = 1 / 3
@@ -67,10 +66,9 @@ def enclosed_space(
         solid = parts_of(grown(shut, gap / 2))
         shells = [Polygon(part.exterior) for part in solid if part.interiors]
         whole = grown(shapely.union_all(shells), -gap / 2)
-        inside = sum_in_order(Polygon(hole).area for part in solid for hole in part.interiors)
-        outlines.append((inside, whole, gap))
-    most = max(inside for inside, *_ in outlines)
-    whole, gap = next((w, g) for inside, w, g in outlines if inside >= KEPT_SHARE * most)
+        outlines.append((whole, gap))
+    most = max(float(whole.area) for whole, _ in outlines)
+    whole, gap = next((w, g) for w, g in outlines if w.area >= KEPT_SHARE * most)
     if gap > 0 and most > 0:
         notes.append(f"gaps in the walls are closed up to {gap:g} m to find the inside")
     return multi(whole)
@@ -186,7 +184,7 @@ def wall_gaps(walls: BaseGeometry, rooms: Sequence[MultiPolygon]) -> Iterator[Li
     solid = shapely.union_all([walls, *rooms])
     closed = grown(grown(solid, WIDEST_FRONT_DOOR_M / 2), -WIDEST_FRONT_DOOR_M / 2)
     inner = shapely.union_all(rooms)
-    for piece in parts_of(closed.difference(solid)):
+    for piece in parts_of(opened(closed.difference(solid), TOUCH_M)):  # no slivers along walls
         box = piece.minimum_rotated_rectangle
         if box.area == 0 or piece.area < STRAIGHT_SHARE * box.area:
             continue

@@ -410,7 +410,7 @@ class Draft:
 
 def _door_at(door: Feature, rooms: Sequence[MultiPolygon]) -> LineString:
     """Return the line of a door that the file has as a point: along the nearest side of a room."""
-    at = door.shape
+    at: Any = door.shape
     ring = min((ring for room in rooms for ring in shapely.get_rings(room)), key=at.distance)
     corners = shapely.get_coordinates(ring)
     sides = [LineString(pair) for pair in pairwise(corners)]

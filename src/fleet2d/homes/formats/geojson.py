@@ -123,7 +123,8 @@ def read_features(content: dict[str, Any], notes: list[str]) -> tuple[list[Featu
             POLYGONS.check(parts, "it", FloorPlanError, prefix="at least ")
             corners += int(shapely.get_num_coordinates(shape))
             CORNERS.check(corners, "it", FloorPlanError, prefix="at least ")
-            for level in _levels(properties) or [None]:
+            levels: list[str | None] = [*_levels(properties)]
+            for level in levels or [None]:
                 features.append(Feature(kind, where, shape, properties, level))
                 if kind == "wall" and properties.get("category") == "glass":
                     features.append(replace(features[-1], kind="window"))

@@ -64,8 +64,9 @@ def _radians(angle: object) -> object:
     value = angle.get("value")
     unit = angle.get("unit")
     symbol = unit.get("symbol") if isinstance(unit, dict) else unit
-    is_degrees = symbol in ("°", "deg") and isinstance(value, int | float)
-    return math.radians(value) if is_degrees else value
+    if symbol in ("°", "deg") and isinstance(value, int | float):
+        return math.radians(value)
+    return value
 
 
 Angle = Annotated[float, BeforeValidator(_radians), Field(ge=-100, le=100)]
