@@ -143,5 +143,5 @@ def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path: 
         drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "WALL"})
     drawing.saveas(tmp_path / "plan.dxf")
 
-    with pytest.raises(FloorPlanError, match="set floorplan.scale; 0.01 makes it 57 m2"):
+    with pytest.raises(FloorPlanError, match=r"set floorplan\.scale; 0\.01 makes it 57 m2"):
         load_floorplan(tmp_path / "plan.dxf")

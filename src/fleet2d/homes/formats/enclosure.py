@@ -10,8 +10,8 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.floorplan.rooms.doorways import MAX_WALL_M, TOUCH_M
 from fleet2d.kernels import F64
 
-# Widths of gaps in walls that are closed in turn to find what they enclose [m], none of them a usual
-# width of doors, and the share of the largest space that it must keep.
+# Widths of gaps in walls that are closed in turn to find what they enclose [m], none of them that
+# of usual doors, and the share of the largest space that it must keep.
 GAPS_M = (0.0, 0.05, 0.2, 0.53, 1.07, 1.43)
 KEPT_SHARE = 0.97
 # The share of the outlines of rooms, or of where they touch, along which a file that draws walls
@@ -24,7 +24,7 @@ WIDEST_FRONT_DOOR_M = 1.3
 # The part of its rectangle that a straight gap fills, and of its sides that walls and rooms touch.
 STRAIGHT_SHARE = 0.85
 SIDE_SHARE = 0.5
-# The narrowest space, and the smallest, that is more than a gap between a room and a wall.
+# The narrowest space, and the smallest, that is more than a gap in a wall.
 NARROW_M = 0.5
 LEAST_M2 = 0.5
 
@@ -163,12 +163,18 @@ def within_walls(room: MultiPolygon, walls: BaseGeometry, whole: BaseGeometry) -
 def unnamed_space(walls: BaseGeometry, rooms: Sequence[MultiPolygon]) -> list[Polygon]:
     """Return the spaces that walls and rooms surround, and that are in no room.
 
-    Gaps between a room and its wall are left out.
+    Gaps in the wall between two rooms are left out.
     """
     solid = shapely.union_all([walls, *rooms])
     holes = [Polygon(ring) for part in parts_of(solid) for ring in part.interiors]
-    spaces = parts_of(opened(shapely.union_all(holes).difference(solid), NARROW_M))
-    return [space for space in spaces if space.area >= LEAST_M2]
+    spaces = parts_of(opened(shapely.union_all(holes).difference(solid), 2 * TOUCH_M))
+    large = [space for space in spaces if space.area >= LEAST_M2]
+    return [
+        space
+        for space in large
+        if not opened(space, NARROW_M).is_empty
+        or sum(room.distance(space) <= TOUCH_M for room in rooms) == 1
+    ]
 
 
 def wall_gaps(walls: BaseGeometry, rooms: Sequence[MultiPolygon]) -> Iterator[LineString]:
