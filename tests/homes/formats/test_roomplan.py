@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.small_home import TYPES, VARIATIONS, check, noisy, small_home
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.homes.formats.roomplan import RoomPlan
-from tests.small_home import TYPES, VARIATIONS, check, noisy, small_home
 
 
 def surface(x: float, z: float, width: float, angle_deg: float = 0, **keys: Any) -> dict[str, Any]:

@@ -4,13 +4,13 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 import shapely
+from tests.small_home import INNER_M, OUTER_M, VARIATIONS, check, small_home
 
 import fleet2d
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.homes.formats.storeys import Storey, choose_storey
 from fleet2d.homes.formats.sweethome import SweetHome
-from tests.small_home import INNER_M, OUTER_M, VARIATIONS, check, small_home
 
 WALLS = """
 <wall xStart="0" yStart="0" xEnd="800" yEnd="0" thickness="10"/>

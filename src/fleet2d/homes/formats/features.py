@@ -62,6 +62,8 @@ INSIDE_M = 0.3
 ENTRANCE_REACH_M = 1.0
 # Side of an object that is drawn as a point, and width of a door that is.
 POINT_OBJECT_M = 0.1
+# Space in no room that is smaller belongs to the nearest [m2].
+SLIVER_M2 = 0.1
 POINT_DOOR_M = 0.9
 DOOR_WIDTHS_M = (0.4, 5.0)
 # Words in the names of front doors, in several languages, and what a door outside leads to, the
@@ -315,7 +317,7 @@ class Draft:
     # --- Rooms and objects ---------------------------------------------------------------------
 
     def _regions(self, cell: float) -> list[LabelledRegion]:
-        """Return the rooms, each with its half of the passages through its walls."""
+        """Return the rooms, each with its half of the passages through its walls, and slivers."""
         halves: list[list[Polygon]] = [[] for _ in self.rooms]
         for _, passage in self.doors if self.rooms else ():
             for half in passage.halves:
@@ -323,6 +325,11 @@ class Draft:
                 overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
                 if max(overlap) < half.area / 2:
                     halves[away.index(min(away))].append(half)
+        covered = shapely.union_all([*self.rooms, *(half for own in halves for half in own)])
+        for sliver in parts_of(self.free.difference(covered)) if self.rooms else ():
+            if 0 < sliver.area < SLIVER_M2:  # of inexact outlines
+                away = shapely.distance(self.rooms, sliver).tolist()
+                halves[away.index(min(away))].append(sliver)
         own_names = [room.text("name") for room in self._of("room")]
         names = distinct_names(own_names, "rooms", self.notes)
         regions = []
@@ -411,7 +418,8 @@ class Draft:
 def _door_at(door: Feature, rooms: Sequence[MultiPolygon]) -> LineString:
     """Return the line of a door that the file has as a point: along the nearest side of a room."""
     at: Any = door.shape
-    ring = min((ring for room in rooms for ring in shapely.get_rings(room)), key=at.distance)
+    rings = [ring for room in rooms for ring in shapely.get_rings(shapely.get_parts(room))]
+    ring = min(rings, key=at.distance)
     corners = shapely.get_coordinates(ring)
     sides = [LineString(pair) for pair in pairwise(corners)]
     side = min(sides, key=at.distance)
