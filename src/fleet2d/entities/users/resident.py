@@ -632,8 +632,8 @@ def _match(actor: Actor, activity: Activity) -> tuple[str, list[Room]]:
 def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[str, list[Room]]:
     """Return the first of the names of an activity's rooms that fits, and all rooms that it means.
 
-    Rooms with furniture for the activity come before others: first those with any of it that the
-    activity names, then any room with its main piece.
+    Rooms with furniture for the activity come before others: first those that it names, then any,
+    but for chairs, which stand at the desks of bedrooms, too.
 
     Args:
         activity: The activity.
@@ -648,7 +648,7 @@ def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[st
     )
     if activity.objects and activity.first == "furniture":
         for name in activity.rooms:
-            kinds = activity.objects if name != "any" else activity.objects[:1]
+            kinds = set(activity.objects) - ({"chair"} if name == "any" else set())
             used = {home.room_of(t) for t in home.objects if t.type in kinds and t.uses}
             with suppress(PlacementError):  # it has no such room
                 furnished = [room for room in match((name,))[1] if room in used]
