@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import path, run, scenario
+from tests.scenes import path, run
+from tests.scenes import scenario as lives
 
 import fleet2d
 from fleet2d.errors import FloorPlanError, ScenarioError
@@ -156,7 +157,7 @@ def test_a_robot_gets_upstairs_if_it_climbs(tmp_path: Path, climbs: bool, rooms:
     floorplan = {"type": "native", "path": str(house(tmp_path))}
     rounds = {"type": "patrol", "rooms": ["kitchen", "bedroom"]}
     robots = {"astro": {"start": "kitchen", "climbs": climbs, "behaviors": [rounds]}}
-    stored = run(scenario("2 h", users={}, robots=robots, floorplan=floorplan))
+    stored = run(lives("2 h", users={}, robots=robots, floorplan=floorplan))
 
     way = path(stored, "astro")
     still = (np.diff(way.x) == 0) & (np.diff(way.y) == 0)
@@ -167,7 +168,7 @@ def test_members_of_a_household_sleep_upstairs(tmp_path: Path) -> None:
     floorplan = {"type": "native", "path": str(house(tmp_path)), "furnish": True}
     household = {"members": {"ana": "retired", "ben": "works_outside"}}
     users = {name: {"type": "routine", "household": household} for name in household["members"]}
-    stored = run(scenario("1 d", users=users, robots={}, floorplan=floorplan))
+    stored = run(lives("1 d", users=users, robots={}, floorplan=floorplan))
 
     for name in users:
         way = path(stored, name)
