@@ -453,14 +453,13 @@ def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
 
 def _standing_ends(standing: BaseGeometry, way: LineString) -> tuple[float, Point, Point]:
     """Return how far people stand from the ends of stairs, the most [m], and where."""
-    away = 0.0
-    places: list[Point] = []
-    for end in shapely.get_coordinates(way)[[0, -1]]:
-        line = shapely.shortest_line(standing, shapely.Point(end))
-        away = max(away, np.inf if line is None or line.is_empty else float(line.length))
-        x, y = shapely.get_coordinates(line)[0].tolist() if np.isfinite(away) else end.tolist()
-        places.append((round(x, 6), round(y, 6)))
-    return away, places[0], places[1]
+    ends = shapely.get_coordinates(way)[[0, -1]]
+    if standing.is_empty:
+        return np.inf, (0.0, 0.0), (0.0, 0.0)
+    lines = [shapely.shortest_line(standing, shapely.Point(end)) for end in ends]
+    places = [shapely.get_coordinates(line)[0].round(6).tolist() for line in lines]
+    (x0, y0), (x1, y1) = places
+    return max(float(line.length) for line in lines), (x0, y0), (x1, y1)
 
 
 def _to_plan(move: Move, at: Point) -> Point:
