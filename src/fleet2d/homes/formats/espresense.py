@@ -18,14 +18,14 @@ from fleet2d.homes.formats.storeys import Storey, arrange
 Height = Annotated[float, Field(ge=-1e4, le=1e4)]
 
 
-class _Room(BaseModel):
+class _PointedRoom(BaseModel):
     model_config = ConfigDict(defer_build=True, coerce_numbers_to_str=True)
 
     name: str = ""
     points: Ring
 
 
-class _Floor(BaseModel):
+class _EspresenseFloor(BaseModel):
     """A storey; `bounds` are two corners (x, y, z) [m]."""
 
     model_config = ConfigDict(defer_build=True, coerce_numbers_to_str=True)
@@ -33,10 +33,10 @@ class _Floor(BaseModel):
     id: str = ""
     name: str = ""
     bounds: Listed[Listed[Height]] = []
-    rooms: Listed[_Room] = []
+    rooms: Listed[_PointedRoom] = []
 
 
-_FLOORS = TypeAdapter(Listed[_Floor])
+_FLOORS = TypeAdapter(Listed[_EspresenseFloor])
 
 
 class Espresense(FileSource):

@@ -77,7 +77,7 @@ def _name_of(category: object) -> object:
     return next(iter(category), "object") if isinstance(category, dict) else category
 
 
-class _Curve(BaseModel):
+class _SurfaceCurve(BaseModel):
     """How a surface is curved, in its own x and z [m]."""
 
     model_config = ConfigDict(defer_build=True)
@@ -105,7 +105,7 @@ class _Surface(BaseModel):
     dimensions: Extent
     transform: Matrix
     category: Annotated[str, BeforeValidator(_name_of)] = "object"
-    curve: _Curve | None = None
+    curve: _SurfaceCurve | None = None
     corners: Listed[Extent] = Field(default=[], alias="polygonCorners")
     story: int = 0
 
