@@ -689,3 +689,9 @@ def test_three_centimetres_of_noise_keep_the_door(tmp_path: Path, k: int) -> Non
     assert [True] == [d.leaf for d in plan.doorways]
     assert plan.doorways[0].width_m == pytest.approx(0.9, abs=0.1)
     assert plan.area_m2 == pytest.approx(24 - 0.1 * 2.1, abs=0.3)
+
+
+def test_a_room_may_name_its_building(tmp_path: Path) -> None:
+    room = feature(box(0, 0, 4, 3), name="Kitchen", building="House A")
+
+    assert ["Kitchen"] == [r.name for r in read(tmp_path, room, units="m").rooms]

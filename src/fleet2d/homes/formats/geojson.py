@@ -105,6 +105,8 @@ def read_features(content: dict[str, Any], notes: list[str]) -> tuple[list[Featu
     floors: list[dict[str, Any]] = []
     ignored: Counter[str] = Counter()
     parts = corners = 0
+    tags = (item.get("properties") for item in items if isinstance(item, dict))
+    is_osm = any(isinstance(own, dict) and "indoor" in own for own in tags)
     for number, item in enumerate(items):
         where = f"features[{number}]"
         if not isinstance(item, dict):
@@ -112,7 +114,7 @@ def read_features(content: dict[str, Any], notes: list[str]) -> tuple[list[Featu
         properties = item.get("properties") or {}
         if not isinstance(properties, dict):
             raise FloorPlanError(f"{where}.properties is {shown_value(properties)}: no object")
-        kind, name = _kind(item, properties, where)
+        kind, name = _kind(item, properties, where, is_osm)
         if name == "level":
             floors.append({**properties, "id": item.get("id")})
         elif kind is None:
@@ -164,7 +166,9 @@ def in_metres(
 # --- Kinds and floors --------------------------------------------------------------------------
 
 
-def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple[str | None, str]:
+def _kind(
+    item: dict[str, Any], properties: dict[str, Any], where: str, is_osm: bool
+) -> tuple[str | None, str]:
     """Return a feature's kind, None for an unknown one, and its name for a note."""
     geometry = item.get("geometry")
     form = geometry.get("type") if isinstance(geometry, dict) else None
@@ -185,7 +189,7 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
         if imdf == "opening" and isinstance(door, dict) and door.get("type") != "open":
             return "door", imdf  # a leaf hangs in it
         return _IMDF_KINDS.get(imdf), imdf
-    tagged = _osm_kind(properties, form)
+    tagged = _osm_kind(properties, form) if is_osm else None
     if tagged is not None:
         return tagged
     for key in ("type", "category"):
