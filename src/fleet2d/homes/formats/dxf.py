@@ -248,7 +248,7 @@ def _scales(drawing: Any, lines: list[F64], arcs: F64) -> list[float]:
 def _likeliest(plans: list[tuple[float, FloorPlan]], drawing: Any, is_given: bool) -> FloorPlan:
     """Return the home in the likeliest of some scales, which have no doors with arcs to decide.
 
-    That is the one that the file says, unless in another one more gaps are as wide as doors.
+    That is the one that the file says, unless in it far fewer gaps are as wide as doors.
 
     Raises:
         FloorPlanError: Several are as likely.
@@ -259,8 +259,10 @@ def _likeliest(plans: list[tuple[float, FloorPlan]], drawing: Any, is_given: boo
         return sum(DOOR_M[0] <= door.width_m <= DOOR_M[1] for door in plan.doorways)
 
     most = max(doors(plan) for _, plan in plans)
-    best = [(scale, plan) for scale, plan in plans if doors(plan) == most]
-    scale, plan = next((entry for entry in best if entry[0] == said), best[0])
+    least = max(most / 2, min(most, 1))
+    best = [entry for entry in plans if doors(entry[1]) == most]
+    likely = (entry for entry in plans if entry[0] == said and doors(entry[1]) >= least)
+    scale, plan = next(likely, best[0])
     if len(best) > 1 and scale != said:
         sizes = ", ".join(f"{scale:g} makes it {plan.area_m2:.0f} m2" for scale, plan in best)
         raise FloorPlanError(

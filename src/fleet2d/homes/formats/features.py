@@ -19,6 +19,7 @@ from fleet2d.floorplan.native import ObjectUse
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, Portal, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
+    BORDER_M,
     NEAR_M,
     TOUCH_M,
     DoorLine,
@@ -227,7 +228,7 @@ class Draft:
         """Return the rooms, with walls where they touch unless the file draws its walls."""
         borders = shared_borders(self.rooms)
         # A gap within the precision of drawings is no wall.
-        joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
+        joints = [line.buffer(BORDER_M, cap_style="flat") for line in borders]
         if draws_walls(walls, self.rooms, borders, wall_m):
             self._fit_rooms(walls)
             return multi(shapely.union_all([*self.rooms, *joints]))
