@@ -57,7 +57,8 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
 
     No piece stands within 0.9 m before a doorway, or where it would cut a route: free places that
     a body of 0.1 m to 0.25 m radius could walk between stay connected, and each piece is reachable.
-    A room that has furniture already, or an unknown type, stays as it is. The same plan and seed
+    A room that has furniture already, or an unknown type, stays as it is, unless it serves as the
+    living room of a home with rooms of known types. The same plan and seed
     give the same furniture on every machine.
 
     Args:
@@ -82,7 +83,7 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
         )
     interior = Interior(plan)
     kinds = {label for room in plan.rooms for label in (room.type, *room.labels)}
-    serving = day_room(plan.rooms)
+    serving = day_room(plan.rooms) if kinds.intersection(RULES) else None
     furnished = {room.index for room in plan.rooms if plan.objects_in(room)}
     for room in plan.rooms:
         if room.index not in furnished:
