@@ -345,11 +345,11 @@ def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(
         "format": "fleet2d-floorplan",
         "version": 1,
         "free": [
-            {"outline": [[0, 0], [4, 0], [4, 4], [0, 4]]},
+            {"outline": [[0, 0], [4, 0], [4, 6], [0, 6]]},
             {"outline": [[5, 0], [8, 0], [8, 4], [5, 4]]},
         ],
         "rooms": [
-            {"type": "kitchen", "polygon": [[0, 0], [4, 0], [4, 4], [0, 4]]},
+            {"type": "kitchen", "polygon": [[0, 0], [4, 0], [4, 6], [0, 6]]},
             {"type": "office", "polygon": [[5, 0], [8, 0], [8, 4], [5, 4]]},
         ],
     }

@@ -1,7 +1,11 @@
+import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from tests.small_home import VARIATIONS, SmallHome, check, small_home
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
@@ -84,3 +88,60 @@ def test_one_sees_through_windows_between_rooms(tmp_path: Path) -> None:
     assert pane.area / plan.lattice.units_per_m**2 == pytest.approx(0.8 * 0.22, abs=0.05)
     assert 2 == len(plan.rooms)
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
+
+
+# Metres to a unit, and what the header says: it lies in the last five, where doors have arcs.
+UNITS = [(0.001, 4), (0.01, 5), (1.0, 6), (0.0254, 1), (0.3048, 2), (0.001, 0)]
+LIES = [(0.0254, 4), (0.001, 6), (0.01, 4), (0.0254, 6), (0.01, 1)]
+
+
+def drawn(home: SmallHome, k: int, folder: Path) -> Path:
+    unit_m, header = (UNITS + LIES)[k % 11]
+    drawing: Any = ezdxf.new(units=header)
+    space = drawing.modelspace()
+    layer = {"layer": ("WALL", "A-WALL", "Wände", "MURS", "Muros", "0-MURI")[k % 6]}
+
+    def units(point: tuple[float, float]) -> tuple[float, float]:
+        return point[0] / unit_m, point[1] / unit_m
+
+    for box in home.walls:
+        corners = [units(p) for p in home.corners(box)]
+        if k % 2:
+            space.add_lwpolyline(corners, close=True, dxfattribs=layer)
+        else:
+            for a, b in pairwise([*corners, corners[0]]):
+                space.add_line(a, b, dxfattribs=layer)
+    if k % 11 >= len(UNITS) or k % 3 == 0:
+        for start, end in (*map(home.line, home.doors), home.line(home.front)):
+            angle = math.degrees(math.atan2(end[1] - start[1], end[0] - start[0]))
+            radius = math.dist(start, end) / unit_m
+            space.add_arc(units(start), radius, angle - 90, angle, dxfattribs={"layer": "A-DOOR"})
+    path = folder / "plan.dxf"
+    drawing.saveas(path)
+    return path
+
+
+@pytest.mark.parametrize("k", VARIATIONS)
+def test_drawings_of_any_unit_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+    home = small_home(k, turns=(0, 90, 17, 0, 45))
+
+    plan = load_floorplan(drawn(home, k, tmp_path))
+
+    check(plan, home, types=("room",) * 3)
+    assert plan.entrance is not None
+    front = np.mean(home.line(home.front), axis=0)
+    lowest = np.min([home.corners(box) for box in home.walls], axis=(0, 1))
+    assert math.dist(plan.entrance, front - lowest) < 0.5
+
+
+def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path: Path) -> None:
+    drawing: Any = ezdxf.new(units=0)
+    for corners in (
+        [(0, 0), (900, 0), (900, 700), (0, 700)],
+        [(20, 20), (880, 20), (880, 680), (20, 680)],
+    ):
+        drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "WALL"})
+    drawing.saveas(tmp_path / "plan.dxf")
+
+    with pytest.raises(FloorPlanError, match=r"set floorplan\.scale; 0\.01 makes it 57 m2"):
+        load_floorplan(tmp_path / "plan.dxf")

@@ -1,8 +1,10 @@
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 import shapely
+from tests.small_home import INNER_M, OUTER_M, VARIATIONS, check, small_home
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
@@ -16,9 +18,10 @@ Box = tuple[float, float, float, float]
 class Model:
     """An IFC model of boxes, written by ifcopenshell's own functions in millimetres."""
 
-    def __init__(self, storeys: dict[str, float], schema: str = "IFC4") -> None:
+    def __init__(self, storeys: dict[str, float], schema: str = "IFC4", turn: float = 0.0) -> None:
         from ifcopenshell.api import aggregate, context, project, root, unit
 
+        self.turn = turn
         self.file = project.create_file(version=schema)
         top = root.create_entity(self.file, ifc_class="IfcProject", name="flat")
         unit.assign_unit(self.file)
@@ -46,6 +49,9 @@ class Model:
         from ifcopenshell.api import geometry
 
         matrix = np.eye(4)
+        if not element.is_a("IfcBuildingStorey"):
+            c, s = math.cos(self.turn), math.sin(self.turn)
+            matrix[:2, :2] = [[c, -s], [s, c]]
         matrix[2, 3] = z
         geometry.edit_object_placement(self.file, product=element, matrix=matrix)
 
@@ -115,7 +121,7 @@ def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path)
     model.add("IfcFurnishingElement", (4, 2, 5, 3), "Table", storey="Up", z=(0, 0.75))
     path = model.write(tmp_path)
 
-    assert [0.5] == [thing.height for thing in load_floorplan(path).objects]
+    assert [0.5] == [thing.height for thing in Ifc(path=path, level="Ground").load().objects]
     assert [0.9, None] == [thing.height for thing in Ifc(path=path, level="Up").load().objects]
 
 
@@ -123,7 +129,7 @@ def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path)
 def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     tmp_path: Path, schema: str
 ) -> None:
-    plan = load_floorplan(flat(schema).write(tmp_path))
+    plan = Ifc(path=flat(schema).write(tmp_path), level="Ground").load()
 
     assert [("Kitchen", "kitchen"), ("Schlafzimmer", "bedroom")] == [
         (room.name, room.type) for room in plan.rooms
@@ -134,13 +140,13 @@ def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     assert ["bed"] == [thing.type for thing in plan.objects]
     (pane,) = shapely.transform(plan.glass, plan.lattice.to_metres)
     assert (3.99, 2, 4.21, 3.5) == pytest.approx(pane.bounds, abs=0.002)
-    assert "of its levels, Ground is used, not Up, Cellar" in plan.notes
+    assert "of its levels, Ground is used, not Cellar, Up" in plan.notes
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
 
 
 def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_path: Path) -> None:
     path = flat().write(tmp_path)
-    walls_only = load_floorplan(flat(spaces=False).write(tmp_path))
+    walls_only = Ifc(path=flat(spaces=False).write(tmp_path), level="Ground").load()
 
     assert 2 == len(walls_only.rooms)
     assert walls_only.area_m2 == pytest.approx(32.2, abs=0.1)
@@ -148,7 +154,7 @@ def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_pat
     assert [("Studio", 32.8)] == [
         (r.name, pytest.approx(r.area_m2, abs=0.2)) for r in upstairs.rooms
     ]
-    with pytest.raises(FloorPlanError, match="its levels are: Up, Ground, Cellar"):
+    with pytest.raises(FloorPlanError, match="its levels are: Cellar, Ground, Up"):
         Ifc(path=path, level="Roof").load()
 
 
@@ -183,3 +189,69 @@ def test_text_in_another_encoding_is_no_obstacle(tmp_path: Path) -> None:
     )
 
     assert plan == load_floorplan(path)
+
+
+def variation(k: int, folder: Path) -> tuple[Path, int, bool]:
+    """A model with gaps in its walls, or doors; perhaps an open plan, and several storeys."""
+    home = small_home(k, turns=(0, 90, 17))
+    is_open = k % 3 == 0
+    names = [f"Storey {n}" for n in range(1 + k % 4 // 2 * (1 + k % 2))]
+    model = Model({n: 2.8 * i for i, n in enumerate(names)}, ("IFC4", "IFC4X3")[k % 2], home.turn)
+    (_, _, x, y), (_, y1, _, top), (x1, _, right, _) = home.rooms
+    t = OUTER_M
+    whole = [(-t, -t, right + t, 0), (-t, top, right + t, top + t), (right, 0, right + t, top)]
+    whole += [(-t, 0, 0, top), (0, y, x, y1), (x, 0, x1, top)]
+    for number, storey in enumerate(names):
+        walls = home.walls if k % 2 else whole
+        for wall in walls:
+            if not (is_open and wall[1] == y and wall[3] == y1):
+                model.add("IfcWall", wall, storey=storey)
+        for k_room, (room, name) in enumerate(zip(home.rooms, home.names, strict=True)):
+            box = (room[0], room[1], room[2], y1) if is_open and k_room == 0 else room
+            model.add("IfcSpace", box, str(k_room), storey, LongName=name)
+        for kind, ((ax, ay), (bx, by)) in zip("ooi", (*home.doors, home.front), strict=True):
+            half = (OUTER_M if kind == "i" else INNER_M) / 2 - 0.01
+            across = ay == by
+            box = (ax, ay - half, bx, by + half) if across else (ax - half, ay, bx + half, by)
+            if not k % 2 and not (is_open and across):
+                model.add("IfcDoor", box, storey=storey, z=(0, 2.1))
+        if number + 1 < len(names):
+            model.add("IfcStair", (right - 1, 0.5, right, 3.5), storey=storey, z=(0, 2.8))
+    return model.write(folder), len(names), is_open
+
+
+@pytest.mark.parametrize("k", VARIATIONS)
+def test_models_of_any_storeys_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+    path, storeys, is_open = variation(k, tmp_path)
+
+    plan = load_floorplan(path)
+
+    check(plan, small_home(k), doors=1 if is_open else 2, storeys=storeys, slack=0.03)
+    assert not any("there are walls" in note for note in plan.notes)
+
+
+def test_a_whole_house_is_side_by_side_and_its_stairs_are_a_portal(tmp_path: Path) -> None:
+    model = flat()
+    model.add("IfcStair", (5, 0.5, 6, 3.5), z=(0, 2.8))
+    plan = load_floorplan(model.write(tmp_path))
+
+    assert ["Kitchen", "Schlafzimmer", "Studio"] == [room.name for room in plan.rooms]
+    assert "storeys without rooms, which are left out: Cellar" in plan.notes
+    ((_, takes_us),) = [(p.type, p.takes_us) for p in plan.portals]
+    assert 11.5e6 == pytest.approx(takes_us, rel=0.01)  # 16.5 treads of 17 cm in 0.7 s each
+
+
+def test_an_opening_without_a_door_is_a_way_and_one_above_a_sill_is_none(tmp_path: Path) -> None:
+    ways = {}
+    for z in ((0.0, 2.2), (0.9, 2.2)):
+        model = Model({"Ground": 0.0})
+        for wall in ((-0.2, -0.2, 8.4, 0), (-0.2, 4, 8.4, 4.2), (-0.2, 0, 0, 4), (8.2, 0, 8.4, 4)):
+            model.add("IfcWall", wall)
+        model.add("IfcWall", (4, 0, 4.2, 4))
+        for number, box in enumerate(((0, 0, 4, 4), (4.2, 0, 8.2, 4))):
+            model.add("IfcSpace", box, str(number))
+        model.add("IfcOpeningElement", (3.9, 1, 4.3, 2), z=z)
+        ways[z] = len(load_floorplan(model.write(tmp_path)).polygons)
+        (tmp_path / "flat.ifc").unlink()
+
+    assert {(0.0, 2.2): 1, (0.9, 2.2): 2} == ways

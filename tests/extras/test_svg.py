@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+from tests.small_home import INNER_M, VARIATIONS, check, small_home
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
@@ -84,3 +85,63 @@ def test_one_sees_through_windows_between_rooms(tmp_path: Path) -> None:
     (pane,) = plan.glass
     assert pane.area / plan.lattice.units_per_m**2 == pytest.approx(1.3 * 0.22, abs=0.02)
     assert load_floorplan(write(tmp_path, CUBICASA)).glass == ()
+
+
+def rooms_of(k: int, folder: Path) -> Path:
+    """The home in pixels: walls as one path or several, rooms named by ids, classes or texts."""
+    home = small_home(k, turns=(0, 90, 17))
+    pixels = (100.0, 50.0, 37.8)[k % 3]
+
+    def at(point: tuple[float, float]) -> tuple[float, float]:
+        return round(point[0] * pixels, 2), round(-point[1] * pixels, 2)
+
+    def path_of(box: tuple[float, float, float, float]) -> str:
+        return "M" + " L".join(f"{x} {y}" for x, y in map(at, home.corners(box))) + " Z"
+
+    walls = [path_of(box) for box in home.walls]
+    drawn = (
+        f'<path d="{" ".join(walls)}"/>'
+        if k % 4 == 0
+        else "".join(f'<path d="{w}"/>' for w in walls)
+    )
+    rooms, texts = "", ""
+    for box, name in zip(home.rooms, home.names, strict=True):
+        named = {0: f'id="{name}"', 1: 'id="rect12"', 2: f'class="room {name}"'}[k % 3]
+        rooms += f'<path {named} d="{path_of(box)}"/>'
+        x, y = at(home.place(((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)))
+        texts += f'<text x="{x}" y="{y}">{name}</text><text x="{x}" y="{y + 5}">12 m²</text>'
+    doors = ""
+    for (ax, ay), (bx, by) in home.doors if k % 2 else ():
+        dx, dy = (0, INNER_M / 2) if ay == by else (INNER_M / 2, 0)
+        doors += f'<path d="{path_of((ax - dx, ay - dy, bx + dx, by + dy))}"/>'
+    labels = f'<g id="labels">{texts}</g>' if k % 3 == 1 else ""
+    file = folder / "plan.svg"
+    file.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg"><g id="walls">{drawn}</g><g id="rooms">{rooms}</g>'
+        f'<g id="doors">{doors}</g>{labels}</svg>'
+    )
+    return file
+
+
+@pytest.mark.parametrize("k", VARIATIONS)
+def test_drawings_of_any_scale_language_and_naming_are_the_home(tmp_path: Path, k: int) -> None:
+    path = rooms_of(k, tmp_path)
+
+    plan = load_floorplan(path, scale=1 / (100.0, 50.0, 37.8)[k % 3])
+
+    check(plan, small_home(k), slack=0.02)
+
+
+def test_the_hole_of_a_wall_is_no_wall(tmp_path: Path) -> None:
+    """Walls as one shape whose outlines are its holes, as drawing programs join them."""
+    path = tmp_path / "plan.svg"
+    path.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><g id="walls"><path fill="#000" d="M0 0H900V600H0Z'
+        ' M10 10V590H445V10Z M455 10V590H890V10Z"/></g><g id="rooms"><rect x="10" y="10" width="435"'
+        ' height="580"/><rect x="455" y="10" width="435" height="580"/></g><g id="door"><rect'
+        ' x="445" y="200" width="10" height="90"/></g></svg>'
+    )
+
+    plan = load_floorplan(path, scale=0.01)
+
+    assert plan.area_m2 == pytest.approx(2 * 4.35 * 5.8 + 0.09, abs=0.02)

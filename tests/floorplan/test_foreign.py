@@ -46,7 +46,7 @@ FILES = {
         "map_saver",
     ),
     "walls.csv": (b"x0,y0,x1,y1\n0,0,4,3\n", "is a table (CSV)", "each room as a rectangle"),
-    "home.sh3d": (zipped("Home.xml"), "is a home of Sweet Home 3D", "Home.xml"),
+    "home.zip": (zipped("Home.xml"), "is a home of Sweet Home 3D", "the ending .sh3d"),
     "map.json": (b"#ROSBAG V2.0\n\xff", "is a ROS 1 bag", "type: bag"),
     "map.osm": (b"<?xml version='1.0'?>\n<osm>", "is OpenStreetMap data", "GeoJSON"),
     "page.yaml": (b"<!DOCTYPE html><html>", "is a web page", "download the file"),

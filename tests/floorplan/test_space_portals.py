@@ -6,9 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.scenes import path, run
+from tests.scenes import scenario as lives
 
 import fleet2d
 from fleet2d.errors import FloorPlanError, ScenarioError
+from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan, save_floorplan
 
@@ -135,3 +138,39 @@ def test_portals_in_a_scenario_are_checked_where_they_stand(tmp_path: Path) -> N
 
     with pytest.raises((FloorPlanError, ScenarioError), match=r"floorplan.portals\[0\]"):
         fleet2d.run(settings)
+
+
+def test_the_checkup_tells_what_a_robot_loses_that_climbs_no_stairs(tmp_path: Path) -> None:
+    (found,) = checkup(load_floorplan(house(tmp_path)))
+
+    assert ("storeys", "odd") == (found.kind, found.severity)
+    assert (
+        "a robot that starts at (0.50, 0.50) m and climbs no stairs can't get to 20.0 m2 of"
+        " 40.0 m2: bedroom_0, bathroom_0"
+    ) == found.text
+
+
+@pytest.mark.parametrize(
+    ("climbs", "rooms"), [(False, {"kitchen_0"}), (True, {"kitchen_0", "bedroom_0"})]
+)
+def test_a_robot_gets_upstairs_if_it_climbs(tmp_path: Path, climbs: bool, rooms: set[str]) -> None:
+    floorplan = {"type": "native", "path": str(house(tmp_path))}
+    rounds = {"type": "patrol", "rooms": ["kitchen", "bedroom"]}
+    robots = {"astro": {"start": "kitchen", "climbs": climbs, "behaviors": [rounds]}}
+    stored = run(lives("2 h", users={}, robots=robots, floorplan=floorplan))
+
+    way = path(stored, "astro")
+    still = (np.diff(way.x) == 0) & (np.diff(way.y) == 0)
+    assert rooms == {stored.plan.rooms[r].name for r in np.array(way.room)[1:][still]}
+
+
+def test_members_of_a_household_sleep_upstairs(tmp_path: Path) -> None:
+    floorplan = {"type": "native", "path": str(house(tmp_path)), "furnish": True}
+    household = {"members": {"ana": "retired", "ben": "works_outside"}}
+    users = {name: {"type": "routine", "household": household} for name in household["members"]}
+    stored = run(lives("1 d", users=users, robots={}, floorplan=floorplan))
+
+    for name in users:
+        way = path(stored, name)
+        rooms = [stored.plan.rooms[r].name for r in np.array(way.room)[: 3 * 60]]
+        assert rooms.count("bedroom_0") > 0.9 * len(rooms)

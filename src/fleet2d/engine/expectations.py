@@ -107,7 +107,7 @@ class RunExpectations(Watcher):
         robots = self.actors[self.bodies.users :]
         home = self._run.home
         clock = self.clock
-        rooms = [name for room in home.rooms for name in (room.name, room.type)]
+        rooms = [name for room in home.rooms for name in room.words]
         names = {
             "users": [actor.name for actor in users],
             "robots": [actor.name for actor in robots],

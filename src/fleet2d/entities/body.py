@@ -107,7 +107,7 @@ class BodySettings(Settings):
     start_heading_deg: AngleDeg | None = None
     color: str | None = Field(default=None, min_length=1)
     opens_doors: bool = False
-    # Whether it climbs stairs and takes lifts.
+    # Whether all bodies of its kind climb stairs and take lifts.
     uses_portals: ClassVar[bool] = False
     # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
     minds_costs: ClassVar[bool] = False
@@ -121,6 +121,11 @@ class BodySettings(Settings):
     sight_events: ClassVar[tuple[str, str]]
     # What it hears about what it wants of people.
     request_events: ClassVar[frozenset[str]] = frozenset()
+
+    @property
+    def climbs_stairs(self) -> bool:
+        """Whether it climbs stairs and takes lifts."""
+        return self.uses_portals
 
     @property
     def eyes(self) -> dict[str, Camera]:
@@ -393,7 +398,7 @@ class Body:
         space = self.home.space(
             entity.radius,
             opens_doors=entity.opens_doors,
-            uses_portals=entity.uses_portals,
+            uses_portals=entity.climbs_stairs,
             without=rooms,
         )
         return self.home.costed(space) if entity.minds_costs else space

@@ -166,6 +166,7 @@ class Robot(Entity):
             nothing that it has learned.
         keep_out: Rooms, or kinds of rooms if the home has them, that it never enters: it starts,
             stops, passes and follows nowhere there. Put there by a person, it leaves.
+        climbs: Whether it climbs stairs and takes lifts, as people do.
     """
 
     radius: Length = Field(default=0.15, gt=0, le=2)
@@ -185,6 +186,7 @@ class Robot(Entity):
     localization: Localization | None = None
     power: Power | None = None
     keep_out: tuple[str, ...] = ()
+    climbs: bool = False
     sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
     request_events = REQUEST_EVENTS
 
@@ -201,6 +203,11 @@ class Robot(Entity):
         if isinstance(cameras, Sequence) and not isinstance(cameras, str):
             cameras = {f"camera_{i:02}": camera for i, camera in enumerate(cameras)}
         return {**data, "camera": None, "cameras": cameras}
+
+    @property
+    def climbs_stairs(self) -> bool:
+        """Whether it climbs stairs and takes lifts."""
+        return self.climbs
 
     def model_post_init(self, _: object, /) -> None:
         """Require cameras for what needs them, and one way to perceive."""

@@ -21,7 +21,7 @@ from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
-from fleet2d.floorplan.rooms.room import PRIORITY, usual_type
+from fleet2d.floorplan.rooms.room import LIVING_ROOM, PRIORITY, day_room, usual_type
 from fleet2d.kernels import I64, TURN, UNIT, cosine, sine
 from fleet2d.runtime.determinism import Draws
 
@@ -118,6 +118,7 @@ def matching_rooms(
     reachable: Sequence[Room],
     objects: Sequence[PlacedObject] = (),
     never_in: RoomChoice = (),
+    stands_in: bool = False,
 ) -> tuple[str, list[Room]]:
     """Return the first name that matches a reachable room, and all reachable rooms it matches.
 
@@ -127,6 +128,7 @@ def matching_rooms(
         reachable: The rooms that the body can get to.
         objects: Furniture, which a place may name as well; only for the message.
         never_in: Rooms and kinds of rooms that 'any' leaves out, as long as there are others.
+        stands_in: Whether the largest room to spend the day in serves as a missing living room.
 
     Raises:
         PlacementError: No name matches a reachable room; the message lists the rooms.
@@ -135,12 +137,15 @@ def matching_rooms(
         if name == ANY:
             others = [r for r in reachable if r.name not in never_in and r.type not in never_in]
             return ANY, others or list(reachable)
-        matches = [room for room in reachable if name in (room.name, room.type)]
+        matches = [room for room in reachable if room.is_called(name)]
+        if stands_in and name == LIVING_ROOM and not matches:
+            serving = day_room(rooms)
+            matches = [room for room in reachable if room == serving]
         if matches:
             return name, matches
     requested = " or ".join(repr(name) for name in names)
     room_names = ", ".join(room.name for room in reachable)
-    if any(name in (room.name, room.type) for name in names for room in rooms):
+    if any(room.is_called(name) for name in names for room in rooms):
         raise PlacementError(
             f"{requested} can't be reached from where it starts; it can reach: {room_names}"
         )
@@ -165,7 +170,7 @@ def furniture_of(body: "Body", place: RoomChoice | Point) -> PlacedObject | None
     """
     if is_point(place):
         return None
-    rooms = {name for room in body.reachable_rooms() for name in (room.name, room.type)}
+    rooms = {word for room in body.reachable_rooms() for word in room.words}
     for name in place:
         if name == ANY or name in rooms:
             return None
@@ -326,7 +331,7 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
         return False
     things: tuple[Room | PlacedObject, ...] = (*body.home.rooms, *body.home.objects)
     names = {thing.name for thing in things}
-    types = {thing.type for thing in things}
+    types = {thing.type for thing in things} | {k for room in body.home.rooms for k in room.labels}
     return all(
         name not in names
         and not str(name)[-1:].isdigit()  # bathroom_7 is a single bathroom

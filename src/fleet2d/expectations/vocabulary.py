@@ -130,7 +130,7 @@ class distance(NumberSignal):
         if isinstance(self.other, tuple):
             return self.other
         kind = str(self.other).removeprefix(ANY_KIND)
-        rooms = [room.index for room in home.rooms if kind in (room.name, room.type)]
+        rooms = [room.index for room in home.rooms if room.is_called(kind)]
         is_object = any(item.name == self.other for item in home.objects)
         return home.object(kind) if is_object and not rooms else rooms
 
@@ -262,7 +262,7 @@ class room(WordSignal):
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the row of the body; the words are the names and types of rooms."""
-        gauge.words = {room.index: (room.name, room.type) for room in run.home.rooms}
+        gauge.words = {room.index: room.words for room in run.home.rooms}
         return run.row(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
@@ -513,7 +513,7 @@ class light(Condition):
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the indices of the rooms."""
         name = self.name.removeprefix(ANY_KIND)
-        return {room.index for room in run.home.rooms if name in (room.name, room.type)}
+        return {room.index for room in run.home.rooms if room.is_called(name)}
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return 1 while it is on."""

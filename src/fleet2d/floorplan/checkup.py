@@ -27,6 +27,8 @@ Severity = Literal["unlivable", "wrong", "odd"]
 PERSON_RADIUS = 0.2
 """The radius of a person who uses the furniture [m], which is the default of users."""
 
+# Rooms that a finding names one by one.
+FEW_NAMES = 6
 HOME_M2 = (8.0, 2000.0)
 """Least and largest area of a home."""
 
@@ -98,7 +100,7 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
         ...     print(finding.severity, finding.text)
         wrong a body of radius 0.15 m can't get to office_0 (15.2 m2)
     """
-    of_plan = (_scale, _parts, _no_go, _specks, _labels, _doors, _standing_in_walls)
+    of_plan = (_scale, _parts, _storeys, _no_go, _specks, _labels, _doors, _standing_in_walls)
     findings = [finding for find in of_plan for finding in find(plan)]
     findings += [*_routes(Home(plan), radius), *_unreachable_objects(plan)]
     return sorted(findings, key=lambda finding: _ORDER.index(finding.severity))
@@ -210,6 +212,25 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
         text = f"nothing joins {parts_text} to the rest,{' the largest' * (len(small) > 1)}"
         shape = shapely.MultiPolygon(small)
         yield _found("parts", "odd", text, small[0].representative_point(), shape)
+
+
+def _storeys(plan: FloorPlan) -> Iterator[Finding]:
+    """Tell what a robot that climbs no stairs doesn't get to."""
+    if not plan.portals:
+        return
+    parts = shapely.get_parts(plan.free_space).tolist()
+    at = shapely.Point(plan.entrance or plan.portals[0].start)
+    own = next((part for part in parts if part.intersects(at)), parts[0])
+    others = [part for part in parts if part is not own]
+    away = [r for r in plan.rooms if not own.intersects(shapely.Point(r.anchor_xy))]
+    names = ", ".join(room.name for room in away[:FEW_NAMES])
+    names += f" and {len(away) - FEW_NAMES} more" if len(away) > FEW_NAMES else ""
+    area = sum_in_order(room.area_m2 for room in away)
+    text = (
+        f"a robot that starts at ({at.x:.2f}, {at.y:.2f}) m and climbs no stairs can't get to"
+        f" {area:.1f} m2 of {plan.area_m2:.1f} m2: {names}"
+    )
+    yield Finding("storeys", "odd", text, away[0].anchor_xy, shapely.MultiPolygon(others))
 
 
 def _no_go(plan: FloorPlan) -> Iterator[Finding]:
@@ -405,7 +426,7 @@ def _unreachable_objects(plan: FloorPlan) -> Iterator[Finding]:
     if not plan.objects:
         return
     try:
-        space = Home(plan).space(PERSON_RADIUS)
+        space = Home(plan).space(PERSON_RADIUS, uses_portals=True)
     except FloorPlanError:
         return  # reported for the robot; for a doll's house it doesn't matter
     standing = space.part_of_cell == (main_part(plan, space) or 0)

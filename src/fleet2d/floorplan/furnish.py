@@ -12,6 +12,7 @@ from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.furniture_places import FurnitureGroup, Interior, Piece
 from fleet2d.floorplan.placed_objects import number_objects
 from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.rooms.room import LIVING_ROOM, day_room
 from fleet2d.kernels import I64
 from fleet2d.runtime.determinism import Draws, stream_key
 
@@ -56,7 +57,8 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
 
     No piece stands within 0.9 m before a doorway, or where it would cut a route: free places that
     a body of 0.1 m to 0.25 m radius could walk between stay connected, and each piece is reachable.
-    A room that has furniture already, or an unknown type, stays as it is. The same plan and seed
+    A room that has furniture already, or an unknown type, stays as it is, unless it serves as the
+    living room of a home with rooms of known types. The same plan and seed
     give the same furniture on every machine.
 
     Args:
@@ -81,10 +83,12 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
         )
     interior = Interior(plan)
     kinds = {label for room in plan.rooms for label in (room.type, *room.labels)}
+    serving = day_room(plan.rooms) if kinds.intersection(RULES) else None
     furnished = {room.index for room in plan.rooms if plan.objects_in(room)}
     for room in plan.rooms:
         if room.index not in furnished:
-            _furnish_room(interior, room, seed, density, kinds)
+            uses = (LIVING_ROOM,) if room == serving else ()
+            _furnish_room(interior, room, seed, density, kinds, uses)
     if all(thing.type != "charger" for thing in plan.objects):
         _place_charger(interior, seed)
     interior.remove_obstructions()
@@ -92,10 +96,15 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
 
 
 def _furnish_room(
-    interior: Interior, room: Room, seed: int, density: float, kinds: set[str]
+    interior: Interior,
+    room: Room,
+    seed: int,
+    density: float,
+    kinds: set[str],
+    further_uses: tuple[str, ...] = (),
 ) -> None:
     first_uses = _first_uses(interior.plan, room)
-    labels = dict.fromkeys((*first_uses, room.type, *room.labels))
+    labels = dict.fromkeys((*first_uses, room.type, *room.labels, *further_uses))
     rules = [rule for label in labels for rule in RULES.get(label, ())]
     if first_uses:
         rules.sort(key=lambda rule: rule.type not in ESSENTIAL)

@@ -232,9 +232,25 @@ def _format_of(content: dict[str, Any]) -> str | None:
     if content.get("format") == FORMAT:  # the usual format, without importing the others
         return "native"
     for kind, (key, value) in _marks():
-        if key in content and value in (None, content[key]):
+        found = _at(content, key)
+        if found is not _NOTHING and value in (None, found):
             return kind
     return None
+
+
+_NOTHING = object()
+
+
+def _at(content: Any, key: str) -> Any:
+    """Return what is in a file at a key, or `_NOTHING`; `a.0.b` is below other keys."""
+    for step in key.split("."):
+        if isinstance(content, dict):
+            content = content.get(step, _NOTHING)
+        elif isinstance(content, list) and step.isdigit() and int(step) < len(content):
+            content = content[int(step)]
+        else:
+            return _NOTHING
+    return content
 
 
 def format_by_suffix(path: Path) -> str | None:

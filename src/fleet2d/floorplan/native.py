@@ -58,7 +58,7 @@ from fleet2d.floorplan.placed_objects import (
 )
 from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.doorways import DoorLine
-from fleet2d.floorplan.rooms.room import MAX_GAP_M2, UNKNOWN, LabelledRegion, room_type
+from fleet2d.floorplan.rooms.room import MAX_GAP_M2, UNKNOWN, LabelledRegion, usual_type
 from fleet2d.floorplan.source import FloorPlanSource
 
 FORMAT = "fleet2d-floorplan"
@@ -172,7 +172,7 @@ class RoomEntry(FileModel):
 
     def to_region(self) -> LabelledRegion:
         """Return the room as a region of the plan."""
-        kind = room_type(self.type)
+        kind = usual_type(self.type)
         labels = self.labels
         if labels is None:
             labels = [self.type] if kind != UNKNOWN else []

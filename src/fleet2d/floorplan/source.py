@@ -315,7 +315,8 @@ class FloorPlanSource(Component):
 
     kind = "floorplan"
 
-    # Keys, each with its value unless that is None; by one the content of a file is recognized.
+    # Keys, each with its value unless that is None; by one the content of a file is recognized. A
+    # key below others is written with dots.
     marks: ClassVar[tuple[tuple[str, str | None], ...]] = ()
 
     # The endings, such as ".dxf", of the files that it reads, if they aren't JSON or YAML.

@@ -162,11 +162,11 @@ class KeepOut(RobotIntervention, Lasting):
             PlacementError: One of the names is no room of the home, and no kind of one.
         """
         rooms = world.home.rooms
-        known = dict.fromkeys(name for room in rooms for name in (room.name, room.type))
+        known = dict.fromkeys(name for room in rooms for name in room.words)
         names = (self.of,) if isinstance(self.of, str) else self.of
         for name in names:
             check_known(name, "room", known, PlacementError)
-        return [room for room in rooms if room.name in names or room.type in names]
+        return [room for room in rooms if not set(room.words).isdisjoint(names)]
 
 
 class SetBattery(RobotIntervention):

@@ -13,6 +13,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
+from fleet2d.floorplan.rooms.room import PASSED_THROUGH
 from fleet2d.routines import distributions
 from fleet2d.routines.distributions import Distribution
 from fleet2d.runtime.clock import SECOND
@@ -125,6 +126,7 @@ AnyDurationDistribution = Annotated[DurationDistribution, SchemaForms("text", "n
 
 # Kinds of rooms in which people do nothing unless an activity names them.
 NOT_LIVED_IN = (
+    *PASSED_THROUGH,
     "bathroom",
     "toilet",
     "laundry",
@@ -147,6 +149,8 @@ class Activity(Settings):
         posture: Posture if there is no such furniture.
         away: Whether it is done out of the home.
         exclusive: Whether only one member of a household does it at a time, as in a bathroom.
+        first: What decides where it is done. furniture: the first kind of room in which its
+            furniture stands; room: the first kind of room that exists.
         choose: The choice among several rooms: own: one of the first kind that exists, always the
             same; nearest: the nearest of all listed kinds; each_time: one of all listed kinds,
             drawn each time; here: the room that the person is in.
@@ -164,6 +168,7 @@ class Activity(Settings):
     posture: Literal["stand", "sit", "lie"] = "stand"
     away: bool = False
     exclusive: bool = False
+    first: Literal["furniture", "room"] = "furniture"
     choose: Literal["own", "nearest", "each_time", "here"] = "own"
     interruptible: bool = True
     takes: AnyDurationDistribution = DurationDistribution()

@@ -1,5 +1,6 @@
 """Where the bundled personas do what they do: no activity is in a room that it doesn't belong in."""
 
+import json
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +12,8 @@ import pytest
 from tests.scenes import path, run, scenario
 from tests.thorough import THOROUGH, some
 
+from fleet2d.floorplan.native import Native
+from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.routines.activity import NOT_LIVED_IN, catalogue
 from fleet2d.routines.persona import bundled_names
 
@@ -92,3 +95,101 @@ def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: 
 @pytest.mark.parametrize("floorplan", some(SYNTHETIC, 72), ids=lambda plan: plan["seed"])
 def test_nothing_is_done_in_an_odd_room_of_a_synthetic_home(floorplan: dict[str, Any]) -> None:
     assert odd(minutes_still(floorplan)) == {}
+
+
+HALL = [[0, 0], [9, 0], [9, 2], [0, 2]]
+LEFT = [[0, 2.1], [4.4, 2.1], [4.4, 6], [0, 6]]
+RIGHT = [[4.5, 2.1], [9, 2.1], [9, 6], [4.5, 6]]
+DOORS = [[[1, 2], [1.9, 2], [1.9, 2.1], [1, 2.1]], [[6, 2], [6.9, 2], [6.9, 2.1], [6, 2.1]]]
+
+
+def flat(folder: Path, *uses: list[str], sofa_in: str = "", **keys: Any) -> dict[str, Any]:
+    """A hall with two rooms, each with its functions; perhaps a sofa in the left or right one."""
+    rooms = [
+        {"type": kinds[0], "labels": kinds, "polygon": polygon}
+        for kinds, polygon in zip(uses, (HALL, LEFT, RIGHT), strict=True)
+    ]
+    plan = {"format": "fleet2d-floorplan", "version": 1, "free": [HALL, LEFT, RIGHT, *DOORS]}
+    (folder / "flat.json").write_text(json.dumps(plan | {"rooms": rooms}))
+    source = {"type": "native", "path": str(folder / "flat.json"), **keys}
+    if sofa_in:
+        at = {"left": [2, 5.4], "right": [7, 5.4]}[sofa_in]
+        source["furniture"] = [{"type": "sofa", "at": at, "heading_deg": 270}]
+    return source
+
+
+def load(source: dict[str, Any]) -> FloorPlan:
+    return Native(**{key: value for key, value in source.items() if key != "type"}).plan()
+
+
+def minutes_of(activities: tuple[str, ...], floorplan: dict[str, Any]) -> Counter[str]:
+    """Minutes that a retired person and a child spend on some activities, by room."""
+    users = {name: {"type": "routine", "persona": name} for name in ("retired", "child")}
+    stored = run(scenario("5 d", users=users, robots={}, floorplan=floorplan))
+    events = stored.polars("events").filter(pl.col("event") == "activity")
+    minutes: Counter[str] = Counter()
+    for name in users:
+        own = events.filter(pl.col("entity") == name)
+        life = path(stored, name)
+        times = np.array(life.time, "datetime64[us]")
+        which = np.searchsorted(own["time"].to_numpy(), times, side="right") - 1
+        still = np.r_[False, (np.diff(life.x) == 0) & (np.diff(life.y) == 0)]
+        details = own["detail"].to_list()
+        for minute in np.flatnonzero(~np.array(life.away) & (which >= 0) & still):
+            if details[which[minute]] in activities:
+                minutes[stored.plan.rooms[life.room[minute]].name] += 1
+    return minutes
+
+
+def most(minutes: Counter[str]) -> tuple[str, float]:
+    room, count = minutes.most_common(1)[0]
+    return room, count / minutes.total()
+
+
+KITCHEN_LIVING = ["Kitchen", "Living_Room"]
+
+
+@pytest.mark.parametrize(
+    ("uses", "sofa_in", "expected"),
+    [
+        ((["Hallway"], KITCHEN_LIVING, ["Bedroom"]), "", "kitchen_0"),
+        ((["Hallway"], ["Kitchen"], ["Bedroom"]), "", "kitchen_0"),
+        ((["Hallway"], ["Dining_Room"], ["Bedroom"]), "left", "dining_room_0"),
+        ((["Hallway"], ["Living_Room"], ["Kitchen"]), "right", "kitchen_0"),
+        ((["Hallway"], ["Bedroom"], ["Bedroom"]), "right", "bedroom_1"),
+    ],
+    ids=[
+        "a kitchen that is a living room, too",
+        "the largest day room serves",
+        "and has the sofa",
+        "the sofa comes before the room",
+        "the sofa decides between bedrooms",
+    ],
+)
+def test_people_watch_television_where_the_sofa_or_the_living_room_is(
+    tmp_path: Path, uses: tuple[list[str], ...], sofa_in: str, expected: str
+) -> None:
+    room, share = most(minutes_of(("tv", "read"), flat(tmp_path, *uses, sofa_in=sofa_in)))
+
+    assert expected == room
+    assert share > 0.9
+
+
+@pytest.mark.parametrize("hall", ["Hallway", "Hall", "Entryway", "Lobby"])
+def test_nobody_plays_or_works_in_a_hall(tmp_path: Path, hall: str) -> None:
+    uses = ([hall], ["Kitchen"], ["Bedroom"])
+    activities = ("play", "work_at_home", "study", "computer", "hobby", "games")
+
+    minutes = minutes_of(activities, flat(tmp_path, *uses))
+
+    assert minutes.total() > 60
+    assert minutes[f"{hall.lower()}_0"] < 0.02 * minutes.total()
+
+
+def test_a_room_to_furnish_gets_the_furniture_of_all_its_functions(tmp_path: Path) -> None:
+    uses = (["Hallway"], KITCHEN_LIVING, ["Bedroom"])
+    both = load(flat(tmp_path, *uses, furnish=True)).objects
+    serving = load(flat(tmp_path, ["Hallway"], ["Dining_Room"], ["Bedroom"], furnish=True)).objects
+
+    assert {"stove", "sofa"} <= {thing.type for thing in both}
+    assert {"table", "sofa"} <= {thing.type for thing in serving}

@@ -6,7 +6,9 @@ from typing import Any
 import pytest
 import shapely
 from pydantic import ValidationError
+from tests.small_home import INNER_M, VARIATIONS, check, noisy, small_home
 
+import fleet2d
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan, save_floorplan
@@ -372,9 +374,9 @@ FLOORS[0]["id"], FLOORS[1]["id"] = "b", "a"
 
 @pytest.mark.parametrize(
     ("level", "room"),
-    [(None, "Down"), ("0", "Down"), ("G", "Down"), ("a", "Down"), ("1", "Up"), ("Upstairs", "Up")],
+    [("0", "Down"), ("G", "Down"), ("a", "Down"), ("1", "Up"), ("Upstairs", "Up")],
 )
-def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
+def test_one_level_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
     plan = read(tmp_path, *FLOORS, units="m", level=level)
 
     assert [room] == [plan_room.name for plan_room in plan.rooms]
@@ -383,7 +385,7 @@ def test_one_floor_is_taken(tmp_path: Path, level: str | None, room: str) -> Non
 
 
 def test_floor_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FloorPlanError, match="no level '7'; its levels are: b or 1 or Upstairs, a"):
+    with pytest.raises(FloorPlanError, match="no level '7'; its levels are: a or 0 or G, b or 1"):
         read(tmp_path, *FLOORS, units="m", level="7")
 
 
@@ -582,3 +584,114 @@ def test_glass_walls_of_imdf_are_seen_through(tmp_path: Path) -> None:
 
     assert 1 == len(plan.glass)
     assert () == plan.doorways
+
+
+def mapped(k: int) -> list[dict[str, Any]]:
+    """An indoor map of the home: in metres or degrees, doors as points or lines, with noise."""
+    home = small_home(k, turns=(0, 30, 90))
+    noise = noisy(k, 0.015)
+    is_osm = k % 2 == 1
+    (_, _, x, y), (_, y1, _, top), (x1, _, right, _) = home.rooms
+    shift = INNER_M / 2 if k % 4 < 2 else 0.0  # rooms touch, or have the gap of a wall between them
+    boxes = [
+        (0, 0, x + shift, y + shift),
+        (0, y1 - shift, x + shift, top),
+        (x1 - shift, 0, right, top),
+    ]
+    features = []
+    for box, name in zip(boxes, home.names, strict=True):
+        corners = [noise(home.place(p)) for p in corners_of(box)]
+        tags = {"indoor": "room", "level": "0"} if is_osm else {"kind": "room"}
+        features.append(feature(ring(corners), **tags, name=name))
+    for line_ in (*home.doors, home.front):
+        start, end = (noise(home.place(p)) for p in line_)
+        middle = [(start[0] + end[0]) / 2, (start[1] + end[1]) / 2]
+        point = {"type": "Point", "coordinates": middle}
+        if is_osm:
+            features.append(feature(point, door="hinged", level="0", width="0.9"))
+        else:
+            shape = point if k % 6 == 0 else line(start, end)
+            features.append(feature(shape, kind="door"))
+    if is_osm:
+        features.append(feature(ring([(-1, -1), (20, -1), (20, 20), (-1, 20)]), building="yes"))
+    if k % 3 == 2:
+        return [{**f, "geometry": on_earth(f["geometry"], 48.1, 11.6)} for f in features]
+    return features
+
+
+def corners_of(box_: tuple[float, float, float, float]) -> list[tuple[float, float]]:
+    x0, y0, x1, y1 = box_
+    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+
+
+def ring(corners: list[tuple[float, float]]) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [[list(p) for p in (*corners, corners[0])]]}
+
+
+@pytest.mark.parametrize("k", VARIATIONS)
+def test_maps_of_any_unit_language_and_noise_are_the_home(tmp_path: Path, k: int) -> None:
+    plan = read(tmp_path, *mapped(k))
+
+    check(plan, small_home(k), slack=0.03)
+
+
+def storey_maps() -> list[dict[str, Any]]:
+    """OpenStreetMap: two storeys, stairs and a lift on both, and a room of three."""
+
+    def unit(x0: float, x1: float, level: str, **tags: Any) -> dict[str, Any]:
+        return feature(ring(corners_of((x0, 0, x1, 3))), indoor="room", level=level, **tags)
+
+    return [
+        unit(0, 4, "0", name="Kitchen"),
+        unit(0, 4, "1", name="Bedroom"),
+        unit(4, 6, "0;1", stairs="yes"),
+        unit(6, 8, "0-1", highway="elevator"),
+        *(
+            feature({"type": "Point", "coordinates": [x, 1.5]}, door="yes", level="0;1")
+            for x in (4, 6)
+        ),
+    ]
+
+
+def test_storeys_of_openstreetmap_lie_side_by_side(tmp_path: Path) -> None:
+    plan = read(tmp_path, *storey_maps(), units="m")
+
+    assert 2 == len(plan.polygons)
+    assert ["lift", "stairs"] == sorted(portal.type for portal in plan.portals)
+    assert 1 == fleet2d.Home(plan).space(0.2, uses_portals=True).parts
+    assert {"Kitchen", "Bedroom"} <= {room.name for room in plan.rooms}
+    upstairs = read_geojson(tmp_path / "flat.geojson", units="m", level="1")
+    assert "Bedroom" in {room.name for room in upstairs.rooms}
+    assert "Kitchen" not in {room.name for room in upstairs.rooms}
+
+
+def test_portals_are_written_and_read(tmp_path: Path) -> None:
+    plan = read(tmp_path, *storey_maps(), units="m")
+
+    save_floorplan(plan, tmp_path / "again.geojson")
+
+    assert plan.portals == load_floorplan(tmp_path / "again.geojson").portals
+
+
+@pytest.mark.parametrize("k", range(20))
+def test_three_centimetres_of_noise_keep_the_door(tmp_path: Path, k: int) -> None:
+    """Rooms that touch up to a gap or an overlap of 3 cm."""
+    noise = noisy(k, 0.015)
+    rooms = [
+        feature(ring([noise(p) for p in corners_of(b)]), kind="room", name=name)
+        for b, name in (((0, 0, 4, 3), "Kitchen"), ((4, 0, 8, 3), "Bedroom"))
+    ]
+    door = feature(line(noise((4, 1)), noise((4, 1.9))), kind="door")
+
+    plan = read(tmp_path, *rooms, door, units="m")
+
+    assert 1 == len(plan.polygons)
+    assert [True] == [d.leaf for d in plan.doorways]
+    assert plan.doorways[0].width_m == pytest.approx(0.9, abs=0.1)
+    assert plan.area_m2 == pytest.approx(24 - 0.1 * 2.1, abs=0.3)
+
+
+def test_a_room_may_name_its_building(tmp_path: Path) -> None:
+    room = feature(box(0, 0, 4, 3), name="Kitchen", building="House A")
+
+    assert ["Kitchen"] == [r.name for r in read(tmp_path, room, units="m").rooms]

@@ -58,8 +58,9 @@ def test_raw_map_is_read_with_segments_charger_and_path(tmp_path: Path, wrap: An
     assert 1 == len(plan.no_go)
 
 
-def test_wrapped_raw_map_is_recognized_by_its_content(tmp_path: Path) -> None:
-    path = write(tmp_path, {"rand256": {"full_data": raw()}})
+@pytest.mark.parametrize("wrap", [lambda m: m, lambda m: {"rand256": {"full_data": m}}])
+def test_raw_map_is_recognized_by_its_content(tmp_path: Path, wrap: Any) -> None:
+    path = write(tmp_path, wrap(raw()))
 
     assert load_floorplan(path) == Valetudo(path=path).load()
 

@@ -152,6 +152,16 @@ def test_first_row_of_the_image_is_the_top_and_origin_the_lower_left(tmp_path: P
     assert plan.room_at(-2.7, 8.4) is None  # upper left
 
 
+@pytest.mark.parametrize("yaw", ["-nan", ".nan", "nan", "-.NaN"])
+def test_yaw_that_is_no_number_is_none_with_a_note(tmp_path: Path, yaw: str) -> None:
+    """`map_saver` wrote `-nan` for none: ros-planning/navigation#993."""
+    plan = load_floorplan(write(tmp_path, origin=f"[-15.4, -30.9, {yaw}]"))
+
+    straight = read_ros(write(tmp_path, origin="[-15.4, -30.9, 0]"))
+    assert plan == straight
+    assert "origin has no yaw, as older map_savers write it: 0 is taken" in plan.notes
+
+
 @pytest.mark.parametrize("yaw", [0.3, math.pi / 2, math.pi, -2.0])
 def test_yaw_turns_the_map_about_its_origin(tmp_path: Path, yaw: float) -> None:
     origin, at = np.array([2.0, -1.0]), np.array([2.0, 0.2])  # lower right; (2, 1.4) is upper right

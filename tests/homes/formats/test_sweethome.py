@@ -1,12 +1,15 @@
 import math
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 import shapely
+from tests.small_home import INNER_M, OUTER_M, VARIATIONS, check, small_home
 
+import fleet2d
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.homes.formats.features import choose_level
+from fleet2d.homes.formats.storeys import Storey, choose_storey
 from fleet2d.homes.formats.sweethome import SweetHome
 
 WALLS = """
@@ -94,15 +97,18 @@ def test_walls_alone_enclose_the_home(tmp_path: Path) -> None:
     assert 2 == len(plan.rooms)
 
 
-def test_level_is_chosen_by_name_and_else_the_ground_floor(tmp_path: Path) -> None:
+def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path: Path) -> None:
     levels = (
         '<level id="a" name="Cellar" elevation="-250"/><level id="b" name="Ground" elevation="0"/>'
     )
     upper = WALLS.replace("<wall", '<wall level="a"').replace('"400"', '"500"')
     path = write(tmp_path, levels, upper, WALLS.replace("<wall", '<wall level="b"'))
 
-    assert SweetHome(path=path).load().bounds[1] == pytest.approx(-3.95)
+    assert SweetHome(path=path, level="Ground").load().bounds[1] == pytest.approx(-3.95)
     assert SweetHome(path=path, level="Cellar").load().bounds[1] == pytest.approx(-4.95)
+    both = SweetHome(path=path).load()
+    assert 4 == len(both.rooms)
+    assert "its storeys lie side by side: Cellar, Ground" in both.notes
     with pytest.raises(FloorPlanError, match="its levels are: Cellar, Ground"):
         SweetHome(path=path, level="Roof").load()
 
@@ -143,10 +149,110 @@ def test_one_sees_through_low_windows_between_rooms_only(tmp_path: Path) -> None
 
 
 def test_levels_of_one_name_are_told_apart_by_their_ids() -> None:
-    levels, notes = [("a", "Floor", 0.0), ("b", "Floor", 262.0)], list[str]()
+    levels = [Storey("a", "Floor", 0.0), Storey("b", "Floor", 2.62)]
 
-    assert choose_level(levels, None, notes) == "a"
-    assert notes == ["of its levels, Floor (id a, at 0) is used, not Floor (id b, at 262)"]
-    assert choose_level(levels, "b", []) == "b"
+    assert choose_storey(levels, "b").key == "b"
     with pytest.raises(FloorPlanError, match="2 levels are called 'Floor'; its levels are: Floor"):
-        choose_level(levels, "Floor", [])
+        choose_storey(levels, "Floor")
+
+
+def house(k: int) -> tuple[str, int]:
+    """A home of one to three storeys, turned, and how many storeys it has."""
+    home = small_home(k, turns=(0, 90, 17, 45))
+    storeys = 1 + k % 3
+    (_, _, x, y), (_, y1, _, top), (x1, _, right, _) = home.rooms
+    half = OUTER_M / 2
+    elements = []
+
+    def xy(point: tuple[float, float], names: tuple[str, str] = ("x", "y")) -> str:
+        px, py = home.place(point)
+        return f'{names[0]}="{px * 100:.3f}" {names[1]}="{-py * 100:.3f}"'
+
+    lines = [
+        ((-half, -half), (right + half, -half), OUTER_M),
+        ((right + half, -half), (right + half, top + half), OUTER_M),
+        ((right + half, top + half), (-half, top + half), OUTER_M),
+        ((-half, top + half), (-half, -half), OUTER_M),
+        ((0, (y + y1) / 2), (x, (y + y1) / 2), INNER_M),
+        (((x + x1) / 2, 0), ((x + x1) / 2, top), INNER_M),
+    ]
+    for n in range(storeys):
+        level = f'level="L{n}"' if storeys > 1 else ""
+        elements += [f'<level id="L{n}" name="{n}. OG" elevation="{n * 262}"/>'] if level else []
+        for start, end, thickness in lines:
+            ends = f"{xy(start, ('xStart', 'yStart'))} {xy(end, ('xEnd', 'yEnd'))}"
+            elements.append(f'<wall {ends} thickness="{thickness * 100}" {level}/>')
+        for room, name in zip(home.rooms, home.names, strict=True):
+            x0, y0, x2, y2 = room
+            corners = ((x0, y0), (x2, y0), (x2, y2), (x0, y2))
+            points = "".join(f"<point {xy(corner)}/>" for corner in corners)
+            elements.append(f'<room name="{name}" {level}>{points}</room>')
+        for (ax, ay), (bx, by) in (*home.doors, home.front):
+            angle = (0 if ay == by else math.pi / 2) - home.turn
+            at = xy(((ax + bx) / 2, (ay + by) / 2))
+            width = math.dist((ax, ay), (bx, by)) * 100
+            elements.append(
+                f'<doorOrWindow name="Door" {at} width="{width:.1f}" depth="12"'
+                f' angle="{angle}" {level}/>'
+            )
+        stairs = f'width="100" depth="280" height="262" angle="{-home.turn}" {level}'
+        words = ("Staircase", "Treppe", "Escalier", "Escalera", "Scala")[k % 5]
+        elements.append(f'<pieceOfFurniture name="{words}" {xy((right - 1, 1.8))} {stairs}/>')
+    return f'<?xml version="1.0"?>\n<home name="house">{"".join(elements)}</home>', storeys
+
+
+@pytest.mark.parametrize("k", VARIATIONS)
+def test_houses_of_any_storeys_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+    content, storeys = house(k)
+    path = tmp_path / ("Home.xml", "house.sh3d")[k % 2]
+    if k % 2:
+        with ZipFile(path, "w") as archive:
+            archive.writestr("Home.xml", content)
+    else:
+        path.write_text(content)
+
+    plan = load_floorplan(path)
+
+    check(plan, small_home(k), storeys=storeys)
+    home = fleet2d.Home(plan)
+    assert (storeys, 1) == (home.space(0.2).parts, home.space(0.2, uses_portals=True).parts)
+
+
+@pytest.mark.parametrize("degrees", [-150, -90, -30, 10, 45, 90, 120, 179, 200, 270])
+def test_round_walls_bulge_by_their_arc(tmp_path: Path, degrees: float) -> None:
+    """The area changes by the segment of the circle; rooms reach to the wall."""
+    angle = math.radians(degrees)
+    sides = [(0, 0, 800, 0), (800, 0, 800, 1400), (800, 1400, 0, 1400), (0, 1400, 0, 0)]
+    areas = []
+    for arc in (f'arcExtent="{angle}"', ""):
+        walls = [
+            f'<wall xStart="{a}" yStart="{b}" xEnd="{c}" yEnd="{d}" thickness="10"'
+            f" {arc if k == 0 else ''}/>"
+            for k, (a, b, c, d) in enumerate(sides)
+        ]
+        room = (
+            '<room name="Hall"><point x="5" y="5"/><point x="795" y="5"/><point x="795" y="1395"/>'
+        )
+        areas.append(
+            load_floorplan(write(tmp_path, *walls, f'{room}<point x="5" y="1395"/></room>')).area_m2
+        )
+
+    radius = 8 / 2 / abs(math.sin(angle / 2))
+    segment = radius**2 / 2 * (angle - math.sin(angle))
+    assert areas[0] - areas[1] == pytest.approx(segment, rel=0.06, abs=0.3)
+
+
+def test_a_home_of_an_older_program_says_how_to_save_it(tmp_path: Path) -> None:
+    with ZipFile(tmp_path / "old.sh3d", "w") as archive:
+        archive.writestr("Home", b"\xac\xed\x00\x05")
+
+    with pytest.raises(FloorPlanError, match=r"has no Home\.xml in it: save it with Sweet Home 3D"):
+        load_floorplan(tmp_path / "old.sh3d")
+
+
+def test_an_archive_that_unpacks_to_gigabytes_is_refused(tmp_path: Path) -> None:
+    with ZipFile(tmp_path / "bomb.sh3d", "w", ZIP_DEFLATED) as archive:
+        archive.writestr("Home.xml", b" " * (65 << 20))
+
+    with pytest.raises(FloorPlanError, match=r"Home\.xml has at least 67,?108,?865 bytes"):
+        load_floorplan(tmp_path / "bomb.sh3d")

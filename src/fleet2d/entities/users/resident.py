@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Set
+from contextlib import suppress
 from datetime import datetime
 from functools import lru_cache, partial
 from operator import attrgetter
@@ -593,43 +594,69 @@ class ResidentBehavior(Behavior):
             return Venue(activity, [], [], [], (), None)
         names = activity.rooms
         if activity.choose == "own":
-            rooms = self._own_rooms(actor, names)
+            rooms = self._own_rooms(actor, activity)
         else:
-            named = (r for name in names for r in self.reachable_rooms if name in (r.name, r.type))
-            rooms = list(dict.fromkeys(named)) or _match(actor, names)[1]
+            named = (r for name in names for r in self.reachable_rooms if r.is_called(name))
+            rooms = list(dict.fromkeys(named)) or _match(actor, Activity(rooms=names))[1]
         means = {kind: getattr(activity, kind) for kind in MOVE_KINDS if self.small_moves}
         moves = ((kind, max(1, seconds(mean))) for kind, mean in means.items() if mean is not None)
         seats = self.spots.at_furniture(activity, rooms)
         if not activity.fetches:
             return Venue(activity, rooms, seats, [], tuple(moves), None)
-        stores = self._own_rooms(actor, activity.fetches_from)
+        stores = self._own_rooms(actor, Activity(rooms=activity.fetches_from))
         return Venue(activity, rooms, seats, stores, tuple(moves), activity.fetch_takes.table())
 
     def _bed(self, actor: Actor, sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
         """Return the venue of sleep for a member of a household, whose bed it may share."""
-        rooms = _match(actor, sleep.rooms)[1]
+        rooms = _match(actor, sleep)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep, [room], side)
         return self._venue(actor, sleep)._replace(rooms=[room], seats=seats)
 
     @staticmethod
-    def _own_rooms(actor: Actor, names: RoomChoice) -> list[Room]:
+    def _own_rooms(actor: Actor, activity: Activity) -> list[Room]:
         """Return the rooms of the first name that matches: of several of a kind, one for good."""
-        name, rooms = _match(actor, names)
+        name, rooms = _match(actor, activity)
         if name == "any" or not rooms:
             return rooms
         return [Draws(actor.stream(f"room of {name}"), 0).choice(rooms)]
 
 
-def _match(actor: Actor, names: RoomChoice) -> tuple[str, list[Room]]:
+def _match(actor: Actor, activity: Activity) -> tuple[str, list[Room]]:
     try:
-        return matching_rooms(
-            names, actor.home.rooms, actor.reachable_rooms(), never_in=NOT_LIVED_IN
-        )
+        return rooms_for(activity, actor.home, actor.reachable_rooms())
     except PlacementError as error:
-        if is_kind(actor, names):
+        if is_kind(actor, activity.rooms):
             return "", []
         raise PlacementError(f"{actor.path}: {error}") from None
+
+
+def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[str, list[Room]]:
+    """Return the first of the names of an activity's rooms that fits, and all rooms that it means.
+
+    Rooms with furniture for the activity come before others: first those that it names, then any,
+    but for chairs, which stand at the desks of bedrooms, too.
+
+    Args:
+        activity: The activity.
+        home: The home.
+        reachable: The rooms that the body can get to.
+
+    Raises:
+        PlacementError: No name matches a reachable room.
+    """
+    match = partial(
+        matching_rooms, rooms=home.rooms, reachable=reachable, never_in=NOT_LIVED_IN, stands_in=True
+    )
+    if activity.objects and activity.first == "furniture":
+        for name in activity.rooms:
+            kinds = set(activity.objects) - ({"chair"} if name == "any" else set())
+            used = {home.room_of(t) for t in home.objects if t.type in kinds and t.uses}
+            with suppress(PlacementError):  # it has no such room
+                furnished = [room for room in match((name,))[1] if room in used]
+                if furnished:
+                    return name, furnished
+    return match(activity.rooms)
 
 
 def rooms_at(

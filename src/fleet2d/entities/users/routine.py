@@ -10,7 +10,7 @@ from typing import NamedTuple
 from fleet2d.configuration.problems import problem, suggest
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor
-from fleet2d.entities.place import ANY, Point, RoomChoice, matching_rooms
+from fleet2d.entities.place import ANY, Point, RoomChoice
 from fleet2d.entities.users import resident
 from fleet2d.entities.users.resident import EPISODES_PER_DAY, ResidentBehavior, Seat, Spots, Venue
 from fleet2d.errors import PlacementError
@@ -18,7 +18,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
 from fleet2d.kernels import ANY_ROOM, NO_GAP_S
-from fleet2d.routines.activity import NOT_LIVED_IN, Activity, catalogue
+from fleet2d.routines.activity import Activity, catalogue
 from fleet2d.routines.household import AWAY, AnyHousehold, AnyPeriod, Household, with_absences
 from fleet2d.routines.life import CACHED_DAYS, WELCOME, Life, Lives, MemberRooms
 from fleet2d.routines.persona import AnyPersona, Persona, bundled_persona
@@ -45,7 +45,7 @@ def private_rooms(household: Household, home: Home) -> MemberRooms:
         for name, activity in persona.used_activities.items():
             if activity.away:
                 continue
-            indices = [room.index for room in _rooms_of(activity, reachable)]
+            indices = [room.index for room in _rooms_of(activity, home, reachable)]
             if indices:
                 of_member[name] = indices
             if name in persona.interruptions.exclusive:
@@ -58,21 +58,23 @@ def private_rooms(household: Household, home: Home) -> MemberRooms:
 
 def usual_rooms(home: Home) -> list[Room]:
     """Return the rooms that members of a household can get to, the same for all of them."""
-    space = home.space(DEFAULT_RADIUS, opens_doors=True)
+    space = home.space(DEFAULT_RADIUS, opens_doors=True, uses_portals=True)
     return [room for room in home.rooms if len(space.cells(room.index, 0))]
 
 
-def _rooms_of(activity: Activity, reachable: list[Room]) -> list[Room]:
-    """Return the rooms of the activity's first kind that exists, or of all its kinds.
+def _rooms_of(activity: Activity, home: Home, reachable: list[Room]) -> list[Room]:
+    """Return the rooms of the activity's first kind that fits, or of all its kinds.
 
     All kinds count if the activity may be done in a different room each time.
     """
-    found: list[Room] = []
-    for kind in activity.rooms:
-        if kind != ANY:
-            found += [room for room in reachable if kind in (room.name, room.type)]
-        if found and activity.choose == "own":
-            break
+    if activity.choose == "own":
+        try:
+            name, rooms = resident.rooms_for(activity, home, reachable)
+        except PlacementError:
+            return []
+        return rooms if name != ANY else []
+    kinds = [kind for kind in activity.rooms if kind != ANY]
+    found = [room for kind in kinds for room in reachable if room.is_called(kind)]
     return list(dict.fromkeys(found))
 
 
@@ -230,9 +232,7 @@ class Seating:
     def _rooms(self, rank: int, activity: Activity, bedroom: int | None) -> Sequence[Room]:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
         try:
-            name, rooms = matching_rooms(
-                activity.rooms, self._home.rooms, self._reachable, never_in=NOT_LIVED_IN
-            )
+            name, rooms = resident.rooms_for(activity, self._home, self._reachable)
         except PlacementError:  # then rest replaces the activity
             return ()
         if bedroom is not None:

@@ -427,6 +427,8 @@ def _crosses(first: I64, step: I64, passage: Segment) -> Bool:
 
 TOUCH_M = 0.02
 """Outlines no further apart than this touch, as coordinates are rounded (degrees to 1 cm)."""
+BORDER_M = 0.032
+"""Sides of two rooms no further apart, and that overlap no more, touch: so inexact are drawings."""
 MAX_WALL_M = 0.6
 """Largest thickness of a wall."""
 NEAR_M = 0.25
@@ -537,20 +539,20 @@ def find_passage(free: MultiPolygon, start: Point, end: Point) -> Passage | None
 
 
 def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
-    """Return the lines along which rooms touch one another, side by side."""
+    """Return the lines along which rooms touch one another, side by side, but for noise."""
     borders: list[BaseGeometry] = []
     tree = shapely.STRtree(rooms)
-    pairs = tree.query(rooms, predicate="dwithin", distance=TOUCH_M)
+    pairs = tree.query(rooms, predicate="dwithin", distance=BORDER_M)
     for one, other in sorted((int(i), int(k)) for i, k in pairs.T if i < k):
         near = (
             rooms[other]
-            .buffer(TOUCH_M, join_style="mitre")
-            .difference(rooms[other].buffer(-TOUCH_M, join_style="mitre"))
+            .buffer(BORDER_M, join_style="mitre")
+            .difference(rooms[other].buffer(-BORDER_M, join_style="mitre"))
         )
         sides = _sides(rooms[one])
         pieces = shapely.intersection(sides, near)
         lengths = shapely.length(pieces)
-        most = 2 * TOUCH_M
+        most = 2 * BORDER_M
         # The first centimetres of a side that leads away from the border are near it, too.
         along = (lengths > most) | ((lengths > 0) & (lengths >= shapely.length(sides) / 2))
         parts = shapely.get_parts(pieces[along])

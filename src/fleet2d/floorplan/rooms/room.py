@@ -29,7 +29,20 @@ PRIORITY = tuple(ALSO_CALLED)
 spaces come first, special types before general ones (a child's room is a bedroom), and catch-alls
 last."""
 _LAST = ("room", UNKNOWN)
-_TYPE_OF = {name: kind for kind, names in ALSO_CALLED.items() for name in (kind, *names)}
+_TYPES_OF: dict[str, tuple[str, ...]] = {}
+for _kind, _names in ALSO_CALLED.items():
+    for _name in (_kind, *_names):
+        _TYPES_OF[_name] = (*_TYPES_OF.get(_name, ()), _kind)
+# What joins the uses of a room in its name.
+_JOINTS = re.compile(r"[/+&,;|]|\s-\s|\s(?:and|und|et|y|e|en|with|mit)\s", re.IGNORECASE)
+LIVING_ROOM = "living_room"
+# Rooms in which nobody spends the day, and those in which people do so if the home has no others.
+NIGHT_ROOMS = ("bedroom", "child_room", "guest_room")
+PASSED_THROUGH = ("hallway", "entryway", "hall", "lobby")
+_LAST_DAY_ROOMS = ("hall", "lobby")
+_DAY_ROOMS = ("dining_room", "kitchen", "room", "office", UNKNOWN)
+# The smallest room that serves as a living room [m2].
+LEAST_DAY_M2 = 8.0
 
 
 def room_type(label: str) -> str:
@@ -58,14 +71,30 @@ def usual_type(name: str) -> str:
         >>> usual_type("Yoga Studio 3")
         'yoga_studio_3'
     """
-    own = room_type(name)
-    words = own.split("_")
+    return leading_type(usual_types(name))
+
+
+def usual_types(name: str) -> tuple[str, ...]:
+    """Return all room types that a room's name means, each once; itself if it means none.
+
+    Example:
+        >>> usual_types("Kitchen / Living room"), usual_types("Wohnküche 1")
+        (('kitchen', 'living_room'), ('kitchen', 'living_room'))
+        >>> usual_types("Ana & Ben's bedroom"), usual_types("Yoga Studio")
+        (('bedroom',), ('yoga_studio',))
+    """
+    known = [kind for part in _JOINTS.split(name) for kind in _known_types(part)]
+    return tuple(dict.fromkeys(known)) or (room_type(name),)
+
+
+def _known_types(name: str) -> tuple[str, ...]:
+    """Return the types of the vocabulary that a name without joints means."""
+    words = room_type(name).split("_")
     while len(words) > 1 and words[-1].isdigit():
         words.pop()
     endings = ["_".join(words[first:]) for first in range(len(words))]
     beginnings = ["_".join(words[:last]) for last in range(len(words) - 1, 0, -1)]
-    types = (_TYPE_OF[part] for part in (*endings, *beginnings) if part in _TYPE_OF)
-    return next(types, own)
+    return next((_TYPES_OF[part] for part in (*endings, *beginnings) if part in _TYPES_OF), ())
 
 
 def leading_type(types: tuple[str, ...]) -> str:
@@ -115,7 +144,7 @@ class LabelledRegion:
     @property
     def types(self) -> tuple[str, ...]:
         """The labels as room types, each once."""
-        return tuple(dict.fromkeys(room_type(label) for label in self.labels))
+        return tuple(dict.fromkeys(kind for label in self.labels for kind in usual_types(label)))
 
     @property
     def main_type(self) -> str:
@@ -255,6 +284,7 @@ class Room:
         name: Unique in the plan, such as `bedroom_0`.
         type: Its type, such as `bedroom`.
         labels: Every type that the file gives it, in file order; empty for space without a label.
+            Each is a function: a kitchen with the label living_room is a living room, too.
         cells: Number of cells.
         area_m2: Area of the cells [m²].
         anchor_xy: Centre of the cell that is deepest inside the room [m].
@@ -269,6 +299,30 @@ class Room:
     area_m2: float
     anchor_xy: tuple[float, float]
     bounds: tuple[float, float, float, float]
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What it may be called by: its name, its type and its other functions, each once."""
+        return tuple(dict.fromkeys((self.name, self.type, *self.labels)))
+
+    def is_called(self, name: str) -> bool:
+        """Return whether a name is that of the room, of its type or of another of its functions."""
+        return name in (self.name, self.type) or name in self.labels
+
+
+def day_room(rooms: Sequence[Room]) -> Room | None:
+    """Return the room that serves as a living room: the largest in which people spend the day.
+
+    None if a room is one, or none is large enough.
+    """
+    if any(room.is_called(LIVING_ROOM) for room in rooms):
+        return None
+    large = [room for room in rooms if room.area_m2 >= LEAST_DAY_M2]
+    for kinds in (_DAY_ROOMS, _LAST_DAY_ROOMS):
+        fitting = [room for room in large if room.type in kinds]
+        if fitting:
+            return max(fitting, key=lambda room: room.area_m2)
+    return None
 
 
 def assign_rooms(

@@ -3,14 +3,14 @@
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely import LineString, MultiPolygon
-from shapely.geometry.base import BaseGeometry
+from shapely import LineString, MultiPolygon, Point
 
 from fleet2d.bounds import CORNERS
 from fleet2d.configuration.units import InputPath
@@ -19,10 +19,11 @@ from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import in_file, reading
 from fleet2d.floorplan.lattice import SIDE_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.homes.formats.features import Draft, Feature, enclosed_space
+from fleet2d.homes.formats.enclosure import enclosed_space, grown, opened, outer_gaps, parts_of
+from fleet2d.homes.formats.features import Draft, Feature
 from fleet2d.kernels import F64
 
-# Metres to a unit, by the header variable $INSUNITS, and what is tried if it says nothing.
+# Metres to a unit, by the header variable $INSUNITS, and what is tried if that makes no home.
 UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0}
 TRIED_M = (1.0, 0.001, 0.01, 0.0254, 0.3048)
 # Words in the names of layers, in several languages.
@@ -38,8 +39,20 @@ DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE")
 LINE_M = 0.02
 NARROW_M = 0.5
 MIN_PART_M2 = 1.0
+# What is nearer to each other is one point [m].
+ROUNDED_M = 0.001
 # Largest distance between two lines of one window [m].
 WINDOW_LINES_M = 0.3
+# Doors are so wide [m]: less apart than any two units are, so that doors decide between these. They
+# are drawn by an arc of about a quarter turn [deg].
+DOOR_M = (0.55, 1.3)
+DOOR_ARC_DEG = (60.0, 110.0)
+USUAL_DOOR_M = 0.95
+# A home has such an area [m2]; so much less floor than its frame has the widest home round a yard.
+HOME_M2 = (12.0, 2000.0)
+# How far inside a front door its entrance is, and how far off its arc may be [m].
+INSIDE_M = 0.3
+AT_DOOR_M = 0.4
 
 
 class Dxf(FileSource):
@@ -47,7 +60,8 @@ class Dxf(FileSource):
 
     Attributes:
         path: The DXF file.
-        scale: Metres to a unit of the drawing; left out: as the file says, or by its extent.
+        scale: Metres to a unit of the drawing; left out: by the widths of doors,
+            as the file says, or by a likely area.
         walls: Layers with walls, by name, `*` for any text; left out: those named like walls and
             windows, or all lines if there are none.
     """
@@ -80,14 +94,41 @@ class Dxf(FileSource):
                 raise FloorPlanError(
                     "it has no lines of walls: name their layers by floorplan.walls"
                 )
-            bounds = np.concatenate(lines)
-            low, high = bounds.min(axis=0), bounds.max(axis=0)
-            scale = self.scale or _scale(int(drawing.units), float((high - low).max()), notes)
-            metres = [LineString(np.round((line - low) * scale, 4)) for line in lines]
-            free = _inside(metres, notes)
-            panes = _panes([(line - low) * scale for line in _lines(drawing, windows)])
-            draft = Draft([Feature("free", "walls", free, {}), *panes], 0.0, notes)
-            return draft.build(self.path.stem, self.cell, f"DXF, {self.path.name}")
+            arcs = _door_arcs(drawing)
+            scales = [self.scale] if self.scale else _scales(drawing, lines, arcs)
+            plans: list[tuple[float, FloorPlan]] = []
+            problems: list[FloorPlanError] = []
+            for scale in scales:
+                panes = [line * scale for line in _lines(drawing, windows)]
+                doors = arcs * scale
+                try:
+                    plan = self._home([line * scale for line in lines], panes, doors, notes)
+                except FloorPlanError as error:
+                    problems.append(error)
+                    continue
+                plans.append((scale, plan))
+            if not plans:
+                raise problems[0]
+            return _likeliest(plans, drawing, self.scale is not None)
+
+    def _home(
+        self, walls: list[F64], windows: list[F64], doors: F64, notes: list[str]
+    ) -> FloorPlan:
+        """Return the home between lines of walls and windows, with the arcs of doors [m]."""
+        corner = np.concatenate(walls).min(axis=0)
+        said = list(notes)
+        free, entrances = _inside([np.round(line - corner, 4) for line in walls], said)
+        centres = doors[:, :2] - corner
+
+        def unlikely(entrance: tuple[float, Point]) -> tuple[bool, float]:
+            width, at = entrance
+            away = np.hypot(*(centres - np.array([at.x, at.y])).T)
+            return not (away <= width + AT_DOOR_M).any(), abs(width - USUAL_DOOR_M)
+
+        fronts = [Feature("entrance", "gap", at, {}) for _, at in sorted(entrances, key=unlikely)]
+        panes = _panes([line - corner for line in windows])
+        draft = Draft([Feature("free", "walls", free, {}), *panes, *fronts], 0.0, said)
+        return draft.build(self.path.stem, self.cell, f"DXF, {self.path.name}")
 
     def _layers(self, drawing: Any, notes: list[str]) -> set[str]:
         """Return the names of the layers with walls."""
@@ -149,27 +190,118 @@ def _panes(lines: Sequence[F64]) -> list[Feature]:
     return windows
 
 
-def _scale(units: int, extent: float, notes: list[str]) -> float:
-    """Return the metres to a unit: as the file says, else by the extent of the drawing."""
-    for scale in (UNITS_M.get(units, 0.0), *TRIED_M):
-        if SIDE_M[0] <= extent * scale <= SIDE_M[1]:
-            if scale != UNITS_M.get(units):
-                notes.append(f"a unit is taken for {scale:g} m, by the extent; scale: sets another")
-            return scale
-    raise FloorPlanError(
-        f"its walls extend over {extent:.4g} units, which is not a home in metres, centimetres,"
-        " millimetres, inches or feet: set floorplan.scale to the metres to a unit"
-    )
+def _clean(line: F64) -> F64:
+    """Return a line without steps of less than a millimetre [m], and shut if its ends meet."""
+    kept = np.concatenate([[True], np.hypot(*np.diff(line, axis=0).T) > ROUNDED_M])
+    if not kept[1:].any():
+        return line
+    line = line[kept]
+    if len(line) > 2 and np.hypot(*(line[-1] - line[0])) <= ROUNDED_M:
+        line[-1] = line[0]
+    return line
 
 
-def _inside(lines: list[LineString], notes: list[str]) -> MultiPolygon:
-    """Return the space that lines enclose [m], without the inside of walls."""
-    walls: BaseGeometry = shapely.union_all(lines).buffer(LINE_M / 2, join_style="mitre")
-    space = enclosed_space(walls, [], notes).difference(walls)
-    half = NARROW_M / 2
-    roomy = space.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
-    parts = shapely.get_parts(roomy.intersection(space)).tolist()
-    kept = [p for p in parts if p.geom_type == "Polygon" and p.area >= MIN_PART_M2]
+def _door_arcs(drawing: Any) -> F64:
+    """Return the arcs of doors as their middle (x, y) and radius, float64 (n, 3), in units."""
+    arcs = []
+    for entity in drawing.modelspace():
+        parts = entity.virtual_entities() if entity.dxftype() == "INSERT" else [entity]
+        for part in parts:
+            if part.dxftype() != "ARC" or WINDOWS.search(str(part.dxf.layer)):
+                continue
+            sweep = (float(part.dxf.end_angle) - float(part.dxf.start_angle)) % 360
+            if DOOR_ARC_DEG[0] <= sweep <= DOOR_ARC_DEG[1]:
+                centre = part.ocs().to_wcs(part.dxf.center)
+                arcs.append((float(centre.x), float(centre.y), float(part.dxf.radius)))
+    found = np.array(arcs, np.float64).reshape(-1, 3)
+    return found[np.isfinite(found).all(axis=1)]
+
+
+def _scales(drawing: Any, lines: list[F64], arcs: F64) -> list[float]:
+    """Return the metres that a unit may be, the likeliest first: what the file says, or others.
+
+    If doors have arcs, their width decides.
+    """
+    corners = np.concatenate(lines)
+    frame = np.ptp(corners, axis=0)
+    said = UNITS_M.get(int(drawing.units), 0.0)
+    likely = [said, *(scale for scale in TRIED_M if scale != said)]
+    homes = [
+        scale
+        for scale in likely
+        if SIDE_M[0] <= frame.max() * scale <= SIDE_M[1]
+        and HOME_M2[0] <= frame[0] * frame[1] * scale**2
+    ]
+    if len(arcs):
+        door = float(np.median(arcs[:, 2]))
+        fitting = [scale for scale in homes if DOOR_M[0] <= door * scale <= DOOR_M[1]]
+        if fitting:
+            return fitting[:1]
+    if not homes:
+        raise FloorPlanError(
+            f"its walls extend over {frame.max():.4g} units, which is not a home in metres,"
+            " centimetres, millimetres, inches or feet: set floorplan.scale to the metres to a unit"
+        )
+    return homes
+
+
+def _likeliest(plans: list[tuple[float, FloorPlan]], drawing: Any, is_given: bool) -> FloorPlan:
+    """Return the home in the likeliest of some scales, which have no doors with arcs to decide.
+
+    That is the one that the file says, unless in it far fewer gaps are as wide as doors.
+
+    Raises:
+        FloorPlanError: Several are as likely.
+    """
+    said = UNITS_M.get(int(drawing.units), 0.0)
+
+    def doors(plan: FloorPlan) -> int:
+        return sum(DOOR_M[0] <= door.width_m <= DOOR_M[1] for door in plan.doorways)
+
+    most = max(doors(plan) for _, plan in plans)
+    least = max(most / 2, min(most, 1))
+    best = [entry for entry in plans if doors(entry[1]) == most]
+    likely = (entry for entry in plans if entry[0] == said and doors(entry[1]) >= least)
+    scale, plan = next(likely, best[0])
+    if len(best) > 1 and scale != said:
+        sizes = ", ".join(f"{scale:g} makes it {plan.area_m2:.0f} m2" for scale, plan in best)
+        raise FloorPlanError(
+            f"it doesn't say its unit, and no door tells it: set floorplan.scale; {sizes}"
+        )
+    if is_given or scale == said:
+        return plan
+    others = "" if not said else f", though the file says {said:g} m"
+    note = f"a unit is taken for {scale:g} m, by its doors and area{others}; scale: sets another"
+    return replace(plan, notes=(note, *plan.notes))
+
+
+def _inside(lines: list[F64], notes: list[str]) -> tuple[MultiPolygon, list[tuple[float, Point]]]:
+    """Return the space that lines enclose, and the ways out, with the width of each [m].
+
+    What is narrower than a person is the inside of a wall, and gaps in outer walls are shut.
+    """
+    drawn = shapely.union_all([LineString(_clean(line)) for line in lines])
+    thick = drawn.buffer(NARROW_M / 2, cap_style="square", join_style="mitre")
+    solid = grown(thick, -NARROW_M / 2)
+    alone = drawn.difference(solid.buffer(LINE_M / 2))
+    walls = shapely.union_all([solid, grown(alone, LINE_M / 2)])
+    whole = enclosed_space(walls, [], notes)
+    gaps = outer_gaps(walls, whole)
+    space = whole.difference(shapely.union_all([walls, *gaps]))
+    kept = [
+        part
+        for part in parts_of(space)
+        if part.area >= MIN_PART_M2 and not opened(part, NARROW_M).is_empty
+    ]
     if not kept:
         raise FloorPlanError("its lines enclose no space that a person fits into")
-    return MultiPolygon(kept)
+    free = MultiPolygon(kept)
+    ways = []
+    for gap in gaps:
+        corners = shapely.get_coordinates(gap)
+        outer, inner = corners[:2].mean(axis=0), corners[2:4].mean(axis=0)
+        inward = (inner - outer) / max(float(np.hypot(*(inner - outer))), 1e-9)
+        at = Point(inner + INSIDE_M * inward)
+        if free.contains(at):
+            ways.append((float(np.hypot(*(corners[1] - corners[0]))), at))
+    return free, ways

@@ -1,22 +1,26 @@
 """Plans of features: rooms, walls, doors and furniture as shapes, however a file draws them."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import shapely
 import shapely.geometry
 from pydantic import TypeAdapter
-from shapely import MultiPolygon, Polygon
+from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.files import validate
 from fleet2d.floorplan.native import ObjectUse
-from fleet2d.floorplan.placed_objects import PlacedObject, Point, distinct_names
+from fleet2d.floorplan.placed_objects import PlacedObject, Point, Portal, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
+    BORDER_M,
+    NEAR_M,
     TOUCH_M,
     DoorLine,
     Passage,
@@ -25,6 +29,16 @@ from fleet2d.floorplan.rooms.doorways import (
     shared_borders,
 )
 from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_type
+from fleet2d.floorplan.rooms.segmentation import MIN_APART_M
+from fleet2d.homes.formats.enclosure import (
+    draws_walls,
+    enclosed_space,
+    multi,
+    parts_of,
+    unnamed_space,
+    wall_gaps,
+    within_walls,
+)
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
 
@@ -33,8 +47,11 @@ LINES = ("LineString", "MultiLineString")
 GEOMETRIES = {
     **dict.fromkeys(("room", "free", "no_go"), SURFACES),
     "object": (*SURFACES, "Point"),
-    **dict.fromkeys(("door", "opening", "window", "wall"), (*LINES, *SURFACES)),
+    **dict.fromkeys(("window", "wall"), (*LINES, *SURFACES)),
+    **dict.fromkeys(("door", "opening"), (*LINES, *SURFACES, "Point")),
     "entrance": ("Point", "LineString"),
+    "portal": LINES,
+    **dict.fromkeys(("stairs", "lift"), SURFACES),
 }
 """The types of geometry that each kind of feature may have."""
 
@@ -44,14 +61,33 @@ Move = Callable[[F64], F64]
 # Distance of the entrance from a door that leads outside, and how far an entrance may be moved.
 INSIDE_M = 0.3
 ENTRANCE_REACH_M = 1.0
-# Widths of gaps in walls that are closed in turn to find what they enclose [m], and the share of
-# the largest space that it must keep.
-GAPS_M = (0.0, 0.05, 0.2, 0.5, 1.0)
-KEPT_SHARE = 0.7
-# Side of an object that is drawn as a point.
+# Side of an object that is drawn as a point, and width of a door that is.
 POINT_OBJECT_M = 0.1
+# Space in no room that is smaller belongs to the nearest [m2].
+SLIVER_M2 = 0.1
+POINT_DOOR_M = 0.9
+DOOR_WIDTHS_M = (0.4, 5.0)
+# Words in the names of front doors, in several languages, and what a door outside leads to, the
+# likeliest first; last of all where people sit outside.
+FRONT_DOORS = re.compile(
+    "front|main|entr|haust|eingang|wohnungst|voordeur|ingresso|principal", re.IGNORECASE
+)
+FRONT_ROOMS = ("entryway", "lobby", "hallway", "hall", "living_room", "kitchen")
+BACK_ROOMS = ("balcony", "loggia", "terrace", "garage")
+# How far from the end of stairs people may stand, and how much room they need there [m].
+STAIRS_REACH_M = 1.5
+STANDING_M = 0.25
+PORTAL_S = 12.0
 
 _USES = ("category", "type", "usage", "use", "room", "room_type", "function")
+# Tags of OpenStreetMap that tell the use of a room, with the type that they mean.
+_OSM_USES = {
+    ("amenity", "toilets"): "toilet",
+    ("amenity", "kitchen"): "kitchen",
+    ("indoor", "corridor"): "hallway",
+    ("highway", "elevator"): "passenger_elevator",
+    ("stairs", "yes"): "stairs",
+}
 # IMDF's categories of units that have another name in the vocabulary.
 _IMDF_TYPES = {
     "restroom": "toilet",
@@ -80,7 +116,8 @@ class Feature:
         where: Its place in the file, for messages.
         shape: Its geometry; in the units of the file until `in_metres`.
         properties: Its properties in the file.
-        level: The floor that it is on, or None.
+        level: The storey that it is on, or None.
+        shift: How far it was moved along x, to lie beside other storeys.
     """
 
     kind: str
@@ -88,6 +125,7 @@ class Feature:
     shape: BaseGeometry
     properties: dict[str, Any]
     level: str | None = None
+    shift: float = 0.0
 
     def text(self, *keys: str) -> str | None:
         """Return the first property with text, on one line; in English if possible."""
@@ -127,19 +165,21 @@ class Draft:
             shapes = [shapely.transform(f.shape, lambda xy: xy * scale) for f in features]
             features = [replace(f, shape=s) for f, s in zip(features, shapes, strict=True)]
             self.move = lambda xy: move(xy) * scale
-        self.features = features
+        self.scale = scale or 1.0
+        self.features = list(features)
         self.notes = notes
-        self.rooms = [_areas([room]) for room in self._of("room")]
+        self.rooms = [areas_of([room]) for room in self._of("room")]
         self.free = self._free(wall_m)
+        self._widen_doors()
         self.doors: list[tuple[Feature, Passage]] = []
-        self.ways_out: list[Passage] = []
+        self.ways_out: list[tuple[Feature, Passage]] = []
         self._cut_doors()
         self.panes = list(self._glaze())
 
     def build(self, name: str, cell: float, source: str) -> FloorPlan:
         """Return the floor plan."""
         areas = self._of("no_go")
-        return FloorPlan.build(
+        plan = FloorPlan.build(
             name=name,
             free=self.free,
             regions=tuple(self._regions(cell)),
@@ -148,11 +188,12 @@ class Draft:
             entrance=self._entrance(),
             doorways=tuple(self._doorways()) if self._of("door", "opening") else None,
             regions_are="exact" if self.rooms else "none",
-            objects=tuple(o for f in self._of("object") for o in _to_objects(f, self.move)),
-            no_go=tuple(part for area in areas for part in _parts(area.shape)),
+            objects=tuple(o for f in self._of("object") for o in self._objects(f)),
+            no_go=tuple(part for area in areas for part in parts_of(area.shape)),
             glass=tuple(self.panes),
             notes=tuple(self.notes),
         )
+        return self._with_portals(plan)
 
     def _of(self, *kinds: str) -> list[Feature]:
         return [feature for feature in self.features if feature.kind in kinds]
@@ -161,18 +202,15 @@ class Draft:
 
     def _free(self, wall_m: float) -> MultiPolygon:
         """Return the free space between the walls, before doors open these."""
-        open_space = _areas(self._of("free"))
+        open_space = areas_of(self._of("free"))
         walls = self._walls(wall_m)
         if open_space.is_empty and not self.rooms and not walls.is_empty:
             doors = [door.shape for door in self._of("door", "opening")]
             open_space = enclosed_space(walls, doors, self.notes)
         if open_space.is_empty and not self.rooms:
-            raise FloorPlanError(
-                "it has no room and no free space: no feature of kind room or free, and no walls"
-                " that enclose space"
-            )
+            raise FloorPlanError("it has no room and no free space, and no walls that enclose any")
         free = self._room_space(walls, wall_m) if open_space.is_empty else open_space
-        free = _multi(free.difference(walls))
+        free = multi(free.difference(walls))
         if free.is_empty:
             raise FloorPlanError("no free space is left: all of it is wall")
         return free
@@ -187,20 +225,58 @@ class Draft:
         return shapely.union_all([*solid, _thick(lines, wall_m)])
 
     def _room_space(self, walls: BaseGeometry, wall_m: float) -> MultiPolygon:
-        """Return the rooms, with walls where they touch unless the file draws these."""
-        free = _areas(self._of("room"))
+        """Return the rooms, with walls where they touch unless the file draws its walls."""
         borders = shared_borders(self.rooms)
-        length = sum_in_order(line.length for line in borders)
-        near = walls.buffer(TOUCH_M + wall_m / 2, join_style="mitre")
-        drawn = sum_in_order(float(line.intersection(near).length) for line in borders)
-        if borders and wall_m > 0 and drawn < length / 2:
+        # A gap within the precision of drawings is no wall.
+        joints = [line.buffer(BORDER_M, cap_style="flat") for line in borders]
+        if draws_walls(walls, self.rooms, borders, wall_m):
+            self._fit_rooms(walls)
+            return multi(shapely.union_all([*self.rooms, *joints]))
+        free = areas_of(self._of("room"))
+        if borders and wall_m > 0:
+            length = sum_in_order(line.length for line in borders)
             self.notes.append(
                 f"rooms touch along {length:.1f} m: there are walls of {wall_m:g} m but for doors"
             )
-            return _multi(free.difference(_thick(borders, wall_m)))
-        # A gap within the precision of drawings is no wall.
-        joints = [line.buffer(TOUCH_M, cap_style="flat") for line in borders]
-        return _multi(shapely.union_all([free, *joints]))
+            return multi(free.difference(_thick(borders, wall_m)))
+        return multi(shapely.union_all([free, *joints]))
+
+    def _fit_rooms(self, walls: BaseGeometry) -> None:
+        """Fit the rooms to the walls of the file, and mark the gaps in these as ways."""
+        doors = self._of("door", "opening")
+        whole = enclosed_space(walls, [door.shape for door in doors], [])
+        self.rooms = [within_walls(room, walls, whole) for room in self.rooms]
+        unnamed = unnamed_space(walls, self.rooms)
+        for space in unnamed:
+            contacts = [
+                float(room.boundary.intersection(space.buffer(TOUCH_M)).length)
+                for room in self.rooms
+            ]
+            most = max(contacts)
+            if most >= MIN_APART_M:
+                index = contacts.index(most)
+                joint = space.buffer(TOUCH_M, join_style="mitre").difference(walls)
+                self.rooms[index] = multi(shapely.union_all([self.rooms[index], joint]))
+            elif any(door.shape.distance(space) <= TOUCH_M for door in doors):
+                self.features.append(Feature("room", "space without a name", space, {}))
+                self.rooms.append(multi(space))
+            else:
+                at = space.representative_point()
+                self.notes.append(
+                    f"space of {space.area:.1f} m2 at ({at.x:.2f}, {at.y:.2f}) m is in no room and"
+                    " has no door: left out"
+                )
+        for line in wall_gaps(walls, self.rooms):
+            if all(door.shape.distance(line) > NEAR_M for door in doors):
+                x, y = line.centroid.x, line.centroid.y
+                self.features.append(Feature("opening", f"gap at ({x:.2f}, {y:.2f}) m", line, {}))
+
+    def _widen_doors(self) -> None:
+        """Make each door that is a point a line along the nearest wall."""
+        for number, feature in enumerate(self.features):
+            if feature.kind in ("door", "opening") and isinstance(feature.shape, shapely.Point):
+                line = _door_at(feature, self.rooms or [self.free])
+                self.features[number] = replace(feature, shape=line)
 
     def _cut_doors(self) -> None:
         """Open the walls where doors are; a door that leads outside stays shut."""
@@ -212,11 +288,11 @@ class Draft:
                 self.doors.append((feature, through))
                 cuts += [through.opening] if through.halves else []
             elif passages:
-                self.ways_out.append(passages[0])
+                self.ways_out.append((feature, passages[0]))
                 self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
             else:
                 self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
-        self.free = _multi(shapely.union_all([self.free, *cuts]))
+        self.free = multi(shapely.union_all([self.free, *cuts]))
 
     def _passages(self, *kinds: str) -> Iterator[tuple[Feature, list[Passage]]]:
         """Yield each door or window of some kinds, with its possible passages through a wall."""
@@ -242,7 +318,7 @@ class Draft:
     # --- Rooms and objects ---------------------------------------------------------------------
 
     def _regions(self, cell: float) -> list[LabelledRegion]:
-        """Return the rooms, each with its half of the passages through its walls."""
+        """Return the rooms, each with its half of the passages through its walls, and slivers."""
         halves: list[list[Polygon]] = [[] for _ in self.rooms]
         for _, passage in self.doors if self.rooms else ():
             for half in passage.halves:
@@ -250,6 +326,11 @@ class Draft:
                 overlap = shapely.area(shapely.intersection(self.rooms, half)).tolist()
                 if max(overlap) < half.area / 2:
                     halves[away.index(min(away))].append(half)
+        covered = shapely.union_all([*self.rooms, *(half for own in halves for half in own)])
+        for sliver in parts_of(self.free.difference(covered)) if self.rooms else ():
+            if 0 < sliver.area < SLIVER_M2:  # of inexact outlines
+                away = shapely.distance(self.rooms, sliver).tolist()
+                halves[away.index(min(away))].append(sliver)
         own_names = [room.text("name") for room in self._of("room")]
         names = distinct_names(own_names, "rooms", self.notes)
         regions = []
@@ -262,8 +343,59 @@ class Draft:
             own_labels = feature.properties.get("labels")
             if isinstance(own_labels, list) and all(isinstance(x, str) for x in own_labels):
                 labels = tuple(own_labels)
-            regions.append(LabelledRegion(labels, _multi(shape), name, kind))
+            regions.append(LabelledRegion(labels, multi(shape), name, kind))
         return regions
+
+    def _front_door(self) -> Passage:
+        """Return the door outside through which people most likely leave the home."""
+        levels = list(dict.fromkeys(feature.level for feature in self.features))
+
+        def rank(way: tuple[Feature, Passage]) -> tuple[bool, int, int]:
+            feature, passage = way
+            x, y = passage.inside(INSIDE_M)
+            inside = shapely.Point(x, y)
+            rooms = zip(self._of("room"), self.rooms, strict=True)
+            kind = next((_use_of(f)[1] for f, area in rooms if area.intersects(inside)), UNKNOWN)
+            likely = FRONT_ROOMS.index(kind) if kind in FRONT_ROOMS else len(FRONT_ROOMS)
+            likely += len(FRONT_ROOMS) * (kind in BACK_ROOMS)
+            is_named = FRONT_DOORS.search(feature.text("name") or feature.where) is not None
+            return not is_named, levels.index(feature.level), likely
+
+        feature, passage = min(self.ways_out, key=rank)
+        if len(self.ways_out) > 1:
+            name = feature.text("name") or feature.where
+            self.notes.append(f"of {len(self.ways_out)} doors outside, {name} is the entrance")
+        return passage
+
+    def _with_portals(self, plan: FloorPlan) -> FloorPlan:
+        """Return the plan with the stairs and lifts of the file."""
+        things = [o.footprint for o in plan.objects if o.blocks != "nothing"]
+        standing = self.free.difference(shapely.union_all(things)).buffer(-STANDING_M)
+        for feature in self._of("portal"):
+            ways = [_standing_ends(standing, way) for way in shapely.get_parts(feature.shape)]
+            away, start, end = min(ways, key=lambda way: way[0])
+            takes = feature.properties.get("takes") or PORTAL_S
+            kind = str(feature.properties.get("type") or "stairs")
+            try:
+                if away > STAIRS_REACH_M:
+                    raise FloorPlanError("there is no floor at one of its ends")
+                portal = Portal(kind, start, end, round(float(takes) * 1_000_000))
+                plan = plan.with_portals([portal], feature.where)
+            except FloorPlanError as error:
+                plan = replace(
+                    plan, notes=(*plan.notes, f"{feature.where} joins no storeys: {error}")
+                )
+        return plan
+
+    def _objects(self, feature: Feature) -> Iterable[PlacedObject]:
+        """Return the objects of a feature, with their places of use."""
+        shift = np.array([feature.shift * self.scale, 0.0])
+
+        def move(xy: F64) -> F64:
+            moved: F64 = self.move(xy) + shift
+            return moved
+
+        return _to_objects(feature, move)
 
     def _entrance(self) -> tuple[float, float] | None:
         """Return the place just inside the front door, if the file has one."""
@@ -272,8 +404,8 @@ class Draft:
             if len(shapes) > 1:
                 self.notes.append(f"it has {len(shapes)} entrances: the first is used")
             at = shapes[0].centroid
-        elif len(self.ways_out) == 1:
-            at = shapely.Point(self.ways_out[0].inside(INSIDE_M))
+        elif self.ways_out:
+            at = shapely.Point(self._front_door().inside(INSIDE_M))
         else:
             return None
         roomy = self.free.buffer(-INSIDE_M / 3, join_style="mitre")
@@ -284,14 +416,51 @@ class Draft:
         return round(float(at.x), 6), round(float(at.y), 6)
 
 
+def _door_at(door: Feature, rooms: Sequence[MultiPolygon]) -> LineString:
+    """Return the line of a door that the file has as a point: along the nearest side of a room."""
+    at: Any = door.shape
+    rings = [ring for room in rooms for ring in shapely.get_rings(shapely.get_parts(room))]
+    ring = min(rings, key=at.distance)
+    corners = shapely.get_coordinates(ring)
+    sides = [LineString(pair) for pair in pairwise(corners)]
+    side = min(sides, key=at.distance)
+    half = min(_width_of(door), side.length) / 2
+    middle = min(max(side.project(at), half), side.length - half)
+    ends = [side.interpolate(middle - half), side.interpolate(middle + half)]
+    return LineString(ends)
+
+
+def _width_of(door: Feature) -> float:
+    """Return the width of a door that is a point [m]: of its property, as OSM has it."""
+    text = str(door.properties.get("width", "")).removesuffix("m").strip()
+    try:
+        width = float(text)
+    except ValueError:
+        return POINT_DOOR_M
+    return width if DOOR_WIDTHS_M[0] <= width <= DOOR_WIDTHS_M[1] else POINT_DOOR_M
+
+
 def _use_of(room: Feature) -> tuple[tuple[str, ...], str]:
     """Return a room's labels and type: by its use in the file, else by its name."""
-    use = room.text(*_USES) or UNKNOWN
+    tags = ((key, room.properties.get(key)) for key, _ in _OSM_USES)
+    tagged = (_OSM_USES[tag] for tag in tags if tag in _OSM_USES)
+    use = room.text(*_USES) or next(tagged, UNKNOWN)
     name = room.text("name")
     kind = _IMDF_TYPES.get(use.partition(".")[0], usual_type(use))
     if kind in ("room", UNKNOWN) and name is not None and usual_type(name) in PRIORITY:
         return (name,), usual_type(name)
     return () if kind == UNKNOWN else (use,), kind
+
+
+def _standing_ends(standing: BaseGeometry, way: LineString) -> tuple[float, Point, Point]:
+    """Return how far people stand from the ends of stairs, the most [m], and where."""
+    ends = shapely.get_coordinates(way)[[0, -1]]
+    if standing.is_empty:
+        return np.inf, (0.0, 0.0), (0.0, 0.0)
+    lines = [shapely.shortest_line(standing, shapely.Point(end)) for end in ends]
+    places = [shapely.get_coordinates(line)[0].round(6).tolist() for line in lines]
+    (x0, y0), (x1, y1) = places
+    return max(float(line.length) for line in lines), (x0, y0), (x1, y1)
 
 
 def _to_plan(move: Move, at: Point) -> Point:
@@ -315,7 +484,7 @@ def _to_objects(feature: Feature, move: Move) -> Iterable[PlacedObject]:
         approach = use.approach and _to_plan(move, use.approach)
         uses.append(replace(use, x=x, y=y, approach=approach))
     name = feature.text("name") or ""
-    parts = _parts(shape)
+    parts = parts_of(shape)
     for number, part in enumerate(parts):
         own = f"{name} {number + 1}" if name and len(parts) > 1 else name
         own_uses = () if number else tuple(uses)
@@ -329,73 +498,6 @@ def _thick(lines: Iterable[BaseGeometry], wall_m: float) -> BaseGeometry:
     return shapely.union_all(shapes)
 
 
-def _areas(features: Iterable[Feature]) -> MultiPolygon:
-    return _multi(shapely.union_all([feature.shape for feature in features]))
-
-
-def _multi(shape: BaseGeometry) -> MultiPolygon:
-    return MultiPolygon(_parts(shape))
-
-
-def _parts(shape: BaseGeometry) -> list[Polygon]:
-    return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
-
-
-def enclosed_space(
-    walls: BaseGeometry, doors: Iterable[BaseGeometry], notes: list[str]
-) -> MultiPolygon:
-    """Return the space within walls and doors, with gaps closed that would lose most of it.
-
-    Args:
-        walls: The walls [m]; what they cover isn't left out.
-        doors: Doors, at which walls may have gaps [m].
-        notes: A note is added if gaps are closed.
-    """
-    shut = [walls, *(door.buffer(GAPS_M[1]) for door in doors)]
-    outlines = []
-    for gap in GAPS_M:
-        with np.errstate(invalid="ignore"):  # GEOS divides by zero at corners in line, without harm
-            solid = _parts(shapely.union_all(shut).buffer(gap / 2, join_style="mitre"))
-            shells = [Polygon(part.exterior) for part in solid if part.interiors]
-            whole = shapely.union_all(shells).buffer(-gap / 2, join_style="mitre")
-        inside = sum_in_order(Polygon(hole).area for part in solid for hole in part.interiors)
-        outlines.append((inside, whole, gap))
-    most = max(inside for inside, *_ in outlines)
-    whole, gap = next((w, g) for inside, w, g in outlines if inside >= KEPT_SHARE * most)
-    if gap > 0 and most > 0:
-        notes.append(f"gaps in the walls are closed up to {gap:g} m to find the inside")
-    return _multi(whole)
-
-
-def choose_level(
-    levels: Sequence[tuple[str, str, float]], level: str | None, notes: list[str]
-) -> str | None:
-    """Return the id of the storey to read, or None if there is only one.
-
-    Args:
-        levels: Id, name and elevation of each.
-        level: The name or id of one; None for the lowest that is not below the ground.
-        notes: A note is added if others are left out.
-
-    Raises:
-        FloorPlanError: There is no such storey, or several have that name.
-
-    Example:
-        >>> choose_level([("a", "Cellar", -2.5), ("c", "Up", 2.8), ("b", "Ground", 0)], None, [])
-        'b'
-    """
-    called = [name for _, name, _ in levels]
-    names = {k: n if called.count(n) == 1 else f"{n} (id {k}, at {z:g})" for k, n, z in levels}
-    if level is not None:
-        matches = [key for key, name, _ in levels if level in (key, name)]
-        if len(matches) != 1 and level not in names:
-            known = ", ".join(names.values()) or "none"
-            problem = f"{len(matches)} levels are called" if matches else "there is no level"
-            raise FloorPlanError(f"{problem} {level!r}; its levels are: {known}")
-        return level if level in names else matches[0]
-    if len(levels) < 2:
-        return None
-    chosen = min(levels, key=lambda entry: (entry[2] < 0, entry[2]))[0]
-    others = ", ".join(name for key, name in names.items() if key != chosen)
-    notes.append(f"of its levels, {names[chosen]} is used, not {others}")
-    return chosen
+def areas_of(features: Iterable[Feature]) -> MultiPolygon:
+    """Return the areas of some features as one."""
+    return multi(shapely.union_all([feature.shape for feature in features]))

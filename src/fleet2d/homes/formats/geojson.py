@@ -1,13 +1,16 @@
 """Vector floor plans as GeoJSON (RFC 7946): rooms, walls, doors and furniture as features.
 
-Two dialects are read, also mixed: our own, which names the kind of a feature by its property
-`kind`, and IMDF (Indoor Mapping Data Format), which names it by its member `feature_type`.
+Three dialects are read, also mixed: our own, which names the kind of a feature by its property
+`kind`, IMDF (Indoor Mapping Data Format), which names it by its member `feature_type`, and indoor
+maps of OpenStreetMap, which have the tag `indoor`.
 """
 
 import math
+import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,6 +39,7 @@ from fleet2d.floorplan.native import object_document
 from fleet2d.floorplan.plan import FloorPlan, cell_polygons
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.homes.formats.features import GEOMETRIES, SURFACES, Draft, Feature, Move
+from fleet2d.homes.formats.storeys import Storey, arrange
 from fleet2d.kernels import F64
 
 COLLECTION = "FeatureCollection"
@@ -55,19 +59,43 @@ _DEPTHS = {"Point": 0, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "Mul
 _IMDF_KINDS = {"unit": "room", "opening": "opening", "fixture": "object", "kiosk": "object"}
 _IMDF_SOLID = ("brick", "column", "concrete", "drywall", "glass", "structure", "wall")
 _IMDF_NO_FLOOR = ("opentobelow", "road", "vegetation")
+# Kinds of features by OpenStreetMap's tag `indoor`; None for those without an effect.
+_OSM_KINDS = {
+    "room": "room",
+    "area": "room",
+    "corridor": "room",
+    "wall": "wall",
+    "door": "door",
+    "level": None,
+    "yes": None,
+}
+# Tags that only outdoor features, or outlines of whole buildings, have.
+_OSM_OUTSIDE = ("building", "building:part", "landuse", "natural", "barrier")
+# What a room of IMDF or OpenStreetMap is if it joins storeys.
+_LINKS = {
+    "stairs": "stairs",
+    "steps": "stairs",
+    "escalator": "stairs",
+    "ramp": "stairs",
+    "elevator": "lift",
+    "lift": "lift",
+}
+# The part of stairs on a storey that those on the next cover, if they are the same.
+SAME_SHARE = 0.3
+MAX_LEVELS = 100
+_RANGE = re.compile(r"\s*(-?\d+)\s*-\s*(-?\d+)\s*")
 _KIND_WORDS = {"furniture": "object", "no_go_area": "no_go"} | {kind: kind for kind in GEOMETRIES}
 
 
-def read_features(content: dict[str, Any], level: str | None, notes: list[str]) -> list[Feature]:
-    """Return the features of known kinds on one floor, in the units of the file.
+def read_features(content: dict[str, Any], notes: list[str]) -> tuple[list[Feature], list[Storey]]:
+    """Return the features of known kinds in the units of the file, and its storeys.
 
     Args:
         content: The content of the file.
-        level: The floor, if there are several; None for the one of ordinal 0, or the first.
         notes: Sentences on anomalies are added.
 
     Raises:
-        FloorPlanError: It isn't such a file, a feature is damaged, or there is no such floor.
+        FloorPlanError: It isn't such a file, or a feature is damaged.
     """
     items = content.get("features")
     if content.get("type") != COLLECTION or not isinstance(items, list):
@@ -77,6 +105,8 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
     floors: list[dict[str, Any]] = []
     ignored: Counter[str] = Counter()
     parts = corners = 0
+    tags = (item.get("properties") for item in items if isinstance(item, dict))
+    is_osm = any(isinstance(own, dict) and "indoor" in own for own in tags)
     for number, item in enumerate(items):
         where = f"features[{number}]"
         if not isinstance(item, dict):
@@ -84,7 +114,7 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
         properties = item.get("properties") or {}
         if not isinstance(properties, dict):
             raise FloorPlanError(f"{where}.properties is {shown_value(properties)}: no object")
-        kind, name = _kind(item, properties, where)
+        kind, name = _kind(item, properties, where, is_osm)
         if name == "level":
             floors.append({**properties, "id": item.get("id")})
         elif kind is None:
@@ -95,13 +125,17 @@ def read_features(content: dict[str, Any], level: str | None, notes: list[str]) 
             POLYGONS.check(parts, "it", FloorPlanError, prefix="at least ")
             corners += int(shapely.get_num_coordinates(shape))
             CORNERS.check(corners, "it", FloorPlanError, prefix="at least ")
-            features.append(Feature(kind, where, shape, properties, _level(properties)))
-            if kind == "wall" and properties.get("category") == "glass":
-                features.append(replace(features[-1], kind="window"))
+            levels: list[str | None] = [*_levels(properties)]
+            for level in levels or [None]:
+                features.append(Feature(kind, where, shape, properties, level))
+                if kind == "wall" and properties.get("category") == "glass":
+                    features.append(replace(features[-1], kind="window"))
+            POLYGONS.check(len(features), "it", FloorPlanError, prefix="at least ")
     if ignored:
         names = ", ".join(f"{name} ({count})" for name, count in ignored.items())
         notes.append(f"also in the file, without effect on the plan: {names}")
-    return _on_one_floor(features, floors, level, notes)
+    storeys = _storeys(features, floors)
+    return [*features, *_links(features, storeys)], storeys
 
 
 def in_metres(
@@ -132,8 +166,12 @@ def in_metres(
 # --- Kinds and floors --------------------------------------------------------------------------
 
 
-def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple[str | None, str]:
+def _kind(
+    item: dict[str, Any], properties: dict[str, Any], where: str, is_osm: bool
+) -> tuple[str | None, str]:
     """Return a feature's kind, None for an unknown one, and its name for a note."""
+    geometry = item.get("geometry")
+    form = geometry.get("type") if isinstance(geometry, dict) else None
     kind = properties.get("kind")
     if kind is not None:
         if not isinstance(kind, str) or kind not in GEOMETRIES:
@@ -151,42 +189,91 @@ def _kind(item: dict[str, Any], properties: dict[str, Any], where: str) -> tuple
         if imdf == "opening" and isinstance(door, dict) and door.get("type") != "open":
             return "door", imdf  # a leaf hangs in it
         return _IMDF_KINDS.get(imdf), imdf
+    tagged = _osm_kind(properties, form) if is_osm else None
+    if tagged is not None:
+        return tagged
     for key in ("type", "category"):
         text = properties.get(key)
         if isinstance(text, str) and room_type(text) in _KIND_WORDS:
             return _KIND_WORDS[room_type(text)], text
-    geometry = item.get("geometry")
-    form = geometry.get("type") if isinstance(geometry, dict) else None
     return ("room", "room") if form in SURFACES else (None, f"{form or 'feature'} without a kind")
 
 
-def _level(properties: dict[str, Any]) -> str | None:
-    values = (properties.get(key) for key in ("level_id", "level"))
-    return next((str(value) for value in values if isinstance(value, str | int | float)), None)
+def _osm_kind(properties: dict[str, Any], form: str | None) -> tuple[str | None, str] | None:
+    """Return the kind of a feature with tags of OpenStreetMap, and its name for a note."""
+    indoor = properties.get("indoor")
+    if form == "Point" and ("door" in properties or "entrance" in properties):
+        return ("opening" if properties.get("door") == "no" else "door"), "door"
+    if isinstance(indoor, str):
+        return _OSM_KINDS.get(indoor), f"indoor={indoor}"
+    if properties.get("highway") == "elevator" and form in SURFACES:
+        return "room", "elevator"
+    outside = next((key for key in _OSM_OUTSIDE if key in properties), None)
+    return None if outside is None else (None, outside)
 
 
-def _on_one_floor(
-    features: list[Feature], floors: list[dict[str, Any]], level: str | None, notes: list[str]
-) -> list[Feature]:
-    """Return the features of one floor, and those that name no floor."""
-    levels = list(dict.fromkeys(f.level for f in features if f.level is not None))
-    names_of: dict[str, list[str]] = {}
-    for name in levels:
-        floor = next((floor for floor in floors if str(floor.get("id")) == name), {})
+def _levels(properties: dict[str, Any]) -> list[str]:
+    """Return the storeys that a feature is on: OpenStreetMap also writes `0;1` and `0-2`.
+
+    >>> _levels({"level": "0;1-3"}), _levels({"level_id": "a-1"}), _levels({"level": [0, 1.5]})
+    (['0', '1', '2', '3'], ['a-1'], ['0', '1.5'])
+    """
+    values = properties.get("level_id", properties.get("level"))
+    levels: list[str] = []
+    for value in values if isinstance(values, list) else [values]:
+        if isinstance(value, str) and "level_id" not in properties:
+            for part in value.split(";"):
+                limits = _RANGE.fullmatch(part)
+                if limits is not None and int(limits[1]) < int(limits[2]):
+                    last = min(int(limits[2]), int(limits[1]) + MAX_LEVELS)
+                    levels += [str(level) for level in range(int(limits[1]), last + 1)]
+                elif part.strip():
+                    levels.append(part.strip())
+        elif isinstance(value, str | int | float) and not isinstance(value, bool):
+            levels.append(f"{value:g}" if isinstance(value, float) else str(value))
+    return list(dict.fromkeys(levels))[:MAX_LEVELS]
+
+
+def _storeys(features: Sequence[Feature], floors: Sequence[dict[str, Any]]) -> list[Storey]:
+    """Return the storeys that features are on; without ordinals, levels that are numbers rank."""
+    storeys = []
+    levels = dict.fromkeys(f.level for f in features if f.level is not None)
+    for number, key in enumerate(levels):
+        floor = next((floor for floor in floors if str(floor.get("id")) == key), {})
         feature = Feature("level", "", Point(), floor)
-        further = (floor.get("ordinal"), feature.text("short_name"), feature.text("name"))
-        names_of[name] = [name, *(str(word) for word in further if word is not None)]
-    if level is None and len(levels) < 2:
-        return features
-    matches = [name for name in levels if ("0" if level is None else level) in names_of[name]]
-    if level is not None and not matches:
-        known = ", ".join(" or ".join(names) for names in names_of.values()) or "none"
-        raise FloorPlanError(f"there is no level {level!r}; its levels are: {known}")
-    chosen = (matches or levels)[0]
-    others = ", ".join(names_of[name][-1] for name in levels if name != chosen)
-    if others:
-        notes.append(f"of its levels, {names_of[chosen][-1]} is used, not {others}")
-    return [feature for feature in features if feature.level in (None, chosen)]
+        rank = floor.get("ordinal", key)
+        try:
+            elevation = float(rank)
+        except (TypeError, ValueError):
+            elevation = float(number)
+        words = (floor.get("ordinal"), feature.text("short_name"), feature.text("name"))
+        also = (key, *(str(word) for word in words if word is not None))
+        elevation = elevation if math.isfinite(elevation) else float(number)
+        storeys.append(Storey(key, also[-1], elevation, also))
+    return storeys
+
+
+def _links(features: Sequence[Feature], storeys: Sequence[Storey]) -> Iterator[Feature]:
+    """Yield the stairs and lifts: rooms of such a use that lie above one another on two storeys."""
+    in_order = sorted(storeys, key=lambda storey: storey.elevation)
+    for lower, upper in pairwise(in_order):
+        ways: list[list[tuple[Feature, str]]] = []
+        for storey in (lower, upper):
+            here = [f for f in features if f.kind == "room" and f.level == storey.key]
+            ways.append([(f, use) for f in here if (use := _link(f.properties)) is not None])
+        for way, use in ways[0]:
+            shapes = [other.shape for other, kind in ways[1] if kind == use]
+            covered = way.shape.intersection(shapely.union_all(shapes)).area
+            if covered >= SAME_SHARE * way.shape.area:
+                yield Feature(use, way.where, way.shape, {"upper": upper.key}, lower.key)
+
+
+def _link(properties: dict[str, Any]) -> str | None:
+    """Return `stairs` or `lift` for a room that joins storeys."""
+    if properties.get("stairs", "no") != "no":
+        return "stairs"
+    words = (properties.get(k) for k in ("category", "highway", "room", "type"))
+    return next((_LINKS[str(word)] for word in words if str(word) in _LINKS), None)
 
 
 # --- Geometries --------------------------------------------------------------------------------
@@ -306,7 +393,7 @@ class GeoJson(FileSource):
         path: The plan's GeoJSON file.
         units: Units of its coordinates; auto determines them from the file.
         wall_m: Thickness of walls drawn as lines, and of those between rooms that touch.
-        level: The floor, by id, name or ordinal; left out: the one of ordinal 0.
+        level: The storey, by id, name or ordinal; left out: all of them, side by side.
     """
 
     marks = (("type", COLLECTION),)
@@ -334,9 +421,11 @@ class GeoJson(FileSource):
         content = parse_json(files[self.path], self.path)
         with in_file(self.path):
             notes: list[str] = []
-            raw = read_features(content, self.level, notes)
+            raw, storeys = read_features(content, notes)
             units = "m" if self.scale and self.units == "auto" else self.units
-            features, move = in_metres(raw, content, units, notes)
+            measured, move = in_metres(raw, content, units, notes)
+            metre = 1 / (self.scale or 1)
+            features = arrange(measured, storeys, self.level, notes, metre=metre)
             name = content.get("name")
             return Draft(features, self.wall_m, notes, move=move, scale=self.scale).build(
                 name if isinstance(name, str) and name else self.path.stem,
@@ -365,6 +454,9 @@ def geojson_document(plan: FloorPlan) -> dict[str, Any]:
         features.append(_feature(thing.footprint, "object", **properties))
     features += [_feature(area, "no_go") for area in plan.no_go]
     features += [_feature(shapely.transform(pane, to_metres), "window") for pane in plan.glass]
+    for portal in plan.portals:
+        way = LineString([portal.start, portal.end])
+        features.append(_feature(way, "portal", type=portal.type, takes=portal.takes_us / 1e6))
     if plan.entrance is not None:
         features.append(_feature(Point(plan.entrance), "entrance"))
     return {"type": COLLECTION, "name": plan.name, "units": "m", "features": features}

@@ -1,4 +1,4 @@
-"""Building models in IFC: the spaces, walls, doors, windows and furniture of one storey."""
+"""Building models in IFC: the spaces, walls, doors, windows, furniture and stairs."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,14 +16,21 @@ from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import in_file, reading
 from fleet2d.floorplan.furniture import measured_height
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.homes.formats.features import Draft, Feature, choose_level
+from fleet2d.homes.formats.features import Draft, Feature
+from fleet2d.homes.formats.storeys import Storey, arrange
 from fleet2d.homes.formats.sweethome import furniture_type
+from fleet2d.kernels import F64, I64
 
 # What each class of IFC is in a plan; classes that a version of IFC lacks are left out.
 KINDS = {
     "IfcSpace": "room",
     "IfcWall": "wall",
+    "IfcCurtainWall": "wall",
     "IfcColumn": "wall",
+    "IfcOpeningElement": "opening",
+    "IfcStair": "stairs",
+    "IfcRamp": "stairs",
+    "IfcTransportElement": "lift",
     "IfcDoor": "door",
     "IfcWindow": "window",
     "IfcFurnishingElement": "object",
@@ -34,10 +41,17 @@ KINDS = {
 UNDEFINED = (None, "", "NOTDEFINED", "USERDEFINED")
 # Coordinates are rounded to this, so that faces of one wall meet [m].
 ROUNDED_M = 1e-4
+# An opening without a door is a way if it begins below the first height above the storey, and ends
+# above the second [m].
+WAY_M = (0.3, 1.6)
+# The first and the last steps of stairs are in such a slice of their height [m].
+STEP_M = 0.4
 # Objects whose lowest point is higher above the storey hang on a wall; through windows whose sill
 # is higher nobody is seen [m].
-RAISED_M = 0.5
-SILL_M = 1.3
+HIGHEST = {"object": 0.5, "window": 1.3}
+# How many elements may contain one another, and be the parts of one.
+MAX_PARENTS = 8
+MAX_PARTS = 500
 
 
 class Ifc(FileSource):
@@ -45,7 +59,7 @@ class Ifc(FileSource):
 
     Attributes:
         path: The IFC file.
-        level: The storey, by name or GlobalId; left out: the lowest that is not below the ground.
+        level: The storey, by name or GlobalId; left out: all of them, side by side.
     """
 
     suffixes = (".ifc",)
@@ -54,11 +68,12 @@ class Ifc(FileSource):
     level: str | None = Field(default=None, coerce_numbers_to_str=True)
 
     def read(self, files: Mapping[Path, bytes]) -> FloorPlan:
-        """Read a storey of the model, as seen from above.
+        """Read the storeys of the model, as seen from above.
 
         Free space is the spaces (`IfcSpace`) without the walls or, without spaces, what the walls
-        enclose. Doors lead through walls, and one sees through windows between rooms. Their
-        geometry is computed by ifcopenshell, in metres whatever the units of the model.
+        enclose. Doors, openings and gaps lead through walls, one sees through windows between
+        rooms, and stairs join storeys. Their geometry is computed by ifcopenshell, in metres
+        whatever the units of the model.
 
         Raises:
             FloorPlanError: The file can't be read, or its storey has no spaces and no closed walls.
@@ -68,9 +83,11 @@ class Ifc(FileSource):
         with in_file(self.path):
             notes: list[str] = []
             storeys = {str(s.GlobalId): s for s in model.by_type("IfcBuildingStorey")}
-            levels = [(k, s.Name or k, float(s.Elevation or 0.0)) for k, s in storeys.items()]
-            level = choose_level(levels, self.level, notes)
-            features = list(_features(model, None if level is None else storeys[level], notes))
+            heights = {key: _height(storey) for key, storey in storeys.items()}
+            levels = [Storey(k, s.Name or k, heights[k]) for k, s in storeys.items()]
+            drawn = list(_features(model, heights, notes))
+            metre = 1 / (self.scale or 1)
+            features = arrange(drawn, levels, self.level, notes, metre=metre)
             corners = shapely.get_num_coordinates([feature.shape for feature in features]).sum()
             CORNERS.check(int(corners), "it", FloorPlanError)
             draft = Draft(features, 0.1, notes, scale=self.scale)
@@ -87,73 +104,113 @@ def _read(content: bytes, path: Path) -> Any:
         return ifcopenshell.file.from_string(content.decode("latin-1"))
 
 
-def _elements(model: Any, storey: Any) -> Iterator[tuple[str, Any]]:
-    """Yield kind and element of what is on a storey; all that the model has without storeys."""
-    from ifcopenshell.util.element import get_aggregate, get_container
-
+def _elements(model: Any) -> Iterator[tuple[str, Any]]:
+    """Yield kind and element of what a plan shows."""
     for name, kind in KINDS.items():
         try:
             elements = model.by_type(name)
         except RuntimeError:  # this version of IFC has no such class
             continue
-        for element in elements:
-            place = get_aggregate(element) if kind == "room" else get_container(element)
-            if storey is None or place is None or place == storey:
-                yield kind, element
+        yield from ((kind, element) for element in elements)
 
 
-def _features(model: Any, storey: Any, notes: list[str]) -> Iterator[Feature]:
-    """Yield what is on a storey as features [m]; what hangs on walls is left out."""
-    from ifcopenshell import geom
+def _storey_of(element: Any, heights: Mapping[str, float]) -> str | None:
+    """Return the GlobalId of the storey that an element is on, if it is on any."""
+    from ifcopenshell.util.element import get_aggregate, get_container
 
-    settings = geom.settings()
-    settings.set("use-world-coords", True)
-    highest = {"object": RAISED_M, "window": SILL_M}
+    place = element
+    if element.is_a("IfcOpeningElement"):
+        place = next((rel.RelatingBuildingElement for rel in element.VoidsElements), None)
+    for _ in range(MAX_PARENTS):
+        if place is None or str(place.GlobalId) in heights:
+            break
+        place = get_aggregate(place) if place.is_a("IfcSpace") else get_container(place)
+    return None if place is None else str(place.GlobalId)
+
+
+def _features(model: Any, heights: Mapping[str, float], notes: list[str]) -> Iterator[Feature]:
+    """Yield what is on each storey as features [m]; what hangs on walls is left out."""
     lost = 0
-    for kind, element in _elements(model, storey):
-        try:
-            shape, low, high = _seen_from_above(geom.create_shape(settings, element))
-        except RuntimeError:  # it has no geometry, or a damaged one
-            shape = shapely.Polygon()
-            low = 0.0
-            high = 0.0
+    for kind, element in _elements(model):
+        if kind == "opening" and element.HasFillings:
+            continue  # a door or window is in it
+        points, faces = _geometry(element)
+        shape = _seen_from_above(points, faces)
         lost += shape.is_empty
-        if shape.is_empty or low - _height(storey) > highest.get(kind, np.inf):
+        if shape.is_empty:
+            continue
+        key = _storey_of(element, heights)
+        floor = heights.get(key or "", 0.0)
+        low, high = float(points[:, 2].min()) - floor, float(points[:, 2].max()) - floor
+        if low > HIGHEST.get(kind, np.inf):
+            continue
+        if kind == "opening" and (low > WAY_M[0] or high < WAY_M[1]):
             continue
         label = getattr(element, "LongName", None) or element.Name
         properties = {"name": label} if label else {}
-        if kind in ("door", "window"):
+        if kind in ("door", "window", "opening"):
             shape = shape.minimum_rotated_rectangle
+            properties = properties if kind == "door" else {}
         elif kind == "object":
             words = [label, getattr(element, "PredefinedType", None)]
             own = [str(word) for word in words if word not in UNDEFINED]
             type_name = furniture_type(" ".join(own) or "object")
-            height = measured_height(type_name, high - _height(storey))
-            properties = {"type": type_name, "height": height}
-        yield Feature(kind, f"{element.is_a()} {element.GlobalId}", shape, properties)
+            properties = {"type": type_name, "height": measured_height(type_name, high)}
+        elif kind in ("stairs", "lift"):
+            properties = _way_up(points, heights)
+        yield Feature(kind, f"{element.is_a()} {element.GlobalId}", shape, properties, key)
     if lost:
         notes.append(f"elements without a geometry, which are left out: {lost}")
 
 
+def _geometry(element: Any) -> tuple[F64, I64]:
+    """Return the corners (n, 3) [m] and triangles (m, 3) of an element, or of its parts."""
+    from ifcopenshell import geom
+    from ifcopenshell.util.element import get_parts
+
+    settings = geom.settings()
+    settings.set("use-world-coords", True)
+    own = [element] if element.Representation else get_parts(element)
+    points = [np.empty((0, 3))]
+    faces = [np.empty((0, 3), np.int64)]
+    count = 0
+    for part in own[:MAX_PARTS]:
+        try:
+            made = geom.create_shape(settings, part).geometry
+        except RuntimeError:  # it has no geometry, or a damaged one
+            continue
+        corners = np.asarray(made.verts, np.float64).reshape(-1, 3)
+        points.append(corners)
+        faces.append(np.asarray(made.faces, np.int64).reshape(-1, 3) + count)
+        count += len(corners)
+    return np.concatenate(points), np.concatenate(faces)
+
+
+def _way_up(points: F64, heights: Mapping[str, float]) -> dict[str, Any]:
+    """Return the storey that stairs lead to, and the middle of their first and last steps."""
+    low, high = float(points[:, 2].min()), float(points[:, 2].max())
+    above = {key: height for key, height in heights.items() if height > low + WAY_M[1]}
+    ends = [points[points[:, 2] <= low + STEP_M], points[points[:, 2] >= high - STEP_M]]
+    foot, head = (tuple(((end.min(axis=0) + end.max(axis=0)) / 2)[:2].tolist()) for end in ends)
+    upper = min(above, key=lambda key: abs(above[key] - high), default=None)
+    return {"foot": foot, "head": head, "upper": upper}
+
+
 def _height(storey: Any) -> float:
     """Return how high a storey is [m]."""
-    if storey is None or storey.ObjectPlacement is None:
-        return 0.0
     from ifcopenshell.util.placement import get_local_placement
     from ifcopenshell.util.unit import calculate_unit_scale
 
-    return float(get_local_placement(storey.ObjectPlacement)[2, 3]) * float(
-        calculate_unit_scale(storey.file)
-    )
+    height = 0.0
+    if storey.ObjectPlacement is not None:
+        height = float(get_local_placement(storey.ObjectPlacement)[2, 3])
+    return (height or float(storey.Elevation or 0.0)) * float(calculate_unit_scale(storey.file))
 
 
-def _seen_from_above(element: Any) -> tuple[BaseGeometry, float, float]:
-    """Return what an element covers of the floor, and where it begins and ends in height [m]."""
-    points = np.asarray(element.geometry.verts, np.float64).reshape(-1, 3)
-    faces = np.asarray(element.geometry.faces, np.int64).reshape(-1, 3)
+def _seen_from_above(points: F64, faces: I64) -> BaseGeometry:
+    """Return what a body of corners [m] and triangles covers of the floor."""
     if not len(faces) or not np.isfinite(points).all():
-        return shapely.Polygon(), 0.0, 0.0
+        return shapely.Polygon()
     flat = np.round(points[:, :2] / ROUNDED_M) * ROUNDED_M
     triangles = np.asarray(shapely.polygons(flat[faces]))
-    area = shapely.union_all(triangles[shapely.area(triangles) > 0], grid_size=ROUNDED_M)
-    return area, float(points[:, 2].min()), float(points[:, 2].max())
+    return shapely.union_all(triangles[shapely.area(triangles) > 0], grid_size=ROUNDED_M)

@@ -67,6 +67,8 @@ class Ros(PictureSource):
             settings = _settings(content, self.scale or 1.0)
             *_, (file, image) = files.items()
             notes = _note_image(settings.image, file, self.path)
+            if is_nan(content["origin"][2]):
+                notes.append("origin has no yaw, as older map_savers write it: 0 is taken")
             picture = grey_picture(image, file)
             free = self.home(self._occupancy(settings, picture, notes), picture, notes)
             return self.build(free, settings.resolution, f"ROS map, {self.path.name}", notes)
@@ -156,6 +158,15 @@ def _number(value: object, key: str) -> float:
     return number
 
 
+def is_nan(value: object) -> bool:
+    """Return whether a yaw is not a number, as older versions of `map_saver` write it for none.
+
+    >>> is_nan("-nan"), is_nan(float("nan")), is_nan(0), is_nan("north")
+    (True, True, False, False)
+    """
+    return str(value).strip().lower().lstrip("+-.") == "nan"
+
+
 def _threshold(content: dict[str, Any], key: str) -> float:
     value = _number(content[key], key)
     if not 0 <= value <= 1:
@@ -166,7 +177,8 @@ def _threshold(content: dict[str, Any], key: str) -> float:
 def _origin(value: object) -> tuple[float, float, float]:
     if not isinstance(value, list) or len(value) != 3:
         raise FloorPlanError(f"origin is {shown_value(value)}: a list [x, y, yaw] is expected")
-    x, y, yaw = (_number(v, f"origin[{k}]") for k, v in enumerate(value))
+    x, y = (_number(value[k], f"origin[{k}]") for k in (0, 1))
+    yaw = 0.0 if is_nan(value[2]) else _number(value[2], "origin[2]")
     if max(abs(x), abs(y)) > MAX_COORDINATE_M:
         raise FloorPlanError(
             f"origin is {shown_value(value)}: too far out for coordinates in metres"

@@ -1,22 +1,27 @@
 """Homes of Sweet Home 3D, as the Home.xml in their file has them."""
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
+from zipfile import ZipFile
 
 import numpy as np
 from shapely import LineString, Polygon, affinity
 
+from fleet2d.bounds import FILE_BYTES
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
-from fleet2d.floorplan.files import MAX_COORDINATE_M, in_file
+from fleet2d.floorplan.files import MAX_COORDINATE_M, in_file, reading
 from fleet2d.floorplan.furniture import FURNITURE, measured_height
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.room import room_type
-from fleet2d.homes.formats.features import Draft, Feature, choose_level
+from fleet2d.homes.formats.features import Draft, Feature
+from fleet2d.homes.formats.storeys import Storey, arrange
 
 CM_PER_M = 100
 # What begins higher above the floor is a window or hangs on a wall [cm].
@@ -37,17 +42,21 @@ FURNITURE_WORDS = {
     "bedsidetable": "nightstand",
 }
 MIN_SIDE_CM = 1.0
+# Words in the names of stairs, in several languages.
+STAIRS = re.compile("stair|trepp|escali|escaler|scala|scale\\b|trap\\b", re.IGNORECASE)
+# The angle between two corners of a round wall [rad].
+ARC_STEP = math.radians(5)
 
 
 class SweetHome(FileSource):
-    """A home of Sweet Home 3D: the Home.xml that is in its .sh3d file, a ZIP file.
+    """A home of Sweet Home 3D: its .sh3d file, or the Home.xml in that.
 
     Attributes:
-        path: The Home.xml file.
-        level: The floor, by name or id; left out: the lowest that is not below the ground.
+        path: The file.
+        level: The storey, by name or id; left out: all of them, side by side.
     """
 
-    suffixes = (".xml",)
+    suffixes = (".xml", ".sh3d")
 
     path: InputPath
     level: str | None = None
@@ -56,7 +65,7 @@ class SweetHome(FileSource):
         """Read the home.
 
         Free space is the rooms without the walls or, without rooms, what the walls enclose. Doors
-        lead through walls, and one sees through windows between rooms.
+        lead through walls, one sees through windows between rooms, and stairs join storeys.
 
         Raises:
             FloorPlanError: The file can't be read, isn't such a home, or has no free space.
@@ -66,22 +75,42 @@ class SweetHome(FileSource):
             if root.tag != "home":
                 raise FloorPlanError(f"no home of Sweet Home 3D: it begins with <{root.tag}>")
             notes: list[str] = []
-            levels = [(str(e.get("id")), e) for e in root.findall("level")]
-            named = [(key, e.get("name") or key, _number(e, "elevation")) for key, e in levels]
-            level = choose_level(named, self.level, notes)
-            here = [e for e in root.iter() if level is None or e.get("level") in (None, level)]
-            features = [feature for element in here for feature in _features(element)]
+            storeys = [
+                Storey(str(e.get("id")), _name(e), _number(e, "elevation") / CM_PER_M)
+                for e in root.findall("level")
+            ]
+            drawn = [feature for element in root.iter() for feature in _features(element)]
+            features = arrange(drawn, storeys, self.level, notes, metre=1 / (self.scale or 1))
             return Draft(features, 0.1, notes, scale=self.scale).build(
                 root.get("name") or self.path.stem, self.cell, f"Sweet Home 3D, {self.path.name}"
             )
 
 
 def _parse(content: bytes, path: Path) -> ET.Element:
-    """Return the root of an XML file."""
+    """Return the root of an XML file, or of the one in a ZIP file."""
+    if content.startswith(b"PK"):
+        content = _unpacked(content, path)
     try:
         return ET.fromstring(content)  # noqa: S314 - within the child's limits
     except (ET.ParseError, ValueError, LookupError) as error:
         raise FloorPlanError(f"{path} is not XML: {error}") from None
+
+
+def _unpacked(content: bytes, path: Path) -> bytes:
+    """Return the Home.xml in a .sh3d file."""
+    with reading(path, "a home of Sweet Home 3D"), ZipFile(BytesIO(content)) as archive:
+        if "Home.xml" not in archive.namelist():
+            raise FloorPlanError(
+                f"{path} has no Home.xml in it: save it with Sweet Home 3D 5.0 or later"
+            )
+        with archive.open("Home.xml") as file:
+            inner = file.read(FILE_BYTES.limit + 1)  # whatever size the archive claims
+        FILE_BYTES.check(len(inner), f"{path}: Home.xml", FloorPlanError, prefix="at least ")
+        return inner
+
+
+def _name(level: ET.Element) -> str:
+    return level.get("name") or str(level.get("id"))
 
 
 def _number(element: ET.Element, key: str, default: float = 0.0) -> float:
@@ -101,30 +130,61 @@ def _features(element: ET.Element) -> Iterator[Feature]:
     name = element.get("name")
     where = f"<{element.tag}{f' {name}' if name else ''}>"
     properties: dict[str, Any] = {"name": name} if name else {}
-    if element.tag == "room":
+    level = element.get("level")
+    if element.tag in ("doorOrWindow", "pieceOfFurniture") and _is_stairs(element):
+        yield Feature("stairs", where, _box(element), {}, level)
+    elif element.tag == "room":
         corners = _metres((_number(p, "x"), _number(p, "y")) for p in element.iter("point"))
         if len(corners) > 2 and Polygon(corners).is_valid:
-            yield Feature("room", where, Polygon(corners), properties)
+            yield Feature("room", where, Polygon(corners), properties, level)
     elif element.tag == "wall":
         ends = _metres(
             (_number(element, f"x{end}"), _number(element, f"y{end}")) for end in ("Start", "End")
         )
         thickness = max(_number(element, "thickness", 10.0), MIN_SIDE_CM) / CM_PER_M
         if ends[0] != ends[1]:
-            wall = LineString(ends).buffer(thickness / 2, cap_style="square")
-            yield Feature("wall", where, wall, properties)
+            line = _arc(ends, _number(element, "arcExtent"))
+            wall = line.buffer(thickness / 2, cap_style="square", join_style="mitre")
+            yield Feature("wall", where, wall, properties, level)
     elif element.tag == "doorOrWindow":
         elevation = _number(element, "elevation")
         if elevation < SILL_CM:
             kind = "door" if elevation < RAISED_CM else "window"
-            yield Feature(kind, where, _box(element), {})
+            yield Feature(kind, where, _box(element), {}, level)
     elif element.tag == "pieceOfFurniture" and _number(element, "elevation") < RAISED_CM:
         kind = furniture_type(f"{element.get('catalogId', '')} {name or ''}")
         top = _number(element, "elevation") + _number(element, "height")
         heading = -math.pi / 2 - _number(element, "angle")
         height = measured_height(kind, top / CM_PER_M)
         piece = {"type": kind, "heading": round(heading, 6) % math.tau, "height": height}
-        yield Feature("object", where, _box(element), piece)
+        yield Feature("object", where, _box(element), piece, level)
+
+
+def _is_stairs(element: ET.Element) -> bool:
+    words = f"{element.get('catalogId', '')} {element.get('name', '')}"
+    return element.get("staircaseCutOutShape") is not None or STAIRS.search(words) is not None
+
+
+def _arc(ends: list[tuple[float, float]], extent: float) -> LineString:
+    """Return the middle line of a wall, which is an arc over an angle [rad] unless that is 0.
+
+    A positive angle bends it to the left, seen from its start in the file, whose y points down.
+    """
+    if abs(math.sin(extent / 2)) < 1e-6:
+        return LineString(ends)
+    start, end = np.array(ends)
+    chord = end - start
+    left = np.array([-chord[1], chord[0]])
+    centre = (start + end) / 2 - left / (2 * math.tan(extent / 2))
+    count = max(math.ceil(abs(extent) / ARC_STEP), 2)
+    arm = start - centre
+    corners = [start]
+    for k in range(1, count):
+        turn = -extent * k / count
+        cosine, sine = math.cos(turn), math.sin(turn)
+        turned = np.array([[cosine, -sine], [sine, cosine]]) @ arm
+        corners.append(centre + turned)
+    return LineString(np.round([*corners, end], 4))
 
 
 def _box(element: ET.Element) -> Polygon:

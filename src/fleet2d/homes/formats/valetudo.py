@@ -297,7 +297,12 @@ class Valetudo(PixelSource, FileSource):
             walls (`exact`).
     """
 
-    marks = (("__class", MAP_CLASS), *((key, None) for key in WRAPPERS))
+    marks = (
+        ("__class", MAP_CLASS),
+        *((key, None) for key in WRAPPERS),
+        ("image.pixels.floor", None),
+        ("image.pixels.walls", None),
+    )
 
     path: InputPath
     no_go: NoGo = "keep_out"
