@@ -12,13 +12,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.interactions.answers import ASLEEP, LOADS, PRIVATE_ROOMS, Answers
+from fleet2d.interactions.answers import (
+    ASLEEP,
+    HALF_WORTH,
+    KIND_LOGITS,
+    LOADS,
+    PRIVATE_ROOMS,
+    Answers,
+)
+from fleet2d.interactions.attitude import GAINS, HABIT_FORMS
 from fleet2d.learning.gym import RobotEnv
 from fleet2d.metrics.household import APART_M, RESTS, has_time
+from fleet2d.metrics.household import TERMS as TERMS
 from fleet2d.runs.run import Run
 from fleet2d.runtime.determinism import logistic
 
 SECOND = timedelta(seconds=1)
+DAY = timedelta(days=1)
 DAY_S = 86400
 # Places nearer than this to each other count as the same in bounds: twice what a relocation needs.
 SAME_M = 2 * APART_M
@@ -155,7 +165,9 @@ def hangout_bound(people: list[Person], stations: Stations, weights: dict[str, f
             for here in range(count):
                 arrives = times + stations.least_s[here, to]
                 until = arrives + stations.period_s
-                gain = near[to, until.clip(max=steps)] - near[to, (arrives + rest_s).clip(max=steps)]
+                gain = (
+                    near[to, until.clip(max=steps)] - near[to, (arrives + rest_s).clip(max=steps)]
+                )
                 worth = np.maximum(gain, 0) + best[to, until] - price[here, to]
                 leaves[here] = np.maximum(leaves[here], np.where(here == to, -np.inf, worth))
         # To leave at t is worth near[t + 1] - near[begin] from `begin` on, as to stay until then.
@@ -213,7 +225,9 @@ def hangout_plan(
 # Find and patrol
 
 
-def find_bound(people: list[Person], weights: dict[str, float], every_s: int, lasts_s: int) -> float:
+def find_bound(
+    people: list[Person], weights: dict[str, float], every_s: int, lasts_s: int
+) -> float:
     """Return a bound of the reward of searching: all that can succeed do, at once."""
     may = np.any([person.may_be_found for person in people], axis=0)
     found = sum(bool(may[begin : begin + lasts_s].any()) for begin in range(0, len(may), every_s))
@@ -284,9 +298,6 @@ def _best_logit(
     part: Any = answers.attitude
     months: Any = answers.months
     importance: Any = answers.importance
-    from fleet2d.interactions.answers import HALF_WORTH, KIND_LOGITS
-    from fleet2d.interactions.attitude import GAINS, HABIT_FORMS
-
     trust = 1 - (1 - months.trust) * (1 - GAINS) ** accepted
     habit = 1 - (1 - HABIT_FORMS) ** same
     novelty = 2 ** -(since_s / months.novelty_lasts.total_seconds())

@@ -261,6 +261,8 @@ class AskPolicy(LearnedBehavior, Interact):
     def decide(self, now: Situation) -> Plan | None:
         """Go on with a person, let the policy choose, or leave the decision to later behaviors."""
         stage = self._stage(now)
+        if self.served is not None and self.served.step == "ask":
+            self._remember_answer(now, self.served)
         served = self._take_served(now)
         if stage == "reply":
             return self._reply(now)
@@ -299,8 +301,8 @@ class AskPolicy(LearnedBehavior, Interact):
         self._may_address(now, request, place)  # what kept it from that is over
         return self._ask(now, request, place)
 
-    def _react(self, now: Situation, served: ServedRequest) -> Plan:
-        """Remember the answer, and react to it."""
+    def _remember_answer(self, now: Situation, served: ServedRequest) -> None:
+        """Count the answer to a question; none, if it was sent away, too."""
         row = self.names(now).index(served.request.name)
         answers = [e.event for e in now.events if e.event in OUTCOMES and e.user == served.text]
         hour = now.time.hour
@@ -308,7 +310,6 @@ class AskPolicy(LearnedBehavior, Interact):
         self.accepted[row, hour] += Outcome.ACCEPTED in answers
         self.had_time[row, hour] += any(answer in HAD_TIME for answer in answers)
         self.asked_at[row] = now.step * now.actor.clock.step_us / 1e6
-        return super()._react(now, served)
 
 
 def _rate(yes: F64, all_of_them: F64) -> float:

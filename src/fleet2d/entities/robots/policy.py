@@ -175,7 +175,11 @@ class WaitingPoses:
         if ways is None:
             if len(self._ways) >= KEPT_WAYS:
                 self._ways.clear()
-            ways = self._ways[x, y, actions] = self._measure(self._distances.of((x, y)), actions)
+            metres = self._distances.of((x, y))
+            if not np.isfinite(metres).any():
+                # It was interrupted so near to a corner that the middle of its cell isn't free.
+                metres = self._distances.of(space.nearest(x, y, actor.part) or (x, y))
+            ways = self._ways[x, y, actions] = self._measure(metres, actions)
         return ways
 
     def __getstate__(self) -> dict[str, Any]:
