@@ -7,7 +7,7 @@ it; `docs/gym.md` says what. For the task hangout there is also a plan that keep
 
 from collections.abc import Callable
 from datetime import timedelta
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -269,32 +269,29 @@ def interact_bound(life: Run, interactions: Any, weights: dict[str, float]) -> f
     annoyed. How often to ask, and when, is found by dynamic programming over the stretches of time
     between changes of activity.
     """
+    start = life.clock.start
+    end = start + life.clock.steps * SECOND
     total = 0.0
-    for name, interaction in interactions.items():
-        answers = Answers()
+    for interaction in interactions.values():
         person = person_of(life, interaction.to)
-        start = life.clock.start
-        end = start + len(person.room) * SECOND
-        times = list(takewhile(lambda at: at < end, interaction.times(start, start)))
-        others = [i for n, i in interactions.items() if i.to == interaction.to and n != name]
-        for number, due in enumerate(times):
+        same_person = [each for each in interactions.values() if each.to == interaction.to]
+        for number, due in enumerate(_times(interaction, start, end)):
             since = int((due - start) / SECOND)
-            accepted = number + sum(_count(each, start, due) for each in others)
-            logit = _best_logit(answers, interaction, since, number, accepted)
+            accepted = sum(len(_times(each, start, due)) for each in same_person)
+            logit = _best_logit(interaction, since, number, accepted)
             pieces = _pieces(person, since, since + int(interaction.within / SECOND))
             total += _worth_of_request(pieces, since, interaction, logit, weights)
     return total
 
 
-def _count(interaction: Any, start: Any, until: Any) -> int:
-    """Return how many requests come up before a time and may be accepted by then."""
-    return sum(1 for _ in takewhile(lambda at: at < until, interaction.times(start, start)))
+def _times(interaction: Any, start: Any, end: Any) -> list[Any]:
+    """Return when requests come up from the start of a run up to before a time."""
+    return list(takewhile(lambda at: at < end, interaction.times(start, start)))
 
 
-def _best_logit(
-    answers: Answers, interaction: Any, since_s: int, same: int, accepted: int
-) -> float:
+def _best_logit(interaction: Any, since_s: int, same: int, accepted: int) -> float:
     """Return the largest possible logit of accepting, if all requests before were accepted."""
+    answers = Answers()
     part: Any = answers.attitude
     months: Any = answers.months
     importance: Any = answers.importance
@@ -318,7 +315,7 @@ def _pieces(person: Person, since: int, until: int) -> list[Piece]:
     within = [step for step in person.begins if since < step < until]
     edges = sorted({since, until, *changes.tolist(), *within})
     pieces = []
-    for begin, end in zip(edges, edges[1:], strict=False):
+    for begin, end in pairwise(edges):
         if not person.away[begin]:
             doing = person.activities[int(np.searchsorted(person.begins, begin, "right")) - 1]
             pieces.append(Piece(begin, end, doing))

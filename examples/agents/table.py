@@ -59,8 +59,7 @@ HOURS = [9, 10, 11, 17, 18, 19, 20]
 BUNDLED: dict[str, dict[str, tuple[Behaviors, dict[str, Any]]]] = {
     "hangout": {
         "`hangout`": ([{"type": "hangout"}], {}),
-        "`hangout` by `ltp`": ([with_ltp(type="hangout")], {}),
-        "the same, eager": ([with_ltp(type="hangout", **EAGER)], {}),
+        "`hangout` by `ltp`, eager": ([with_ltp(type="hangout", **EAGER)], {}),
         "the same, out of bedrooms": (
             [with_ltp(type="hangout", **EAGER, avoid=ROOMS_TO_LEAVE)],
             {},
@@ -309,7 +308,7 @@ def means(
 
 def print_table(task: str, rows: Mapping[str, Any]) -> None:
     """Print a row for each robot."""
-    shown = [name for name in load_task(task).reward]
+    shown = list(load_task(task).reward)
     columns = [1 + list(bounds.TERMS).index(name) for name in shown]
     first = next(iter(rows.values()))
     print(f"| robot | reward | {' | '.join(f'`{name}`' for name in shown)} | difference |")

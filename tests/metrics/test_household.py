@@ -94,8 +94,8 @@ def twin(stored: Run) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("behaviors", "interactions", "counted"),
     [
-        ([HANGOUT], {}, ["near_min", "disturbing_min", "relocations", "unvisited_h"]),
-        ([FIND, HANGOUT], {}, ["found", "searching_min"]),
+        ([HANGOUT], {}, ["near_min", "disturbing_min", "unvisited_h"]),
+        ([FIND, HANGOUT], {}, ["found", "searching_min", "relocations"]),
         ([ASKS, {"type": "patrol"}], {"pill": PILL}, ["value", "bother", "unvisited_h"]),
     ],
 )
@@ -117,7 +117,7 @@ def test_terms_are_the_same_however_the_run_is_cut() -> None:
         simulation.run_until(step)
         measured(simulation, "household")
 
-    assert whole == run(content, "metrics.household.period=1 s").metrics["household"]
+    assert whole == run(content, "metrics.household.period=7 min").metrics["household"]
     simulation.run_until(simulation.clock.steps)
     assert whole == simulation.finish().metrics["household"]
 

@@ -56,7 +56,7 @@ def test_the_request_that_was_chosen_is_served() -> None:
 @pytest.mark.slow
 def test_spans_are_invisible() -> None:
     def life(**settings: Any) -> Run:
-        outcomes = ("ignored", "deferred", "sent_away", "accepted")
+        outcomes = ("sent_away", "accepted")
         return run(asking(users={"ana": ana(outcomes=outcomes)}), **settings)
 
     whole = life()

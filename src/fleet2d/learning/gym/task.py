@@ -142,7 +142,7 @@ class Variants:
 
 
 def load_task(source: str | Path | Mapping[str, Any] | LearningTask) -> LearningTask:
-    """Return a task: hangout, find, patrol, interact, a file of a task or a scenario, or its content.
+    """Return a task: one of ours by name, a file of a task or a scenario, or its content.
 
     Raises:
         InputError: There is none, or it is wrong.
