@@ -4,7 +4,6 @@ Its numbers are what learning agents are rewarded by (docs/gym.md), so bundled b
 policies are measured alike. They are truth, which robots never read.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
@@ -105,7 +104,7 @@ class Household(Metric):
 
     def start(self, home: Home) -> None:
         """Begin counting."""
-        self.totals: dict[str, Counter[str]] = {}  # of each robot; durations in steps
+        self.totals: dict[str, dict[str, float]] = {}  # of each robot; durations in steps
         self.tracks: dict[str, RobotTrack] = {}
         self.activities: dict[str, str] = {}  # of each user at the end of the last history
         self.step_s = 1.0
@@ -120,7 +119,7 @@ class Household(Metric):
             poses = history.poses(robot)
             if robot not in self.tracks:
                 self.tracks[robot] = RobotTrack(poses.at(0), np.zeros(len(rooms), np.int64))
-                self.totals[robot] = Counter(dict.fromkeys(TERMS, 0))
+                self.totals[robot] = dict.fromkeys(TERMS, 0)
             track = self.tracks[robot]
             total = self.totals[robot]
             is_resting = _rest(track, poses, history.step_s, total)
@@ -171,7 +170,7 @@ class Household(Metric):
         return PersonStretch(poses.room, may_be_found & is_free, is_left_alone, may_be_found)
 
 
-def _rest(track: RobotTrack, poses: BodyPoses, step_s: float, total: Counter[str]) -> Bool:
+def _rest(track: RobotTrack, poses: BodyPoses, step_s: float, total: dict[str, float]) -> Bool:
     """Follow a robot's rests, and count relocations; return at which steps it rests."""
     xy = poses.xy
     has_moved = (np.diff(xy, axis=0, prepend=[track.place]) != 0).any(axis=1)
@@ -197,7 +196,7 @@ def _search(
     events: Sequence[Event],
     people: dict[str, PersonStretch],
     history: History,
-    total: Counter[str],
+    total: dict[str, float],
 ) -> None:
     """Follow a robot's searches up to the last step."""
     since = history.first  # the searching before is counted
