@@ -59,8 +59,7 @@ HOURS = [9, 10, 11, 17, 18, 19, 20]
 BUNDLED: dict[str, dict[str, tuple[Behaviors, dict[str, Any]]]] = {
     "hangout": {
         "`hangout`": ([{"type": "hangout"}], {}),
-        "`hangout` by `ltp`, eager": ([with_ltp(type="hangout", **EAGER)], {}),
-        "the same, out of bedrooms": (
+        "`hangout` by `ltp`, eager, out of bedrooms": (
             [with_ltp(type="hangout", **EAGER, avoid=ROOMS_TO_LEAVE)],
             {},
         ),

@@ -119,7 +119,7 @@ class Household(Metric):
             poses = history.poses(robot)
             if robot not in self.tracks:
                 self.tracks[robot] = RobotTrack(poses.at(0), np.zeros(len(rooms), np.int64))
-                self.totals[robot] = dict.fromkeys(TERMS, 0)
+                self.totals[robot] = dict.fromkeys(TERMS, 0.0)
             track = self.tracks[robot]
             total = self.totals[robot]
             is_resting = _rest(track, poses, history.step_s, total)

@@ -27,5 +27,6 @@ for _name in ("Hangout", "Find", "Patrol", "Interact"):
         entry_point="fleet2d.learning.gym.env:RobotEnv",
         vector_entry_point="fleet2d.learning.gym.env:VectorRobotEnv",
         kwargs={"task": _name.lower()},
+        disable_env_checker=True,  # without wrappers `make` returns the environment itself
         order_enforce=False,
     )
