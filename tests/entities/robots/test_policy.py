@@ -189,6 +189,27 @@ def test_search_ends_when_the_person_is_found_or_the_deadline_is_over() -> None:
     assert ["find_begins", "gave_up"] * 2 == names(lost)
 
 
+def test_who_was_interrupted_close_to_a_corner_may_still_go_to_all_rooms() -> None:
+    """The middle of its cell wasn't free, so that no room had a way, and all were masked."""
+    simulation = Simulation(home_with([policy()], "1 h"))
+    run_until_asked(simulation, "astro")
+    actor: Any = simulation.actors["astro"]
+    behavior = actor.behaviors[0]
+    free = behavior.mask(situation_of(simulation, "astro"))
+    space = actor.space
+    cells = [
+        space.plan.lattice.cell_centre(*cell) for cell in np.ndindex(space.plan.room_of_cell.shape)
+    ]
+    near = next(
+        (x, y)
+        for x, y in cells
+        if not np.isfinite(space.distances((x, y), behavior.poses.points)).any()
+    )
+    actor.state = actor.state._replace(x=near[0], y=near[1])
+
+    assert free.tolist() == behavior.poses.ways(17).mask.tolist()
+
+
 def test_last_action_of_a_search_gives_it_up() -> None:
     content = home_with([fixed(16, task="find", every="20 min")], "30 min", ana=OUT)
 
