@@ -351,7 +351,7 @@ def main() -> None:
     rows = means(task, files, "test", arguments.homes, arguments.workers)
     trained = [rows.pop(str(path)) for path in files]
     if trained:
-        rows[f"PPO, mean of {len(files)}"] = np.mean(trained, axis=0)
+        rows[f"PPO, mean of {len(files)} seeds" if best else "PPO"] = np.mean(trained, axis=0)
         print("PPO by seed:", ", ".join(f"{each[:, 0].mean():.1f}" for each in trained))
     if best is not None:
         rows["PPO, chosen by validation"] = trained[files.index(best)]

@@ -19,10 +19,14 @@ PILL = {"do": "remind", "to": "ana", "at": ["07:10"], "within": "1 h", "worth": 
 TEA = {"do": "offer", "to": "ana", "at": ["07:20"], "within": "1 h", "worth": 1, "takes": "30 s"}
 
 
+OBSERVED: list[F32] = []
+
+
 class First(AskPolicy):
-    """Serve the first request that may be served."""
+    """Serve the first request that may be served, and keep what was observed."""
 
     def act(self, observation: F32, mask: Bool) -> int:
+        OBSERVED.append(observation)
         return int(mask.argmax())
 
 
@@ -70,12 +74,19 @@ def test_spans_are_invisible() -> None:
 )
 def test_actions_from_outside_repeat_the_run_of_the_policy(outcomes: tuple[str, ...]) -> None:
     """Also where it is sent away, so that an order interrupts its question."""
-    stored = run(asking(users={"ana": ana(outcomes=outcomes)}))
-    content = asking(users={"ana": ana(outcomes=outcomes)})
-    simulation, rows = choices(content, lambda _, mask: int(mask.argmax()))
+
+    def life() -> dict[str, Any]:
+        people = {"ana": ana(outcomes=outcomes), "ben": ana("living_room")}
+        interactions = {"pill": PILL, "tea": {**TEA, "to": "ben", "at": ["07:10"]}}
+        return asking(users=people, interactions=interactions)
+
+    OBSERVED.clear()
+    stored = run(life())
+    simulation, rows = choices(life(), lambda _, mask: int(mask.argmax()))
 
     assert stored.digest == simulation.finish().digest
-    assert rows
+    assert len(OBSERVED) > 1
+    assert np.array_equal(np.stack(OBSERVED), np.stack([table for _, table, _ in rows]))
 
 
 def test_who_waits_chooses_again_after_a_period_and_when_a_request_comes_up() -> None:

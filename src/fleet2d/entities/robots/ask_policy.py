@@ -260,9 +260,15 @@ class AskPolicy(LearnedBehavior, Interact):
 
     def decide(self, now: Situation) -> Plan | None:
         """Go on with a person, let the policy choose, or leave the decision to later behaviors."""
+        served = self.served
+        plan = self._next_plan(now)
+        if served is not None and served.step == "ask":
+            self._remember_answer(now, served)  # not before, as observations are made before, too
+        return plan
+
+    def _next_plan(self, now: Situation) -> Plan | None:
+        """Return what to do at a step; None: later behaviors decide."""
         stage = self._stage(now)
-        if self.served is not None and self.served.step == "ask":
-            self._remember_answer(now, self.served)
         served = self._take_served(now)
         if stage == "reply":
             return self._reply(now)
