@@ -3,7 +3,7 @@
 import copy
 import pickle
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,9 +16,11 @@ from tests.entities.robots.robots import OUT, home_with  # noqa: E402
 import fleet2d  # noqa: E402
 from fleet2d.errors import InputError  # noqa: E402
 from fleet2d.learning.gym import DiscountByTime, RobotEnv, RobotsEnv, VectorRobotEnv, load_task  # noqa: E402
+from fleet2d.learning.gym.task import Split  # noqa: E402
 
 SHORT = "simulation.duration=1 d"
-TASKS = ["hangout", "find", "patrol"]
+TASKS = ["hangout", "find", "patrol", "interact"]
+SHAPES = {"interact": (8, 33)}
 
 
 def policy(task: str = "hangout", **fields: Any) -> dict[str, Any]:
@@ -27,6 +29,13 @@ def policy(task: str = "hangout", **fields: Any) -> dict[str, Any]:
 
 def flat(task: str = "hangout", duration: str = "4 h", **sections: Any) -> dict[str, Any]:
     return home_with([policy(task, rooms=7, every="1 h")], duration, **sections)
+
+
+def short(task: str) -> dict[str, Any]:
+    """A task of ours whose lives last a day."""
+    content = load_task(task).model_dump(exclude_unset=True)
+    content["scenario"]["simulation"]["duration"] = "1 d"
+    return content
 
 
 def play(env: Any, seed: int | None = None, steps: int = 10**6) -> Iterator[tuple[Any, ...]]:
@@ -45,28 +54,54 @@ def play(env: Any, seed: int | None = None, steps: int = 10**6) -> Iterator[tupl
 def test_gymnasium_has_no_complaint(task: str) -> None:
     from gymnasium.utils.env_checker import check_env
 
-    env = RobotEnv(task, SHORT, masked="rest")
-    env.spec = gymnasium.spec(f"fleet2d/{task.title()}-v1")
+    env = gymnasium.make(f"fleet2d/{task.title()}-v1", task=short(task))
+
     check_env(env, skip_render_check=True)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_actions_are_sampled_by_the_mask(task: str) -> None:
+    env = RobotEnv(short(task), masked="error")
+    _, info = env.reset(seed=1)
+
+    assert np.int8 == info["action_mask"].dtype
+    for _ in range(20):
+        _, _, _, is_over, info = env.step(env.action_space.sample(info["action_mask"]))
+        if is_over:
+            break
 
 
 @pytest.mark.filterwarnings("ignore:Your observation")  # a table, for which it has no network
 def test_stable_baselines_has_no_complaint() -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="not installed")
 
-    checker.check_env(RobotEnv("hangout", SHORT, masked="rest"), skip_render_check=True)
+    checker.check_env(RobotEnv("hangout", SHORT), skip_render_check=True)
 
 
-def test_pettingzoo_has_no_complaint() -> None:
-    from pettingzoo.test import parallel_api_test
-
+def two_robots() -> dict[str, Any]:
     robots = {
         name: {"start": [1.0 + n, 3.0], "behaviors": [policy(rooms=7)]}
         for n, name in enumerate(("astro", "rosie"))
     }
-    content = flat()
-    content["robots"] = robots
-    parallel_api_test(RobotsEnv({"scenario": content}, masked="rest"), num_cycles=60)
+    return {**flat(), "robots": robots}
+
+
+def test_pettingzoo_has_no_complaint() -> None:
+    from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+    parallel_api_test(RobotsEnv({"scenario": two_robots()}), num_cycles=60)
+    parallel_seed_test(lambda: RobotsEnv({"scenario": two_robots()}), num_cycles=20)
+
+
+def test_robots_sample_their_actions_by_their_masks() -> None:
+    env = RobotsEnv({"scenario": two_robots()}, masked="error")
+    _, infos = env.reset(seed=1)
+    for _ in range(10):
+        masks = {robot: infos[robot]["action_mask"] for robot in env.agents}
+        actions = {robot: env.action_space(robot).sample(mask) for robot, mask in masks.items()}
+        *_, infos = env.step(actions)
+
+    assert {np.dtype(np.int8)} == {info["action_mask"].dtype for info in infos.values()}
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -77,9 +112,11 @@ def test_environments_are_made_by_name(task: str) -> None:
         f"fleet2d/{task.title()}-v1", 3, vectorization_mode="vector_entry_point"
     )
 
-    assert (16, 40) == env.observation_space.shape
-    assert 17 == env.action_space.n
-    assert (3, 16, 40) == many.observation_space.shape
+    rows, columns = SHAPES.get(task, (16, 40))
+
+    assert (rows, columns) == env.observation_space.shape
+    assert rows + 1 == env.action_space.n
+    assert (3, rows, columns) == many.observation_space.shape
 
 
 def test_environment_of_a_scenario_file(tmp_path: Any) -> None:
@@ -101,13 +138,13 @@ def test_life_is_truncated_at_its_end_and_intervals_add_up() -> None:
 
 
 def test_rewards_add_up_to_the_terms_of_the_whole_run() -> None:
-    env = RobotEnv({"scenario": flat(), "reward": {"in_view_min": 1.0, "relocations": -0.5}})
+    weights = {"near_min": 1.0, "disturbing_min": -1.0, "relocations": -0.5}
+    env = RobotEnv({"scenario": flat(), "reward": weights})
     total = sum(reward for _, reward, *_ in play(env, seed=1))
-    stored = env.run()
-    events = stored.arrow("events").to_pylist()
+    terms = env.run().metrics["household"]["astro"]
 
-    moves = sum(row["event"] == "relocates" for row in events)
-    assert pytest.approx(stored.tables["observations"].num_rows / 60 - 0.5 * moves) == total
+    assert pytest.approx(sum(weight * terms[name] for name, weight in weights.items())) == total
+    assert terms["relocations"] > 0
 
 
 def test_reward_may_be_a_function() -> None:
@@ -169,7 +206,7 @@ def test_action_that_is_no_whole_number_is_an_error(action: Any) -> None:
 
 @pytest.mark.parametrize("action", [4, 6, 8, -1])
 def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
-    env = RobotEnv(flat())
+    env = RobotEnv(flat(), masked="error")
     _, info = env.reset(seed=1)
     storage = env.present.simulation.home.plan.room("storage_0").index
     action = storage if action == 4 else action
@@ -180,8 +217,8 @@ def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
     assert env.step(7)[4]["elapsed_s"] == 600
 
 
-def test_masked_action_may_mean_to_rest() -> None:
-    env = RobotEnv(flat(), masked="rest")
+def test_masked_action_means_to_rest() -> None:
+    env = RobotEnv(flat())
     env.reset(seed=1)
     storage = env.present.simulation.home.plan.room("storage_0").index
 
@@ -206,9 +243,14 @@ def test_empty_battery_terminates_the_life() -> None:
 
 
 def test_nobody_at_home_is_never_found() -> None:
-    env = RobotEnv({"scenario": flat("find", ana=OUT), "reward": {"found": 1.0, "gave_up": -1.0}})
+    env = RobotEnv(
+        {"scenario": flat("find", ana=OUT), "reward": {"found": 1.0, "searching_min": -1.0}}
+    )
 
-    assert {0.0, -1.0} == {reward for _, reward, *_ in play(env)}
+    steps = [reward for _, reward, *_ in play(env)]
+
+    assert 0 == env.present.terms("astro")["found"]
+    assert sum(steps) == pytest.approx(-env.present.terms("astro")["searching_min"]) != 0
 
 
 def test_truth_is_told_only_if_asked_for() -> None:
@@ -217,7 +259,7 @@ def test_truth_is_told_only_if_asked_for() -> None:
 
 
 def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
-    settings: dict[str, Any] = {"task": load_task("hangout"), "masked": "rest"}
+    settings: dict[str, Any] = {"task": load_task("hangout")}
     few, many = VectorRobotEnv(2, SHORT, **settings), VectorRobotEnv(3, SHORT, **settings)
     first, second = few.reset(seed=5)[0], many.reset(seed=5)[0]
     for step in range(60):
@@ -229,7 +271,7 @@ def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
 
 
 def test_lives_are_those_of_single_environments() -> None:
-    lives, env = VectorRobotEnv(2, task=flat(), masked="rest"), RobotEnv(flat(), masked="rest")
+    lives, env = VectorRobotEnv(2, task=flat()), RobotEnv(flat())
     observations, info = lives.reset(seed=3)
     single, own = env.reset(seed=4)
 
@@ -258,7 +300,7 @@ def test_pickled_environment_goes_on_as_the_original() -> None:
 
 
 def test_pickled_environments_go_on_as_the_originals() -> None:
-    lives = VectorRobotEnv(2, task=flat(), masked="rest")
+    lives = VectorRobotEnv(2, task=flat())
     lives.reset(seed=1)
     twins = pickle.loads(pickle.dumps(lives))
     for _ in range(5):
@@ -365,8 +407,8 @@ def test_broken_policy_file_is_named(tmp_path: Any) -> None:
 
 
 def test_discount_is_by_time() -> None:
-    env = DiscountByTime(RobotEnv(flat(), reward={"in_view_min": 1.0}), half_life="20 min")
-    plain = RobotEnv(flat(), reward={"in_view_min": 1.0})
+    env = DiscountByTime(RobotEnv(flat(), reward={"near_min": 1.0}), half_life="20 min")
+    plain = RobotEnv(flat(), reward={"near_min": 1.0})
     env.reset(seed=1)
     plain.reset(seed=1)
     for number in range(6):
@@ -375,13 +417,21 @@ def test_discount_is_by_time() -> None:
     assert callable(info)
 
 
-def test_task_draws_homes_apart_for_training_and_testing() -> None:
-    task, random = load_task("hangout"), np.random.default_rng(0)
-    train = {task.draw(random, "train")["floorplan.seed"] for _ in range(50)}
-    test = {task.draw(random, "test")["floorplan.seed"] for _ in range(50)}
+@pytest.mark.parametrize("task", TASKS)
+def test_task_draws_homes_apart_for_each_split(task: str) -> None:
+    random = np.random.default_rng(0)
+    splits: tuple[Split, ...] = get_args(Split)
+    homes = [
+        {load_task(task).draw(random, split)["floorplan.seed"] for _ in range(50)}
+        for split in splits
+    ]
 
-    assert not train & test
-    assert max(train) < 1000 <= min(test)
+    assert sum(map(len, homes)) == len(set.union(*homes))
+
+
+def test_unknown_split_has_the_nearest_name() -> None:
+    with pytest.raises(InputError, match="did you mean 'validation'"):
+        RobotEnv("hangout", split="validate")  # type: ignore[arg-type]
 
 
 def test_task_without_a_policy_says_what_to_give() -> None:

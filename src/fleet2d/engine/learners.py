@@ -223,6 +223,16 @@ class Learners:
             for event in events
         )
 
+    def measure(self, name: str, end: int, log: Log) -> dict[str, Any]:
+        """Update a metric before its period is over; return its result up to step `end` - 1."""
+        learner = next(each for each in self.all if each.path == f"metrics.{name}")
+        if learner.since < end:
+            self._update(learner, end, log, self.outputs)
+            learner.since = end
+            self._due = self._earliest_due()
+        result: dict[str, Any] = check_result(learner.component.result())  # type: ignore[union-attr]
+        return result
+
     def finish(self, end: int, log: Log) -> dict[str, dict[str, Any]]:
         """Update metrics with the rest of their period; return the results of all by name."""
         results = {}

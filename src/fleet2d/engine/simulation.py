@@ -55,7 +55,7 @@ from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.native import native_document
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
-from fleet2d.kernels import About, in_radians
+from fleet2d.kernels import in_radians
 from fleet2d.runs.run import Run, open_store
 from fleet2d.runtime.clock import midnight_of
 from fleet2d.runtime.events import Event, EventKind
@@ -1055,15 +1055,18 @@ def situation_of(simulation: Simulation, name: str) -> Situation:
     return simulation._state.situation(simulation._body(name).row, simulation.step)
 
 
-def perceived_s(simulation: Simulation, robot: str) -> float:
-    """Return for how long a robot has perceived people so far, summed over people [s]."""
-    steps = 0
-    for cameras in simulation._state.cameras:
-        if cameras.owner.name == robot:
-            simulation._state.take(cameras, simulation.step)
-            noticed = cameras.memory.about[..., About.NOTICED.value].T.tolist()
-            steps += sum(map(max, noticed)) * int(cameras.lenses.period[0])
-    return steps * simulation.clock.step_us / 1e6
+def measured(simulation: Simulation, metric: str) -> dict[str, Any]:
+    """Return the result of a metric up to the present step.
+
+    Its next period begins here, so only metrics without rows to store should be asked.
+    """
+    state = simulation._state
+    state.settle(simulation.step)
+    assert state.log is not None, "a run with metrics has a log"
+    state.count_looks()
+    result = state.learners.measure(metric, simulation.step, state.log)
+    state.forget(min(learner.oldest for learner in state.learners.all))
+    return result
 
 
 def evidence_of(simulation: Simulation, name: str) -> "VerdictEvidence":

@@ -11,6 +11,7 @@ time. Nothing interrupts it, but a robot still gives way and its battery still r
 ends after its duration, with the next order, or on release.
 """
 
+import copy
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -506,14 +507,21 @@ class DecidingActor(Actor):
 
         Nothing changes by the question.
         """
-        if self.is_stuck or self._chosen is not None or self.order is not None:
-            return False
-        if self._runs_down(now):
+        if self.is_stuck or self._chosen is not None or self._runs_down(now):
             return False
         waits = self.waiting is not None and not now.events
         if waits and self.waiting.continued(now) is not None:  # type: ignore[union-attr]
             return False
-        return self.arbiter.asks_first(now, self.plan)
+        return self._is_order_over(now) and self.arbiter.asks_first(now, self.plan)
+
+    def _is_order_over(self, now: Situation) -> bool:
+        """Return whether it has no order, or one that has nothing left to do; nothing changes."""
+        if self.order is None:
+            return True
+        try:
+            return copy.copy(self.order).decide(now) is None
+        except (PlacementError, NoWayError):
+            return False
 
     def decide(self, now: Situation) -> None:
         """Ask the behaviors, in order, for a plan that begins now."""

@@ -5,12 +5,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.entities.robots.robots import OUT, assert_same_for_every_max_span, home_with, names
+from tests.entities.robots.robots import (
+    OUT,
+    assert_same_for_every_max_span,
+    events,
+    home_with,
+    names,
+)
 from tests.scenes import run
 
 import fleet2d
 from fleet2d import Simulation
-from fleet2d.engine.simulation import perceived_s, run_until_asked, situation_of
+from fleet2d.engine.simulation import run_until_asked, situation_of
 from fleet2d.entities.robots.policy import COLUMNS, NEVER, Policy, SightingMemory
 from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
 from fleet2d.interventions import Send
@@ -60,7 +66,7 @@ def lives(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[F32]]:
         behavior: Any = simulation.actors["astro"].behaviors[0]
         now = situation_of(simulation, "astro")
         observations.append(behavior.observe(now))
-        behavior.given = choose(behavior, observations[-1], behavior.mask())
+        behavior.given = choose(behavior, observations[-1], behavior.mask(now))
     return simulation, observations
 
 
@@ -149,8 +155,9 @@ def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str)
     simulation = Simulation(home_with([policy()]))
     run_until_asked(simulation, "astro")
     behavior: Any = simulation.actors["astro"].behaviors[0]
+    now = situation_of(simulation, "astro")
     with pytest.raises(InputError, match=reason):
-        behavior.check(situation_of(simulation, "astro"), action, behavior.mask())
+        behavior.check(now, action, behavior.mask(now))
 
 
 def test_policy_without_a_file_says_what_to_give() -> None:
@@ -183,23 +190,33 @@ def test_search_ends_when_the_person_is_found_or_the_deadline_is_over() -> None:
     assert ["find_begins", "gave_up"] * 2 == names(lost)
 
 
-def test_terms_of_rewards_count_searches_to_their_ends() -> None:
-    content = home_with([policy("find", every="20 min", deadline="3 min")], "30 min", ana=OUT)
-    simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
-    behavior: Any = simulation.actors["astro"].behaviors[0]
-    tally = behavior.tally(situation_of(simulation, "astro"))
+def test_who_was_interrupted_close_to_a_corner_may_still_go_to_all_rooms() -> None:
+    """The middle of its cell wasn't free, so that no room had a way, and all were masked."""
+    simulation = Simulation(home_with([policy()], "1 h"))
+    run_until_asked(simulation, "astro")
+    actor: Any = simulation.actors["astro"]
+    behavior = actor.behaviors[0]
+    free = behavior.mask(situation_of(simulation, "astro"))
+    space = actor.space
+    cells = [
+        space.plan.lattice.cell_centre(*cell) for cell in np.ndindex(space.plan.room_of_cell.shape)
+    ]
+    near = next(
+        (x, y)
+        for x, y in cells
+        if not np.isfinite(space.distances((x, y), behavior.poses.points)).any()
+    )
+    actor.state = actor.state._replace(x=near[0], y=near[1])
 
-    assert (0, 2) == (tally["found"], tally["gave_up"])
-    assert 6 <= tally["searching_min"] < 8
+    assert free.tolist() == behavior.poses.ways(17).mask.tolist()
 
 
-def test_perceived_time_is_that_of_the_sightings() -> None:
-    content = home_with([policy()], "2 h")
-    simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
-    seconds = perceived_s(simulation, "astro")
-    stored = simulation.finish()
+def test_last_action_of_a_search_gives_it_up() -> None:
+    content = home_with([fixed(16, task="find", every="20 min")], "30 min", ana=OUT)
 
-    assert stored.tables["observations"].num_rows == seconds > 0
+    assert [(0, "find_begins"), (0, "gave_up"), (1200, "find_begins"), (1200, "gave_up")] == [
+        (step, event) for step, event, _ in events(run(content))
+    ]
 
 
 def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:

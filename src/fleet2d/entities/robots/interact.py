@@ -302,16 +302,20 @@ class Interact(BeliefBehavior):
 
     def _may_address(self, now: Situation, request: Request, place: Point) -> bool:
         """Return whether a person in view may be addressed: one who was left alone for a while."""
-        if self.left_alone.get(request.to, now.time) > now.time:
-            return False
-        if is_in_rooms(now, *place, now.actor.banned(now.step)):
-            return False
-        x, y = self.unanswered.get(request.to, (math.inf, math.inf))
-        if (x - place[0]) ** 2 + (y - place[1]) ** 2 < MOVED_M**2:
+        if self._leaves_alone(now, request, place):
             return False
         self.unanswered.pop(request.to, None)
         self.not_sought.pop(request.to, None)
         return True
+
+    def _leaves_alone(self, now: Situation, request: Request, place: Point) -> bool:
+        """Return whether it doesn't address the person of a request at a place; nothing changes."""
+        if self.left_alone.get(request.to, now.time) > now.time:
+            return True
+        if is_in_rooms(now, *place, now.actor.banned(now.step)):
+            return True
+        x, y = self.unanswered.get(request.to, (math.inf, math.inf))
+        return (x - place[0]) ** 2 + (y - place[1]) ** 2 < MOVED_M**2
 
     def _is_good_time(self, now: Situation, request: Request) -> bool:
         """Draw whether to serve a request now, with the probability that `timing` names."""

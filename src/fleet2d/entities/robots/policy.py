@@ -10,7 +10,7 @@ robot's sightings (`SightingMemory`).
 from collections.abc import Sequence
 from copy import copy
 from datetime import datetime, timedelta
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -49,6 +49,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "other": (),
 }
 """Kinds of rooms in observations, and the types of rooms of each."""
+KIND_OF_TYPE = {room_type: kind for kind, types in KINDS.items() for room_type in types}
 
 COLUMNS = (
     # Of the home
@@ -74,9 +75,6 @@ INPUTS = ("observation", "action_mask")
 # The rows of `ShownMemory.fresh_rows` and its like: first the visits, then the person.
 PERSON = 2
 
-TALLIED = ("relocations", EventKind.FOUND, EventKind.GAVE_UP, "searching_min", "overdue_h")
-"""What a policy counts for rewards: see `fleet2d.learning.gym.task.REWARDS`."""
-MAX_OVERDUE_H = 24.0
 MINUTE = timedelta(minutes=1)
 SATURDAY = 5
 
@@ -200,7 +198,11 @@ class WaitingPoses:
         if ways is None:
             if len(self._ways) >= KEPT_WAYS:
                 self._ways.clear()
-            ways = self._ways[x, y, actions] = self._measure(self._distances.of((x, y)), actions)
+            metres = self._distances.of((x, y))
+            if not np.isfinite(metres).any():
+                # It was interrupted so near to a corner that the middle of its cell isn't free.
+                metres = self._distances.of(space.nearest(x, y, actor.part) or (x, y))
+            ways = self._ways[x, y, actions] = self._measure(metres, actions)
         return ways
 
     def __getstate__(self) -> dict[str, Any]:
@@ -247,14 +249,115 @@ def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
     )
 
 
-class Policy(BeliefBehavior):
+class LearnedBehavior(BeliefBehavior):
+    """Base of behaviors whose decisions come from a file, a class, or an environment.
+
+    An observation has a row for each of the things that it chooses among, padded to a fixed number
+    of rows. Action r is to take row r; the last one is to take none of them.
+
+    Attributes:
+        file: The policy, an ONNX file; left out: a class of yours, or an environment, decides.
+    """
+
+    remembers = True
+    # The names of the columns of an observation.
+    columns: ClassVar[tuple[str, ...]]
+
+    file: InputPath | None = None
+
+    def model_post_init(self, _: object, /) -> None:
+        """Require the format ONNX."""
+        if self.file is not None and self.file.suffix != ".onnx":
+            raise problem(f"expected a file with the suffix .onnx, got {self.file.name}")
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of an observation."""
+        raise NotImplementedError
+
+    def open_policy(self) -> None:
+        """Begin without an action, and check the policy in a file.
+
+        Raises:
+            InputError: The file is no policy.
+        """
+        self.given: int | None = None  # the next action, if an environment decides
+        if self.file is not None:
+            open_network(self.file, INPUTS)
+
+    def observe(self, now: Situation) -> F32:
+        """Return the observation, float32 (rows, columns): see docs/gym.md."""
+        raise NotImplementedError
+
+    def mask(self, now: Situation) -> Bool:
+        """Return which actions are possible, bool (rows + 1,); the last one always is."""
+        raise NotImplementedError
+
+    def asks(self, now: Situation) -> bool:
+        """Return whether its decision at a step depends on the policy; nothing changes by it."""
+        raise NotImplementedError
+
+    def why_not(self, now: Situation, row: int) -> str:
+        """Return why a masked action is impossible, as the end of a sentence."""
+        raise NotImplementedError
+
+    def act(self, observation: F32, mask: Bool) -> int:
+        """Return the action for an observation; override it for a policy of your own.
+
+        Args:
+            observation: float32 (rows, columns), see docs/gym.md.
+            mask: bool (rows + 1,), the possible actions.
+
+        Raises:
+            ComponentError: There is no policy; or it fails, or returns NaN.
+        """
+        if self.file is None:
+            raise ComponentError(
+                "the policy has no file: give one, as file: hangout.onnx, derive a class from"
+                f" {type(self).__name__} that overrides act, or use fleet2d.learning.gym"
+            )
+        output = compute(self.file, {INPUTS[0]: observation[None], INPUTS[1]: mask[None]})
+        scores = output[0] if output.ndim else output
+        if scores.shape != mask.shape:
+            raise ComponentError(
+                f"{self.file.name} returned scores of the shape {scores.shape}, expected"
+                f" {mask.shape}: train it with as many rows, {self.rows}"
+            )
+        return int(np.argmax(np.where(mask, scores, -np.inf)))
+
+    def choose(self, now: Situation) -> int:
+        """Return the action at a step, from the environment or of the policy."""
+        mask = self.mask(now)
+        action = self.given
+        self.given = None
+        if action is None:
+            action = self.act(self.observe(now), mask)
+        self.check(now, action, mask)
+        return int(action)
+
+    def check(self, now: Situation, action: object, mask: Bool) -> None:
+        """Refuse an impossible action.
+
+        Raises:
+            InputError: It is out of range, or masked; the message says why.
+        """
+        if not (isinstance(action, int | np.integer) and 0 <= action <= self.rows):
+            raise InputError(
+                f"the policy chose {action!r}: actions are whole numbers from 0 to {self.rows}"
+            )
+        if not mask[action]:
+            raise InputError(f"the policy chose {self.why_not(now, int(action))}")
+
+
+class Policy(LearnedBehavior):
     """Let a learned policy choose the next room: to wait in, to look for a person in, or to visit.
 
     The policy is a file of ONNX with the inputs `observation`, float32 (1, rooms, columns), and
     optionally `action_mask`, bool (1, rooms + 1), whose first output has a score for each of the
     rooms + 1 actions; or a class of yours, derived from this one, that overrides `act`. Action r is
     to go to room r; the last action is to rest: at the charger, if the robot has one, until it is
-    charged, else where it is. The columns are those of `COLUMNS`.
+    charged, else where it is; of a search (find) it is to give up. The columns are those of
+    `COLUMNS`.
 
     Events: `relocates` (hangout) and `visits` (patrol) with the room, and those of the behavior
     `find`.
@@ -262,7 +365,6 @@ class Policy(BeliefBehavior):
     Attributes:
         task: To wait where people are in view (hangout); to look for a person (find); or to visit
             rooms (patrol).
-        file: The policy, an ONNX file; left out: a class of yours, or an environment, decides.
         rooms: Number of rooms in an observation; a home may have fewer.
         period: How long it waits in a room (hangout), or when it rests.
         dwell: How long it stays in a visited room (patrol).
@@ -277,20 +379,19 @@ class Policy(BeliefBehavior):
         }
     )  # fmt: skip
 
-    remembers = True
+    columns = COLUMNS
 
     task: Literal["hangout", "find", "patrol"] = "hangout"
-    file: InputPath | None = None
     rooms: int = Field(default=16, ge=1, le=256)
     period: PositiveDuration = timedelta(minutes=30)
     dwell: PositiveDuration = timedelta(minutes=5)
     every: PositiveDuration = timedelta(hours=2)
     deadline: PositiveDuration = timedelta(minutes=10)
 
-    def model_post_init(self, _: object, /) -> None:
-        """Require the format ONNX."""
-        if self.file is not None and self.file.suffix != ".onnx":
-            raise problem(f"expected a file with the suffix .onnx, got {self.file.name}")
+    @property
+    def rows(self) -> int:
+        """Number of rooms in an observation."""
+        return self.rooms
 
     def start(self, actor: Actor) -> None:
         """Choose where it stands in each room.
@@ -300,8 +401,7 @@ class Policy(BeliefBehavior):
             PlacementError: The home has more rooms than an observation.
             InputError: The file is no policy.
         """
-        if self.file is not None:
-            open_network(self.file, INPUTS)
+        self.open_policy()
         approach.check_has_camera(actor, "policy")
         count = len(actor.home.rooms)
         if count > self.rooms:
@@ -315,9 +415,6 @@ class Policy(BeliefBehavior):
         self.visited = np.full(count, NEVER, np.int64)
         self.since: datetime | None = None  # when the present search began
         self.due = actor.clock.start
-        self.given: int | None = None  # the next action, if an environment decides
-        # From the beginning of the run, of rewards.
-        self._tally = dict.fromkeys(TALLIED, 0.0)
         self._fixed = self._describe_home(actor)
         self._shown = shown_memory(self.names, self.user)
         self._person = int(self._shown.fresh_rows[PERSON])
@@ -366,7 +463,7 @@ class Policy(BeliefBehavior):
         kernels.show_memory(memory, shown, visits, now.step, time.hour, step_s, common, table)
         return table
 
-    def mask(self) -> Bool:
+    def mask(self, now: Situation) -> Bool:
         """Return which actions are possible, bool (rooms + 1,): rooms with a way, and to rest."""
         return self.poses.ways(self.rooms + 1).mask
 
@@ -374,21 +471,15 @@ class Policy(BeliefBehavior):
         """Return what never changes in observations, float32 (rooms, columns)."""
         table = np.zeros((self.rooms, len(COLUMNS)), np.float32)
         cells = sum(room.cells for room in actor.home.rooms)
-        types = {kind: name for name, kinds in KINDS.items() for kind in kinds}
         for room in actor.home.rooms:
             row = table[room.index]
             row[_AT["room"]] = 1
             row[_AT["area"]] = room.cells / cells
             if self.source is None:
                 row[_AT["belief"]] = row[_AT["area"]]
-            row[_AT[f"is_{types.get(room.type, 'other')}"]] = 1
+            row[_AT[f"is_{KIND_OF_TYPE.get(room.type, 'other')}"]] = 1
         table[self.poses.index, _AT["reachable"]] = 1
         return table
-
-    def tally(self, now: Situation) -> dict[str, float]:
-        """Return the counts since the beginning of the run, by name: see `TALLIED`."""
-        searching = 0.0 if self.since is None else (now.time - self.since) / MINUTE
-        return {**self._tally, "searching_min": self._tally["searching_min"] + searching}
 
     # What it does
 
@@ -422,94 +513,49 @@ class Policy(BeliefBehavior):
                 self.since = now.time
                 plan.note(EventKind.FIND_BEGINS, self.user)
             if end is not None:
-                self._tally["searching_min"] += (now.time - self.since) / MINUTE
-                self._tally[end] += 1
-                self.since = None
-                while self.due <= now.time:
-                    self.due += self.every
-                return plan.note(end, self.user).stay(until=self.due)
-        action = self._action(now)
-        if action == self.rooms:
-            return self._rest(now, plan)
-        return self._go(now, plan, action)
+                return self._end_search(now, plan, end)
+        action = self.choose(now)
+        if action < self.rooms:
+            return self._go(now, plan, action)
+        if self.task == "find":
+            return self._end_search(now, plan, EventKind.GAVE_UP)
+        return self._rest(now, plan)
 
-    def act(self, observation: F32, mask: Bool) -> int:
-        """Return the action for an observation; override it for a policy of your own.
+    def _end_search(self, now: Situation, plan: Plan, end: EventKind) -> Plan:
+        """Note how a search ends, and wait for the next one."""
+        self.since = None
+        while self.due <= now.time:
+            self.due += self.every
+        return plan.note(end, self.user).stay(until=self.due)
 
-        Args:
-            observation: float32 (rooms, columns), see `COLUMNS`.
-            mask: bool (rooms + 1,), the possible actions.
-
-        Raises:
-            ComponentError: There is no policy; or it fails, or returns NaN.
-        """
-        if self.file is None:
-            raise ComponentError(
-                "the policy has no file: give one, as file: hangout.onnx, derive a class from"
-                " Policy that overrides act, or use fleet2d.learning.gym"
-            )
-        output = compute(self.file, {INPUTS[0]: observation[None], INPUTS[1]: mask[None]})
-        scores = output[0] if output.ndim else output
-        if scores.shape != mask.shape:
-            raise ComponentError(
-                f"{self.file.name} returned scores of the shape {scores.shape}, expected"
-                f" {mask.shape}: train it with rooms={self.rooms}"
-            )
-        return int(np.argmax(np.where(mask, scores, -np.inf)))
-
-    def _action(self, now: Situation) -> int:
-        mask = self.mask()
-        action = self.given
-        self.given = None
-        if action is None:
-            action = self.act(self.observe(now), mask)
-        self.check(now, action, mask)
-        return int(action)
-
-    def check(self, now: Situation, action: object, mask: Bool) -> None:
-        """Refuse an impossible action.
-
-        Raises:
-            InputError: It is out of range, or masked; the message says why.
-        """
-        if not (isinstance(action, int | np.integer) and 0 <= action <= self.rooms):
-            raise InputError(
-                f"the policy chose {action!r}: actions are whole numbers from 0 to {self.rooms}"
-            )
-        if not mask[action]:
-            rooms = now.home.rooms
-            reason = "can't be reached" if action < len(rooms) else "doesn't exist"
-            raise InputError(f"the policy chose room {action}, which {reason}")
+    def why_not(self, now: Situation, row: int) -> str:
+        """Return why a room can't be chosen."""
+        reason = "can't be reached" if row < len(now.home.rooms) else "doesn't exist"
+        return f"room {row}, which {reason}"
 
     def _rest(self, now: Situation, plan: Plan) -> Plan:
         """Charge, if it has a battery; else stay where it is."""
         charge = now.actor.charge
-        lasts = MINUTE if self.task == "find" else self.period
+        lasts = self.period
         if charge is not None and plan.reaches(*charge.charger):
             if plan.position != charge.charger:
                 plan.go_to_point(*charge.charger).note(EventKind.DOCKS, charge.percent)
             lasts = max(timedelta(microseconds=charge.time_to_charge(1.0)), MINUTE)
-        plan.stay(lasts)
-        return plan.interrupt_on(EventKind.USER_SEEN) if self.task == "find" else plan
+        return plan.stay(lasts)
 
     def _go(self, now: Situation, plan: Plan, room: int) -> Plan:
         """Go to a room, and wait or look round there."""
         name = now.home.rooms[room].name
         number = self.poses.number[room]
-        begun = max(int(self.visited[room]), 0)
         self.visited[room] = now.step
         if self.sites is not None and self.task == "find":
             self.sites.look_round(plan, number)
-            self._tally["relocations"] += 1
             return plan.interrupt_on(EventKind.USER_SEEN)
         x, y = self.poses.points[number].tolist()
         if plan.position != (x, y):
-            self._tally["relocations"] += 1
             kind = EventKind.RELOCATES if self.task == "hangout" else EventKind.VISITS
             plan.note(kind, name).go_to_point(x, y)
             plan.turn_to(int(self.poses.headings[number]))
         if self.task == "hangout":
             return plan.stay(self.period)
-        overdue_s = (now.step - begun) * now.actor.clock.step_us / 1e6
-        self._tally["overdue_h"] += min(overdue_s / HOUR_S, MAX_OVERDUE_H)
         return plan.turn_by(1.0).stay(self.dwell)

@@ -2,10 +2,10 @@
 
 import copy
 import operator
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, Self, SupportsFloat, cast
+from typing import Any, Literal, Self, SupportsFloat, cast, get_args
 
 import gymnasium
 import numpy as np
@@ -16,13 +16,14 @@ from pettingzoo import ParallelEnv
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import parse_duration
-from fleet2d.engine.simulation import Simulation, perceived_s, run_until_asked, situation_of
+from fleet2d.engine.simulation import Simulation, measured, run_until_asked, situation_of
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.robots.policy import COLUMNS, Policy
+from fleet2d.entities.robots.policy import LearnedBehavior
 from fleet2d.errors import InputError
 from fleet2d.kernels import F32, Bool
-from fleet2d.learning.gym.task import LearningTask, Split, Variants, checked, load_task
+from fleet2d.learning.gym.task import METRIC, LearningTask, Split, Variants, checked, load_task
+from fleet2d.metrics.household import TERMS
 from fleet2d.runs.run import Run
 
 OPTIONS = ("values", "seed")
@@ -62,9 +63,9 @@ class RobotLife:
         """Return a robot."""
         return self._actors[robot]
 
-    def policy(self, robot: str) -> Policy:
+    def policy(self, robot: str) -> LearnedBehavior:
         """Return the policy of a robot."""
-        return cast("Policy", self._actors[robot].behaviors[0])
+        return cast("LearnedBehavior", self._actors[robot].behaviors[0])
 
     def act(self, actions: Mapping[str, int]) -> None:
         """Let robots that have to choose act, up to the next step at which one has to choose.
@@ -86,19 +87,18 @@ class RobotLife:
         return now
 
     def mask(self, robot: str) -> Bool:
-        """Return which actions are possible at the present step, bool (rooms + 1,), read-only."""
-        return self.policy(robot).mask()
+        """Return which actions are possible at the present step, bool (rows + 1,), read-only."""
+        return self.policy(robot).mask(self.now(robot))
 
     def is_empty(self, robot: str) -> bool:
         """Whether the battery of a robot is empty, so that it never decides again."""
         charge = self.actor(robot).charge
         return charge is not None and charge.is_empty
 
-    def terms(self, robot: str, names: Collection[str]) -> dict[str, float]:
-        """Return terms of the reward, from the beginning to the present step: at least these."""
-        terms = self.policy(robot).tally(self.now(robot))
-        if "in_view_min" in names:
-            terms["in_view_min"] = perceived_s(self.simulation, robot) / 60
+    def terms(self, robot: str) -> dict[str, float]:
+        """Return the terms of rewards, from the beginning to the present step."""
+        nothing = dict.fromkeys(TERMS, 0.0)  # at the first step
+        terms: dict[str, float] = measured(self.simulation, METRIC).get(robot, nothing)
         return terms
 
     def copy(self) -> "RobotLife":
@@ -109,20 +109,22 @@ class RobotLife:
 class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
     """The decisions of one robot, each lasting until the next: a semi-Markov process.
 
-    An observation is a table float32 (rooms, columns), with the columns `COLUMNS` of
-    `fleet2d.entities.robots.policy`; action r is to go to room r, the last one to rest. `info` has
-    the `action_mask`, the length of the interval since the last decision, `elapsed_s`, and the
+    An observation is a table float32 (rows, columns): a row for each room, with the columns
+    `COLUMNS` of `fleet2d.entities.robots.policy`, or for each interaction, with `ASK_COLUMNS` of
+    `fleet2d.entities.robots.ask_policy`. Action r is to go to room r, or to serve the request of
+    interaction r; the last one is to rest, to give up a search, or to wait. `info` has the
+    `action_mask`, int8, the length of the interval since the last decision, `elapsed_s`, and the
     local `time`. A life is truncated at the end of its scenario, and terminated when the robot's
     battery is empty.
 
     Args:
-        task: hangout, find, patrol, a file of a task or a scenario, or a `LearningTask`.
+        task: hangout, find, patrol, interact, a file of a task or a scenario, or a `LearningTask`.
         overrides: Changes of the scenario, such as "simulation.duration=3 d".
         robot: The robot; left out: the only one with a policy.
         reward: Weights of terms in place of the task's, or a function that is called with the
             environment after each step.
         split: Which values of what varies are drawn.
-        masked: What an impossible action is: an error, or as to rest.
+        masked: What an impossible action is: the same as the last one, or an error.
         truth: Put the truth, where everybody is, into `info`.
 
     Example:
@@ -145,12 +147,12 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         robot: str | None = None,
         reward: Reward = None,
         split: Split = "train",
-        masked: Literal["error", "rest"] = "error",
+        masked: Literal["error", "rest"] = "rest",
         truth: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        if split not in ("train", "test") or masked not in ("error", "rest"):
-            raise InputError("split is 'train' or 'test', and masked is 'error' or 'rest'")
+        check_known(split, "split", get_args(Split), InputError)
+        check_known(masked, "value of masked", ("rest", "error"), InputError)
         self.variants = Variants(load_task(task), overrides)
         self.reward: Any = self.variants.task.reward if reward is None else reward
         if not callable(self.reward):
@@ -164,10 +166,10 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
                 f"name the robot that learns by robot=…: one of {', '.join(variant.robots)}"
             )
         policy = variant.scenario.robots[self.robot].behaviors[0]
-        assert isinstance(policy, Policy)
-        shape = policy.rooms, len(COLUMNS)
+        assert isinstance(policy, LearnedBehavior)
+        shape = policy.rows, len(policy.columns)
         self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, shape, np.float32)
-        self.action_space = gymnasium.spaces.Discrete(policy.rooms + 1)
+        self.action_space = gymnasium.spaces.Discrete(policy.rows + 1)
         self.life: RobotLife | None = None
 
     def reset(
@@ -203,7 +205,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
     def join(self, life: RobotLife) -> None:
         """Go on in a life, which other robots may share."""
         self.life, self._step = life, life.simulation.step
-        self._terms = {} if callable(self.reward) else life.terms(self.robot, self.reward)
+        self._terms = {} if callable(self.reward) else life.terms(self.robot)
 
     def step(self, action: Any) -> tuple[F32, float, bool, bool, dict[str, Any]]:
         """Let the robot act until it has to choose again.
@@ -245,7 +247,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         if callable(self.reward):
             return float(self.reward(self))
         before = self._terms
-        self._terms = self.present.terms(self.robot, self.reward)
+        self._terms = self.present.terms(self.robot)
         return sum(w * (self._terms[name] - before[name]) for name, w in self.reward.items())
 
     def branch(self) -> Self:
@@ -260,7 +262,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         return self.present.simulation.finish()
 
     def action_masks(self) -> Bool:
-        """Return which actions are possible, bool (rooms + 1,), as MaskablePPO asks for it."""
+        """Return which actions are possible, bool (rows + 1,), as MaskablePPO asks for it."""
         return self.present.mask(self.robot)
 
     def render(self) -> Any:
@@ -287,7 +289,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         policy = life.policy(self.robot)
         info: dict[str, Any] = {
             "elapsed_s": float(elapsed_s),
-            "action_mask": life.mask(self.robot).copy(),
+            "action_mask": life.mask(self.robot).astype(np.int8),
             "time": now.time.isoformat(),
         }
         if self.truth:
@@ -335,7 +337,7 @@ class VectorRobotEnv(SyncVectorEnv):  # type: ignore[misc]
     """Some environments that are stepped together; they share their homes.
 
     Where a life is over, the next step begins a new one, and ignores the action. `info` has the
-    arrays `action_mask`, bool (n, actions), and `elapsed_s`, float64 (n,).
+    arrays `action_mask`, int8 (n, actions), and `elapsed_s`, float64 (n,).
 
     Args:
         num_envs: Number of environments.
@@ -445,7 +447,6 @@ class RobotsEnv(ParallelEnv):  # type: ignore[misc]
             observations[robot], info = self._envs[robot].observe(elapsed_s)
             info["due"] = robot in self.life.due
             if not info["due"]:
-                info["action_mask"] = np.zeros_like(info["action_mask"])
-                info["action_mask"][-1] = True
+                info["action_mask"][:-1] = 0
             infos[robot] = info
         return observations, infos

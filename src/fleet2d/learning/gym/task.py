@@ -1,7 +1,7 @@
 """Tasks: the scenarios that an agent lives in, as a distribution of homes and people, and rewards.
 
 A task is one YAML file: a scenario with a robot whose first behavior is `policy`, what to vary in
-it at each reset, apart for training and testing, and the weights of the reward.
+it at each reset, apart for each split, and the weights of the reward.
 """
 
 import json
@@ -16,44 +16,39 @@ from pydantic import Field, ValidationError, field_validator
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import check_known, problem, suggest
-from fleet2d.entities.robots.policy import Policy
+from fleet2d.entities.robots.policy import LearnedBehavior
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.floorplan.home import HOME_CACHE
 from fleet2d.floorplan.source import PLAN_CACHE
-from fleet2d.runtime.events import EventKind
+from fleet2d.metrics.household import TERMS
 from fleet2d.scenario.load import explain, load_scenario
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import check_count
 
 FOLDER = Path(__file__).with_name("tasks")
-Split = Literal["train", "test"]
+Split = Literal["train", "validation", "test"]
 # Scenarios of one task that are kept, and their homes.
 KEPT = 512
 HOMES = 128
 
-REWARDS = {
-    "in_view_min": "minutes for which a person is perceived, summed over the people",
-    "relocations": "times that it goes to another place",
-    EventKind.FOUND: "searches that end with the person in view",
-    EventKind.GAVE_UP: "searches that end without",
-    "searching_min": "minutes of searching",
-    "overdue_h": "hours, 24 at most, since the last visit of each room that it visits",
-}
-"""What a reward can be made of: the change of each over the whole interval between decisions."""
+METRIC = "household"
+"""The metric of every life, which counts what rewards are made of: see `Household`."""
 
 
 class Values(Settings):
-    """The values of one key of the scenario, for training and for testing.
+    """The values of one key of the scenario, for training, for choosing a policy, and for testing.
 
     Attributes:
         train: The values, or {range: [first, end]}, for training.
+        validation: Likewise for choosing among policies; left out: those for training.
         test: Likewise for testing; left out: those for training.
     """
 
     train: tuple[Any, ...] = Field(min_length=1)
+    validation: tuple[Any, ...] = ()
     test: tuple[Any, ...] = ()
 
-    @field_validator("train", "test", mode="before")
+    @field_validator("train", "validation", "test", mode="before")
     @classmethod
     def _spell_out(cls, value: Any) -> Any:
         if not isinstance(value, Mapping):
@@ -73,25 +68,23 @@ class LearningTask(Settings):
     Attributes:
         scenario: The scenario, or the file of one.
         vary: Values of keys of the scenario, such as floorplan.seed, drawn anew at each reset.
-        reward: Weights of the reward's terms; see `REWARDS`.
+        reward: Weights of the reward's terms; see `fleet2d.metrics.household.TERMS`.
     """
 
     scenario: dict[str, Any] | str = "bundled:paper"
     vary: dict[str, Values] = Field(default={})
-    reward: dict[str, float] = Field(default={"in_view_min": 1.0}, min_length=1)
+    reward: dict[str, float] = Field(default={"near_min": 1.0}, min_length=1)
 
     @field_validator("reward")
     @classmethod
     def _is_known(cls, value: dict[str, float]) -> dict[str, float]:
         for name in value:
-            check_known(name, "term", REWARDS, problem)
+            check_known(name, "term", TERMS, problem)
         return value
 
     def draw(self, random: np.random.Generator, split: Split) -> dict[str, Any]:
         """Draw a value of each key that varies."""
-        values = {
-            key: (v.test if split == "test" else ()) or v.train for key, v in self.vary.items()
-        }
+        values = {key: getattr(each, split) or each.train for key, each in self.vary.items()}
         return {key: items[int(random.integers(len(items)))] for key, items in values.items()}
 
 
@@ -133,11 +126,12 @@ class Variants:
         return self.load(self.task.draw(np.random.default_rng(0), split))
 
     def _read(self, changes: tuple[str, ...]) -> LifeScenario:
-        scenario = load_scenario(self.task.scenario, *self.overrides, *changes)
+        metric = f"metrics.{METRIC}.type={METRIC}"
+        scenario = load_scenario(self.task.scenario, *self.overrides, *changes, metric)
         robots = tuple(
             name
             for name, robot in scenario.robots.items()
-            if robot.behaviors and isinstance(robot.behaviors[0], Policy)
+            if robot.behaviors and isinstance(robot.behaviors[0], LearnedBehavior)
         )
         if not robots:
             raise ScenarioError(
@@ -148,13 +142,13 @@ class Variants:
 
 
 def load_task(source: str | Path | Mapping[str, Any] | LearningTask) -> LearningTask:
-    """Return a task: hangout, find, patrol, a file of a task or a scenario, or its content.
+    """Return a task: one of ours by name, a file of a task or a scenario, or its content.
 
     Raises:
         InputError: There is none, or it is wrong.
 
     Example:
-        >>> load_task("hangout").reward["in_view_min"]
+        >>> load_task("hangout").reward["near_min"]
         1.0
     """
     if isinstance(source, LearningTask):
