@@ -3,6 +3,7 @@
 import { effect } from "@preact/signals";
 import type { Run } from "./data/run";
 import * as state from "./state";
+import * as lanes from "./timeline/rows";
 
 const DELAY_MS = 250;
 
@@ -11,7 +12,7 @@ export function addressOf(run: Run): string {
   const { clock } = run;
   const [from, to] = state.range.value;
   const words = new URLSearchParams();
-  words.set("at", momentText(clock.startMs, state.moment.value));
+  words.set("at", momentText(clock.startMs, state.told.value));
   if (from > state.beginUs.value || to < state.endUs.value) {
     words.set("from", momentText(clock.startMs, from));
     words.set("to", momentText(clock.startMs, to));
@@ -27,16 +28,22 @@ export function addressOf(run: Run): string {
     kind: state.eventKind.value,
     body: state.followed.value,
     plot: state.plot.value,
+    ask: state.question.value?.text ?? "",
+    lanes: lanes.filter.value,
     theme: state.theme.value === "auto" ? "" : state.theme.value,
   };
   for (const [name, value] of Object.entries(optional)) if (value) words.set(name, value);
+  const marked = state.marked.value;
+  if (marked) words.set("marked", marked.map((us) => momentText(clock.startMs, us)).join("~"));
+  for (const lane of lanes.pinned.value) words.append("pin", lane);
+  for (const lane of lanes.hidden.value) words.append("hide", lane);
   return words.toString();
 }
 
 export function applyAddress(text: string, run: Run): void {
   const words = new URLSearchParams(text.replace(/^#/, ""));
-  const us = (name: string): number | null => {
-    const value = words.get(name);
+  const us = (name: string): number | null => momentOf(words.get(name));
+  const momentOf = (value: string | null): number | null => {
     const ms = value === null ? NaN : Date.parse(`${value}Z`);
     return Number.isNaN(ms) ? null : (ms - run.clock.startMs) * 1000;
   };
@@ -60,6 +67,13 @@ export function applyAddress(text: string, run: Run): void {
   state.eventKind.value = words.get("kind") ?? "";
   state.followed.value = words.get("body") ?? "";
   state.plot.value = words.get("plot") ?? "";
+  const asked = words.get("ask");
+  state.question.value = asked ? { text: asked, nearUs: state.moment.value } : null;
+  const [first, last] = (words.get("marked") ?? "").split("~").map(momentOf);
+  state.marked.value = typeof first === "number" && typeof last === "number" ? [first, last] : null;
+  lanes.pinned.value = new Set(words.getAll("pin"));
+  lanes.hidden.value = new Set(words.getAll("hide"));
+  lanes.filter.value = words.get("lanes") ?? "";
   const theme = words.get("theme");
   if (theme === "light" || theme === "dark") state.theme.value = theme;
 }

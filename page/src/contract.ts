@@ -139,11 +139,12 @@ export interface VerdictFacts {
   step: number | null;
 }
 
-/** A moment that is worth a look. */
+/** A moment that is worth a look, and the bodies that it is about, the most important first. */
 export interface StoryFacts {
   step: number;
   title: string;
   words: string;
+  who: string[];
 }
 
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */

@@ -3,6 +3,7 @@
 import { render } from "preact";
 import { applyAddress, followAddress } from "./address";
 import { App } from "./App";
+import { DAY_US } from "./data/clock";
 import { Run } from "./data/run";
 import { openSession } from "./data/source";
 import { followKeyboard } from "./keyboard";
@@ -14,7 +15,6 @@ import { followTheme } from "./theme";
 
 /** Runs beside each other at first, as many as the command takes; branches join them. */
 const MOST_RUNS = 4;
-const DAY_US = 86_400e6;
 
 async function start(box: HTMLElement): Promise<void> {
   followTheme();

@@ -23,6 +23,8 @@ export interface Colors {
   shadow: string;
   /** How much people move, in the overview. */
   bars: string;
+  /** What a home stands on. */
+  stage: string;
 }
 
 const LIGHT: Colors = {
@@ -44,6 +46,7 @@ const LIGHT: Colors = {
   slow: "#0077bb",
   shadow: "rgba(70, 60, 45, 0.28)",
   bars: "#9a9fa8",
+  stage: "#f1ede5",
 };
 
 const DARK: Colors = {
@@ -65,6 +68,7 @@ const DARK: Colors = {
   slow: "#66bbee",
   shadow: "rgba(0, 0, 0, 0.65)",
   bars: "#6a727d",
+  stage: "#191d22",
 };
 
 const query = typeof matchMedia === "function" ? matchMedia("(prefers-color-scheme: dark)") : null;

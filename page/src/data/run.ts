@@ -16,6 +16,7 @@ import { Walls } from "./sight";
 import type { RunSource } from "./source";
 import type { Stretches } from "./stretches";
 import { readTracks, Track, tracksOf } from "./tracks";
+import { bodyLabels, title } from "./words";
 
 /** When something was switched, and whether on. */
 export interface Switches {
@@ -33,6 +34,7 @@ const NO_STRETCHES: Stretches = { from: [], to: [], value: [] };
 export class Run {
   readonly clock: Clock;
   readonly home: Home;
+  private readonly labels: ReadonlyMap<string, string>;
   tracks = new Map<string, Track>();
   rooms = new Map<string, Stretches>();
   events = new Events();
@@ -69,6 +71,12 @@ export class Run {
   ) {
     this.clock = new Clock(facts.start, facts.step_us, facts.steps);
     this.home = new Home(facts.home);
+    this.labels = bodyLabels(facts.bodies.map(({ name }) => name));
+  }
+
+  /** The name of a body as people write it. */
+  label(name: string): string {
+    return this.labels.get(name) ?? title(name);
   }
 
   static async open(source: RunSource): Promise<Run> {

@@ -32,7 +32,7 @@ function Facts({ rows }: { rows: [string, string][] }) {
 
 function BodyView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const body = run.body(name)!;
   const now = bodyState(run, name, us);
   useEffect(() => void run.readDecisions(), [run]);
@@ -116,7 +116,7 @@ export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]
 
 function DoorView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   return (
     <div data-inspected={name}>
       <h2>{name}</h2>
@@ -141,7 +141,7 @@ function FurnitureView({ run, name }: { run: Run; name: string }) {
 
 function RoomView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const index = run.home.roomIndex(name);
   const room = run.facts.home.rooms[index]!;
   const occupants = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);

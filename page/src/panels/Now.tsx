@@ -9,8 +9,10 @@ import { lastAtMost } from "../data/search";
 import { TURN } from "../data/tracks";
 import { doing, title } from "../data/words";
 import { Icon } from "../Icon";
+import { playReel } from "../player";
 import * as state from "../state";
 import { bodyColor } from "../theme";
+import { Thumbnail } from "../timeline/Hover";
 import { Tiles } from "./Tiles";
 
 export interface BodyState {
@@ -54,7 +56,7 @@ export function Now() {
 
 function NowOf({ run, title: heading }: { run: Run; title: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const step = run.clock.stepAt(us);
   return (
     <>
@@ -144,17 +146,25 @@ function Expectations({ run }: { run: Run }) {
   );
 }
 
-/** Moments that are worth a look. */
+/** Moments that are worth a look, as cards with the home at each; all of them as a reel. */
 function Story({ run }: { run: Run }) {
   const { story } = run.facts;
   if (story.length === 0) return null;
   return (
     <section class="story">
-      <h2>Story</h2>
+      <h2>
+        Story
+        {run === state.run.value && (
+          <button type="button" title="All moments in half a minute (r)" onClick={playReel}>
+            <Icon name="play" size={11} /> Play all
+          </button>
+        )}
+      </h2>
       <ol>
-        {story.map(({ step, title: words, words: about }) => (
+        {story.map(({ step, title: words, words: about, who }) => (
           <li key={words}>
-            <button type="button" class="link" onClick={() => state.goTo(step * run.clock.stepUs)}>
+            <button type="button" class="card" onClick={() => state.goTo(step * run.clock.stepUs)}>
+              <Thumbnail run={run} us={step * run.clock.stepUs} focus={who[0] ?? ""} />
               <b>{words}</b>
               <span>{about}</span>
               <time>{run.clock.text(step * run.clock.stepUs).slice(0, -3)}</time>

@@ -2,12 +2,12 @@
 
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
+import { DAY_US } from "../data/clock";
 import { numberColumns, readSeries } from "../data/metrics";
 import type { Run } from "../data/run";
 import { lastAtMost } from "../data/search";
 import { timeWithin } from "../timeline/days";
 
-const DAY_US = 86_400e6;
 const MOST_POINTS = 60;
 
 interface Tile {

@@ -5,10 +5,12 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { durationText } from "../data/clock";
 import type { Run } from "../data/run";
 import { timeByWord } from "../data/stretches";
-import { fitted, oncePerFrame } from "../plan/canvas";
+import { fitted, oncePerFrame, sizeOf, watchSizes } from "../plan/canvas";
 import * as state from "../state";
 import { colors } from "../theme";
-import { drawCursor, drawMarked, drawRows, heightOf, type PlacedRow, visibleRows, xOf } from "./draw";
+import { momentSlider } from "../Transport";
+import { drawMarked, drawRows, heightOf, type PlacedRow, visibleRows, xOf } from "./draw";
+import { type Hovered, Hover } from "./Hover";
 import { answerLane, beliefLanes, type Lane, lanesOf, noteLane, tableLanes } from "./lanes";
 import { followPointer, scaleOf } from "./pointer";
 import * as shown from "./rows";
@@ -63,9 +65,9 @@ export function Timeline() {
   const scroller = useRef<HTMLElement>(null);
   const box = useRef<HTMLDivElement>(null);
   const base = useRef<HTMLCanvasElement>(null);
-  const top = useRef<HTMLCanvasElement>(null);
+  const cursor = useRef<HTMLSpanElement>(null);
   const view = useSignal({ scrolled: 0, height: 0 });
-  const hover = useSignal<{ words: string; x: number; y: number } | null>(null);
+  const hover = useSignal<Hovered | null>(null);
   const lanes = useLanes();
   const rows = useMemo(() => computed(() => shown.rowsOf(lanes.value)), []);
   const visible = useMemo(() => computed(() => visibleRows(rows.value, view.value.scrolled, view.value.height)), []);
@@ -75,44 +77,40 @@ export function Timeline() {
       const { context, width, height } = fitted(base.current!);
       context.clearRect(0, 0, width, height);
       drawRows(context, visible.value, scaleOf(width), clock, colors.value, height);
-    });
-    const paintCursor = oncePerFrame(() => {
-      const { context, width, height } = fitted(top.current!);
-      context.clearRect(0, 0, width, height);
       if (state.marked.value) drawMarked(context, scaleOf(width), state.marked.value, height, colors.value);
-      const x = xOf(scaleOf(width), state.moment.value);
-      drawCursor(context, x, height, clock.timeText(state.moment.value), width, colors.value);
     });
+    const moveCursor = (): void => {
+      const [width] = sizeOf(base.current!);
+      const x = xOf(scaleOf(width), state.moment.value);
+      cursor.current!.style.transform = `translateX(${x.toFixed(1)}px)`;
+      cursor.current!.dataset.side = x < 30 ? "right" : x > width - 30 ? "left" : "";
+      cursor.current!.hidden = x < -1 || x > width + 1;
+    };
     const measure = (): void => {
       const { scrollTop: scrolled, clientHeight: height } = scroller.current!;
       if (scrolled !== view.value.scrolled || height !== view.value.height) view.value = { scrolled, height };
       paintRows();
-      paintCursor();
+      moveCursor();
     };
     const stops = [
       effect(() => {
-        void [state.range.value, visible.value, colors.value, state.endUs.value];
+        void [state.range.value, state.marked.value, visible.value, colors.value, state.endUs.value];
         paintRows();
       }),
-      effect(() => {
-        void [state.range.value, state.moment.value, state.marked.value, visible.value, colors.value];
-        paintCursor();
-      }),
+      effect(moveCursor),
       followPointer({
         box: box.current!,
         rows: () => visible.value,
         hover: (row, us, x, y) => {
           const words = row?.lane?.words(us);
-          hover.value = words ? { words: `${row!.label}: ${words} · ${clock.text(us)}`, x, y } : null;
+          hover.value = words ? { words: `${row!.label}: ${words} · ${clock.text(us)}`, us, x, y } : null;
         },
       }),
     ];
-    const observer = new ResizeObserver(measure);
-    observer.observe(box.current!);
-    observer.observe(scroller.current!);
+    const unwatch = watchSizes([box.current!, base.current!, scroller.current!], measure);
     scroller.current!.addEventListener("scroll", measure, { passive: true });
     return () => {
-      observer.disconnect();
+      unwatch();
       scroller.current?.removeEventListener("scroll", measure);
       stops.forEach((stop) => stop());
     };
@@ -124,21 +122,12 @@ export function Timeline() {
         <div
           ref={box}
           class="lanes"
-          role="slider"
-          tabIndex={0}
-          aria-label="Moment"
-          aria-valuemin={0}
-          aria-valuemax={clock.steps - 1}
-          aria-valuenow={clock.stepAt(state.moment.value)}
-          aria-valuetext={clock.text(state.moment.value)}
+          {...momentSlider("Moment")}
         >
           <canvas ref={base} aria-hidden="true" />
-          <canvas ref={top} aria-hidden="true" />
-          {hover.value && (
-            <output class="hover" aria-live="off" style={{ left: `${hover.value.x}px`, top: `${hover.value.y}px` }} data-side={hover.value.x > 500 ? "left" : "right"}>
-              {hover.value.words}
-            </output>
-          )}
+          <span ref={cursor} class="cursor" aria-hidden="true">
+            <CursorTime />
+          </span>
         </div>
         <div class="labels">
           <div class="corner">
@@ -150,8 +139,13 @@ export function Timeline() {
         </div>
         <div class="spacer" />
       </section>
+      <Hover run={state.run.value!} at={hover.value} />
     </>
   );
+}
+
+function CursorTime() {
+  return <b>{state.run.value!.clock.timeText(state.told.value)}</b>;
 }
 
 function Label({ row }: { row: PlacedRow }) {

@@ -205,11 +205,12 @@ class VerdictFacts(TypedDict):
 
 
 class StoryFacts(TypedDict):
-    """A moment that is worth a look."""
+    """A moment that is worth a look, and the bodies that it is about, the most important first."""
 
     step: int
     title: str
     words: str
+    who: list[str]
 
 
 class SlowFacts(TypedDict):
