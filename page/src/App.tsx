@@ -7,6 +7,7 @@ import { copyLink } from "./address";
 import { DAY_US } from "./data/clock";
 import type { Run } from "./data/run";
 import { KEYS } from "./keyboard";
+import { connected } from "./live/feed";
 import { Icon } from "./Icon";
 import { BeliefsPanel } from "./panels/BeliefsPanel";
 import { EventsPanel, KindChoice } from "./panels/EventsPanel";
@@ -154,10 +155,13 @@ function Verdicts({ run, title }: { run: Run; title: string }) {
   );
 }
 
+const CONNECTION_LOST = "The connection to the simulation is lost, and tried again: if that lasts, start fleet2d run --live again, and reload the page.";
+
 /** Notes are remarks; what could not be read is missing on the page. */
 function Notes() {
   const notes = state.runs.value.flatMap((run) => run.facts.notes);
   const problems = state.runs.value.flatMap((run) => run.problems.value);
+  if (state.live.value && !connected.value) problems.push(CONNECTION_LOST);
   if (notes.length + problems.length === 0) return null;
   return (
     <div class="notes">
@@ -219,6 +223,7 @@ function Panels() {
 
 function GoTo() {
   const isWrong = useSignal(false);
+  const { clock, beginUs, endUs } = state.run.value!;
   const input = useRef<HTMLInputElement>(null);
   const run = state.run.value!;
   const go = () => {
@@ -242,7 +247,14 @@ function GoTo() {
           if (event.key === "Enter") go();
         }}
       />
-      <button onClick={go}>Go</button>
+      <button type="button" onClick={go}>
+        Go
+      </button>
+      {isWrong.value && (
+        <strong role="alert" class="status">
+          No time of this run, which lasts from {clock.text(beginUs).slice(0, -3)} to {clock.text(endUs).slice(0, -3)}
+        </strong>
+      )}
     </div>
   );
 }
@@ -318,7 +330,7 @@ function CopyLink() {
   };
   return (
     <button type="button" class="quiet" title="A link to this moment and view" onClick={() => void copy()}>
-      <Icon name="link" /> {words.value}
+      <Icon name="link" /> <span class="words">{words.value}</span>
     </button>
   );
 }

@@ -110,20 +110,20 @@ function SpeedChoice() {
 
 /** The whole run on one line, by how much people move; a click goes there. */
 function Overview({ run }: { run: Run }) {
-  const box = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const cursor = useRef<HTMLSpanElement>(null);
   const { clock } = run;
   useEffect(() => {
+    const [drawn, line] = [canvas.current!, cursor.current!];
     const paint = oncePerFrame(() => {
-      const { context, width, height } = fitted(canvas.current!);
+      const { context, width, height } = fitted(drawn);
       context.clearRect(0, 0, width, height);
       drawOverview(context, run, width, height);
     });
     const move = (): void => {
       const [begin, end] = [state.beginUs.value, state.endUs.value];
       const share = (state.moment.value - begin) / (end - begin);
-      cursor.current!.style.transform = `translateX(${(share * sizeOf(canvas.current!)[0] - 1).toFixed(1)}px)`;
+      line.style.transform = `translateX(${(share * sizeOf(drawn)[0] - 1).toFixed(1)}px)`;
     };
     const today = computed(() => clock.day(state.moment.value));
     const stops = [
@@ -132,7 +132,7 @@ function Overview({ run }: { run: Run }) {
         paint();
       }),
       effect(move),
-      watchSizes([canvas.current!], () => {
+      watchSizes([drawn], () => {
         paint();
         move();
       }),
@@ -148,7 +148,7 @@ function Overview({ run }: { run: Run }) {
     return state.beginUs.value + ((event.clientX - left) / width) * (state.endUs.value - state.beginUs.value);
   };
   return (
-    <div ref={box} class="overview" {...momentSlider("Moment in the run")} onPointerDown={seek} onPointerMove={seek}>
+    <div class="overview" {...momentSlider("Moment in the run")} onPointerDown={seek} onPointerMove={seek}>
       <canvas ref={canvas} aria-hidden="true" />
       <span ref={cursor} class="cursor" aria-hidden="true" />
     </div>

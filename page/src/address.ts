@@ -50,6 +50,7 @@ export function applyAddress(text: string, run: Run): void {
   const [from, to, at] = [us("from"), us("to"), us("at")];
   if (from !== null && to !== null && to > from) state.setRange(from, to);
   if (at !== null) state.goTo(at);
+  reportUnknown(words, at, run);
   const show = words.get("show");
   if (show !== null) {
     const names = show.split(",");
@@ -62,7 +63,8 @@ export function applyAddress(text: string, run: Run): void {
   const view = words.get("view");
   if (view === "calendar" || view === "lanes") state.view.value = view;
   state.selected.value = words.get("select") ?? "";
-  state.layer.value = words.get("layer") ?? "";
+  const layer = words.get("layer") ?? "";
+  state.layer.value = run.tableFacts(`layer.${layer}`) ? layer : "";
   state.belief.value = words.get("belief") ?? "";
   state.eventKind.value = words.get("kind") ?? "";
   state.followed.value = words.get("body") ?? "";
@@ -76,6 +78,24 @@ export function applyAddress(text: string, run: Run): void {
   lanes.filter.value = words.get("lanes") ?? "";
   const theme = words.get("theme");
   if (theme === "light" || theme === "dark") state.theme.value = theme;
+}
+
+/** Say what a link names that the run doesn't have: it may be of another run, or of an older one. */
+function reportUnknown(words: URLSearchParams, at: number | null, run: Run): void {
+  const { doors, objects, rooms } = run.facts.home;
+  const tables = run.facts.tables.map(({ name }) => name);
+  const bodies = run.bodies.map(({ name }) => name);
+  const known: Record<string, readonly string[]> = {
+    select: [...bodies, ...[...rooms, ...doors, ...objects].map(({ name }) => name)],
+    body: bodies,
+    layer: tables.filter((name) => name.startsWith("layer.")).map((name) => name.slice("layer.".length)),
+  };
+  for (const [key, names] of Object.entries(known)) {
+    const name = words.get(key);
+    if (name && !names.includes(name)) run.report(`The link names ${key === "layer" ? "the layer " : ""}'${name}', which this run doesn't have.`);
+  }
+  if (at === null || (at >= run.beginUs && at < run.endUs)) return;
+  run.report(`The link is about ${run.clock.text(at)}, which this run doesn't have: it lasts from ${run.clock.text(run.beginUs)} to ${run.clock.text(run.endUs)}.`);
 }
 
 /** Copy a link to what is shown now; false where the browser refuses. */

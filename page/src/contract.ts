@@ -155,6 +155,15 @@ export interface SlowFacts {
   end: number;
 }
 
+/** Stretches in which people sit or lie [us since the start], by user and time. `use` is the number of the place in `uses`. */
+export interface PostureFacts {
+  uses: UseFacts[];
+  user: string[];
+  use: number[];
+  from_us: number[];
+  to_us: number[];
+}
+
 /** Stretches in which a robot noticed a user: steps `first` to `last`, both included. `false` marks stretches in which the robot took something else for that user. */
 export interface SightingFacts {
   robot: string;

@@ -49,6 +49,9 @@ export const live = signal(false);
 export const follow = signal(true);
 
 export const run = computed<Run | null>(() => runs.value[0] ?? null);
+const chosenRun = signal<Run | null>(null);
+/** The run that is inspected: the one on whose plan somebody clicked last. */
+export const inspected = computed<Run | null>(() => (chosenRun.value && runs.value.includes(chosenRun.value) ? chosenRun.value : run.value));
 /** The part of the runs that can be shown [us]. */
 export const beginUs = computed(() => Math.min(...runs.value.map((entry) => entry.beginUs)));
 export const endUs = computed(() => Math.max(1, ...runs.value.map((entry) => (entry.version.value, entry.endUs))));
@@ -167,8 +170,10 @@ export function jump(forward: boolean): void {
   if (us !== undefined) goTo(us);
 }
 
-export function select(name: string): void {
+/** Select a body, a door or a room; of two runs, in the one that was clicked. */
+export function select(name: string, of: Run | null = null): void {
   batch(() => {
+    if (of) chosenRun.value = of;
     selected.value = name;
     if (name) panel.value = "inspect";
   });

@@ -851,14 +851,17 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
             places = [t.locator("tr[data-body=astro]").get_attribute("data-x") for t in tables]
             assert places[0] == places[1]
             page.locator("tr[data-body=astro] button").first.click()
-            page.select_option("select[aria-label='Key of a behavior of astro']", "hangout.tau")
+            offer = "Astro: hangout.tau …"
+            page.select_option("select[aria-label='What to change']", label=offer)
             page.fill("input[aria-label='Value of hangout.tau']", "10 min")
             page.get_by_role("button", name="Change", exact=True).click()
             page.click("text=Call astro")
             page.mouse.click(*place_in(page, 1, "Living room"))
             page.click("button.play")
             page.wait_for_selector("html[data-ended='1']", timeout=60_000)
+            assert "astro: hangout with tau 10 min" in page.inner_text(".chips")
             page.click("#tab-now")
+            assert "Astro elsewhere" in page.inner_text(".differences")
             shows_step(page, 9 * 3600 - 1)
             rooms = [
                 page.locator(f"table.now[data-step='{9 * 3600 - 1}']")

@@ -10,6 +10,7 @@ import { Home } from "./home";
 import { LayerTable } from "./layers";
 import { Observations, type ObservationSource } from "./observations";
 import { Table } from "./parquet";
+import { Postures } from "./postures";
 import { roomStretches } from "./rooms";
 import { lastAtMost } from "./search";
 import { Walls } from "./sight";
@@ -41,6 +42,8 @@ export class Run {
   beliefs: Beliefs[] = [];
   sightings: SightingFacts[] = [];
   observations: ObservationSource | null = null;
+  /** When people sit or lie; null while it isn't read, and in a live run. */
+  postures: Postures | null = null;
   /** Goes up by one whenever something more of the run was read. */
   readonly version = signal(0);
   /** Whether everything was read that questions are about. */
@@ -166,6 +169,10 @@ export class Run {
     });
     await this.attempt(async () => {
       this.notes.value = await this.source.notes();
+    });
+    await this.attempt(async () => {
+      const facts = await this.source.postures();
+      this.postures = facts && new Postures(facts);
     });
     if (this.tableFacts("decisions")) await this.readDecisions();
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {

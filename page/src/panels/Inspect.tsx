@@ -7,6 +7,7 @@ import type { EventRow } from "../data/events";
 import type { Run } from "../data/run";
 import { lastAtMost } from "../data/search";
 import { valueAt } from "../data/stretches";
+import { title } from "../data/words";
 import * as state from "../state";
 import { bodyState } from "./Now";
 import { Terms } from "./Terms";
@@ -15,7 +16,7 @@ const SHOWN_EVENTS = 12;
 
 export function Inspect() {
   const name = state.selected.value;
-  const run = state.run.value!;
+  const run = state.inspected.value!;
   void run.version.value;
   if (!name) return <p class="hint">Choose somebody, a door or a room: click on the plan, or on a name.</p>;
   if (run.body(name)) return <BodyView run={run} name={name} />;
@@ -23,6 +24,16 @@ export function Inspect() {
   if (run.home.roomIndex(name) >= 0) return <RoomView run={run} name={name} />;
   if (run.facts.home.objects.some((thing) => thing.name === name)) return <FurnitureView run={run} name={name} />;
   return <p class="hint">There is no {name} in this run.</p>;
+}
+
+/** What is inspected, and of two runs in which. */
+function heading(run: Run, words: string): string {
+  return state.runs.value.length > 1 ? `${words} · ${run.facts.title}` : words;
+}
+
+/** The name of a room or a piece of furniture as people write it. */
+function labelOf(run: Run, name: string): string {
+  return run.home.labels[run.home.roomIndex(name)] ?? title(name);
 }
 
 /** The facts that are known. */
@@ -56,7 +67,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
   ];
   return (
     <div data-inspected={name}>
-      <h2>{name}</h2>
+      <h2>{heading(run, run.label(name))}</h2>
       <button
         type="button"
         aria-pressed={state.followed.value === name}
@@ -119,7 +130,7 @@ function DoorView({ run, name }: { run: Run; name: string }) {
   const us = state.told.value;
   return (
     <div data-inspected={name}>
-      <h2>{name}</h2>
+      <h2>{heading(run, run.label(name))}</h2>
       <Facts rows={[["kind", "door"], ["now", run.doorOpen(name, us) ? "open" : "shut"]]} />
       <h3>History</h3>
       <History run={run} rows={run.events.ofEntity(name)} us={us} />
@@ -133,7 +144,7 @@ function FurnitureView({ run, name }: { run: Run; name: string }) {
   const thing = run.facts.home.objects.find((entry) => entry.name === name)!;
   return (
     <div data-inspected={name}>
-      <h2>{name.replaceAll("_", " ")}</h2>
+      <h2>{heading(run, labelOf(run, name))}</h2>
       <Facts rows={[["kind", thing.type.replaceAll("_", " ")], ["blocks", BLOCKS[thing.blocks] ?? thing.blocks]]} />
     </div>
   );
@@ -147,7 +158,7 @@ function RoomView({ run, name }: { run: Run; name: string }) {
   const occupants = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);
   return (
     <div data-inspected={name}>
-      <h2>{name.replaceAll("_", " ")}</h2>
+      <h2>{heading(run, labelOf(run, name))}</h2>
       <Facts
         rows={[
           ["kind", room.type.replaceAll("_", " ")],

@@ -13,6 +13,7 @@ import { playReel } from "../player";
 import * as state from "../state";
 import { bodyColor } from "../theme";
 import { Thumbnail } from "../timeline/Hover";
+import { Differences } from "./Differences";
 import { Tiles } from "./Tiles";
 
 export interface BodyState {
@@ -47,6 +48,7 @@ export function bodyState(run: Run, name: string, us: number): BodyState | null 
 export function Now() {
   return (
     <>
+      <Differences />
       {state.runs.value.map((run, i) => (
         <NowOf key={i} run={run} title={state.runs.value.length > 1 ? run.facts.title : ""} />
       ))}
@@ -77,6 +79,7 @@ function NowOf({ run, title: heading }: { run: Run; title: string }) {
           ))}
         </tbody>
       </table>
+      {run.bodies.length === 0 && <p class="hint">Nobody is in this home, neither people nor robots: a scenario names them under users and robots.</p>}
       <Expectations run={run} />
       <Tiles run={run} />
       <Story run={run} />
@@ -93,9 +96,9 @@ function BodyRow({ run, body, us }: { run: Run; body: BodyFacts; us: number }) {
   return (
     <tr data-body={body.name} data-x={now?.x} data-y={now?.y} data-heading={now?.headingDeg} data-room={now?.room} data-away={now?.away}>
       <th scope="row">
-        <button type="button" class="link" onClick={() => state.select(body.name)}>
+        <button type="button" class="link" onClick={() => state.select(body.name, run)}>
           <span class={body.robot ? "chip robot" : "chip"} style={{ background: bodyColor(body.color) }} />
-          {body.name}
+          {run.label(body.name)}
         </button>
       </th>
       <td title={now && !now.away ? `${now.x.toFixed(2)} m, ${now.y.toFixed(2)} m` : ""}>

@@ -6,6 +6,7 @@ import type { Run } from "../data/run";
 import { Icon } from "../Icon";
 import { feedOf } from "../live/feed";
 import { askCall, askPlace, branchHere, branching, calling, closeRun, placing } from "../live/orders";
+import { Changes } from "../panels/Differences";
 import * as state from "../state";
 import { colors } from "../theme";
 import { oncePerFrame, watchSizes } from "./canvas";
@@ -78,7 +79,7 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
       )}
       {title && (
         <figcaption>
-          {title}
+          {title} <Changes run={run} />
           {run.path && (
             <button type="button" disabled={branching.value} onClick={() => void branchHere(run)}>
               Continue from here
@@ -97,9 +98,9 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
 function cornerOf(canvas: HTMLCanvasElement): readonly [number, number] {
   const clock = document.querySelector(".clock");
   if (!clock || getComputedStyle(clock).position !== "absolute") return [0, 0];
-  const [box, plan] = [clock.getBoundingClientRect(), canvas.getBoundingClientRect()];
-  const isOver = box.left < plan.right && box.right > plan.left;
-  return isOver ? [box.right - plan.left + CLEAR_PX, box.bottom - plan.top + CLEAR_PX] : [0, 0];
+  // Plans beside each other keep the same corner free, so that both homes are of one size.
+  const [box, plan] = [clock.getBoundingClientRect(), canvas.closest(".plans")!.getBoundingClientRect()];
+  return [box.right - plan.left + CLEAR_PX, box.bottom - plan.top + CLEAR_PX];
 }
 
 /** Read the observations and the layer of the moment, several times a second while it changes. */
@@ -185,7 +186,7 @@ function followPointer(
     if (held?.moved && held.body && place) void askPlace(run, held.body, ...place);
     else if (held && !held.moved && calling.value && place) void askCall(run, calling.value, ...place);
     else if (held && !held.moved && placing.value && place) void askPlace(run, placing.value, ...place);
-    else if (held && !held.moved) state.select(painter.thingAt(x, y));
+    else if (held && !held.moved) state.select(painter.thingAt(x, y), run);
     held = null;
   };
   const wheel = (event: WheelEvent): void => {

@@ -206,13 +206,15 @@ export function figureDisc(scene: Pick<Scene, "run" | "us" | "poses" | "frame" |
   return { x, y, radius: reach * bodyRadius(frame, body, scene.smallest) };
 }
 
-/** Farther than this from a place to use furniture, nobody uses it [m]. */
+/** Farther than this from a place to use furniture, nobody uses it [m]; the same as in `fleet2d.viewing.postures`. */
 const USED_WITHIN_M = 0.16;
 const GLANCE_US = 0.5e6;
 
-/** How somebody is at a moment: who stands still at a chair, a sofa or a bed sits or lies on it. */
+/** The place on which somebody sits or lies at a moment; in a live run, that of who stands still there. */
 function usePlace(run: Run, body: BodyFacts, pose: Pose, us: number): UseFacts | null {
-  if (body.robot || isMoving(run, body, pose, us)) return null;
+  if (body.robot) return null;
+  if (run.postures) return run.postures.at(body.name, us);
+  if (isMoving(run, body, pose, us)) return null;
   const [x, y] = [run.home.metres(pose.x, 0), run.home.metres(pose.y, 1)];
   return run.home.restPlaces.find((use) => Math.hypot(use.x - x, use.y - y) < USED_WITHIN_M) ?? null;
 }

@@ -110,16 +110,18 @@ function Days({ run }: { run: Run }) {
   const hover = useSignal<Hovered | null>(null);
   const whole = useSignal(0);
   const { clock } = run;
-  const sheetOf = (): Sheet => {
-    const [width] = sizeOf(canvas.current!);
-    const [, height] = sizeOf(scroller.current!);
+  const sheetOf = (drawn: Element, box: Element): Sheet => {
+    const [width] = sizeOf(drawn);
+    const [, height] = sizeOf(box);
     const count = crowd.value ? MOST_STRIPS : shown.value.length;
-    return new Sheet(width, height, scroller.current!.scrollTop, days.value, count, clock);
+    return new Sheet(width, height, box.scrollTop, days.value, count, clock);
   };
   useEffect(() => {
-    let sheet = sheetOf();
+    const [drawn, box] = [canvas.current!, scroller.current!];
+    const [today, line] = [frame.current!, cursor.current!];
+    let sheet = sheetOf(drawn, box);
     const paint = oncePerFrame(() => {
-      const { context } = fitted(canvas.current!);
+      const { context } = fitted(drawn);
       drawMonth(context, run, shown.value, crowd.value, sheet);
     });
     const moveCursor = (): void => {
@@ -127,16 +129,16 @@ function Days({ run }: { run: Run }) {
       const day = clock.day(us);
       const top = sheet.top(day);
       const isSeen = top >= HEAD - sheet.rowHeight && top < sheet.height;
-      frame.current!.hidden = !isSeen;
-      cursor.current!.hidden = !isSeen;
-      frame.current!.style.transform = `translate(${LEFT - 1}px, ${top - 1}px)`;
-      frame.current!.style.width = `${sheet.wide + 2}px`;
-      frame.current!.style.height = `${sheet.rowHeight - GAP + 2}px`;
-      cursor.current!.style.height = `${sheet.rowHeight - GAP + 8}px`;
-      cursor.current!.style.transform = `translate(${(sheet.x(us, day) - 1).toFixed(1)}px, ${top - 4}px)`;
+      today.hidden = !isSeen;
+      line.hidden = !isSeen;
+      today.style.transform = `translate(${LEFT - 1}px, ${top - 1}px)`;
+      today.style.width = `${sheet.wide + 2}px`;
+      today.style.height = `${sheet.rowHeight - GAP + 2}px`;
+      line.style.height = `${sheet.rowHeight - GAP + 8}px`;
+      line.style.transform = `translate(${(sheet.x(us, day) - 1).toFixed(1)}px, ${top - 4}px)`;
     };
     const measure = (): void => {
-      sheet = sheetOf();
+      sheet = sheetOf(drawn, box);
       whole.value = sheet.whole;
       paint();
       moveCursor();
@@ -147,19 +149,18 @@ function Days({ run }: { run: Run }) {
         untracked(measure);
       }),
       effect(moveCursor),
-      watchSizes([scroller.current!, canvas.current!], measure),
+      watchSizes([box, drawn], measure),
     ];
-    const { current } = scroller;
-    current!.addEventListener("scroll", measure, { passive: true });
+    box.addEventListener("scroll", measure, { passive: true });
     return () => {
-      current!.removeEventListener("scroll", measure);
+      box.removeEventListener("scroll", measure);
       stops.forEach((stop) => stop());
     };
   }, [run]);
   const point = (event: PointerEvent): (ReturnType<Sheet["at"]> & { x: number; y: number }) | null => {
     const { left, top } = canvas.current!.getBoundingClientRect();
     const [x, y] = [event.clientX - left, event.clientY - top];
-    const found = sheetOf().at(x, y);
+    const found = sheetOf(canvas.current!, scroller.current!).at(x, y);
     return found && { ...found, x: event.clientX, y: event.clientY };
   };
   const move = (event: PointerEvent): void => {

@@ -73,21 +73,22 @@ export function Timeline() {
   const visible = useMemo(() => computed(() => visibleRows(rows.value, view.value.scrolled, view.value.height)), []);
   const clock = state.run.value!.clock;
   useEffect(() => {
+    const [drawn, line, around] = [base.current!, cursor.current!, scroller.current!];
     const paintRows = oncePerFrame(() => {
-      const { context, width, height } = fitted(base.current!);
+      const { context, width, height } = fitted(drawn);
       context.clearRect(0, 0, width, height);
       drawRows(context, visible.value, scaleOf(width), clock, colors.value, height);
       if (state.marked.value) drawMarked(context, scaleOf(width), state.marked.value, height, colors.value);
     });
     const moveCursor = (): void => {
-      const [width] = sizeOf(base.current!);
+      const [width] = sizeOf(drawn);
       const x = xOf(scaleOf(width), state.moment.value);
-      cursor.current!.style.transform = `translateX(${x.toFixed(1)}px)`;
-      cursor.current!.dataset.side = x < 30 ? "right" : x > width - 30 ? "left" : "";
-      cursor.current!.hidden = x < -1 || x > width + 1;
+      line.style.transform = `translateX(${x.toFixed(1)}px)`;
+      line.dataset.side = x < 30 ? "right" : x > width - 30 ? "left" : "";
+      line.hidden = x < -1 || x > width + 1;
     };
     const measure = (): void => {
-      const { scrollTop: scrolled, clientHeight: height } = scroller.current!;
+      const { scrollTop: scrolled, clientHeight: height } = around;
       if (scrolled !== view.value.scrolled || height !== view.value.height) view.value = { scrolled, height };
       paintRows();
       moveCursor();
@@ -107,11 +108,11 @@ export function Timeline() {
         },
       }),
     ];
-    const unwatch = watchSizes([box.current!, base.current!, scroller.current!], measure);
-    scroller.current!.addEventListener("scroll", measure, { passive: true });
+    const unwatch = watchSizes([box.current!, drawn, around], measure);
+    around.addEventListener("scroll", measure, { passive: true });
     return () => {
       unwatch();
-      scroller.current?.removeEventListener("scroll", measure);
+      around.removeEventListener("scroll", measure);
       stops.forEach((stop) => stop());
     };
   }, []);

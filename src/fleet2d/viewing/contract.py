@@ -222,6 +222,19 @@ class SlowFacts(TypedDict):
     end: int
 
 
+class PostureFacts(TypedDict):
+    """Stretches in which people sit or lie [us since the start], by user and time.
+
+    `use` is the number of the place in `uses`.
+    """
+
+    uses: list[UseFacts]
+    user: list[str]
+    use: list[int]
+    from_us: list[int]
+    to_us: list[int]
+
+
 class SightingFacts(TypedDict):
     """Stretches in which a robot noticed a user: steps `first` to `last`, both included.
 

@@ -80,10 +80,16 @@ def intervention_label(record: Mapping[str, Any]) -> str:
     'shut bath_door'
     >>> intervention_label({"do": "put", "step": 4, "entity": "ana", "x": 5, "by": "script.0"})
     'put ana (script.0)'
+    >>> keys = {"tau": "10 min"}
+    >>> intervention_label({"do": "configure", "entity": "astro", "behavior": "hangout", "keys": keys})
+    'astro: hangout with tau 10 min'
     """
     parts = [value for key, value in record.items() if isinstance(value, str) and key != "by"]
     if isinstance(change := record.get("change"), Mapping):
         parts = next(([key, value] for key, value in change.items() if value), ["change"])
+    elif isinstance(keys := record.get("keys"), Mapping):
+        settings = ", ".join(f"{key} {value}" for key, value in keys.items())
+        parts = [f"{record['entity']}: {record['behavior']} with {settings}"]
     by = f" ({record['by']})" if record.get("by") else ""
     return " ".join(str(part) for part in parts[:3]) + by
 
