@@ -97,9 +97,10 @@ export function Plan({ run, other, title }: { run: Run; other: Run | null; title
 /** The corner of a plan that the clock takes [px]. */
 function cornerOf(canvas: HTMLCanvasElement): readonly [number, number] {
   const clock = document.querySelector(".clock");
-  if (!clock || getComputedStyle(clock).position !== "absolute") return [0, 0];
+  const plans = canvas.closest(".plans");
+  if (!clock || !plans || getComputedStyle(clock).position !== "absolute") return [0, 0];
   // Plans beside each other keep the same corner free, so that both homes are of one size.
-  const [box, plan] = [clock.getBoundingClientRect(), canvas.closest(".plans")!.getBoundingClientRect()];
+  const [box, plan] = [clock.getBoundingClientRect(), plans.getBoundingClientRect()];
   return [box.right - plan.left + CLEAR_PX, box.bottom - plan.top + CLEAR_PX];
 }
 

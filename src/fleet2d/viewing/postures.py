@@ -1,9 +1,9 @@
 """Postures of people over time, from the key frames of a stored run and its furniture.
 
 Runs store where people are, and not whether they stand, sit or lie: that follows from the place.
-Somebody who stays at the place where furniture is sat or lain on sits or lies there. The page, films
-and reports show these postures. Who sits where there is no furniture for it counts as standing: over
-six days of the family, 99.1 % of the postures that a camera saw are the same.
+Somebody who stays at the place where furniture is sat or lain on sits or lies there. Who sits where
+there is no furniture for it counts as standing: over six days of the family, 99.1 % of the postures
+that a camera saw are the same.
 """
 
 from collections.abc import Iterator

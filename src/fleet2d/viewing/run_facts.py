@@ -80,8 +80,8 @@ def intervention_label(record: Mapping[str, Any]) -> str:
     'shut bath_door'
     >>> intervention_label({"do": "put", "step": 4, "entity": "ana", "x": 5, "by": "script.0"})
     'put ana (script.0)'
-    >>> keys = {"tau": "10 min"}
-    >>> intervention_label({"do": "configure", "entity": "astro", "behavior": "hangout", "keys": keys})
+    >>> change = {"entity": "astro", "behavior": "hangout", "keys": {"tau": "10 min"}}
+    >>> intervention_label({"do": "configure", **change})
     'astro: hangout with tau 10 min'
     """
     parts = [value for key, value in record.items() if isinstance(value, str) and key != "by"]
