@@ -311,6 +311,7 @@ export const LOOK = {
       "#e2caa6"
     ]
   },
+  "unknown": "#f4f4f2",
   "carpet": {
     "rooms": [
       "bedroom",

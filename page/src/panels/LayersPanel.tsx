@@ -49,7 +49,7 @@ const LEGEND: [string, string][] = [
   ["■", "a robot"],
   ["──", "its way of the last five minutes"],
   ["┄┄", "its way of the next two minutes"],
-  ["◔", "what a camera has in view: yellow; further cameras blue, orange"],
+  ["◔", "what a camera has in view: teal; further cameras blue, orange"],
   ["◯", "somebody whom a robot notices"],
   ["⊗", "a false observation, red"],
   ["◌", "where somebody is in the other run, red"],

@@ -32,7 +32,8 @@ export function drawFloors(context: Context, home: Home): void {
     context.clip(floor.path);
     const seed = floor.box[0] * 100 + floor.box[1] * 10;
     const tiles = TILES[room.type];
-    if (isPlain) fill(context, floor.box, tiles?.color ?? (CARPETED.has(room.type) ? CARPET[i % CARPET.length]! : WOOD[0]!));
+    if (room.type === "unknown") fill(context, floor.box, LOOK.unknown);
+    else if (isPlain) fill(context, floor.box, tiles?.color ?? (CARPETED.has(room.type) ? CARPET[i % CARPET.length]! : WOOD[0]!));
     else if (tiles) drawTiles(context, floor.box, tiles.color, tiles.pitch, drawsOf(seed + 5));
     else if (CARPETED.has(room.type)) drawCarpet(context, floor.box, CARPET[i % CARPET.length]!, drawsOf(seed + 9));
     else drawPlanks(context, floor.box, drawsOf(seed + 3));

@@ -10,12 +10,15 @@ from typing import Any, Literal
 
 from fleet2d.viewing.contract import ShapeFacts
 
-Material = Literal["planks", "carpet", "tiles"]
+Material = Literal["planks", "carpet", "tiles", "plain"]
 
 PLANK_M = 0.19
 JOINT_M = 0.012
 WOOD = ("#e8d3b3", "#e5cfae", "#ebd8ba", "#e2caa6")
 CARPET = ("#dcdde8", "#e3dce0", "#dbe2e2")
+UNKNOWN = "#f4f4f2"
+"""The floor of rooms of which nobody knows what they are for."""
+
 CARPETED = ("bedroom", "child_room", "guest_room", "wardrobe")
 WET = ("#dce9ea", 0.3)
 STONE = ("#dfdbd3", 0.75)
@@ -84,6 +87,7 @@ def constants() -> dict[str, Any]:
     """Return the tables that the page draws by, as JSON has them."""
     return {
         "planks": {"pitch": PLANK_M, "joint": JOINT_M, "colors": WOOD},
+        "unknown": UNKNOWN,
         "carpet": {"rooms": CARPETED, "colors": CARPET},
         "tiles": {kind: {"color": color, "pitch": pitch} for kind, (color, pitch) in TILES.items()},
         "walls": {
@@ -116,6 +120,8 @@ def floor_of(kind: str, number: int = 0) -> tuple[Material, str, float]:
         >>> floor_of("kitchen"), floor_of("bedroom", 1), floor_of("office")
         (('tiles', '#eeeae2', 0.6), ('carpet', '#e3dce0', 0.0), ('planks', '#e8d3b3', 0.19))
     """
+    if kind == "unknown":
+        return "plain", UNKNOWN, 0.0
     if kind in TILES:
         return "tiles", *TILES[kind]
     if kind in CARPETED:
@@ -394,6 +400,11 @@ def _charger(s: Symbol) -> None:
     s.box(-0.07, -0.02, 0.07, 0.02, "#3fd0c9", 0.02)
 
 
+def _treadmill(s: Symbol) -> None:
+    s.whole("#454b52", 0.06)
+    s.inset(0.1, "#23282d", 0.03)
+
+
 def _other(s: Symbol) -> None:
     s.whole("#d9d8d4", 0.04, OUTLINE_EDGE)
 
@@ -427,6 +438,7 @@ SYMBOLS: Mapping[str, Callable[[Symbol], None]] = MappingProxyType(
         "rug": _rug,
         "glass": _glass,
         "charger": _charger,
+        "treadmill": _treadmill,
     }
 )
 

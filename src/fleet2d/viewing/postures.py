@@ -6,6 +6,7 @@ there is no furniture for it counts as standing: over six days of the family, 99
 that a camera saw are the same.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -86,6 +87,28 @@ def postures_of(run: Run, plan: FloorPlan) -> Any:
         for column, kind in zip(columns, SCHEMA.values(), strict=True)
     ]
     return pa.table(arrays, names=list(SCHEMA))
+
+
+class Postures:
+    """The postures of people of a run, by user and time."""
+
+    def __init__(self, run: Run, plan: FloorPlan) -> None:
+        """Derive the postures of a run.
+
+        Raises:
+            ArtifactError: The key frames are damaged.
+        """
+        self._begins: dict[str, list[int]] = {}
+        self._rows: dict[str, list[dict[str, Any]]] = {}
+        for row in postures_of(run, plan).to_pylist():
+            self._begins.setdefault(row["user"], []).append(row["time_us"])
+            self._rows.setdefault(row["user"], []).append(row)
+
+    def at(self, user: str, time_us: int) -> dict[str, Any] | None:
+        """Return the row of a user at a time [us since the start]; None: the user stands."""
+        number = bisect_right(self._begins.get(user, []), time_us) - 1
+        row = self._rows[user][number] if number >= 0 else None
+        return row if row is not None and time_us < row["end_us"] else None
 
 
 def posture_facts(run: Run, plan: FloorPlan) -> PostureFacts:
