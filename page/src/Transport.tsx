@@ -174,7 +174,6 @@ function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number
   const [begin, end] = [state.beginUs.value, state.endUs.value];
   const x = (us: number): number => ((us - begin) / (end - begin)) * width;
   const { clock } = run;
-  const pace = paceOf(run);
   const [first, last] = [clock.day(begin), clock.day(Math.max(begin, end - 1))];
   const today = clock.day(state.moment.value);
   const cell = Math.max(DAY_US / CELLS_A_DAY, (end - begin) / (width / 2));
@@ -184,7 +183,7 @@ function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number
     context.fillRect(left, 0, Math.max(1, right - left - 1), height);
   }
   context.fillStyle = colors.value.bars;
-  const shares = pace.shares(begin, end, cell);
+  const shares = run.isRead.value ? paceOf(run).shares(begin, end, cell) : [];
   const most = Math.max(0.05, ...shares);
   shares.forEach((share, i) => {
     const us = begin + i * cell;

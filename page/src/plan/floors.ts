@@ -14,6 +14,12 @@ const TILES: Record<string, { color: string; pitch: number } | undefined> = LOOK
 /** In homes larger than this, floors are plain [m²]: their pattern would be finer than a pixel. */
 const MOST_PATTERNED_M2 = 2500;
 
+/** Where planks are narrower than this, floors are plain [px]. */
+const LEAST_PX = 2;
+/** Dots of carpets, which aren't drawn where they are smaller than a pixel. */
+const DOT_M = 0.025;
+const DOTS_PER_M2 = 200;
+
 /** Numbers from 0 to 1 that are the same for the same seed, so that a floor looks the same each time. */
 function drawsOf(seed: number): () => number {
   let state = (Math.abs(Math.round(seed)) % 2147483646) + 1;
@@ -25,7 +31,8 @@ function drawsOf(seed: number): () => number {
 
 export function drawFloors(context: Context, home: Home): void {
   const { rooms, area_m2: area } = home.facts;
-  const isPlain = area > MOST_PATTERNED_M2;
+  const scale = context.getTransform().a;
+  const isPlain = area > MOST_PATTERNED_M2 || PLANK_M * scale < LEAST_PX;
   rooms.forEach((room, i) => {
     const floor = home.floors[i]!;
     context.save();
@@ -35,7 +42,7 @@ export function drawFloors(context: Context, home: Home): void {
     if (room.type === "unknown") fill(context, floor.box, LOOK.unknown);
     else if (isPlain) fill(context, floor.box, tiles?.color ?? (CARPETED.has(room.type) ? CARPET[i % CARPET.length]! : WOOD[0]!));
     else if (tiles) drawTiles(context, floor.box, tiles.color, tiles.pitch, drawsOf(seed + 5));
-    else if (CARPETED.has(room.type)) drawCarpet(context, floor.box, CARPET[i % CARPET.length]!, drawsOf(seed + 9));
+    else if (CARPETED.has(room.type)) drawCarpet(context, floor.box, CARPET[i % CARPET.length]!, DOT_M * scale < 1 ? 0 : DOTS_PER_M2, drawsOf(seed + 9));
     else drawPlanks(context, floor.box, drawsOf(seed + 3));
     context.restore();
   });
@@ -64,13 +71,13 @@ function drawPlanks(context: Context, box: Box, draw: () => number): void {
   }
 }
 
-function drawCarpet(context: Context, box: Box, color: string, draw: () => number): void {
+function drawCarpet(context: Context, box: Box, color: string, dotsPerM2: number, draw: () => number): void {
   const [left, bottom, right, top] = box;
   fill(context, box, color);
-  const dots = (right - left) * (top - bottom) * 200;
+  const dots = (right - left) * (top - bottom) * dotsPerM2;
   for (let i = 0; i < dots; i++) {
     context.fillStyle = draw() > 0.5 ? "#ffffff55" : "#5b5f8a16";
-    context.fillRect(left + draw() * (right - left), bottom + draw() * (top - bottom), 0.025, 0.025);
+    context.fillRect(left + draw() * (right - left), bottom + draw() * (top - bottom), DOT_M, DOT_M);
   }
 }
 

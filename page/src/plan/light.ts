@@ -2,8 +2,7 @@
 
 import type { Home } from "../data/home";
 import type { Run } from "../data/run";
-import { AWAY } from "../data/rooms";
-import { valueAt } from "../data/stretches";
+import { AWAY, roomOf } from "../data/rooms";
 import { mix } from "../theme";
 import type { Frame } from "./frame";
 import { LIFT_M, WALL_M } from "./ground";
@@ -38,7 +37,8 @@ export function litRooms(run: Run, us: number): ReadonlySet<number> {
   const lit = new Set<number>();
   for (const body of run.bodies) {
     if (body.robot || run.events.last(body.name, "activity", us)?.detail === "sleep") continue;
-    const room = valueAt(run.roomsOf(body.name), us) ?? AWAY;
+    const track = run.tracks.get(body.name);
+    const room = track && !track.empty ? roomOf(track, run.home, us) : AWAY;
     if (room !== AWAY) lit.add(room);
   }
   return lit;

@@ -24,7 +24,8 @@ const strips = computed<readonly Strip[]>(() => {
   const run = state.run.value;
   if (!run) return [];
   void [run.version.value, colors.value];
-  return stripsOf(run);
+  // Rooms would be shown until the activities are read.
+  return run.isRead.value ? stripsOf(run) : [];
 });
 const shown = computed(() => {
   const ofChosen = strips.value.filter((strip) => strip.name === chosen.value);

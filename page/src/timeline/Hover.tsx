@@ -39,9 +39,10 @@ export function Thumbnail({ run, us, focus = "" }: { run: Run; us: number; focus
     const paint = oncePerFrame(() => {
       if (canvas.current) drawThumbnail(canvas.current, run, wanted.current.value.us, wanted.current.value.focus);
     });
+    // Small pictures wait until the large one is there.
     return effect(() => {
-      void [wanted.current.value, run.version.value];
-      paint();
+      void wanted.current.value;
+      if (run.isRead.value) paint();
     });
   }, [run]);
   return <canvas ref={canvas} class="thumbnail" width={THUMBNAIL.width * 2} height={THUMBNAIL.height * 2} aria-hidden="true" />;
