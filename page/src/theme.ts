@@ -10,8 +10,6 @@ export interface Colors {
   quiet: string;
   line: string;
   wall: string;
-  furniture: string;
-  furnitureEdge: string;
   door: string;
   view: string;
   viewEdge: string;
@@ -34,8 +32,6 @@ const LIGHT: Colors = {
   quiet: "#5d626a",
   line: "#d5d8dc",
   wall: "#3b4048",
-  furniture: "rgba(251,250,247,0.75)",
-  furnitureEdge: "#8b9099",
   door: "#8a5a2b",
   view: "#0e9e9a",
   viewEdge: "#0b7d7a",
@@ -56,8 +52,6 @@ const DARK: Colors = {
   quiet: "#a4a9b1",
   line: "#3a3f47",
   wall: "#aab0b9",
-  furniture: "rgba(22,24,28,0.45)",
-  furnitureEdge: "#858b95",
   door: "#d49a5c",
   view: "#5ae1d7",
   viewEdge: "#6ff0e6",

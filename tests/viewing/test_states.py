@@ -14,7 +14,7 @@ from fleet2d.viewing.page_data import export_html
 from fleet2d.viewing.page_server import PageServer
 
 from .browser import chromium, page_at
-from .test_browser import served, shown_clock, shown_step, until
+from .test_browser import AXE, served, shown_clock, shown_step, until
 
 START = {"start": "2026-01-05", "duration": "2 d", "seed": 1}
 HOME = {"simulation": START, "floorplan": {"type": "bundled"}}
@@ -261,3 +261,62 @@ def test_two_runs_have_a_table_of_what_differs(
             assert one != other
     with served(run_dir, run_dir) as address, page_at(browser, address) as page:
         page.wait_for_selector(".differences >> text=Nothing does")
+
+
+def open_palette(page: Any) -> None:
+    page.keyboard.press("Control+k")
+    page.keyboard.type("how long was ana in the bathroom")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#palette [role=option] canvas")
+
+
+def open_menu(page: Any) -> None:
+    page.click(".menu summary")
+
+
+def play_reel(page: Any) -> None:
+    page.keyboard.press("r")
+    page.wait_for_selector(".reel")
+
+
+def show_calendar(page: Any) -> None:
+    page.keyboard.press("y")
+    page.wait_for_selector(".calendar")
+
+
+def ask_wrongly(page: Any) -> None:
+    page.fill("#ask", "where is anna")
+    page.press("#ask", "Enter")
+    page.fill("#goto", "day 99")
+    page.press("#goto", "Enter")
+
+
+NEW_STATES = (open_palette, open_menu, play_reel, show_calendar, ask_wrongly)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_in_new_states(
+    browser: Any, run_dir: Path, other_dir: Path, scheme: str
+) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not installed: npm ci in page/")
+    script = AXE.read_text(encoding="utf-8")
+    found = []
+    for show in NEW_STATES:
+        with served(run_dir) as address, page_at(browser, address, color_scheme=scheme) as page:
+            page.evaluate(script)
+            show(page)
+            page.wait_for_timeout(200)
+            found += [
+                f"{show.__name__}: {entry['id']}: {entry['nodes'][0]['html'][:120]}"
+                for entry in page.evaluate("axe.run()")["violations"]
+            ]
+    with (
+        served(run_dir, other_dir) as address,
+        page_at(browser, address, color_scheme=scheme) as page,
+    ):
+        page.evaluate(script)
+        page.wait_for_selector(".differences tbody tr")
+        found += [f"two: {entry['id']}" for entry in page.evaluate("axe.run()")["violations"]]
+    assert [] == found

@@ -8,6 +8,7 @@ import { Decisions, readDecisions } from "./decisions";
 import { type EventRow, Events, readEvents } from "./events";
 import { Home } from "./home";
 import { LayerTable } from "./layers";
+import { MovedObjects } from "./moved";
 import { Observations, type ObservationSource } from "./observations";
 import { Table } from "./parquet";
 import { Postures } from "./postures";
@@ -283,6 +284,15 @@ export class Run {
       this.layers.set(name, layer);
     }
     return layer;
+  }
+
+  private movedBy: { seen: number; moved: MovedObjects } | null = null;
+
+  /** Where furniture is over time, as far as the run is read. */
+  get moved(): MovedObjects {
+    const seen = this.events.rows.length;
+    if (this.movedBy?.seen !== seen) this.movedBy = { seen, moved: new MovedObjects(this.facts.home.objects, this.events.ofKind("moved")) };
+    return this.movedBy!.moved;
   }
 
   /** Whether a door stands open at a moment. */

@@ -56,6 +56,7 @@ const LEGEND: [string, string][] = [
   ["▒", "a room whose light is off"],
   ["≈", "a floor on which robots are slow, blue"],
   ["┅", "an area that robots keep out of"],
+  ["▨", "where the robot that is selected keeps out"],
 ];
 
 function Legend() {

@@ -29,7 +29,7 @@ export function Tiles({ run }: { run: Run }) {
   const tiles = [seenTile(run), error.value, requestTile(run), searchTile(run)].filter((tile) => tile !== null);
   if (tiles.length === 0) return null;
   return (
-    <section class="tiles" aria-label="The run in numbers">
+    <section class="tiles" aria-label={`${run.facts.title} in numbers`}>
       {tiles.map((tile) => (
         <div key={tile.words} class="tile">
           <span>{tile.words}</span>

@@ -26,21 +26,22 @@ export class Backdrop {
 
   /** What the picture of a moment depends on. */
   key(stage: Stage, us: number): string {
-    return stage.withLight ? `${groundKey(stage)} ${this.light.key(this.run, us)}` : groundKey(stage);
+    const key = this.groundKey(stage, us);
+    return stage.withLight ? `${key} ${this.light.key(this.run, us)}` : key;
+  }
+
+  private groundKey({ frame, width, height, ratio, colors, withFurniture }: Stage, us: number): string {
+    return [width, height, ratio, frame.key, colors.ground, withFurniture, this.run.moved.count(us)].join();
   }
 
   picture(stage: Stage, us: number): HTMLCanvasElement {
-    const key = groundKey(stage);
+    const key = this.groundKey(stage, us);
     if (key !== this.drawn) {
       this.drawn = key;
       this.ground.width = Math.round(stage.width * stage.ratio);
       this.ground.height = Math.round(stage.height * stage.ratio);
-      drawGround(this.ground, this.run.home, stage.frame, stage.ratio, stage.colors, stage.withFurniture);
+      drawGround(this.ground, this.run.home, stage.frame, stage.ratio, stage.colors, stage.withFurniture ? this.run.moved.at(us) : []);
     }
     return stage.withLight ? this.light.of(this.ground, key, this.run, us, stage.frame, stage.ratio) : this.ground;
   }
-}
-
-function groundKey({ frame, width, height, ratio, colors, withFurniture }: Stage): string {
-  return [width, height, ratio, frame.key, colors.ground, withFurniture].join();
 }

@@ -1,6 +1,6 @@
 /** What of the plan stands still: floors, furniture, doors, walls. Drawn once for each size. */
 
-import { type DoorwayFacts, LOOK } from "../contract";
+import { type DoorwayFacts, LOOK, type ObjectFacts } from "../contract";
 import type { Home } from "../data/home";
 import type { Colors } from "../theme";
 import { drawFloors } from "./floors";
@@ -54,7 +54,7 @@ class Outlines {
 }
 
 /** Draw a home at the size of a canvas, whose pixels are `ratio` times as many as those of the screen. */
-export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, ratio: number, colors: Colors, withFurniture: boolean): void {
+export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, ratio: number, colors: Colors, objects: readonly ObjectFacts[]): void {
   const context = canvas.getContext("2d")!;
   const scale = frame.scale * ratio;
   const outlines = new Outlines(home);
@@ -73,7 +73,7 @@ export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, 
   context.save();
   context.clip(outlines.free, "evenodd");
   drawFloors(context, home);
-  if (withFurniture) home.facts.objects.forEach((thing) => drawPiece(context, thing, home.facts.symbols, scale));
+  objects.forEach((thing) => drawPiece(context, thing, home.facts.symbols, scale));
   context.restore();
   const pen = new Pen(context);
   const movable = new Set(home.facts.doors.map((door) => String([door.start, door.end])));

@@ -13,6 +13,7 @@ import { fitted } from "./canvas";
 import { Frame } from "./frame";
 import { cellImage, drawCells, drawScale, tracePolygons } from "./ground";
 import { type Box, Labels } from "./labels";
+import { drawKeptOut } from "./kept_out";
 import { litRooms, skyAt } from "./light";
 import { olderWords } from "./older";
 import { Tags } from "./tags";
@@ -75,6 +76,7 @@ export class PlanPainter {
     const names = shows("names") ? this.placeNames(stage, poses, us) : [];
     this.paintBase(stage, us, shows("names"));
     context.clearRect(0, 0, width, height);
+    drawKeptOut(context, run, state.selected.value, frame, colors.value);
     if (shows("beliefs")) drawBeliefs(context, run, frame, us);
     const selected = state.selected.value;
     drawScene(context, { run, us, poses, frame, colors: colors.value, selected, steps: state.playing.value, shows, other: this.other });
@@ -207,7 +209,7 @@ export class PlanPainter {
       return Math.hypot(mx - x, my - y) * frame.scale < DOOR_PX;
     });
     if (door) return door.name;
-    const thing = state.shown.value.has("furniture") ? run.facts.home.objects.find((entry) => isInside(entry.outline, x, y)) : undefined;
+    const thing = state.shown.value.has("furniture") ? run.moved.at(state.moment.value).find((entry) => isInside(entry.outline, x, y)) : undefined;
     if (thing) return thing.name;
     const room = run.home.roomAt(run.home.units(x, 0), run.home.units(y, 1));
     return room >= 0 ? run.home.roomName(room) : "";

@@ -284,10 +284,25 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         skies=skies_of(scenario, run.clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(EventKind),
-        metrics=run.metrics,
+        metrics=as_json(run.metrics),
         scenario=scenario,
         walks_every_s=0.0,
     )
+
+
+def as_json(result: Any) -> Any:
+    """Return the result of a metric as JSON has it: numbers that aren't finite are words.
+
+    >>> as_json({"error": math.nan, "parts": [1.5, math.inf, "none"]})
+    {'error': 'nan', 'parts': [1.5, 'inf', 'none']}
+    """
+    if isinstance(result, Mapping):
+        return {str(key): as_json(value) for key, value in result.items()}
+    if isinstance(result, list | tuple):
+        return [as_json(value) for value in result]
+    if isinstance(result, float) and not math.isfinite(result):
+        return str(result)
+    return result
 
 
 def skies_of(scenario: Mapping[str, Any], clock: Clock) -> list[tuple[float, float, float, float]]:
