@@ -109,7 +109,11 @@ export class PlanPainter {
     context.textAlign = "right";
     context.textBaseline = "alphabetic";
     context.fillStyle = colors.value.text;
-    context.fillText([missing, olderWords(this.run, us)].filter(Boolean).join(" · "), width - 8, height - 5);
+    const words = [missing, olderWords(this.run, us)].filter(Boolean).join(" · ");
+    context.strokeStyle = colors.value.halo;
+    context.lineWidth = 3;
+    context.strokeText(words, width - 8, height - 5);
+    context.fillText(words, width - 8, height - 5);
     context.textAlign = "left";
   }
 
