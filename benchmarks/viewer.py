@@ -50,6 +50,11 @@ SCRUB = """async (frames) => {
 }"""
 
 
+PLAYED_S = 5
+"""How long a run is played to measure its frames."""
+
+COUNT_FRAMES = "window.shown = 0; (function count() { shown++; requestAnimationFrame(count) })()"
+
 ASK = """async (question) => {
   const box = document.getElementById("ask");
   box.value = question;
@@ -77,7 +82,11 @@ ROOMS = (
 LIMITS = {
     "month: first picture": ("s", 0.7, 0.4),
     "month: slowest answer": ("ms", 100, 30),
-    "crowd: first picture": ("s", 3, 1.5),
+    "month: a frame of the calendar": ("ms", 5, 2),
+    "month: a frame of the lanes": ("ms", 5, 2),
+    "crowd: a frame of the calendar": ("ms", 14, 8),
+    "crowd: a frame of the lanes": ("ms", 14, 8),
+    "crowd: first picture": ("s", 1.5, 1),
     "crowd: scrubbing the whole run": ("frames/s", 50, 60),
     "crowd: scrubbing a day": ("frames/s", 50, 60),
     "year: server's memory": ("MB", 300, 150),
@@ -177,6 +186,7 @@ def measure_page(browser: Any, run: Path) -> None:
             slowest = f"{run.name}: slowest answer"
             measured[slowest] = max(lasted, measured.get(slowest, 0.0))
             print(f"  '{words}' ({answer}): {lasted:.0f} ms")
+        measure_frames(browser, address, run)
         heap = page.evaluate("performance.memory.usedJSHeapSize / 1e6")
         pages = int(Path(f"/proc/{server.pid}/statm").read_text().split()[1])
         memory = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -185,6 +195,29 @@ def measure_page(browser: Any, run: Path) -> None:
         print(f"  {heap:.0f} MB of heap; {memory:.0f} MB of the server")
     server.terminate()
     server.wait()
+
+
+def measure_frames(browser: Any, address: str, run: Path) -> None:
+    """Measure the processor time of the page's main thread a frame, while a lively hour plays."""
+    for view, words in (("calendar", "the calendar"), ("lanes", "the lanes")):
+        link = f"{address}#view={view}&at=2026-01-08T07:10:00&speed=60"
+        with page_at(browser, link) as page:
+            session = page.context.new_cdp_session(page)
+            session.send("Performance.enable", {"timeDomain": "threadTicks"})
+            page.click("button.play")
+            session.send("Runtime.evaluate", {"expression": COUNT_FRAMES})
+            work, frames = _work(session), page.evaluate("shown")
+            page.wait_for_timeout(1000 * PLAYED_S)
+            lasted = _work(session) - work
+            milliseconds = 1000 * lasted / max(1, page.evaluate("shown") - frames)
+            measured[f"{run.name}: a frame of {words}"] = milliseconds
+            print(f"  playing {words}: {milliseconds:.1f} ms of the main thread a frame")
+
+
+def _work(session: Any) -> float:
+    """Return the processor time of the main thread of a page [s]."""
+    metrics = session.send("Performance.getMetrics")["metrics"]
+    return next(metric["value"] for metric in metrics if metric["name"] == "TaskDuration")
 
 
 def measure_live(browser: Any) -> None:

@@ -1,5 +1,6 @@
 """Generate ``contract.ts`` of the page: ``python -m tools.contract_types > contract.ts``."""
 
+import json
 import sys
 import types
 import typing
@@ -8,7 +9,7 @@ from typing import Any, Literal
 from typing_extensions import is_typeddict
 
 from fleet2d.runtime.events import EventKind
-from fleet2d.viewing import contract
+from fleet2d.viewing import contract, look
 
 HEADER = "// Written by `python -m tools.contract_types` from fleet2d.viewing.contract.\n"
 _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
@@ -17,7 +18,13 @@ _PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(N
 def contract_source() -> str:
     """Return the TypeScript interfaces of all types of the contract."""
     shapes = [value for value in vars(contract).values() if is_typeddict(value)]
-    return "\n".join([HEADER, _event_kinds(), *map(_interface, shapes)])
+    return "\n".join([HEADER, _event_kinds(), *map(_interface, shapes), _look()])
+
+
+def _look() -> str:
+    tables = json.dumps(look.constants(), indent=2)
+    comment = "/** How homes are drawn: `fleet2d.viewing.look`. */"
+    return f"{comment}\nexport const LOOK = {tables} as const;\n"
 
 
 def _event_kinds() -> str:

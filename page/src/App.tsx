@@ -4,8 +4,10 @@ import { useSignal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useRef } from "preact/hooks";
 import { copyLink } from "./address";
+import { DAY_US } from "./data/clock";
 import type { Run } from "./data/run";
 import { KEYS } from "./keyboard";
+import { connected } from "./live/feed";
 import { Icon } from "./Icon";
 import { BeliefsPanel } from "./panels/BeliefsPanel";
 import { EventsPanel, KindChoice } from "./panels/EventsPanel";
@@ -16,10 +18,12 @@ import { NotesPanel } from "./panels/NotesPanel";
 import { Now } from "./panels/Now";
 import { Terms } from "./panels/Terms";
 import { downloadFilm, filming } from "./film";
+import { Palette } from "./palette/Palette";
 import { Plan } from "./plan/Plan";
+import { reel } from "./player";
+import { recording, saveClip, savePicture, stopClip } from "./share";
 import * as state from "./state";
 import { dark } from "./theme";
-import { Ask } from "./timeline/Ask";
 import { Calendar, CalendarHead } from "./timeline/Calendar";
 import { Timeline } from "./timeline/Timeline";
 import { Clock, Transport } from "./Transport";
@@ -44,6 +48,7 @@ export function App() {
       <main>
         <div class="plans">
           <Clock />
+          <Reel />
           {runs.map((run, i) => (
             <Plan key={run.path || i} run={run} other={two ? (runs[i === 0 ? 1 : 0] ?? null) : null} title={two ? run.facts.title : ""} />
           ))}
@@ -60,7 +65,7 @@ export function App() {
 function Header() {
   const run = state.run.value!;
   const { facts } = run;
-  const days = facts.steps * facts.step_us / 86_400e6;
+  const days = (facts.steps * facts.step_us) / DAY_US;
   const length = days >= 2 ? `${Math.round(days)} days` : `${(days * 24).toFixed(1)} h`;
   return (
     <header>
@@ -74,12 +79,8 @@ function Header() {
         <Verdicts key={i} run={entry} title={state.runs.value.length > 1 ? `${entry.facts.title}: ` : ""} />
       ))}
       <span class="spacer" />
-      <Ask />
-      {run.path && !state.live.value && (
-        <button type="button" class="round" disabled={filming.value} aria-label={filming.value ? "Filming" : "Film"} title="A film of the minute around this moment (m)" onClick={() => void downloadFilm(run)}>
-          <Icon name="film" />
-        </button>
-      )}
+      <Palette />
+      <Share />
       {run.path && <CopyLink />}
       <button
         type="button"
@@ -127,7 +128,7 @@ function Tools() {
             type="button"
             onClick={() => {
               const start = run.clock.dayStart(run.clock.day(state.moment.value));
-              state.showRange(start, start + 86_400e6);
+              state.showRange(start, start + DAY_US);
             }}
           >
             Day
@@ -154,10 +155,13 @@ function Verdicts({ run, title }: { run: Run; title: string }) {
   );
 }
 
+const CONNECTION_LOST = "The connection to the simulation is lost, and tried again: if that lasts, start fleet2d run --live again, and reload the page.";
+
 /** Notes are remarks; what could not be read is missing on the page. */
 function Notes() {
   const notes = state.runs.value.flatMap((run) => run.facts.notes);
   const problems = state.runs.value.flatMap((run) => run.problems.value);
+  if (state.live.value && !connected.value) problems.push(CONNECTION_LOST);
   if (notes.length + problems.length === 0) return null;
   return (
     <div class="notes">
@@ -219,6 +223,7 @@ function Panels() {
 
 function GoTo() {
   const isWrong = useSignal(false);
+  const { clock, beginUs, endUs } = state.run.value!;
   const input = useRef<HTMLInputElement>(null);
   const run = state.run.value!;
   const go = () => {
@@ -242,8 +247,76 @@ function GoTo() {
           if (event.key === "Enter") go();
         }}
       />
-      <button onClick={go}>Go</button>
+      <button type="button" onClick={go}>
+        Go
+      </button>
+      {isWrong.value && (
+        <strong role="alert" class="status">
+          No time of this run, which lasts from {clock.text(beginUs).slice(0, -3)} to {clock.text(endUs).slice(0, -3)}
+        </strong>
+      )}
     </div>
+  );
+}
+
+/** What the browser, or the server, makes of the view. */
+function Share() {
+  const run = state.run.value!;
+  const menu = useRef<HTMLDetailsElement>(null);
+  const share = recording.value;
+  if (share !== null) {
+    return (
+      <button type="button" class="recording" onClick={stopClip}>
+        ● {Math.round(100 * share)} % · Stop
+      </button>
+    );
+  }
+  const choose = (run: () => void) => (): void => {
+    menu.current!.open = false;
+    run();
+  };
+  return (
+    <details
+      ref={menu}
+      class="menu"
+      onFocusOut={(event) => {
+        if (!menu.current!.contains(event.relatedTarget as Node | null)) menu.current!.open = false;
+      }}
+    >
+      <summary class="round" aria-label="Save a picture or a clip" title="Save a picture or a clip">
+        <Icon name="film" />
+      </summary>
+      <div>
+        <button type="button" onClick={choose(() => void savePicture())}>
+          Picture of the plan <small>PNG</small> <kbd>s</kbd>
+        </button>
+        <button type="button" onClick={choose(() => void saveClip())}>
+          Clip of {state.marked.value ? "the marked range" : "the next hour"} <small>10 s</small> <kbd>w</kbd>
+        </button>
+        {run.path && !state.live.value && (
+          <button type="button" disabled={filming.value} onClick={choose(() => void downloadFilm(run))}>
+            {filming.value ? "The server is filming …" : "Film of the minute around this moment"} <small>MP4</small> <kbd>m</kbd>
+          </button>
+        )}
+      </div>
+    </details>
+  );
+}
+
+/** Which card of the story the reel shows. */
+function Reel() {
+  const at = reel.value;
+  if (at < 0) return null;
+  const { story } = state.run.value!.facts;
+  const card = story[at]!;
+  return (
+    <output class="reel">
+      <b>{card.title}</b>
+      <span>{card.words}</span>
+      <small>
+        {at + 1} of {story.length} · any key stops
+      </small>
+    </output>
   );
 }
 
@@ -257,7 +330,7 @@ function CopyLink() {
   };
   return (
     <button type="button" class="quiet" title="A link to this moment and view" onClick={() => void copy()}>
-      <Icon name="link" /> {words.value}
+      <Icon name="link" /> <span class="words">{words.value}</span>
     </button>
   );
 }

@@ -1,22 +1,22 @@
 /** Below the plan: back, play, on; the days; the speed. Above it: the clock. */
 
-import { effect } from "@preact/signals";
+import { computed, effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { DAY_US } from "./data/clock";
 import { paceOf } from "./data/pace";
 import type { Run } from "./data/run";
 import { Icon } from "./Icon";
 import { LiveControls } from "./live/LiveControls";
 import { branchHere, branching, refusal } from "./live/orders";
-import { fitted, oncePerFrame } from "./plan/canvas";
+import { fitted, oncePerFrame, sizeOf, watchSizes } from "./plan/canvas";
 import * as state from "./state";
 import { colors } from "./theme";
 
-const DAY_US = 86_400e6;
 const CELLS_A_DAY = 48;
 
 export function Clock() {
   const { clock } = state.run.value!;
-  const us = state.moment.value;
+  const us = state.told.value;
   const days = clock.day(Math.max(0, state.endUs.value - 1));
   return (
     <output class="clock" aria-label="Shown moment">
@@ -111,53 +111,69 @@ function SpeedChoice() {
 /** The whole run on one line, by how much people move; a click goes there. */
 function Overview({ run }: { run: Run }) {
   const canvas = useRef<HTMLCanvasElement>(null);
+  const cursor = useRef<HTMLSpanElement>(null);
+  const { clock } = run;
   useEffect(() => {
+    const [drawn, line] = [canvas.current!, cursor.current!];
     const paint = oncePerFrame(() => {
-      const { context, width, height } = fitted(canvas.current!);
+      const { context, width, height } = fitted(drawn);
       context.clearRect(0, 0, width, height);
       drawOverview(context, run, width, height);
     });
-    const stop = effect(() => {
-      void [state.moment.value, run.version.value, colors.value, state.endUs.value];
-      paint();
-    });
-    const observer = new ResizeObserver(paint);
-    observer.observe(canvas.current!);
-    return () => {
-      stop();
-      observer.disconnect();
+    const move = (): void => {
+      const [begin, end] = [state.beginUs.value, state.endUs.value];
+      const share = (state.moment.value - begin) / (end - begin);
+      line.style.transform = `translateX(${(share * sizeOf(drawn)[0] - 1).toFixed(1)}px)`;
     };
+    const today = computed(() => clock.day(state.moment.value));
+    const stops = [
+      effect(() => {
+        void [today.value, run.version.value, colors.value, state.endUs.value];
+        paint();
+      }),
+      effect(move),
+      watchSizes([drawn], () => {
+        paint();
+        move();
+      }),
+    ];
+    return () => stops.forEach((stop) => stop());
   }, [run]);
   const seek = (event: PointerEvent): void => {
     if (event.type === "pointermove" && event.buttons !== 1) return;
-    const box = canvas.current!.getBoundingClientRect();
-    const share = (event.clientX - box.left) / box.width;
-    state.goTo(state.beginUs.value + share * (state.endUs.value - state.beginUs.value));
+    state.goTo(momentAt(event));
   };
-  const { clock } = run;
+  const momentAt = (event: PointerEvent): number => {
+    const { left, width } = canvas.current!.getBoundingClientRect();
+    return state.beginUs.value + ((event.clientX - left) / width) * (state.endUs.value - state.beginUs.value);
+  };
   return (
-    <div
-      class="overview"
-      role="slider"
-      tabIndex={0}
-      aria-label="Moment in the run"
-      aria-valuemin={0}
-      aria-valuemax={clock.steps - 1}
-      aria-valuenow={clock.stepAt(state.moment.value)}
-      aria-valuetext={clock.text(state.moment.value)}
-      onPointerDown={seek}
-      onPointerMove={seek}
-    >
+    <div class="overview" {...momentSlider("Moment in the run")} onPointerDown={seek} onPointerMove={seek}>
       <canvas ref={canvas} aria-hidden="true" />
+      <span ref={cursor} class="cursor" aria-hidden="true" />
     </div>
   );
+}
+
+/** What tells a reader of the screen that a part of the page is a slider of the moment. */
+export function momentSlider(label: string) {
+  const { clock } = state.run.value!;
+  const us = state.told.value;
+  return {
+    role: "slider",
+    tabIndex: 0,
+    "aria-label": label,
+    "aria-valuemin": 0,
+    "aria-valuemax": clock.steps - 1,
+    "aria-valuenow": clock.stepAt(us),
+    "aria-valuetext": clock.text(us),
+  } as const;
 }
 
 function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number, height: number): void {
   const [begin, end] = [state.beginUs.value, state.endUs.value];
   const x = (us: number): number => ((us - begin) / (end - begin)) * width;
   const { clock } = run;
-  const pace = paceOf(run);
   const [first, last] = [clock.day(begin), clock.day(Math.max(begin, end - 1))];
   const today = clock.day(state.moment.value);
   const cell = Math.max(DAY_US / CELLS_A_DAY, (end - begin) / (width / 2));
@@ -167,7 +183,7 @@ function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number
     context.fillRect(left, 0, Math.max(1, right - left - 1), height);
   }
   context.fillStyle = colors.value.bars;
-  const shares = pace.shares(begin, end, cell);
+  const shares = run.isRead.value ? paceOf(run).shares(begin, end, cell) : [];
   const most = Math.max(0.05, ...shares);
   shares.forEach((share, i) => {
     const us = begin + i * cell;
@@ -185,6 +201,4 @@ function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number
   context.strokeStyle = colors.value.text;
   context.lineWidth = 1.5;
   context.strokeRect(left + 0.75, 0.75, Math.max(2, right - left - 1.5), height - 1.5);
-  context.fillStyle = colors.value.cursor;
-  context.fillRect(x(state.moment.value) - 1, 0, 2, height);
 }

@@ -37,11 +37,22 @@ export interface UseFacts {
   posture: string;
 }
 
-/** A piece of furniture: its outline [m], the direction of its front [rad], its uses. `blocks` says whether it is in the way of nothing, paths or sight. */
+/** A shape of a symbol [m]: left, bottom, right and top of a box or an ellipse, ends of a line. Boxes have corners of a `radius`. Colours are hexadecimal, with or without an opacity. */
+export interface ShapeFacts {
+  kind: "box" | "ellipse" | "line";
+  at: [number, number, number, number];
+  fill: string | null;
+  edge: string | null;
+  radius: number;
+}
+
+/** A piece of furniture: its outline and middle [m], the direction of its front [rad], its uses. `blocks` says whether it is in the way of nothing, paths or sight. `symbol` is the number of its symbol among those of its home, which is drawn at its middle; -1: it is drawn as its outline. */
 export interface ObjectFacts {
   name: string;
   type: string;
   outline: [number, number][];
+  middle: [number, number];
+  symbol: number;
   blocks: string;
   front: number;
   uses: UseFacts[];
@@ -64,6 +75,7 @@ export interface HomeFacts {
   doorways: DoorwayFacts[];
   doors: DoorFacts[];
   objects: ObjectFacts[];
+  symbols: ShapeFacts[][];
   no_go: [number, number][][];
   entrance: [number, number] | null;
 }
@@ -139,11 +151,12 @@ export interface VerdictFacts {
   step: number | null;
 }
 
-/** A moment that is worth a look. */
+/** A moment that is worth a look, and the bodies that it is about, the most important first. */
 export interface StoryFacts {
   step: number;
   title: string;
   words: string;
+  who: string[];
 }
 
 /** A floor that slows robots down from `step` to before `end`: its outline [m], its effect. */
@@ -152,6 +165,15 @@ export interface SlowFacts {
   words: string;
   step: number;
   end: number;
+}
+
+/** Stretches in which people sit or lie [us since the start], by user and time. `use` is the number of the place in `uses`. */
+export interface PostureFacts {
+  uses: UseFacts[];
+  user: string[];
+  use: number[];
+  from_us: number[];
+  to_us: number[];
 }
 
 /** Stretches in which a robot noticed a user: steps `first` to `last`, both included. `false` marks stretches in which the robot took something else for that user. */
@@ -277,3 +299,187 @@ export interface LiveOrder {
   key: string;
   text: string;
 }
+
+/** How homes are drawn: `fleet2d.viewing.look`. */
+export const LOOK = {
+  "planks": {
+    "pitch": 0.19,
+    "joint": 0.012,
+    "colors": [
+      "#e8d3b3",
+      "#e5cfae",
+      "#ebd8ba",
+      "#e2caa6"
+    ]
+  },
+  "unknown": "#f4f4f2",
+  "carpet": {
+    "rooms": [
+      "bedroom",
+      "child_room",
+      "guest_room",
+      "wardrobe"
+    ],
+    "colors": [
+      "#dcdde8",
+      "#e3dce0",
+      "#dbe2e2"
+    ]
+  },
+  "tiles": {
+    "kitchen": {
+      "color": "#eeeae2",
+      "pitch": 0.6
+    },
+    "bathroom": {
+      "color": "#dce9ea",
+      "pitch": 0.3
+    },
+    "toilet": {
+      "color": "#dce9ea",
+      "pitch": 0.3
+    },
+    "laundry": {
+      "color": "#dce9ea",
+      "pitch": 0.3
+    },
+    "entryway": {
+      "color": "#dfdbd3",
+      "pitch": 0.75
+    },
+    "lobby": {
+      "color": "#dfdbd3",
+      "pitch": 0.75
+    },
+    "storage": {
+      "color": "#dfdbd3",
+      "pitch": 0.75
+    },
+    "boiler_room": {
+      "color": "#dfdbd3",
+      "pitch": 0.75
+    },
+    "garage": {
+      "color": "#d6d7d6",
+      "pitch": 1.2
+    },
+    "balcony": {
+      "color": "#d5dccb",
+      "pitch": 0.5
+    },
+    "loggia": {
+      "color": "#d5dccb",
+      "pitch": 0.5
+    },
+    "terrace": {
+      "color": "#d5dccb",
+      "pitch": 0.5
+    }
+  },
+  "walls": {
+    "thickness": 0.15,
+    "lift": 0.17,
+    "top": "#fcfbf8",
+    "face": "#bdb4a6",
+    "edge": "#a79e90",
+    "shadow": "#3c2d196b"
+  },
+  "door": "#a9783f",
+  "outline": {
+    "fill": "#d9d2c6",
+    "edge": "#8b857b"
+  },
+  "activities": [
+    {
+      "name": "Sleep",
+      "color": "#4c5788",
+      "activities": [
+        "sleep",
+        "nap"
+      ]
+    },
+    {
+      "name": "Care",
+      "color": "#74aeb8",
+      "activities": [
+        "toilet",
+        "wash_hands",
+        "wash",
+        "shower",
+        "bath",
+        "dress",
+        "medication"
+      ]
+    },
+    {
+      "name": "Meals",
+      "color": "#cf8344",
+      "activities": [
+        "drink",
+        "breakfast",
+        "cook",
+        "dinner",
+        "lunch",
+        "snack",
+        "dishes",
+        "eat"
+      ]
+    },
+    {
+      "name": "Work, school",
+      "color": "#8a7ab5",
+      "activities": [
+        "work_at_home",
+        "homework",
+        "computer",
+        "study"
+      ]
+    },
+    {
+      "name": "Leisure",
+      "color": "#e8d38c",
+      "activities": [
+        "read",
+        "tv",
+        "phone_call",
+        "play",
+        "rest",
+        "phone",
+        "hobby",
+        "games",
+        "music"
+      ]
+    },
+    {
+      "name": "Chores",
+      "color": "#b5957d",
+      "activities": [
+        "fetch",
+        "put_away",
+        "tidy",
+        "check_door",
+        "laundry",
+        "clean",
+        "iron"
+      ]
+    },
+    {
+      "name": "Sport",
+      "color": "#2f6b55",
+      "activities": [
+        "sport",
+        "exercise"
+      ]
+    }
+  ],
+  "out": {
+    "name": "Out of home",
+    "color": "#e4e0d7",
+    "activities": []
+  },
+  "other": {
+    "name": "Other",
+    "color": "#9aa3ad",
+    "activities": []
+  }
+} as const;

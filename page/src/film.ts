@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import type { Run } from "./data/run";
 import { fetched } from "./data/source";
+import { download } from "./share";
 import * as state from "./state";
 
 export const filming = signal(false);
@@ -26,11 +27,8 @@ export async function downloadFilm(run: Run): Promise<void> {
   filming.value = true;
   const step = run.clock.stepAt(state.moment.value);
   await run.attempt(async () => {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(await (await fetched(`${run.path}/film/${step}.mp4`)).blob());
-    link.download = `${run.facts.title} ${run.clock.text(state.moment.value)}.mp4`.replaceAll(/[^\w.-]+/g, "-");
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+    const film = await (await fetched(`${run.path}/film/${step}.mp4`)).blob();
+    download(film, `${run.facts.title} ${run.clock.text(state.moment.value)}.mp4`.replaceAll(/[^\w.-]+/g, "-"));
   });
   filming.value = false;
 }

@@ -3,6 +3,7 @@
 import { render } from "preact";
 import { applyAddress, followAddress } from "./address";
 import { App } from "./App";
+import { DAY_US } from "./data/clock";
 import { Run } from "./data/run";
 import { openSession } from "./data/source";
 import { followKeyboard } from "./keyboard";
@@ -14,7 +15,6 @@ import { followTheme } from "./theme";
 
 /** Runs beside each other at first, as many as the command takes; branches join them. */
 const MOST_RUNS = 4;
-const DAY_US = 86_400e6;
 
 async function start(box: HTMLElement): Promise<void> {
   followTheme();
@@ -31,7 +31,7 @@ async function start(box: HTMLElement): Promise<void> {
   state.setRange(state.beginUs.value, state.endUs.value);
   state.goTo(state.beginUs.value);
   const asked = location.hash.length > 1;
-  if (runs.length > 1 || state.endUs.value - state.beginUs.value < 2 * DAY_US || feed) state.view.value = "lanes";
+  if (runs.length > 1 || state.endUs.value - state.beginUs.value < 2 * DAY_US || feed || !runs.some(hasPeople)) state.view.value = "lanes";
   applyAddress(location.hash, runs[0]!);
   document.title = `${runs.map((run) => run.facts.title).join(" · ")} – Fleet2D`;
   render(<App />, box);
@@ -44,6 +44,10 @@ async function start(box: HTMLElement): Promise<void> {
   else await Promise.all(runs.map((run) => run.readRest()));
   if (!feed && !asked) openInMotion();
   document.documentElement.dataset.ready = "true";
+}
+
+function hasPeople(run: Run): boolean {
+  return run.bodies.some((body) => !body.robot);
 }
 
 const box = document.getElementById("page")!;

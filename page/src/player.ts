@@ -1,6 +1,6 @@
 /** Let time pass at the chosen speed, or at the pace of what happens. */
 
-import { effect, untracked } from "@preact/signals";
+import { batch, effect, signal, untracked } from "@preact/signals";
 import { paceOf } from "./data/pace";
 import * as state from "./state";
 
@@ -50,4 +50,55 @@ export function openInMotion(): void {
     if (state.moment.value >= Math.min(dayEnd, run.endUs) - run.clock.stepUs) untracked(() => state.goTo(first));
   });
   for (const kind of ["pointerdown", "keydown", "wheel"]) addEventListener(kind, stopLooping, { once: true, passive: true });
+}
+
+/** The card of the story that the reel shows; -1: it doesn't play. */
+export const reel = signal(-1);
+const REEL_MS = 30_000;
+/** Cards are played at this speed, from so long before their moment [us]. */
+const REEL_SPEED = 20;
+const LEAD_US = 30e6;
+
+let stopReel = (): void => {};
+
+/** Play the moments of the story one after the other, each with who is in it, in half a minute; any touch ends it. */
+export function playReel(): void {
+  const run = state.run.value!;
+  const { story } = run.facts;
+  stopReel();
+  const before = { speed: state.speed.value, followed: state.followed.value };
+  const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const show = (at: number): void => {
+    const card = story[at];
+    if (!card) {
+      stopReel();
+      return;
+    }
+    const us = card.step * run.clock.stepUs;
+    batch(() => {
+      reel.value = at;
+      state.followed.value = card.who[0] ?? "";
+      state.speed.value = REEL_SPEED;
+      state.playing.value = !isStill;
+      state.goTo(isStill ? us : us - LEAD_US);
+    });
+    timer = setTimeout(() => show(at + 1), REEL_MS / story.length);
+  };
+  const stop = (): void => stopReel();
+  stopReel = () => {
+    clearTimeout(timer);
+    for (const kind of ["pointerdown", "keydown"]) removeEventListener(kind, stop);
+    batch(() => {
+      reel.value = -1;
+      state.playing.value = false;
+      state.speed.value = before.speed;
+      state.followed.value = before.followed;
+      state.fits.value++;
+    });
+    stopReel = () => {};
+  };
+  show(0);
+  // The press that began the reel is still on its way.
+  setTimeout(() => ["pointerdown", "keydown"].forEach((kind) => addEventListener(kind, stop, { once: true })));
 }

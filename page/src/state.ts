@@ -19,6 +19,8 @@ export type Theme = "auto" | "light" | "dark";
 export const runs = signal<Run[]>([]);
 /** The moment that is shown [us since the start]. */
 export const moment = signal(0);
+/** The moment that words are about [us]: while time passes it follows several times a second, else at once. */
+export const told = signal(0);
 /** The part of the run that the timeline shows [us]. */
 export const range = signal<[number, number]>([0, 1]);
 /** A range whose totals are shown [us]. */
@@ -27,6 +29,8 @@ export const playing = signal(false);
 export const speed = signal(ADAPTIVE);
 /** How the timeline shows the run: a row a day, or a lane for each body. */
 export const view = signal<"calendar" | "lanes">("calendar");
+/** Goes up by one whenever plans shall show the whole home. */
+export const fits = signal(0);
 export const selected = signal("");
 /** The body that the plan follows; empty: none. */
 export const followed = signal("");
@@ -45,6 +49,9 @@ export const live = signal(false);
 export const follow = signal(true);
 
 export const run = computed<Run | null>(() => runs.value[0] ?? null);
+const chosenRun = signal<Run | null>(null);
+/** The run that is inspected: the one on whose plan somebody clicked last. */
+export const inspected = computed<Run | null>(() => (chosenRun.value && runs.value.includes(chosenRun.value) ? chosenRun.value : run.value));
 /** The part of the runs that can be shown [us]. */
 export const beginUs = computed(() => Math.min(...runs.value.map((entry) => entry.beginUs)));
 export const endUs = computed(() => Math.max(1, ...runs.value.map((entry) => (entry.version.value, entry.endUs))));
@@ -71,6 +78,9 @@ export const answer = computed<Answer | null>(() => {
 export const foundTimes = computed<readonly number[]>(() => foundEvents.value.map((row) => row.us));
 
 const SHORTEST_US = 10e6;
+/** While time passes, words change at most this often [ms]: nobody reads faster. */
+const TOLD_MS = 120;
+let toldAt = 0;
 
 /**
  * Show a moment everywhere. While time passes it may lie between two steps; else it is that of a step, so that what
@@ -84,6 +94,11 @@ export function goTo(us: number): void {
   const at = playing.value ? inside : Math.floor(inside / stepUs) * stepUs;
   batch(() => {
     moment.value = at;
+    const now = performance.now();
+    if (!playing.value || now - toldAt > TOLD_MS) {
+      told.value = at;
+      toldAt = now;
+    }
     const [from, to] = range.value;
     if (at < from || at > to) setRange(at - (to - from) / 2, at + (to - from) / 2);
   });
@@ -155,8 +170,10 @@ export function jump(forward: boolean): void {
   if (us !== undefined) goTo(us);
 }
 
-export function select(name: string): void {
+/** Select a body, a door or a room; of two runs, in the one that was clicked. */
+export function select(name: string, of: Run | null = null): void {
   batch(() => {
+    if (of) chosenRun.value = of;
     selected.value = name;
     if (name) panel.value = "inspect";
   });

@@ -10,8 +10,6 @@ export interface Colors {
   quiet: string;
   line: string;
   wall: string;
-  furniture: string;
-  furnitureEdge: string;
   door: string;
   view: string;
   viewEdge: string;
@@ -23,6 +21,8 @@ export interface Colors {
   shadow: string;
   /** How much people move, in the overview. */
   bars: string;
+  /** What a home stands on. */
+  stage: string;
 }
 
 const LIGHT: Colors = {
@@ -32,8 +32,6 @@ const LIGHT: Colors = {
   quiet: "#5d626a",
   line: "#d5d8dc",
   wall: "#3b4048",
-  furniture: "rgba(251,250,247,0.75)",
-  furnitureEdge: "#8b9099",
   door: "#8a5a2b",
   view: "#0e9e9a",
   viewEdge: "#0b7d7a",
@@ -44,6 +42,7 @@ const LIGHT: Colors = {
   slow: "#0077bb",
   shadow: "rgba(70, 60, 45, 0.28)",
   bars: "#9a9fa8",
+  stage: "#f1ede5",
 };
 
 const DARK: Colors = {
@@ -53,8 +52,6 @@ const DARK: Colors = {
   quiet: "#a4a9b1",
   line: "#3a3f47",
   wall: "#aab0b9",
-  furniture: "rgba(22,24,28,0.45)",
-  furnitureEdge: "#858b95",
   door: "#d49a5c",
   view: "#5ae1d7",
   viewEdge: "#6ff0e6",
@@ -65,6 +62,7 @@ const DARK: Colors = {
   slow: "#66bbee",
   shadow: "rgba(0, 0, 0, 0.65)",
   bars: "#6a727d",
+  stage: "#191d22",
 };
 
 const query = typeof matchMedia === "function" ? matchMedia("(prefers-color-scheme: dark)") : null;

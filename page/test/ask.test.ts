@@ -57,8 +57,8 @@ describe("a question", () => {
   it("tells who was where at a moment", () => {
     const us = 3 * HOUR;
     const room = run.facts.home.rooms[valueAt(run.roomsOf("ana"), us)!]!;
-    expect(ask(run, "ana at 03:00", 0).words).toContain(`ana is in ${room.name}`);
-    expect(ask(run, `${room.name} at 5 Jan 03:00`, 0).words).toContain("ana");
+    expect(ask(run, "ana at 03:00", 0).words).toContain(`Ana is in ${run.home.labels[run.facts.home.rooms.indexOf(room)]}`);
+    expect(ask(run, `${run.home.labels[run.facts.home.rooms.indexOf(room)]} at 5 Jan 03:00`, 0).words).toContain("Ana");
     expect(ask(run, `${room.type} at 3 h`, 0).spans[0]!.from).toBe(us);
   });
 
@@ -132,5 +132,55 @@ describe("a question about two runs", async () => {
     const { spans } = ask(run, "first ana differs", 0, other);
     expect(spans.map((span) => [span.from, span.to])).toEqual([[lane.from[3], lane.to[3]]]);
     expect(ask(run, "astro differs", 0, other).words).toBe("never");
+  });
+});
+
+describe("a question as people ask it", () => {
+  const NEAR_US = 3 * HOUR;
+  const said = (question: string): string => ask(run, question, NEAR_US).words;
+
+  it("is the same as its short form", () => {
+    expect(said("Where is Ana?")).toBe(said("ana at 03:00"));
+    expect(said("where was ana at 06:30")).toBe(said("ana at 06:30"));
+    expect(said("who is in bedroom")).toBe(said("bedroom at 03:00"));
+    expect(said("ana now")).toBe(said("ana at 03:00"));
+    expect(said("is ana in the bedroom?")).toMatch(/: (yes|no)$/);
+    expect(froms("when did astro see ana?")).toEqual(froms("astro sees ana"));
+    expect(froms("who saw ana")).toEqual(froms("seen ana"));
+    expect(froms("when was ana in the bathroom?")).toEqual(froms("ana in bathroom"));
+    expect(froms("both ana and astro in bedroom")).toEqual(froms("ana and astro in bedroom"));
+  });
+
+  it("about how long, how often and longest is counted from its stretches", () => {
+    const spans = ask(run, "ana in bathroom", 0).spans;
+    const lengths = spans.map(({ from, to }) => to - from);
+    expect(said("how often was ana in the bathroom?")).toMatch(new RegExp(`^${spans.length} times?, `));
+    expect(said("how long was ana in the bathroom?")).toContain(`; ${spans.length} time`);
+    const [longest] = ask(run, "longest ana in bathroom", 0).spans;
+    expect(longest!.to - longest!.from).toBe(Math.max(...lengths));
+    const [shortest] = ask(run, "what was the shortest time that ana was in the bathroom", 0).spans;
+    expect(shortest!.to - shortest!.from).toBe(Math.min(...lengths));
+  });
+
+  it("joins clauses that hold at the same time, or at any", () => {
+    const both = total("ana in bedroom and astro in bedroom");
+    expect(both).toBe(total("ana and astro in bedroom"));
+    expect(total("ana in bedroom or astro in bedroom")).toBe(total("ana in bedroom") + total("astro in bedroom") - both);
+    expect(total("ana in bedroom and not seen")).toBe(total("ana in bedroom and ana not seen"));
+    expect(total("ana in bedroom and not seen") + total("ana in bedroom and seen")).toBe(total("ana in bedroom"));
+  });
+
+  it("says with whom somebody is", () => {
+    const us = 3 * HOUR;
+    const room = (name: string): number | null => valueAt(run.roomsOf(name), us);
+    expect(said("who is with ana")).toContain(room("ana") === room("astro") ? "Astro" : "nobody");
+  });
+
+  it("is offered anew where one name is nearly right", () => {
+    const wrong = ask(run, "where is anna", NEAR_US);
+    expect(wrong.isUnderstood).toBe(false);
+    expect(wrong.words).toContain("did you mean 'ana'");
+    expect(wrong.meant).toBe("where is ana");
+    expect(ask(run, "frobnicate", 0).meant).toBe("");
   });
 });

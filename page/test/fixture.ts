@@ -23,6 +23,7 @@ export const source: RunSource = {
   tracks: () => Promise.resolve(null),
   facts: () => Promise.resolve(structuredClone(held.facts)),
   sightings: () => Promise.resolve(held.sightings),
+  postures: () => Promise.resolve(held.postures),
   walls: (number) => Promise.resolve(held.walls[number]!),
   table: (name) => {
     const bytes = Buffer.from(held.tables[name]!, "base64");

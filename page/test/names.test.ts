@@ -84,8 +84,8 @@ describe("names", async () => {
   });
 
   it("of an answer at a moment are those of whoever is there", () => {
-    expect(ask(run, "kitchen at 0:30", 0).words).toContain("ann, ann_lee, Bob, seen, x-1");
-    expect(ask(run, "in at 0:30", 0).words).toContain("in is away"); // somebody before a room
+    expect(ask(run, "kitchen at 0:30", 0).words).toContain("Ann, Ann lee, Bob, Seen, X-1");
+    expect(ask(run, "in at 0:30", 0).words).toContain("In is out of home"); // somebody before a room
     expect(ask(run, "ann and seen in kitchen at 0:30", 0).words).toMatch(/: yes$/);
     expect(ask(run, "ann in kitchen at 3:30", 0).words).toMatch(/: no$/);
   });

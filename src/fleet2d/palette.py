@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 USER_COLORS = ("#aa3377", "#0077bb", "#009988", "#ee7733", "#cc3311", "#33bbee")
 ROBOT_COLORS = ("#22344f", "#5a4634", "#3d3a63", "#2f5148")
-VIEW_COLOR = "#ffd23f"
-VIEW_EDGE = "#b98900"
+VIEW_COLOR = "#0e9e9a"
+VIEW_EDGE = "#0b7d7a"
 DOOR_COLOR = "#8a5a2b"
 DEEPER = 1.9
 """Factor of a room colour's distance from white in a timeline, whose lanes are thin."""

@@ -45,4 +45,4 @@ def page_at(browser: Any, address: str, **options: Any) -> Iterator[Any]:
     page.wait_for_selector(READY, timeout=60_000)
     yield page
     context.close()
-    assert [] == errors
+    assert [] == errors, errors

@@ -1,6 +1,8 @@
 """What the timeline marks covers the run, and says what the manifest and the table say."""
 
 import itertools
+import json
+import math
 from datetime import datetime
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import fleet2d
 from fleet2d.runs.run import Tables
 from fleet2d.runtime.clock import Clock
 from fleet2d.viewing import run_facts
+from fleet2d.viewing.page_data import PageData
 from fleet2d.viewing.run_facts import (
     expectation_marks,
     intervention_marks,
@@ -127,3 +130,10 @@ def test_light_is_as_cameras_have_it_where_the_scenario_has_no_daylight() -> Non
     clock = Clock(datetime(2026, 1, 5), 1_000_000, 60)
 
     assert [(6.0, 8.0, 17.0, 19.0)] == skies_of({"simulation": {"daylight": None}}, clock)
+
+
+def test_results_of_metrics_that_are_no_numbers_reach_the_page() -> None:
+    run = fleet2d.run("bundled:paper", "simulation.duration=10 min")
+    run.manifest["metrics"]["odd"] = {"error": math.nan, "parts": {"none": None, "text": "late"}}
+    metrics = json.loads(PageData(run).facts_json)["metrics"]
+    assert {"error": "nan", "parts": {"none": None, "text": "late"}} == metrics["odd"]

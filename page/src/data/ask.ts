@@ -6,12 +6,16 @@
  *     ana and ben in kitchen > 20 min
  *     astro way blocked > 1 min
  *     kitchen at 13 Jan 19:30
+ *     where is ana now
+ *     how long was ben in the kitchen
+ *     ana in kitchen and ben in bedroom
  */
 
 import type { EventKind } from "../contract";
-import { durationText } from "./clock";
+import { DAY_US, durationText } from "./clock";
 import { type EventRow, shownText } from "./events";
 import { Misunderstood, namesOf, type Names } from "./names";
+import { readingsOf, type Wanted } from "./phrases";
 import { type Clause, clauseOf, type Group, isWord, meaningful, subjectOf, textOf, type Token, tokensOf, wrongRoomOf } from "./question";
 import { AWAY } from "./rooms";
 import type { Run } from "./run";
@@ -23,7 +27,12 @@ export interface Answer {
   spans: Span[];
   /** What was understood, or why nothing was. */
   words: string;
+  isUnderstood: boolean;
+  /** The question that may be meant by one that isn't understood; empty: none is near. */
+  meant: string;
 }
+
+type Found = Pick<Answer, "spans" | "words">;
 
 /** Parts of a day: hours from the midnight that begins it. */
 const PARTS: Record<string, [number, number]> = {
@@ -33,24 +42,44 @@ const PARTS: Record<string, [number, number]> = {
   evenings: [18, 22],
   days: [0, 24],
 };
-const UNITS: Record<string, number> = { s: 1e6, min: 60e6, h: 3600e6, d: 86_400e6 };
+const UNITS: Record<string, number> = { s: 1e6, min: 60e6, h: 3600e6, d: DAY_US };
 const HOUR_US = 3600e6;
 const BOUNDS = new Set(["before", "until", "after", "since"]);
 const AT = new Set(["at"]);
 const NOT = new Set(["not"]);
-const TIMES = "try 13 Jan 19:30, day 3 18:30, 2 d 14 h or 18:30";
+const WITH = new Set(["with"]);
+const OR = new Set(["or"]);
+/** Words between clauses; "or" stands for either. */
+const CLAUSE_JOINERS = new Set(["and", "or", "but", "while"]);
+const NOW = "now";
+const TIMES = "try now, 13 Jan 19:30, day 3 18:30, 2 d 14 h or 18:30";
 
-export const EXAMPLES = ["last seen NAME", "nights NAME not in ROOM", "NAME in ROOM > 10 min", "ROOM at 18:30"];
+export const EXAMPLES = [
+  "where is NAME now",
+  "who is in ROOM at 18:30",
+  "last seen NAME",
+  "how long was NAME in ROOM",
+  "how often was NAME in ROOM",
+  "longest NAME in ROOM",
+  "nights NAME not in ROOM",
+  "NAME in ROOM > 10 min",
+];
 
 /** Answer a question; times without a date are on the day of `nearUs`. */
 export function ask(run: Run, question: string, nearUs: number, other: Run | null = null): Answer {
-  if (!run.isRead.value) return { question, spans: [], words: "the run is still being read" };
-  try {
-    return { question, ...new Question(run, question, nearUs, other).answer() };
-  } catch (error) {
-    if (!(error instanceof Misunderstood)) throw error;
-    return { question, spans: [], words: error.message };
+  if (!run.isRead.value) return { question, spans: [], words: "the run is still being read", isUnderstood: false, meant: "" };
+  let problem = "";
+  let meant = "";
+  for (const { wanted, text } of readingsOf(question)) {
+    try {
+      return { question, ...new Question(run, text, wanted, nearUs, other).answer(), isUnderstood: true, meant: "" };
+    } catch (error) {
+      if (!(error instanceof Misunderstood)) throw error;
+      problem ||= error.message;
+      if (error.instead) meant ||= question.replace(...error.instead);
+    }
   }
+  return { question, spans: [], words: problem, isUnderstood: false, meant };
 }
 
 /** The events that have all of some words, as whole words and whole names, in any order. */
@@ -95,6 +124,7 @@ class Question {
   constructor(
     private readonly run: Run,
     question: string,
+    private readonly wanted: Wanted,
     private readonly nearUs: number,
     private readonly other: Run | null,
   ) {
@@ -113,19 +143,37 @@ class Question {
     return Math.min(this.run.endUs, this.run.presentUs);
   }
 
-  answer(): Omit<Answer, "question"> {
+  answer(): Found {
     const moment = this.moment();
     if (moment) return moment;
     this.readBounds();
     for (const { which, part, rest } of this.readings()) {
       const clause = clauseOf(rest, this.names);
-      if (clause) return this.chosen(this.spansOf(clause), which, part);
+      const found = clause ? this.spansOf(clause) : this.joined(rest);
+      if (found) return this.chosen(found, which, part);
     }
     return this.events();
   }
 
+  /** Read `ana in kitchen and ben asleep`: clauses that hold at the same time, or with `or` at any; null where there are none. */
+  private joined(tokens: readonly Token[]): Span[] | null {
+    for (let at = tokens.length - 2; at > 0; at--) {
+      if (!isWord(tokens[at], CLAUSE_JOINERS)) continue;
+      const right = clauseOf(tokens.slice(at + 1), this.names);
+      if (!right) continue;
+      const left = clauseOf(tokens.slice(0, at), this.names);
+      const before = left ? this.spansOf(left) : this.joined(tokens.slice(0, at));
+      if (!before) continue;
+      // In `ana in kitchen and not seen` the second clause is about the one of the first.
+      const about = right.kind === "seen" && !right.who && left?.who ? { ...right, who: left.who } : right;
+      const after = this.spansOf(about);
+      return isWord(tokens[at], OR) ? union([before, after]) : intersection(before, after);
+    }
+    return null;
+  }
+
   /** Read a last `at TIME`: who is in a room then, where somebody is, or whether something is so. */
-  private moment(): Omit<Answer, "question"> | null {
+  private moment(): Found | null {
     for (let at = this.tokens.length - 2; at > 0; at--) {
       if (!isWord(this.tokens[at], AT)) continue;
       const us = this.timeOf(at);
@@ -138,23 +186,34 @@ class Question {
 
   private at(tokens: readonly Token[], us: number): string {
     const { run } = this;
+    if (isWord(tokens[0], WITH)) return this.companyAt(tokens.slice(1), us);
     const subject = subjectOf(tokens, this.names);
     if (subject && "bodies" in subject) {
-      return subject.bodies.map((name) => `${name} is ${placeName(run, valueAt(run.roomsOf(name), us))}`).join(", ");
+      return subject.bodies.map((name) => `${run.label(name)} is ${placeName(run, valueAt(run.roomsOf(name), us))}`).join(", ");
     }
     if (subject) {
       const inside = run.bodies.filter(({ name }) => subject.rooms.has(valueAt(this.roomsOf(name), us) ?? NaN));
-      return inside.map(({ name }) => name).join(", ") || "nobody";
+      return inside.map(({ name }) => run.label(name)).join(", ") || "nobody";
     }
     const clause = clauseOf(tokens, this.names);
     if (!clause) throw this.names.unknown(textOf(tokens));
     return this.spansOf(clause).some((span) => span.from <= us && us < span.to) ? "yes" : "no";
   }
 
+  /** Read `with ana`: who else is in the room of somebody. */
+  private companyAt(tokens: readonly Token[], us: number): string {
+    const subject = subjectOf(tokens, this.names);
+    if (!subject || !("bodies" in subject)) throw this.names.unknown(textOf(tokens));
+    const rooms = new Set(subject.bodies.map((name) => valueAt(this.roomsOf(name), us)));
+    const others = this.run.bodies.filter(({ name }) => !subject.bodies.includes(name) && rooms.has(valueAt(this.roomsOf(name), us)));
+    const isOut = rooms.size === 1 && rooms.has(AWAY);
+    return isOut ? `${subject.bodies.map((name) => this.run.label(name)).join(", ")} is out of home` : others.map(({ name }) => this.run.label(name)).join(", ") || "nobody";
+  }
+
   /** The time that the tokens after one name; null, and a reason to tell: none of this run. */
   private timeOf(at: number): number | null {
     const text = textOf(this.tokens.slice(at + 1));
-    const us = this.run.clock.parse(text, this.nearUs);
+    const us = text.toLowerCase() === NOW ? this.nearUs : this.run.clock.parse(text, this.nearUs);
     if (us === null) this.wrongTime ||= `'${text}' is no time of this run: ${TIMES}`;
     return us;
   }
@@ -185,7 +244,7 @@ class Question {
   }
 
   /** What is so of the stretches of an answer: their length, their part of days, the limits of time; the first or last. */
-  private chosen(found: readonly Span[], which: string, part: string): Omit<Answer, "question"> {
+  private chosen(found: readonly Span[], which: string, part: string): Found {
     const [from, to] = this.limits;
     const isFitting = (us: number): boolean => this.lengths.every((length) => (length.isLonger ? us > length.us : us < length.us));
     const all = part
@@ -196,7 +255,30 @@ class Question {
     const total = filled(union([spans]), from, to);
     const noun = part.slice(0, -1) || "time";
     const count = `${spans.length} ${noun}${spans.length === 1 ? "" : "s"}`;
+    if (this.wanted === "longest" || this.wanted === "shortest") return this.extreme(spans);
+    if (this.wanted === "length" && total > 0) return { spans, words: `${durationText(total)} in all, ${durationText(total / this.days(from, to))} a day; ${count}` };
+    if (this.wanted === "count") return { spans, words: `${count}, ${rate(spans.length / this.days(from, to))} a day` };
+    if (this.wanted === "place") return { spans, words: this.placesOf(spans, count) };
     return { spans, words: total > 0 && !part ? `${count}, ${durationText(total)} in all` : count };
+  }
+
+  /** The days between two moments of the run, at least an hour. */
+  private days(from: number, to: number): number {
+    return Math.max(HOUR_US, to - from) / DAY_US;
+  }
+
+  private extreme(spans: readonly Span[]): Found {
+    const sign = this.wanted === "longest" ? 1 : -1;
+    const [best] = [...spans].sort((one, other) => sign * (other.to - other.from - (one.to - one.from)));
+    return { spans: [best!], words: `${durationText(best!.to - best!.from)}, ${this.run.clock.text(best!.from).slice(0, -3)}` };
+  }
+
+  /** Where those were whom a question of sight names, at the first of its stretches. */
+  private placesOf(spans: readonly Span[], count: string): string {
+    const us = spans[0]!.from;
+    const named = this.run.bodies.filter(({ name, robot }) => !robot && this.tokens.some(({ text }) => this.names.body(text) === name));
+    const places = named.map(({ name }) => `${this.run.label(name)} ${placeName(this.run, valueAt(this.roomsOf(name), us))}`);
+    return [places.join(", "), `${this.run.clock.text(us).slice(0, -3)}${spans.length > 1 ? ` (the first of ${count})` : ""}`].filter(Boolean).join(", ");
   }
 
   private spansOf(clause: Clause): Span[] {
@@ -206,7 +288,7 @@ class Question {
     if (!other) throw new Misunderstood("'differs' compares two runs: show another beside this one");
     return combined(clause.who ?? { names: run.bodies.map(({ name }) => name), any: true }, (name) => {
       const { from, to } = differences(run.roomsOf(name), other.roomsOf(name));
-      return Array.from(from, (us, i) => ({ from: us, to: to[i]!, words: `${name} is in another room` }));
+      return Array.from(from, (us, i) => ({ from: us, to: to[i]!, words: `${run.label(name)} is in another room` }));
     });
   }
 
@@ -220,7 +302,7 @@ class Question {
     const { from, to, value } = this.roomsOf(name);
     const spans: Span[] = [];
     for (let i = 0; i < from.length; i++) {
-      if (rooms.has(value[i]!) !== isNot) spans.push({ from: from[i]!, to: to[i]!, words: `${name} ${placeName(this.run, value[i]!)}` });
+      if (rooms.has(value[i]!) !== isNot) spans.push({ from: from[i]!, to: to[i]!, words: `${this.run.label(name)} ${placeName(this.run, value[i]!)}` });
     }
     return clipped(union([spans]), this.run.beginUs, this.knownUs);
   }
@@ -241,18 +323,18 @@ class Question {
     const step = this.run.clock.stepUs;
     const lanes = this.run.sightings.filter((lane) => (!user || lane.user === user) && (!robot || lane.robot === robot));
     const lists = lanes.map((lane) => {
-      const words = `${lane.robot} sees ${lane.user || "somebody"}`;
+      const words = `${this.run.label(lane.robot)} sees ${lane.user ? this.run.label(lane.user) : "somebody"}`;
       const spans = lane.first.map((first, i) => ({ from: first * step, to: (lane.last[i]! + 1) * step, words }));
       return spans.filter((_, i) => !lane.false[i]);
     });
     const { beginUs } = this.run;
     const spans = clipped(union(lists), beginUs, this.knownUs);
-    const words = `${robot || "nobody"} ${robot ? "doesn't see" : "sees"} ${user || "anybody"}`;
+    const words = `${robot ? this.run.label(robot) : "Nobody"} ${robot ? "doesn't see" : "sees"} ${user ? this.run.label(user) : "anybody"}`;
     return isNot ? complement(spans, beginUs, this.knownUs, words) : spans;
   }
 
   /** Events that have all words; the reason where they can't be what was asked. */
-  private events(): Omit<Answer, "question"> {
+  private events(): Found {
     if (this.tokens.length > 0 && this.wrongTime) throw new Misunderstood(this.wrongTime);
     const readings = [...this.readings()].flatMap((reading) =>
       [meaningful(reading.rest), reading.rest].map((tokens) => ({ ...reading, units: this.names.units(textOf(tokens)) })),
@@ -291,7 +373,7 @@ class Question {
       const activity = `${row.entity}/activity`;
       const end = row.event === "activity" ? activity : row.event === "way_blocked" ? row.entity : null;
       const to = end === null ? row.us : (ends.get(end) ?? this.knownUs);
-      if (this.names.has(row, units)) spans.push({ from: row.us, to, words: `${row.entity} ${shownText(row)}`.trim() });
+      if (this.names.has(row, units)) spans.push({ from: row.us, to, words: `${row.entity && this.run.label(row.entity)} ${shownText(row)}`.trim() });
       if (row.event === "activity") ends.set(activity, row.us);
       if (!SIGHTS.has(row.event)) ends.set(row.entity, row.us);
     }
@@ -329,7 +411,11 @@ function combined({ names, any }: Group, spansOf: (name: string) => Span[]): Spa
   return any ? union(lists) : lists.reduce(intersection);
 }
 
+function rate(count: number): string {
+  return count >= 10 ? count.toFixed(0) : count.toFixed(1);
+}
+
 function placeName(run: Run, room: number | null): string {
   if (room === null) return "nowhere yet";
-  return room === AWAY ? "away" : `in ${run.home.roomName(room)}`;
+  return room === AWAY ? "out of home" : `in ${run.home.labels[room]!}`;
 }

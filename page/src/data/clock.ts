@@ -1,6 +1,7 @@
 /** Steps and local times of a run. Times are microseconds since its start; local ones, of the offset added. */
 
 const DAY_MS = 86_400_000;
+export const DAY_US = 86_400e6;
 const WEEKDAYS = ["Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"];
 const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
 

@@ -56,3 +56,21 @@ export async function readSeries(facts: TableFacts, table: Table, stepUs: number
   }
   return [...series.values()];
 }
+
+const MOST_LETTERS = 60;
+
+/** A result in words: numbers in four digits, and what is missing or no number as that. */
+function resultText(value: unknown): string {
+  if (value === null || value === undefined) return "–";
+  if (typeof value === "number") return Number.isInteger(value) ? String(value) : value.toPrecision(4);
+  const text = String(value);
+  return text.length > MOST_LETTERS ? `${text.slice(0, MOST_LETTERS - 1)}…` : text;
+}
+
+/** The results of metrics one by one: their names, with those of what they are parts of, and their values in words. */
+export function flat(value: unknown, name = ""): [string, string][] {
+  if (typeof value !== "object" || value === null) return [[name, resultText(value)]];
+  const parts = Object.entries(value);
+  if (parts.length === 0) return name ? [[name, "empty"]] : [];
+  return parts.flatMap(([key, part]) => flat(part, name ? `${name} · ${key}` : key));
+}

@@ -5,7 +5,15 @@ import { AWAY } from "./rooms";
 import type { Run } from "./run";
 
 /** A question that can't be answered as it is; its message says why. */
-export class Misunderstood extends Error {}
+export class Misunderstood extends Error {
+  /** A part of the question that names nothing, and what may be meant by it. */
+  constructor(
+    message: string,
+    readonly instead: readonly [wrong: string, meant: string] | null = null,
+  ) {
+    super(message);
+  }
+}
 
 /** A text as it is compared. */
 export function normal(text: string): string {
@@ -92,7 +100,7 @@ export class Names {
     const near = names.map((name) => [distance(normal(text), name), name] as const).sort(([a], [b]) => a - b)[0];
     const isNear = near && near[0] <= Math.max(1, Math.floor(text.length / 3));
     const there = isNear ? `; did you mean '${near[1]}'?` : `. There are ${names.slice(0, 14).join(", ")}, and kinds of events`;
-    return new Misunderstood(`no person, room, activity or event is called '${text}'${there}`);
+    return new Misunderstood(`no person, room, activity or event is called '${text}'${there}`, isNear ? [text, near[1]] : null);
   }
 }
 
@@ -106,7 +114,7 @@ export function namesOf(run: Run): Names {
 }
 
 /** How many letters must be added, left out or replaced. */
-function distance(one: string, other: string): number {
+export function distance(one: string, other: string): number {
   let row = [...Array(other.length + 1).keys()];
   for (let i = 1; i <= one.length; i++) {
     const next = [i];

@@ -23,7 +23,7 @@ export interface Token {
 }
 
 /** Words that carry no meaning of their own. */
-export const FILLERS = new Set(["in", "the", "is", "are", "was", "were", "of", "does", "did", "at", "on", "a"]);
+export const FILLERS = new Set(["in", "the", "is", "are", "was", "were", "of", "does", "did", "at", "on", "a", "both"]);
 const JOINERS = new Set(["and", "or", ",", "by"]);
 
 export function tokensOf(question: string): Token[] {
@@ -130,7 +130,7 @@ class Reader {
   private *sees(): Found<Clause> {
     for (const [by, next] of this.group(0))
       for (const [isNot, at] of this.gap(next)) {
-        if (!this.is(at, "sees", "see")) continue;
+        if (!this.is(at, "sees", "see", "saw")) continue;
         for (const [who, end] of this.optionalGroup(at + 1)) yield [{ kind: "seen", who, by, isNot }, end];
       }
   }

@@ -8,14 +8,17 @@ import { Decisions, readDecisions } from "./decisions";
 import { type EventRow, Events, readEvents } from "./events";
 import { Home } from "./home";
 import { LayerTable } from "./layers";
+import { MovedObjects } from "./moved";
 import { Observations, type ObservationSource } from "./observations";
 import { Table } from "./parquet";
+import { Postures } from "./postures";
 import { roomStretches } from "./rooms";
 import { lastAtMost } from "./search";
 import { Walls } from "./sight";
 import type { RunSource } from "./source";
 import type { Stretches } from "./stretches";
 import { readTracks, Track, tracksOf } from "./tracks";
+import { bodyLabels, title } from "./words";
 
 /** When something was switched, and whether on. */
 export interface Switches {
@@ -33,12 +36,15 @@ const NO_STRETCHES: Stretches = { from: [], to: [], value: [] };
 export class Run {
   readonly clock: Clock;
   readonly home: Home;
+  private readonly labels: ReadonlyMap<string, string>;
   tracks = new Map<string, Track>();
   rooms = new Map<string, Stretches>();
   events = new Events();
   beliefs: Beliefs[] = [];
   sightings: SightingFacts[] = [];
   observations: ObservationSource | null = null;
+  /** When people sit or lie; null while it isn't read, and in a live run. */
+  postures: Postures | null = null;
   /** Goes up by one whenever something more of the run was read. */
   readonly version = signal(0);
   /** Whether everything was read that questions are about. */
@@ -69,6 +75,12 @@ export class Run {
   ) {
     this.clock = new Clock(facts.start, facts.step_us, facts.steps, facts.offsets);
     this.home = new Home(facts.home);
+    this.labels = bodyLabels(facts.bodies.map(({ name }) => name));
+  }
+
+  /** The name of a body as people write it. */
+  label(name: string): string {
+    return this.labels.get(name) ?? title(name);
   }
 
   static async open(source: RunSource): Promise<Run> {
@@ -158,6 +170,10 @@ export class Run {
     });
     await this.attempt(async () => {
       this.notes.value = await this.source.notes();
+    });
+    await this.attempt(async () => {
+      const facts = await this.source.postures();
+      this.postures = facts && new Postures(facts);
     });
     if (this.tableFacts("decisions")) await this.readDecisions();
     for (const facts of this.facts.tables.filter((entry) => entry.role === "algorithm")) {
@@ -268,6 +284,15 @@ export class Run {
       this.layers.set(name, layer);
     }
     return layer;
+  }
+
+  private movedBy: { seen: number; moved: MovedObjects } | null = null;
+
+  /** Where furniture is over time, as far as the run is read. */
+  get moved(): MovedObjects {
+    const seen = this.events.rows.length;
+    if (this.movedBy?.seen !== seen) this.movedBy = { seen, moved: new MovedObjects(this.facts.home.objects, this.events.ofKind("moved")) };
+    return this.movedBy!.moved;
   }
 
   /** Whether a door stands open at a moment. */

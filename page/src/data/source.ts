@@ -1,7 +1,7 @@
 /** Where the page's data come from: the server, or the page's own file. */
 
 import type { AsyncBuffer } from "hyparquet";
-import type { NoteFacts, Problem, RunFacts, SessionFacts, SightingFacts, WallsFacts } from "../contract";
+import type { NoteFacts, PostureFacts, Problem, RunFacts, SessionFacts, SightingFacts, WallsFacts } from "../contract";
 
 const WHOLE_BYTES = 8_000_000;
 const BLOCK_BYTES = 1 << 20;
@@ -11,6 +11,8 @@ export interface RunSource {
   readonly path: string;
   facts(): Promise<RunFacts>;
   sightings(): Promise<SightingFacts[]>;
+  /** When people sit or lie; null where nobody knows yet. */
+  postures(): Promise<PostureFacts | null>;
   notes(): Promise<NoteFacts[]>;
   storeNotes(notes: readonly NoteFacts[]): Promise<NoteFacts[]>;
   /** The key frames of all bodies as plain arrays; null where only their table is there. */
@@ -23,6 +25,7 @@ export interface RunSource {
 export interface EmbeddedRun {
   facts: RunFacts;
   sightings: SightingFacts[];
+  postures: PostureFacts;
   walls: WallsFacts[];
   /** Parquet files by name, base64. */
   tables: Record<string, string>;
@@ -33,8 +36,13 @@ export interface Session {
   sources: RunSource[];
 }
 
+export const SERVER_GONE =
+  "The server no longer answers: start fleet2d view again, and reload the page. What was read before is still shown.";
+
 export async function fetched(url: string, init?: RequestInit): Promise<Response> {
-  const response = await fetch(url, init);
+  const response = await fetch(url, init).catch(() => {
+    throw new Error(SERVER_GONE);
+  });
   if (!response.ok) {
     const problem = (await response.json().catch(() => null)) as Problem | null;
     throw new Error(problem?.message ?? `${url}: ${response.status}`);
@@ -55,6 +63,10 @@ export class ServedRun implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return json(`${this.path}/sightings.json`);
+  }
+
+  postures(): Promise<PostureFacts> {
+    return json(`${this.path}/postures.json`);
   }
 
   notes(): Promise<NoteFacts[]> {
@@ -148,6 +160,10 @@ class HeldRun extends TablesOnly implements RunSource {
 
   sightings(): Promise<SightingFacts[]> {
     return Promise.resolve(this.held.sightings);
+  }
+
+  postures(): Promise<PostureFacts> {
+    return Promise.resolve(this.held.postures);
   }
 
   walls(number: number): Promise<WallsFacts> {

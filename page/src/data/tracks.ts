@@ -81,6 +81,13 @@ export class Track {
     return { x, y, heading, away: this.away[i] === 1 };
   }
 
+  /** Whether the body is at another place at a key frame between two moments than at the first. */
+  movesWithin(fromUs: number, toUs: number): boolean {
+    const corners = this.way(fromUs, toUs);
+    for (let i = 2; i < corners.length; i++) if (corners[i] !== corners[i - 2]) return true;
+    return false;
+  }
+
   /** Corners of the way between two moments, x and y in turn, without stretches away. */
   way(fromUs: number, toUs: number): number[] {
     const corners: number[] = [];

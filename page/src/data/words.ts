@@ -8,6 +8,13 @@ export function title(name: string): string {
   return words.slice(0, 1).toUpperCase() + words.slice(1);
 }
 
+/** Bodies as people write them: with a capital letter, unless two would be written alike. */
+export function bodyLabels(names: readonly string[]): Map<string, string> {
+  const counts = new Map<string, number>();
+  for (const name of names) counts.set(title(name), (counts.get(title(name)) ?? 0) + 1);
+  return new Map(names.map((name) => [name, counts.get(title(name)) === 1 ? title(name) : name]));
+}
+
 /** Rooms as people write them: `bedroom_1` is "Bedroom 1", its number as everywhere, and "Bedroom" where it is the only one. */
 export function roomLabels(rooms: readonly RoomFacts[]): string[] {
   const counts = new Map<string, number>();

@@ -1,8 +1,8 @@
 /** Controls of a running simulation: pause, slow, step, go on, intervene. */
 
-import { useSignal } from "@preact/signals";
 import * as state from "../state";
 import { connected, feeds, status } from "./feed";
+import { Offers } from "./Offers";
 import { calling, order, orderAll, placing } from "./orders";
 
 const SPEEDS: [number, string][] = [
@@ -52,6 +52,7 @@ export function LiveControls() {
         follow
       </label>
       <Interventions />
+      <Offers run={feeds.value[feeds.value.length - 1]!.run} doors={now.doors} />
       <output class="pace" aria-label="Pace">
         {connected.value ? (now.paused || now.done ? "" : `${Math.round(now.achieved).toLocaleString("en")} ×`) : "connection lost"}
       </output>
@@ -94,7 +95,6 @@ function Interventions() {
         <button type="button" onClick={() => void order({ action: "replan", target: name })}>
           Decide anew
         </button>
-        <Configure key={name} name={name} keys={run.body(name)!.keys} />
       </>
     );
   }
@@ -104,51 +104,5 @@ function Interventions() {
     <button type="button" onClick={() => void order({ action: "door", target: name, value: open ? 0 : 1 })}>
       {open ? `Shut ${name}` : `Open ${name}`}
     </button>
-  );
-}
-
-/** Change a key of a behavior: it starts anew with it. */
-function Configure({ name, keys }: { name: string; keys: Record<string, Record<string, unknown>> }) {
-  const chosen = useSignal("");
-  const value = useSignal("");
-  const names = Object.entries(keys).flatMap(([behavior, ofBehavior]) => Object.keys(ofBehavior).map((key) => `${behavior}.${key}`));
-  const present = (path: string): string => {
-    const [behavior = "", key = ""] = path.split(".");
-    const found = keys[behavior]?.[key];
-    return typeof found === "string" ? found : JSON.stringify(found ?? null);
-  };
-  return (
-    <span class="group">
-      <select
-        aria-label={`Key of a behavior of ${name}`}
-        value={chosen.value}
-        onChange={(event) => {
-          chosen.value = event.currentTarget.value;
-          value.value = chosen.value ? present(chosen.value) : "";
-        }}
-      >
-        <option value="">Change …</option>
-        {names.map((path) => (
-          <option key={path} value={path}>
-            {path}
-          </option>
-        ))}
-      </select>
-      {chosen.value && (
-        <>
-          <input
-            aria-label={`Value of ${chosen.value}`}
-            size={10}
-            value={value.value}
-            onInput={(event) => {
-              value.value = event.currentTarget.value;
-            }}
-          />
-          <button type="button" onClick={() => void order({ action: "configure", target: name, key: chosen.value, text: value.value })}>
-            Change
-          </button>
-        </>
-      )}
-    </span>
   );
 }

@@ -40,6 +40,10 @@ class LiveSource extends TablesOnly implements RunSource {
     return Promise.resolve([]);
   }
 
+  postures(): Promise<null> {
+    return Promise.resolve(null);
+  }
+
   walls(number: number): Promise<WallsFacts> {
     if (this.past && number >= PAST_WALLS) return this.past.readWalls(number - PAST_WALLS);
     return json(`${this.path}/walls/${number}.json`);

@@ -3,6 +3,7 @@
 import { batch, signal } from "@preact/signals";
 import type { BranchOrder, LiveOrder, LiveSession, Problem } from "../contract";
 import type { Run } from "../data/run";
+import { SERVER_GONE } from "../data/source";
 import * as state from "../state";
 import { Feed, feedOf, feeds, show } from "./feed";
 
@@ -17,7 +18,11 @@ export const branching = signal(false);
 
 async function post<T>(url: string, content: object): Promise<T | null> {
   const headers = { "Content-Type": "application/json" };
-  const response = await fetch(url, { method: "POST", headers, body: JSON.stringify(content) });
+  const response = await fetch(url, { method: "POST", headers, body: JSON.stringify(content) }).catch(() => null);
+  if (!response) {
+    refusal.value = SERVER_GONE;
+    return null;
+  }
   const answer: unknown = await response.json().catch(() => null);
   refusal.value = response.ok ? "" : ((answer as Problem | null)?.message ?? `refused: ${response.status}`);
   return response.ok ? (answer as T) : null;

@@ -19,7 +19,7 @@ export function BeliefsPanel() {
 function BeliefsOf({ run, title }: { run: Run; title: string }) {
   void run.version.value;
   const names = beliefNames(run);
-  const comparison = comparisonAt(run, state.moment.value);
+  const comparison = comparisonAt(run, state.told.value);
   if (!comparison) return <p class="hint">No algorithm of this run puts out shares per room that sum to 1.</p>;
   const color = bodyColor(run.body(comparison.user)?.color ?? "#0077bb");
   const { believed, truth } = comparison;

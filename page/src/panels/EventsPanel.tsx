@@ -9,7 +9,7 @@ const AFTER = 60;
 export function EventsPanel() {
   const run = state.run.value!;
   const rows = state.foundEvents.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const at = lastAtMost(state.foundTimes.value, us) + 1;
   const visibleRows = rows.slice(Math.max(0, at - BEFORE), at + AFTER);
   return (

@@ -7,6 +7,7 @@ import type { EventRow } from "../data/events";
 import type { Run } from "../data/run";
 import { lastAtMost } from "../data/search";
 import { valueAt } from "../data/stretches";
+import { title } from "../data/words";
 import * as state from "../state";
 import { bodyState } from "./Now";
 import { Terms } from "./Terms";
@@ -15,7 +16,7 @@ const SHOWN_EVENTS = 12;
 
 export function Inspect() {
   const name = state.selected.value;
-  const run = state.run.value!;
+  const run = state.inspected.value!;
   void run.version.value;
   if (!name) return <p class="hint">Choose somebody, a door or a room: click on the plan, or on a name.</p>;
   if (run.body(name)) return <BodyView run={run} name={name} />;
@@ -25,6 +26,16 @@ export function Inspect() {
   return <p class="hint">There is no {name} in this run.</p>;
 }
 
+/** What is inspected, and of two runs in which. */
+function heading(run: Run, words: string): string {
+  return state.runs.value.length > 1 ? `${words} · ${run.facts.title}` : words;
+}
+
+/** The name of a room or a piece of furniture as people write it. */
+function labelOf(run: Run, name: string): string {
+  return run.home.labels[run.home.roomIndex(name)] ?? title(name);
+}
+
 /** The facts that are known. */
 function Facts({ rows }: { rows: [string, string][] }) {
   return <Terms rows={rows.filter(([, value]) => value)} />;
@@ -32,7 +43,7 @@ function Facts({ rows }: { rows: [string, string][] }) {
 
 function BodyView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const body = run.body(name)!;
   const now = bodyState(run, name, us);
   useEffect(() => void run.readDecisions(), [run]);
@@ -56,7 +67,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
   ];
   return (
     <div data-inspected={name}>
-      <h2>{name}</h2>
+      <h2>{heading(run, run.label(name))}</h2>
       <button
         type="button"
         aria-pressed={state.followed.value === name}
@@ -116,10 +127,10 @@ export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]
 
 function DoorView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   return (
     <div data-inspected={name}>
-      <h2>{name}</h2>
+      <h2>{heading(run, run.label(name))}</h2>
       <Facts rows={[["kind", "door"], ["now", run.doorOpen(name, us) ? "open" : "shut"]]} />
       <h3>History</h3>
       <History run={run} rows={run.events.ofEntity(name)} us={us} />
@@ -133,7 +144,7 @@ function FurnitureView({ run, name }: { run: Run; name: string }) {
   const thing = run.facts.home.objects.find((entry) => entry.name === name)!;
   return (
     <div data-inspected={name}>
-      <h2>{name.replaceAll("_", " ")}</h2>
+      <h2>{heading(run, labelOf(run, name))}</h2>
       <Facts rows={[["kind", thing.type.replaceAll("_", " ")], ["blocks", BLOCKS[thing.blocks] ?? thing.blocks]]} />
     </div>
   );
@@ -141,13 +152,13 @@ function FurnitureView({ run, name }: { run: Run; name: string }) {
 
 function RoomView({ run, name }: { run: Run; name: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const index = run.home.roomIndex(name);
   const room = run.facts.home.rooms[index]!;
   const occupants = run.bodies.filter((body) => valueAt(run.roomsOf(body.name), us) === index);
   return (
     <div data-inspected={name}>
-      <h2>{name.replaceAll("_", " ")}</h2>
+      <h2>{heading(run, labelOf(run, name))}</h2>
       <Facts
         rows={[
           ["kind", room.type.replaceAll("_", " ")],

@@ -1,20 +1,10 @@
 /** What the plan shows: switches, and the run's layers of cells. */
 
+import { SWITCH_WORDS } from "../actions";
 import * as state from "../state";
 import { roomColor, scaleColor } from "../theme";
 import { olderWords } from "../plan/older";
 import { Terms } from "./Terms";
-
-const WORDS: Record<state.Switch, string> = {
-  names: "names",
-  furniture: "furniture",
-  ways: "ways behind and ahead",
-  sight: "what is in view",
-  observations: "observations",
-  beliefs: "beliefs",
-  lights: "lights that are off",
-  slows: "slow floors",
-};
 
 export function LayersPanel() {
   const run = state.run.value!;
@@ -26,7 +16,7 @@ export function LayersPanel() {
         {state.SWITCHES.map((name) => (
           <label key={name}>
             <input type="checkbox" name={name} checked={state.shown.value.has(name)} onChange={() => state.toggle(name)} />
-            {WORDS[name]}
+            {SWITCH_WORDS[name]}
           </label>
         ))}
       </fieldset>
@@ -46,7 +36,7 @@ export function LayersPanel() {
           </label>
         ))}
         {layers.length === 0 && <p class="hint">The run stored none; a scenario asks for them under floorplan.layers.</p>}
-        {state.layer.value && <p class="hint">{olderWords(run)}</p>}
+        {state.layer.value && <p class="hint">{olderWords(run, state.told.value)}</p>}
         {state.layer.value && <ScaleBar />}
       </fieldset>
       <Legend />
@@ -59,13 +49,14 @@ const LEGEND: [string, string][] = [
   ["■", "a robot"],
   ["──", "its way of the last five minutes"],
   ["┄┄", "its way of the next two minutes"],
-  ["◔", "what a camera has in view: yellow; further cameras blue, orange"],
+  ["◔", "what a camera has in view: teal; further cameras blue, orange"],
   ["◯", "somebody whom a robot notices"],
   ["⊗", "a false observation, red"],
   ["◌", "where somebody is in the other run, red"],
   ["▒", "a room whose light is off"],
   ["≈", "a floor on which robots are slow, blue"],
   ["┅", "an area that robots keep out of"],
+  ["▨", "where the robot that is selected keeps out"],
 ];
 
 function Legend() {

@@ -4,7 +4,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { numberColumns, readSeries, type Series, thinned } from "../data/metrics";
+import { flat, numberColumns, readSeries, type Series, thinned } from "../data/metrics";
 import type { Run } from "../data/run";
 import * as state from "../state";
 import { bodyColor, colors, PALETTE } from "../theme";
@@ -161,7 +161,7 @@ function Results({ runs }: { runs: readonly Run[] }) {
             <th scope="row">{name}</th>
             {values.map((ofRun, i) => (
               <td key={i} class="number">
-                {asText(ofRun.get(name))}
+                {ofRun.get(name) ?? "–"}
               </td>
             ))}
           </tr>
@@ -173,14 +173,4 @@ function Results({ runs }: { runs: readonly Run[] }) {
 
 function differs(values: readonly unknown[]): boolean {
   return values.some((value) => value !== values[0]);
-}
-
-function asText(value: unknown): string {
-  if (typeof value !== "number") return value === undefined || value === null ? "–" : String(value);
-  return Number.isInteger(value) ? String(value) : value.toPrecision(4);
-}
-
-function flat(value: unknown, name = ""): [string, unknown][] {
-  if (typeof value !== "object" || value === null) return [[name, value]];
-  return Object.entries(value).flatMap(([key, part]) => flat(part, name ? `${name} · ${key}` : key));
 }

@@ -9,8 +9,11 @@ import { lastAtMost } from "../data/search";
 import { TURN } from "../data/tracks";
 import { doing, title } from "../data/words";
 import { Icon } from "../Icon";
+import { playReel } from "../player";
 import * as state from "../state";
 import { bodyColor } from "../theme";
+import { Thumbnail } from "../timeline/Hover";
+import { Differences } from "./Differences";
 import { Tiles } from "./Tiles";
 
 export interface BodyState {
@@ -45,6 +48,7 @@ export function bodyState(run: Run, name: string, us: number): BodyState | null 
 export function Now() {
   return (
     <>
+      <Differences />
       {state.runs.value.map((run, i) => (
         <NowOf key={i} run={run} title={state.runs.value.length > 1 ? run.facts.title : ""} />
       ))}
@@ -54,7 +58,7 @@ export function Now() {
 
 function NowOf({ run, title: heading }: { run: Run; title: string }) {
   void run.version.value;
-  const us = state.moment.value;
+  const us = state.told.value;
   const step = run.clock.stepAt(us);
   return (
     <>
@@ -75,6 +79,7 @@ function NowOf({ run, title: heading }: { run: Run; title: string }) {
           ))}
         </tbody>
       </table>
+      {run.bodies.length === 0 && <p class="hint">Nobody is in this home, neither people nor robots: a scenario names them under users and robots.</p>}
       <Expectations run={run} />
       <Tiles run={run} />
       <Story run={run} />
@@ -91,9 +96,9 @@ function BodyRow({ run, body, us }: { run: Run; body: BodyFacts; us: number }) {
   return (
     <tr data-body={body.name} data-x={now?.x} data-y={now?.y} data-heading={now?.headingDeg} data-room={now?.room} data-away={now?.away}>
       <th scope="row">
-        <button type="button" class="link" onClick={() => state.select(body.name)}>
+        <button type="button" class="link" onClick={() => state.select(body.name, run)}>
           <span class={body.robot ? "chip robot" : "chip"} style={{ background: bodyColor(body.color) }} />
-          {body.name}
+          {run.label(body.name)}
         </button>
       </th>
       <td title={now && !now.away ? `${now.x.toFixed(2)} m, ${now.y.toFixed(2)} m` : ""}>
@@ -144,17 +149,25 @@ function Expectations({ run }: { run: Run }) {
   );
 }
 
-/** Moments that are worth a look. */
+/** Moments that are worth a look, as cards with the home at each; all of them as a reel. */
 function Story({ run }: { run: Run }) {
   const { story } = run.facts;
   if (story.length === 0) return null;
   return (
     <section class="story">
-      <h2>Story</h2>
+      <h2>
+        Story
+        {run === state.run.value && (
+          <button type="button" title="All moments in half a minute (r)" onClick={playReel}>
+            <Icon name="play" size={11} /> Play all
+          </button>
+        )}
+      </h2>
       <ol>
-        {story.map(({ step, title: words, words: about }) => (
+        {story.map(({ step, title: words, words: about, who }) => (
           <li key={words}>
-            <button type="button" class="link" onClick={() => state.goTo(step * run.clock.stepUs)}>
+            <button type="button" class="card" onClick={() => state.goTo(step * run.clock.stepUs)}>
+              <Thumbnail run={run} us={step * run.clock.stepUs} focus={who[0] ?? ""} />
               <b>{words}</b>
               <span>{about}</span>
               <time>{run.clock.text(step * run.clock.stepUs).slice(0, -3)}</time>

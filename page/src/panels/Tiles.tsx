@@ -2,12 +2,12 @@
 
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
+import { DAY_US } from "../data/clock";
 import { numberColumns, readSeries } from "../data/metrics";
 import type { Run } from "../data/run";
 import { lastAtMost } from "../data/search";
 import { timeWithin } from "../timeline/days";
 
-const DAY_US = 86_400e6;
 const MOST_POINTS = 60;
 
 interface Tile {
@@ -29,7 +29,7 @@ export function Tiles({ run }: { run: Run }) {
   const tiles = [seenTile(run), error.value, requestTile(run), searchTile(run)].filter((tile) => tile !== null);
   if (tiles.length === 0) return null;
   return (
-    <section class="tiles" aria-label="The run in numbers">
+    <section class="tiles" aria-label={`${run.facts.title} in numbers`}>
       {tiles.map((tile) => (
         <div key={tile.words} class="tile">
           <span>{tile.words}</span>

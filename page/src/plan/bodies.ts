@@ -5,10 +5,11 @@ import { isFalse } from "../data/observations";
 import type { Run } from "../data/run";
 import { type Pose, TURN } from "../data/tracks";
 import { cameraColors, type Colors, mix } from "../theme";
-import { drawPerson, drawRobot, type Posture } from "./figures";
+import type { Posture } from "./figures";
 import type { Frame } from "./frame";
 import { drawLeaf, tracePolygons } from "./ground";
 import { Pen } from "./pen";
+import { drawFigure } from "./sprites";
 
 type Context = CanvasRenderingContext2D;
 
@@ -28,6 +29,8 @@ export interface Scene {
   shows: (name: string) => boolean;
   /** Where the bodies of the other run are, when two are compared. */
   other: Run | null;
+  /** The least radius of a body [px]; left out: that of the plan. */
+  smallest?: number;
 }
 
 export function angleOf(heading: number): number {
@@ -157,7 +160,8 @@ function drawWay(context: Context, scene: Scene, body: BodyFacts): void {
   context.strokeStyle = body.color;
   context.lineJoin = "round";
   context.lineCap = "round";
-  for (let i = 0; i < FADES; i++) {
+  const begin = Math.max(0, us - BEHIND_US);
+  for (let i = 0; i < FADES && track.movesWithin(begin, us); i++) {
     const from = us - (BEHIND_US * (FADES - i)) / FADES;
     context.globalAlpha = 0.6 * ((i + 1) / FADES);
     context.lineWidth = (body.name === selected ? 4 : 3) * ((i + 2) / (FADES + 1));
@@ -168,7 +172,8 @@ function drawWay(context: Context, scene: Scene, body: BodyFacts): void {
   context.globalAlpha = 0.7;
   context.lineWidth = 1.5;
   context.setLineDash([1, 5]);
-  strokeLine(context, frame, planned ?? track.way(us, Math.min(run.presentUs, us + AHEAD_US)));
+  const end = Math.min(run.presentUs, us + AHEAD_US);
+  if (planned || track.movesWithin(us, end)) strokeLine(context, frame, planned ?? track.way(us, end));
   context.setLineDash([]);
   context.lineCap = "butt";
   context.globalAlpha = 1;
@@ -182,17 +187,34 @@ function strokeLine(context: Context, frame: Frame, corners: readonly number[]):
 
 const SMALLEST_PX = 9;
 
-export function bodyRadius(frame: Frame, body: BodyFacts): number {
-  return Math.max(SMALLEST_PX, body.radius * frame.scale);
+export function bodyRadius(frame: Frame, body: BodyFacts, smallest = SMALLEST_PX): number {
+  return Math.max(smallest, body.radius * frame.scale);
 }
 
-/** Farther than this from a place to use furniture, nobody uses it [m]. */
+/** A figure reaches so far from its middle [radii]: who lies is long. */
+const FIGURE_REACH = 1.35;
+const LYING_REACH = 4;
+
+/** A circle that holds the figure of somebody who is at home [px]; null where nobody is seen. */
+export function figureDisc(scene: Pick<Scene, "run" | "us" | "poses" | "frame" | "smallest">, body: BodyFacts): { x: number; y: number; radius: number } | null {
+  const { run, us, poses, frame } = scene;
+  const pose = poses.get(body.name);
+  if (!pose || pose.away) return null;
+  const use = usePlace(run, body, pose, us);
+  const reach = use?.posture === "lie" ? LYING_REACH : FIGURE_REACH;
+  const [x, y] = use ? [frame.x(use.x), frame.y(use.y)] : [frame.ux(pose.x), frame.uy(pose.y)];
+  return { x, y, radius: reach * bodyRadius(frame, body, scene.smallest) };
+}
+
+/** Farther than this from a place to use furniture, nobody uses it [m]; the same as in `fleet2d.viewing.postures`. */
 const USED_WITHIN_M = 0.16;
 const GLANCE_US = 0.5e6;
 
-/** How somebody is at a moment: who stands still at a chair, a sofa or a bed sits or lies on it. */
+/** The place on which somebody sits or lies at a moment; in a live run, that of who stands still there. */
 function usePlace(run: Run, body: BodyFacts, pose: Pose, us: number): UseFacts | null {
-  if (body.robot || isMoving(run, body, pose, us)) return null;
+  if (body.robot) return null;
+  if (run.postures) return run.postures.at(body.name, us);
+  if (isMoving(run, body, pose, us)) return null;
   const [x, y] = [run.home.metres(pose.x, 0), run.home.metres(pose.y, 1)];
   return run.home.restPlaces.find((use) => Math.hypot(use.x - x, use.y - y) < USED_WITHIN_M) ?? null;
 }
@@ -207,7 +229,7 @@ const STEP_MS = 170;
 
 function drawBody(context: Context, scene: Scene, body: BodyFacts, pose: Pose): void {
   const { run, us, frame, colors, selected } = scene;
-  const radius = bodyRadius(frame, body);
+  const radius = bodyRadius(frame, body, scene.smallest);
   const { color } = body;
   const use = usePlace(run, body, pose, us);
   const x = use ? frame.x(use.x) : frame.ux(pose.x);
@@ -222,16 +244,10 @@ function drawBody(context: Context, scene: Scene, body: BodyFacts, pose: Pose): 
     context.lineWidth = 2;
     context.stroke();
   }
-  const size = radius / frame.scale;
-  const step = scene.steps && isMoving(run, body, pose, us) ? Math.sin(performance.now() / STEP_MS) : 0;
-  context.save();
-  context.translate(x, y);
-  context.scale(frame.scale, -frame.scale);
-  context.rotate(heading);
-  const edge = 2 / frame.scale;
-  if (body.robot) drawRobot(context, { color, radius: size, step }, null, edge);
-  else drawPerson(context, { color, radius: 1.1 * size, step }, (use?.posture ?? "stand") as Posture, edge);
-  context.restore();
+  const walks = scene.steps && !body.robot && isMoving(run, body, pose, us);
+  const step = walks ? Math.sin(performance.now() / STEP_MS) : 0;
+  const posture = body.robot ? null : ((use?.posture ?? "stand") as Posture);
+  drawFigure(context, { x, y, heading, radius, color, step, posture });
 }
 
 function drawName(context: Context, colors: Colors, name: string, color: string, x: number, y: number): void {

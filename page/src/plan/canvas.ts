@@ -6,10 +6,31 @@ export interface Surface {
   height: number;
 }
 
+/** Sizes of boxes that are watched: to read one in each frame would have the browser lay the page out each time. */
+const sizes = new WeakMap<Element, readonly [width: number, height: number]>();
+
+/** Watch the sizes of boxes, and call `changed` when they are known and whenever they change; return what stops it. */
+export function watchSizes(boxes: readonly Element[], changed: () => void): () => void {
+  const observer = new ResizeObserver((entries) => {
+    for (const { target, contentRect } of entries) sizes.set(target, [contentRect.width, contentRect.height]);
+    changed();
+  });
+  boxes.forEach((box) => observer.observe(box));
+  return () => {
+    observer.disconnect();
+    boxes.forEach((box) => sizes.delete(box));
+  };
+}
+
+/** The size of a box without its border [CSS pixels]. */
+export function sizeOf(box: Element): readonly [width: number, height: number] {
+  return sizes.get(box) ?? [box.clientWidth, box.clientHeight];
+}
+
 /** Fit a canvas to its box; return its size in CSS pixels. */
 export function fitted(canvas: HTMLCanvasElement): Surface {
   const ratio = window.devicePixelRatio || 1;
-  const { clientWidth: width, clientHeight: height } = canvas;
+  const [width, height] = sizeOf(canvas);
   const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
   if (canvas.width !== w || canvas.height !== h) {
     canvas.width = w;

@@ -1,4 +1,4 @@
-/** People and robots as figures, seen from above, in metres: x is where they look. */
+/** People and robots as figures, seen from above: x is where they look, all lengths follow from the radius. */
 
 import { mix } from "../theme";
 import { Pen } from "./pen";
@@ -6,7 +6,7 @@ import { Pen } from "./pen";
 type Context = CanvasRenderingContext2D;
 export type Posture = "stand" | "sit" | "lie";
 
-/** How somebody is drawn: the radius of the body [m], and where a step is, from -1 to 1. */
+/** How somebody is drawn: the radius of the body, and where a step is, from -1 to 1. */
 export interface Look {
   color: string;
   radius: number;
@@ -24,13 +24,13 @@ export function drawPerson(context: Context, look: Look, posture: Posture, edge:
   const { color, radius: r, step } = look;
   const leg = mix(color, "#20242c", 0.62);
   const arm = mix(color, "#fff0e0", 0.27);
-  pen.ellipse(0.03, -0.04, r * 1.05, r * 1.15, "rgba(30, 22, 10, 0.22)");
+  pen.ellipse(r * 0.14, -r * 0.18, r * 1.05, r * 1.15, "rgba(30, 22, 10, 0.22)");
   for (const side of [1, -1]) {
     if (posture === "sit") {
       limb(pen, 0, side * r * 0.4, r * 1.5, side * r * 0.42, r * 0.42, leg);
       limb(pen, r * 0.1, side * r * 0.9, r * 0.95, side * r * 0.6, r * 0.3, arm);
     } else {
-      pen.ellipse(side * step * r * 0.95 + 0.02, side * r * 0.42, r * 0.48, r * 0.24, leg);
+      pen.ellipse(side * step * r * 0.95 + r * 0.1, side * r * 0.42, r * 0.48, r * 0.24, leg);
       limb(pen, 0, side * r * 0.88, -side * step * r * 0.85 + r * 0.15, side * r * 0.98, r * 0.32, arm);
     }
   }
@@ -62,7 +62,7 @@ function drawSleeper(pen: Pen, { color, radius: r }: Look): void {
 /** A robot, its charge as a ring, where that is known. */
 export function drawRobot(context: Context, { color, radius: r }: Look, charge: number | null, edge: number): void {
   const pen = new Pen(context);
-  pen.disc(0.03, -0.05, r * 1.12, "rgba(20, 20, 20, 0.25)");
+  pen.disc(r * 0.16, -r * 0.26, r * 1.12, "rgba(20, 20, 20, 0.25)");
   pen.disc(0, 0, r * 1.36, "rgba(255, 255, 255, 0.45)");
   context.lineWidth = r * 0.2;
   pen.disc(0, 0, r * 1.26, null, "rgba(20, 40, 45, 0.22)");

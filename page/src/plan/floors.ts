@@ -1,33 +1,24 @@
 /** Floors of rooms: what they are made of follows from the type of the room. Drawn in metres. */
 
+import { LOOK } from "../contract";
 import type { Home } from "../data/home";
 import { mix } from "../theme";
 
 type Context = CanvasRenderingContext2D;
 type Box = readonly [left: number, bottom: number, right: number, top: number];
 
-const WOOD = ["#e8d3b3", "#e5cfae", "#ebd8ba", "#e2caa6"];
-const CARPET = ["#dcdde8", "#e3dce0", "#dbe2e2"];
-/** Colour and pitch of tiles [m]. */
-const TILES: Record<string, readonly [string, number]> = {
-  kitchen: ["#eeeae2", 0.6],
-  bathroom: ["#dce9ea", 0.3],
-  toilet: ["#dce9ea", 0.3],
-  laundry: ["#dce9ea", 0.3],
-  entryway: ["#dfdbd3", 0.75],
-  lobby: ["#dfdbd3", 0.75],
-  storage: ["#dfdbd3", 0.75],
-  boiler_room: ["#dfdbd3", 0.75],
-  garage: ["#d6d7d6", 1.2],
-  balcony: ["#d5dccb", 0.5],
-  loggia: ["#d5dccb", 0.5],
-  terrace: ["#d5dccb", 0.5],
-};
-const CARPETED = new Set(["bedroom", "child_room", "guest_room", "wardrobe"]);
-const PLANK_M = 0.19;
-const JOINT_M = 0.012;
+const { pitch: PLANK_M, joint: JOINT_M, colors: WOOD } = LOOK.planks;
+const CARPET = LOOK.carpet.colors;
+const CARPETED: ReadonlySet<string> = new Set(LOOK.carpet.rooms);
+const TILES: Record<string, { color: string; pitch: number } | undefined> = LOOK.tiles;
 /** In homes larger than this, floors are plain [m²]: their pattern would be finer than a pixel. */
 const MOST_PATTERNED_M2 = 2500;
+
+/** Where planks are narrower than this, floors are plain [px]. */
+const LEAST_PX = 2;
+/** Dots of carpets, which aren't drawn where they are smaller than a pixel. */
+const DOT_M = 0.025;
+const DOTS_PER_M2 = 200;
 
 /** Numbers from 0 to 1 that are the same for the same seed, so that a floor looks the same each time. */
 function drawsOf(seed: number): () => number {
@@ -40,16 +31,18 @@ function drawsOf(seed: number): () => number {
 
 export function drawFloors(context: Context, home: Home): void {
   const { rooms, area_m2: area } = home.facts;
-  const isPlain = area > MOST_PATTERNED_M2;
+  const scale = context.getTransform().a;
+  const isPlain = area > MOST_PATTERNED_M2 || PLANK_M * scale < LEAST_PX;
   rooms.forEach((room, i) => {
     const floor = home.floors[i]!;
     context.save();
     context.clip(floor.path);
     const seed = floor.box[0] * 100 + floor.box[1] * 10;
     const tiles = TILES[room.type];
-    if (isPlain) fill(context, floor.box, tiles?.[0] ?? (CARPETED.has(room.type) ? CARPET[i % 3]! : WOOD[0]!));
-    else if (tiles) drawTiles(context, floor.box, ...tiles, drawsOf(seed + 5));
-    else if (CARPETED.has(room.type)) drawCarpet(context, floor.box, CARPET[i % CARPET.length]!, drawsOf(seed + 9));
+    if (room.type === "unknown") fill(context, floor.box, LOOK.unknown);
+    else if (isPlain) fill(context, floor.box, tiles?.color ?? (CARPETED.has(room.type) ? CARPET[i % CARPET.length]! : WOOD[0]!));
+    else if (tiles) drawTiles(context, floor.box, tiles.color, tiles.pitch, drawsOf(seed + 5));
+    else if (CARPETED.has(room.type)) drawCarpet(context, floor.box, CARPET[i % CARPET.length]!, DOT_M * scale < 1 ? 0 : DOTS_PER_M2, drawsOf(seed + 9));
     else drawPlanks(context, floor.box, drawsOf(seed + 3));
     context.restore();
   });
@@ -78,13 +71,13 @@ function drawPlanks(context: Context, box: Box, draw: () => number): void {
   }
 }
 
-function drawCarpet(context: Context, box: Box, color: string, draw: () => number): void {
+function drawCarpet(context: Context, box: Box, color: string, dotsPerM2: number, draw: () => number): void {
   const [left, bottom, right, top] = box;
   fill(context, box, color);
-  const dots = (right - left) * (top - bottom) * 200;
+  const dots = (right - left) * (top - bottom) * dotsPerM2;
   for (let i = 0; i < dots; i++) {
     context.fillStyle = draw() > 0.5 ? "#ffffff55" : "#5b5f8a16";
-    context.fillRect(left + draw() * (right - left), bottom + draw() * (top - bottom), 0.025, 0.025);
+    context.fillRect(left + draw() * (right - left), bottom + draw() * (top - bottom), DOT_M, DOT_M);
   }
 }
 

@@ -1,6 +1,6 @@
 /** What of the plan stands still: floors, furniture, doors, walls. Drawn once for each size. */
 
-import type { DoorwayFacts } from "../contract";
+import { type DoorwayFacts, LOOK, type ObjectFacts } from "../contract";
 import type { Home } from "../data/home";
 import type { Colors } from "../theme";
 import { drawFloors } from "./floors";
@@ -8,14 +8,10 @@ import type { Frame } from "./frame";
 import { drawPiece } from "./furniture";
 import { Pen } from "./pen";
 
-export const WALL_M = 0.15;
+export const WALL_M = LOOK.walls.thickness;
 /** How far the tops of walls are drawn above the floor, as if one looked at the home a little from the south [m]. */
-export const LIFT_M = 0.17;
-const WALL_TOP = "#fcfbf8";
-const WALL_FACE = "#bdb4a6";
-const WALL_EDGE = "#a79e90";
-const WALL_SHADOW = "rgba(60, 45, 25, 0.42)";
-const DOOR = "#a9783f";
+export const LIFT_M = LOOK.walls.lift;
+const { top: WALL_TOP, face: WALL_FACE, edge: WALL_EDGE, shadow: WALL_SHADOW } = LOOK.walls;
 
 type Context = CanvasRenderingContext2D;
 
@@ -58,7 +54,7 @@ class Outlines {
 }
 
 /** Draw a home at the size of a canvas, whose pixels are `ratio` times as many as those of the screen. */
-export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, ratio: number, colors: Colors, withFurniture: boolean): void {
+export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, ratio: number, colors: Colors, objects: readonly ObjectFacts[]): void {
   const context = canvas.getContext("2d")!;
   const scale = frame.scale * ratio;
   const outlines = new Outlines(home);
@@ -77,7 +73,7 @@ export function drawGround(canvas: HTMLCanvasElement, home: Home, frame: Frame, 
   context.save();
   context.clip(outlines.free, "evenodd");
   drawFloors(context, home);
-  if (withFurniture) home.facts.objects.forEach((thing) => drawPiece(context, thing, scale));
+  objects.forEach((thing) => drawPiece(context, thing, home.facts.symbols, scale));
   context.restore();
   const pen = new Pen(context);
   const movable = new Set(home.facts.doors.map((door) => String([door.start, door.end])));
@@ -119,7 +115,7 @@ export function drawLeaf(pen: Pen, width: number): void {
   context.setLineDash([0.07, 0.06]);
   context.stroke();
   context.setLineDash([]);
-  pen.box(-0.028, 0, 0.028, width, DOOR, 0.02);
+  pen.box(-0.028, 0, 0.028, width, LOOK.door, 0.02);
   pen.disc(0, Math.max(0, width - 0.1), 0.03, "#ebd9b6");
 }
 

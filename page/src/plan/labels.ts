@@ -45,24 +45,36 @@ export class Labels {
     this.last = home.facts.rooms.map(() => 0);
   }
 
-  /** Write the names, each at the first of its places that no body covers; return their boxes. */
-  draw(context: Context, bodies: readonly Disc[], color: (room: number) => string): Box[] {
-    context.textAlign = "center";
-    context.textBaseline = "middle";
+  /** Choose for each name the first of its places that no body covers, if there is one; return their boxes. */
+  place(bodies: readonly Disc[]): Box[] {
     const boxes: Box[] = [];
     this.spots.forEach((spots, room) => {
       const isFree = (spot: Spot): boolean => bodies.every((body) => !covers(body, spot));
       const at = this.last[room]!;
       const best = spots[at] && isFree(spots[at]) ? at : spots.findIndex(isFree);
-      const spot = spots[best];
-      if (!spot) return;
       this.last[room] = best;
+      const spot = spots[best];
+      if (spot) boxes.push([spot.x - spot.wide / 2, spot.y - spot.tall / 2, spot.x + spot.wide / 2, spot.y + spot.tall / 2]);
+    });
+    return boxes;
+  }
+
+  /** What the places that were chosen last depend on. */
+  get key(): string {
+    return this.last.join();
+  }
+
+  /** Write the names at the places that were chosen last. */
+  write(context: Context, color: (room: number) => string): void {
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    this.spots.forEach((spots, room) => {
+      const spot = spots[this.last[room]!];
+      if (!spot) return;
       context.font = `600 ${spot.size}px ${FONT}`;
       context.fillStyle = color(room);
       spot.lines.forEach((line, i) => context.fillText(line, spot.x, spot.y + (i - (spot.lines.length - 1) / 2) * spot.size * 1.16));
-      boxes.push([spot.x - spot.wide / 2, spot.y - spot.tall / 2, spot.x + spot.wide / 2, spot.y + spot.tall / 2]);
     });
-    return boxes;
   }
 }
 

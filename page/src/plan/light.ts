@@ -2,8 +2,7 @@
 
 import type { Home } from "../data/home";
 import type { Run } from "../data/run";
-import { AWAY } from "../data/rooms";
-import { valueAt } from "../data/stretches";
+import { AWAY, roomOf } from "../data/rooms";
 import { mix } from "../theme";
 import type { Frame } from "./frame";
 import { LIFT_M, WALL_M } from "./ground";
@@ -38,29 +37,46 @@ export function litRooms(run: Run, us: number): ReadonlySet<number> {
   const lit = new Set<number>();
   for (const body of run.bodies) {
     if (body.robot || run.events.last(body.name, "activity", us)?.detail === "sleep") continue;
-    const room = valueAt(run.roomsOf(body.name), us) ?? AWAY;
+    const track = run.tracks.get(body.name);
+    const room = track && !track.empty ? roomOf(track, run.home, us) : AWAY;
     if (room !== AWAY) lit.add(room);
   }
   return lit;
+}
+
+/** How dark and how red a home is, and which rooms are lit. */
+interface Lighting {
+  shade: number;
+  glow: number;
+  lit: ReadonlySet<number>;
+}
+
+function lightingAt(run: Run, us: number): Lighting {
+  const { day, dusk } = skyAt(run, us);
+  const dark = Math.round(20 * (1 - day)) / 20;
+  const lit = run.hasLights || dark > 0.05 ? litRooms(run, us) : new Set<number>();
+  return { shade: run.hasLights ? Math.max(dark, UNLIT_BY_DAY) : dark, glow: Math.round(10 * dusk) / 10, lit };
 }
 
 /** Draws a ground in its light, anew only when that changes. */
 export class Light {
   private readonly composed = document.createElement("canvas");
   private readonly veil = document.createElement("canvas");
-  private key = "";
+  private drawn = "";
+
+  /** What the light of a moment depends on. */
+  key(run: Run, us: number): string {
+    const { shade, glow, lit } = lightingAt(run, us);
+    return [shade, glow, ...lit].join();
+  }
 
   /** The ground in the light of a moment; `groundKey` says what is on it. */
   of(ground: HTMLCanvasElement, groundKey: string, run: Run, us: number, frame: Frame, ratio: number): HTMLCanvasElement {
-    const { day, dusk } = skyAt(run, us);
-    const dark = Math.round(20 * (1 - day)) / 20;
-    const lit = run.hasLights || dark > 0.05 ? litRooms(run, us) : new Set<number>();
-    const shade = run.hasLights ? Math.max(dark, UNLIT_BY_DAY) : dark;
-    if (shade === 0 && dusk < 0.05) return ground;
-    const glow = Math.round(10 * dusk) / 10;
+    const { shade, glow, lit } = lightingAt(run, us);
+    if (shade === 0 && glow === 0) return ground;
     const key = [groundKey, shade, glow, ...lit].join();
-    if (key !== this.key) {
-      this.key = key;
+    if (key !== this.drawn) {
+      this.drawn = key;
       this.compose(ground, run.home, lit, shade, glow, frame, ratio);
     }
     return this.composed;

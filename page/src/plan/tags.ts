@@ -1,11 +1,10 @@
-/** Who is who: a pill beside each body with its name, and what is said. */
+/** Who is who: a pill beside each body with its name. Bodies on one spot share one: "Ana +9". */
 
 import type { BodyFacts } from "../contract";
 import type { Run } from "../data/run";
 import type { Pose } from "../data/tracks";
-import { title } from "../data/words";
 import { mix } from "../theme";
-import { bodyRadius } from "./bodies";
+import { bodyRadius, figureDisc } from "./bodies";
 import type { Frame } from "./frame";
 import { type Box, overlap } from "./labels";
 
@@ -13,42 +12,106 @@ type Context = CanvasRenderingContext2D;
 
 const FONT = "600 11.5px system-ui, sans-serif";
 const TALL = 20;
+/** Room around a pill for its shadow [px]. */
+const SOFT = 8;
+/** Bodies nearer to each other than this share of a radius are on one spot. */
+const TOGETHER = 0.8;
+const EDGE = 2;
 
-export function drawTags(
-  context: Context,
-  run: Run,
-  poses: ReadonlyMap<string, Pose>,
-  frame: Frame,
-  names: readonly Box[],
-  width: number,
-  height: number,
-): void {
-  const taken: Box[] = [...names];
-  const present: [BodyFacts, number, number, number][] = [];
-  for (const body of run.bodies) {
-    const pose = poses.get(body.name);
-    if (!pose || pose.away) continue;
-    const [x, y, radius] = [frame.ux(pose.x), frame.uy(pose.y), 1.35 * bodyRadius(frame, body)];
-    present.push([body, x, y, radius]);
-    taken.push([x - radius, y - radius, x + radius, y + radius]);
+export interface TagScene {
+  run: Run;
+  us: number;
+  poses: ReadonlyMap<string, Pose>;
+  frame: Frame;
+  /** The boxes of the names of rooms. */
+  names: readonly Box[];
+  width: number;
+  height: number;
+  selected: string;
+}
+
+/** Bodies on one spot [px]; the first one names it. */
+interface Stack {
+  bodies: BodyFacts[];
+  x: number;
+  y: number;
+  radius: number;
+}
+
+export class Tags {
+  /** Pills that were drawn before: their shadows are costly. */
+  private readonly pills = new Map<string, HTMLCanvasElement>();
+  private readonly widths = new Map<string, number>();
+  /** Which of its places each tag had last: it stays there while that is free. */
+  private readonly last = new Map<string, number>();
+
+  /** Draw a tag for each body for which there is a place; return how many bodies have none. */
+  draw(context: Context, scene: TagScene): number {
+    let hidden = 0;
+    for (const { box, stack, words } of this.placed(context, scene)) {
+      if (box) this.drawPill(context, box, words, stack.bodies[0]!.color);
+      else hidden += stack.bodies.length;
+    }
+    return hidden;
   }
-  context.font = FONT;
-  context.textBaseline = "middle";
-  context.textAlign = "left";
-  for (const [body, x, y, radius] of present) {
-    const words = title(body.name);
-    const wide = context.measureText(words).width + 14;
+
+  /** The box of each tag that covers neither a body nor another tag or name; null where there is none. */
+  placed(context: Context, scene: TagScene): { stack: Stack; words: string; box: Box | null }[] {
+    const stacks = stacksOf(scene);
+    const taken: Box[] = [...scene.names];
+    for (const { x, y, radius } of stacks) taken.push([x - radius, y - radius, x + radius, y + radius]);
+    const { width, height } = scene;
     const isFree = (box: Box): boolean =>
-      box[0] > 2 && box[1] > 2 && box[2] < width - 2 && box[3] < height - 2 && !taken.some((other) => overlap(box, other));
-    const places = placesBeside(x, y, radius, wide);
-    const box = places.find(isFree) ?? places[0]!;
-    taken.push(box);
-    drawPill(context, box, words, body.color);
+      box[0] > EDGE && box[1] > EDGE && box[2] < width - EDGE && box[3] < height - EDGE && !taken.some((other) => overlap(box, other));
+    return stacks.map((stack) => {
+      const name = stack.bodies[0]!.name;
+      const words = stack.bodies.length > 1 ? `${scene.run.label(name)} +${stack.bodies.length - 1}` : scene.run.label(name);
+      const places = placesBeside(stack, this.width(context, words));
+      const before = this.last.get(name) ?? 0;
+      const at = isFree(places[before]!) ? before : places.findIndex(isFree);
+      if (at < 0) return { stack, words, box: null };
+      this.last.set(name, at);
+      const box = places[at]!;
+      taken.push(box);
+      return { stack, words, box };
+    });
+  }
+
+  private width(context: Context, words: string): number {
+    let width = this.widths.get(words);
+    if (width === undefined) {
+      context.font = FONT;
+      this.widths.set(words, (width = Math.ceil(context.measureText(words).width) + 14));
+    }
+    return width;
+  }
+
+  private drawPill(context: Context, [left, top, right]: Box, words: string, color: string): void {
+    const ratio = window.devicePixelRatio || 1;
+    const key = `${words} ${color} ${ratio}`;
+    let pill = this.pills.get(key);
+    if (!pill) this.pills.set(key, (pill = pillOf(words, color, right - left, ratio)));
+    context.drawImage(pill, Math.round(left) - SOFT, Math.round(top) - SOFT, pill.width / ratio, pill.height / ratio);
   }
 }
 
-/** Above, below, right, left, and further above. */
-function placesBeside(x: number, y: number, radius: number, wide: number): Box[] {
+/** Where bodies are, those on one spot together: who is selected first, then robots, then people. */
+function stacksOf(scene: TagScene): Stack[] {
+  const { run, selected } = scene;
+  const rank = (body: BodyFacts): number => (body.name === selected ? 0 : body.robot ? 1 : 2);
+  const stacks: Stack[] = [];
+  for (const body of [...run.bodies].sort((one, other) => rank(one) - rank(other))) {
+    const disc = figureDisc(scene, body);
+    if (!disc) continue;
+    const near = stacks.find(({ x, y }) => Math.hypot(x - disc.x, y - disc.y) < TOGETHER * bodyRadius(scene.frame, body));
+    if (near) near.bodies.push(body);
+    else stacks.push({ bodies: [body], ...disc });
+  }
+  return stacks;
+}
+
+/** Above, below, right, left, further above and below, and at the corners. */
+function placesBeside({ x, y, radius }: Stack, wide: number): Box[] {
   const at = (left: number, top: number): Box => [left, top, left + wide, top + TALL];
   return [
     at(x - wide / 2, y - radius - TALL - 2),
@@ -57,19 +120,31 @@ function placesBeside(x: number, y: number, radius: number, wide: number): Box[]
     at(x - radius - 3 - wide, y - TALL / 2),
     at(x - wide / 2, y - radius - 2 * TALL - 4),
     at(x - wide / 2, y + radius + TALL + 4),
+    at(x + 2, y - radius - TALL - 2),
+    at(x - wide - 2, y - radius - TALL - 2),
+    at(x + 2, y + radius + 2),
+    at(x - wide - 2, y + radius + 2),
   ];
 }
 
-function drawPill(context: Context, [left, top, right, bottom]: Box, words: string, color: string): void {
+function pillOf(words: string, color: string, wide: number, ratio: number): HTMLCanvasElement {
+  const canvas = document.createElement("canvas");
+  canvas.width = Math.ceil((wide + 2 * SOFT) * ratio);
+  canvas.height = Math.ceil((TALL + 2 * SOFT) * ratio);
+  const context = canvas.getContext("2d")!;
+  context.scale(ratio, ratio);
   context.save();
   context.shadowColor = "rgba(20, 20, 30, 0.28)";
-  context.shadowBlur = 5;
-  context.shadowOffsetY = 1.5;
+  context.shadowBlur = 5 * ratio;
+  context.shadowOffsetY = 1.5 * ratio;
   context.beginPath();
-  context.roundRect(left, top, right - left, bottom - top, TALL / 2);
+  context.roundRect(SOFT, SOFT, wide, TALL, TALL / 2);
   context.fillStyle = mix(color, "#000000", 0.08);
   context.fill();
   context.restore();
+  context.font = FONT;
+  context.textBaseline = "middle";
   context.fillStyle = "#ffffff";
-  context.fillText(words, left + 7, (top + bottom) / 2 + 0.5);
+  context.fillText(words, SOFT + 7, SOFT + TALL / 2 + 0.5);
+  return canvas;
 }

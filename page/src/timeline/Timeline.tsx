@@ -5,10 +5,12 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { durationText } from "../data/clock";
 import type { Run } from "../data/run";
 import { timeByWord } from "../data/stretches";
-import { fitted, oncePerFrame } from "../plan/canvas";
+import { fitted, oncePerFrame, sizeOf, watchSizes } from "../plan/canvas";
 import * as state from "../state";
 import { colors } from "../theme";
-import { drawCursor, drawMarked, drawRows, heightOf, type PlacedRow, visibleRows, xOf } from "./draw";
+import { momentSlider } from "../Transport";
+import { drawMarked, drawRows, heightOf, type PlacedRow, visibleRows, xOf } from "./draw";
+import { type Hovered, Hover } from "./Hover";
 import { answerLane, beliefLanes, type Lane, lanesOf, noteLane, tableLanes } from "./lanes";
 import { followPointer, scaleOf } from "./pointer";
 import * as shown from "./rows";
@@ -63,57 +65,54 @@ export function Timeline() {
   const scroller = useRef<HTMLElement>(null);
   const box = useRef<HTMLDivElement>(null);
   const base = useRef<HTMLCanvasElement>(null);
-  const top = useRef<HTMLCanvasElement>(null);
+  const cursor = useRef<HTMLSpanElement>(null);
   const view = useSignal({ scrolled: 0, height: 0 });
-  const hover = useSignal<{ words: string; x: number; y: number } | null>(null);
+  const hover = useSignal<Hovered | null>(null);
   const lanes = useLanes();
   const rows = useMemo(() => computed(() => shown.rowsOf(lanes.value)), []);
   const visible = useMemo(() => computed(() => visibleRows(rows.value, view.value.scrolled, view.value.height)), []);
   const clock = state.run.value!.clock;
   useEffect(() => {
+    const [drawn, line, around] = [base.current!, cursor.current!, scroller.current!];
     const paintRows = oncePerFrame(() => {
-      const { context, width, height } = fitted(base.current!);
+      const { context, width, height } = fitted(drawn);
       context.clearRect(0, 0, width, height);
       drawRows(context, visible.value, scaleOf(width), clock, colors.value, height);
-    });
-    const paintCursor = oncePerFrame(() => {
-      const { context, width, height } = fitted(top.current!);
-      context.clearRect(0, 0, width, height);
       if (state.marked.value) drawMarked(context, scaleOf(width), state.marked.value, height, colors.value);
-      const x = xOf(scaleOf(width), state.moment.value);
-      drawCursor(context, x, height, clock.timeText(state.moment.value), width, colors.value);
     });
+    const moveCursor = (): void => {
+      const [width] = sizeOf(drawn);
+      const x = xOf(scaleOf(width), state.moment.value);
+      line.style.transform = `translateX(${x.toFixed(1)}px)`;
+      line.dataset.side = x < 30 ? "right" : x > width - 30 ? "left" : "";
+      line.hidden = x < -1 || x > width + 1;
+    };
     const measure = (): void => {
-      const { scrollTop: scrolled, clientHeight: height } = scroller.current!;
+      const { scrollTop: scrolled, clientHeight: height } = around;
       if (scrolled !== view.value.scrolled || height !== view.value.height) view.value = { scrolled, height };
       paintRows();
-      paintCursor();
+      moveCursor();
     };
     const stops = [
       effect(() => {
-        void [state.range.value, visible.value, colors.value, state.endUs.value];
+        void [state.range.value, state.marked.value, visible.value, colors.value, state.endUs.value];
         paintRows();
       }),
-      effect(() => {
-        void [state.range.value, state.moment.value, state.marked.value, visible.value, colors.value];
-        paintCursor();
-      }),
+      effect(moveCursor),
       followPointer({
         box: box.current!,
         rows: () => visible.value,
         hover: (row, us, x, y) => {
           const words = row?.lane?.words(us);
-          hover.value = words ? { words: `${row!.label}: ${words} · ${clock.text(us)}`, x, y } : null;
+          hover.value = words ? { words: `${row!.label}: ${words} · ${clock.text(us)}`, us, x, y } : null;
         },
       }),
     ];
-    const observer = new ResizeObserver(measure);
-    observer.observe(box.current!);
-    observer.observe(scroller.current!);
-    scroller.current!.addEventListener("scroll", measure, { passive: true });
+    const unwatch = watchSizes([box.current!, drawn, around], measure);
+    around.addEventListener("scroll", measure, { passive: true });
     return () => {
-      observer.disconnect();
-      scroller.current?.removeEventListener("scroll", measure);
+      unwatch();
+      around.removeEventListener("scroll", measure);
       stops.forEach((stop) => stop());
     };
   }, []);
@@ -124,21 +123,12 @@ export function Timeline() {
         <div
           ref={box}
           class="lanes"
-          role="slider"
-          tabIndex={0}
-          aria-label="Moment"
-          aria-valuemin={0}
-          aria-valuemax={clock.steps - 1}
-          aria-valuenow={clock.stepAt(state.moment.value)}
-          aria-valuetext={clock.text(state.moment.value)}
+          {...momentSlider("Moment")}
         >
           <canvas ref={base} aria-hidden="true" />
-          <canvas ref={top} aria-hidden="true" />
-          {hover.value && (
-            <output class="hover" aria-live="off" style={{ left: `${hover.value.x}px`, top: `${hover.value.y}px` }} data-side={hover.value.x > 500 ? "left" : "right"}>
-              {hover.value.words}
-            </output>
-          )}
+          <span ref={cursor} class="cursor" aria-hidden="true">
+            <CursorTime />
+          </span>
         </div>
         <div class="labels">
           <div class="corner">
@@ -150,8 +140,13 @@ export function Timeline() {
         </div>
         <div class="spacer" />
       </section>
+      <Hover run={state.run.value!} at={hover.value} />
     </>
   );
+}
+
+function CursorTime() {
+  return <b>{state.run.value!.clock.timeText(state.told.value)}</b>;
 }
 
 function Label({ row }: { row: PlacedRow }) {

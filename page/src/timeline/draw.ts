@@ -1,6 +1,6 @@
 /** Draw lanes, the axis of dates and times, and the cursor of a timeline. */
 
-import type { Clock } from "../data/clock";
+import { type Clock, DAY_US } from "../data/clock";
 import { firstAtLeast, lastAtMost } from "../data/search";
 import { type Colors } from "../theme";
 import type { LanePaint } from "./lanes";
@@ -238,7 +238,7 @@ function drawAxis(context: Context, scale: Scale, clock: Clock, colors: Colors):
 
 /** Tint the nights of a view of at most some weeks. */
 function shadeNights(context: Context, scale: Scale, clock: Clock, colors: Colors, height: number): void {
-  if (scale.to - scale.from > 45 * 86_400e6) return;
+  if (scale.to - scale.from > 45 * DAY_US) return;
   context.fillStyle = colors.panel;
   for (let day = clock.day(scale.from); clock.dayStart(day) < scale.to; day++) {
     const midnight = clock.dayStart(day);
@@ -254,19 +254,4 @@ export function drawMarked(context: Context, scale: Scale, marked: readonly [num
   context.globalAlpha = 0.15;
   context.fillRect(left, AXIS_HEIGHT - GAP, right - left, height);
   context.globalAlpha = 1;
-}
-
-export function drawCursor(context: Context, x: number, height: number, words: string, width: number, colors: Colors): void {
-  context.fillStyle = colors.cursor;
-  context.fillRect(Math.round(x) - 1, 14, 2, height);
-  context.font = "600 11px system-ui, sans-serif";
-  const wide = context.measureText(words).width + 10;
-  const left = Math.max(0, Math.min(width - wide, x - wide / 2));
-  context.beginPath();
-  context.roundRect(left, 0, wide, 16, 4);
-  context.fill();
-  context.fillStyle = colors.ground;
-  context.textAlign = "left";
-  context.textBaseline = "middle";
-  context.fillText(words, left + 5, 8.5);
 }

@@ -12,7 +12,7 @@ const CLICK = 3;
 export interface PointerView {
   box: HTMLElement;
   rows: () => readonly PlacedRow[];
-  /** What is under the pointer, and where it is. */
+  /** What is under the pointer, and where that is in the window. */
   hover: (row: PlacedRow | null, us: number, x: number, y: number) => void;
 }
 
@@ -70,7 +70,7 @@ export function followPointer({ box, rows, hover }: PointerView): () => void {
       state.pan(((lastX - x) / box.clientWidth) * (to - from));
       lastX = x;
     }
-    hover(rowAt(rows(), y), us, x, y);
+    hover(rowAt(rows(), y), us, event.clientX, event.clientY);
   };
   const pinch = (pointer: number, x: number): void => {
     const other = [...fingers].find(([id]) => id !== pointer)![1];

@@ -81,15 +81,31 @@ class UseFacts(TypedDict):
     posture: str
 
 
-class ObjectFacts(TypedDict):
-    """A piece of furniture: its outline [m], the direction of its front [rad], its uses.
+class ShapeFacts(TypedDict):
+    """A shape of a symbol [m]: left, bottom, right and top of a box or an ellipse, ends of a line.
 
-    `blocks` says whether it is in the way of nothing, paths or sight.
+    Boxes have corners of a `radius`. Colours are hexadecimal, with or without an opacity.
+    """
+
+    kind: Literal["box", "ellipse", "line"]
+    at: tuple[float, float, float, float]
+    fill: str | None
+    edge: str | None
+    radius: float
+
+
+class ObjectFacts(TypedDict):
+    """A piece of furniture: its outline and middle [m], the direction of its front [rad], its uses.
+
+    `blocks` says whether it is in the way of nothing, paths or sight. `symbol` is the number of its
+    symbol among those of its home, which is drawn at its middle; -1: it is drawn as its outline.
     """
 
     name: str
     type: str
     outline: list[Point]
+    middle: Point
+    symbol: int
     blocks: str
     front: float
     uses: list[UseFacts]
@@ -118,6 +134,7 @@ class HomeFacts(TypedDict):
     doorways: list[DoorwayFacts]
     doors: list[DoorFacts]
     objects: list[ObjectFacts]
+    symbols: list[list[ShapeFacts]]
     no_go: list[list[Point]]
     entrance: Point | None
 
@@ -205,11 +222,12 @@ class VerdictFacts(TypedDict):
 
 
 class StoryFacts(TypedDict):
-    """A moment that is worth a look."""
+    """A moment that is worth a look, and the bodies that it is about, the most important first."""
 
     step: int
     title: str
     words: str
+    who: list[str]
 
 
 class SlowFacts(TypedDict):
@@ -219,6 +237,19 @@ class SlowFacts(TypedDict):
     words: str
     step: int
     end: int
+
+
+class PostureFacts(TypedDict):
+    """Stretches in which people sit or lie [us since the start], by user and time.
+
+    `use` is the number of the place in `uses`.
+    """
+
+    uses: list[UseFacts]
+    user: list[str]
+    use: list[int]
+    from_us: list[int]
+    to_us: list[int]
 
 
 class SightingFacts(TypedDict):

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -33,8 +33,11 @@ from fleet2d.viewing.contract import (
     WallsChange,
     WallsFacts,
 )
+from fleet2d.viewing.look import symbol_of
 
 DIGITS = 4  # tenths of a millimetre
+BOX_SHARE = 0.97
+"""A piece that fills less of the box around it than this is no box."""
 
 
 def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
@@ -45,6 +48,7 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         doors: The doors in its doorways.
     """
     lattice = plan.lattice
+    symbols: dict[tuple[str, float, float], int] = {}
     origin = np.rint(np.asarray(lattice.origin) / lattice.cell).astype(int) * UNITS_PER_CELL
     return HomeFacts(
         name=plan.name,
@@ -67,7 +71,8 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         place_cells=runs_of(plan.room_of_place),
         doorways=[DoorwayFacts(start=d.start, end=d.end, leaf=d.leaf) for d in plan.doorways],
         doors=list(doors),
-        objects=[object_facts(item) for item in (*plan.objects, *_panes(plan))],
+        objects=[object_facts(item, symbols) for item in (*plan.objects, *_panes(plan))],
+        symbols=[symbol_of(*key) for key in symbols],
         no_go=[points(shapely.get_coordinates(area.exterior)[:-1]) for area in plan.no_go],
         entrance=plan.entrance,
     )
@@ -79,17 +84,61 @@ def _panes(plan: FloorPlan) -> list[PlacedObject]:
     return [PlacedObject(f"glass_{k}", "glass", pane) for k, pane in enumerate(inside)]
 
 
-def object_facts(item: PlacedObject) -> ObjectFacts:
-    """Return the facts of a piece of furniture."""
+def object_facts(item: PlacedObject, symbols: dict[tuple[str, float, float], int]) -> ObjectFacts:
+    """Return the facts of a piece of furniture.
+
+    Args:
+        item: The piece.
+        symbols: The numbers of symbols by type and size [m], which grow.
+    """
     outline = shapely.get_coordinates(item.footprint.exterior)[:-1]
+    place = placed_symbol(item)
+    symbol = -1
+    if place.is_box:
+        key = (item.type, round(place.wide, 3), round(place.deep, 3))
+        symbol = symbols.setdefault(key, len(symbols))
     return ObjectFacts(
         name=item.name,
         type=item.type,
         outline=points(outline),
+        middle=place.middle,
+        symbol=symbol,
         blocks=item.blocks,
         front=front_of(item),
         uses=[UseFacts(x=u.x, y=u.y, heading=u.heading, posture=u.posture) for u in item.uses],
     )
+
+
+class SymbolPlace(NamedTuple):
+    """Where the symbol of a piece of furniture is [m]: its middle, and its size by its front.
+
+    Attributes:
+        middle: The middle of the piece.
+        wide: Its extent from left to right.
+        deep: Its extent from back to front.
+        is_box: Whether it is a box along its front, which its symbol fills.
+    """
+
+    middle: Point
+    wide: float
+    deep: float
+    is_box: bool
+
+
+def placed_symbol(item: PlacedObject) -> SymbolPlace:
+    """Return where the symbol of a piece of furniture is."""
+    front = front_of(item)
+    forward = np.array([math.cos(front), math.sin(front)])
+    right = np.array([forward[1], -forward[0]])
+    corners = shapely.get_coordinates(item.footprint)
+    along = corners @ forward
+    across = corners @ right
+    wide = float(np.ptp(across))
+    deep = float(np.ptp(along))
+    middle = (across.min() + wide / 2) * right + (along.min() + deep / 2) * forward
+    is_box = item.footprint.area > BOX_SHARE * wide * deep
+    x, y = np.round(middle, DIGITS).tolist()
+    return SymbolPlace((x, y), wide, deep, is_box)
 
 
 def front_of(item: PlacedObject) -> float:

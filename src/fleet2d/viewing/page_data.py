@@ -24,8 +24,9 @@ from fleet2d.kernels import TURN
 from fleet2d.runs.moments import KEY_FRAMES, key_frame_rows, positions
 from fleet2d.runs.run import Run
 from fleet2d.storage.files import path_in, write_atomically
-from fleet2d.viewing.contract import RunFacts, SightingFacts, WallsFacts
+from fleet2d.viewing.contract import PostureFacts, RunFacts, SightingFacts, WallsFacts
 from fleet2d.viewing.home_facts import WallsHistory, walls_facts
+from fleet2d.viewing.postures import posture_facts
 from fleet2d.viewing.run_facts import run_facts, run_title, sightings_of
 
 POSES = "poses"
@@ -87,6 +88,11 @@ class PageData:
     def sightings(self) -> list[SightingFacts]:
         """The stretches in which robots noticed users."""
         return sightings_of(self.run)
+
+    @cached_property
+    def postures(self) -> PostureFacts:
+        """When people sit or lie, and where."""
+        return posture_facts(self.run, self.run.plan)
 
     def table_path(self, name: str) -> Path:
         """Return the Parquet file of a table.
@@ -283,6 +289,7 @@ def embedded_run(data: PageData, first: int, end: int) -> dict[str, Any]:
     return {
         "facts": facts,
         "sightings": [_cut(lane, first, end) for lane in data.sightings],
+        "postures": data.postures,
         "walls": data.all_walls(),
         "tables": {name: _base64_table(data, name, part) for name in names},
     }

@@ -1,6 +1,7 @@
 """The server of the page: it serves the page and some runs on this machine, and nothing else."""
 
 import asyncio
+import html
 import re
 import secrets
 import signal
@@ -18,7 +19,7 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -95,7 +96,7 @@ class Guard:
             return
         reason = self._refusal(scope)
         if reason:
-            response = JSONResponse({"message": reason}, HTTPStatus.FORBIDDEN)
+            response = _refused(reason, Headers(scope=scope).get("accept", ""))
             await response(scope, receive, _with_headers(send))
             return
         path = scope["path"].removeprefix(f"/{self._token}") or "/"
@@ -122,6 +123,18 @@ class Guard:
         if not secrets.compare_digest(token.encode(), self._token.encode()):
             return "the address lacks its token: open the address that fleet2d view printed"
         return ""
+
+
+def _refused(reason: str, accepted: str) -> Response:
+    """Return a refusal: a page for somebody who follows an old link, else JSON."""
+    if "text/html" not in accepted:
+        return JSONResponse({"message": reason}, HTTPStatus.FORBIDDEN)
+    title = "This can't be shown"
+    page = (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title} – Fleet2D</title>'
+        f"<h1>{title}</h1><p>{html.escape(reason)}</p></html>"
+    )
+    return HTMLResponse(page, HTTPStatus.FORBIDDEN)
 
 
 def _with_headers(send: Send) -> Send:

@@ -81,10 +81,16 @@ def intervention_label(record: Mapping[str, Any]) -> str:
     'shut bath_door'
     >>> intervention_label({"do": "put", "step": 4, "entity": "ana", "x": 5, "by": "script.0"})
     'put ana (script.0)'
+    >>> change = {"entity": "astro", "behavior": "hangout", "keys": {"tau": "10 min"}}
+    >>> intervention_label({"do": "configure", **change})
+    'astro: hangout with tau 10 min'
     """
     parts = [value for key, value in record.items() if isinstance(value, str) and key != "by"]
     if isinstance(change := record.get("change"), Mapping):
         parts = next(([key, value] for key, value in change.items() if value), ["change"])
+    elif isinstance(keys := record.get("keys"), Mapping):
+        settings = ", ".join(f"{key} {value}" for key, value in keys.items())
+        parts = [f"{record['entity']}: {record['behavior']} with {settings}"]
     by = f" ({record['by']})" if record.get("by") else ""
     return " ".join(str(part) for part in parts[:3]) + by
 
@@ -280,7 +286,7 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         skies=skies_of(scenario, run.clock),
         starts_unlit=_starts_unlit(scenario),
         event_kinds=sorted(EventKind),
-        metrics=run.metrics,
+        metrics=as_json(run.metrics),
         scenario=scenario,
         walks_every_s=0.0,
     )
@@ -291,6 +297,21 @@ def offsets_of(clock: Clock) -> list[tuple[int, int]]:
     start_us = stamp_us(clock.start)
     parts = even_parts(clock.start, 0, clock.steps * clock.step_us) if clock.zone else ()
     return [(begin_us, zero_us - start_us) for begin_us, _, zero_us in parts]
+
+
+def as_json(result: Any) -> Any:
+    """Return the result of a metric as JSON has it: numbers that aren't finite are words.
+
+    >>> as_json({"error": math.nan, "parts": [1.5, math.inf, "none"]})
+    {'error': 'nan', 'parts': [1.5, 'inf', 'none']}
+    """
+    if isinstance(result, Mapping):
+        return {str(key): as_json(value) for key, value in result.items()}
+    if isinstance(result, list | tuple):
+        return [as_json(value) for value in result]
+    if isinstance(result, float) and not math.isfinite(result):
+        return str(result)
+    return result
 
 
 def skies_of(scenario: Mapping[str, Any], clock: Clock) -> list[tuple[float, float, float, float]]:

@@ -60,6 +60,7 @@ Respond = Callable[[PageData, dict[str, Any], bytes], Response]
 RESPONSES: dict[str, Respond] = {
     "facts.json": lambda data, _, __: Response(data.facts_json, media_type="application/json"),
     "sightings.json": lambda data, _, __: json_answer(data.sightings),
+    "postures.json": lambda data, _, __: json_answer(data.postures),
     "tracks.bin": lambda data, _, __: Response(data.tracks, media_type="application/octet-stream"),
     "notes.json": lambda data, _, __: json_answer(read_notes(data.run)),
     "notes": lambda data, _, body: json_answer(write_notes(data.run, body)),
@@ -117,6 +118,7 @@ class ServedRuns:
                 data.walls(0)
                 _ = data.tracks
                 _ = data.sightings
+                _ = data.postures
         release_memory()  # the tables that were read
 
     def routes(self) -> list[Route]:

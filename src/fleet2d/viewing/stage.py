@@ -35,6 +35,7 @@ from fleet2d.viewing.pictures.life import (
     SightWalls,
     field_of_view,
 )
+from fleet2d.viewing.postures import Postures
 from fleet2d.viewing.run_facts import bodies_of, sightings_of
 
 SEEN_PART = 0.22  # height of the marks of sightings at the foot of a row, as a share of it
@@ -122,6 +123,7 @@ TAIL = timedelta(minutes=1)  # length of the paths behind bodies
 MIN_RADIUS_M = 0.2
 TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
 CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)  # of radius 1
+LYING = 2.6  # length of somebody who lies, as a share of the width
 NOSE = 1.6  # length of the line of the heading [radii]
 STRIP_ROWS = 6
 ABOVE_M = 0.6  # space above the plan
@@ -140,6 +142,7 @@ class BodyArtists:
     name: Any
     views: list[F64]
     view_key: object = None
+    lies: bool = False
 
 
 class Stage:
@@ -192,6 +195,7 @@ class Stage:
         self._axes.set_ylim(top=top + ABOVE_M)
         facts_of_bodies = bodies_of(run.manifest["scenario"], run.manifest["entities"])
         self.bodies = [self._artists(facts) for facts in facts_of_bodies]
+        self._postures = Postures(run, self._plan)
         self._views = PolyCollection([], facecolors=VIEW_COLOR, alpha=0.4, zorder=2.2)
         self._edges = PolyCollection(
             [], facecolors="none", edgecolors=VIEW_EDGE, lw=0.8, zorder=3.2
@@ -326,6 +330,10 @@ class Stage:
             body.views = []
             body.view_key = None
             return None
+        rest = self._postures.at(body.facts["name"], step * self._step_us)
+        body.lies = rest is not None and rest["posture"] == "lie"
+        if rest is not None:
+            x, y, heading = rest["x"], rest["y"], rest["heading"]
         body.name.set_position((x, y + 1.5 * body.radius))
         if body.facts["cameras"]:
             self._look(body, (x, y, heading), step)
@@ -341,7 +349,10 @@ class Stage:
         centre = place[..., :2]
         self._noses.set(segments=np.append(centre, centre + NOSE * radius * facing, axis=1))
         self._noses.set_color(colors)
-        self._discs.set(verts=centre + radius * CIRCLE, facecolor=colors)
+        stretch = np.array([LYING if body.lies else 1.0 for body, _ in here]).reshape(-1, 1, 1)
+        beside = np.stack([-facing[..., 1], facing[..., 0]], axis=2)
+        around = CIRCLE[:, :1] * stretch * facing + CIRCLE[:, 1:] * beside
+        self._discs.set(verts=centre + radius * around, facecolor=colors)
         outlines = [outline for body in self.bodies for outline in body.views]
         for artist in (self._views, self._edges):
             artist.set_verts(outlines)

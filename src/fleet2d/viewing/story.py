@@ -9,6 +9,7 @@ from pyarrow import array, compute
 
 from fleet2d.errors import ArtifactError
 from fleet2d.runs.run import Run
+from fleet2d.runs.verdicts import verdicts_of
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.viewing.contract import StoryFacts
@@ -50,7 +51,7 @@ def story_of(run: Run) -> list[StoryFacts]:
     try:
         events = _events_of(run)
         found = [*_requests(events), *_searches(events, run.clock), *_people(run, events)]
-        found += _learning(run)
+        found += [*_learning(run), *_failure(run)]
     except ArtifactError:  # the run's notes say which table is damaged
         return []
     return sorted(found, key=lambda moment: moment["step"])
@@ -72,13 +73,15 @@ def _requests(events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
         if event.event == EventKind.ACCEPTED:
             about, _, user = event.detail.rpartition(" ")
             words = f"{_title(user)} accepts what {_title(event.entity)} asks: {_plain(about)}"
-            yield StoryFacts(step=event.step, title="The first yes", words=words)
+            who = [event.entity, user]
+            yield StoryFacts(step=event.step, title="The first yes", words=words, who=who)
             return
 
 
 def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFacts]:
-    """Yield the search that took longest until it found somebody."""
+    """Yield the first search that found somebody, and the one that took longest until it did."""
     begun: dict[tuple[str, str], int] = {}
+    first: StoredEvent | None = None
     longest: tuple[int, StoredEvent] | None = None
     for event in events:
         key = event.entity, event.detail
@@ -86,13 +89,19 @@ def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFact
             begun[key] = event.step
         elif event.event == EventKind.FOUND and key in begun:
             steps = event.step - begun.pop(key)
+            first = first or event
             if longest is None or steps > longest[0]:
                 longest = steps, event
     if longest is not None:
         steps, event = longest
         took = _duration(timedelta(microseconds=steps * clock.step_us))
         words = f"{_title(event.entity)} finds {_title(event.detail)} after {took}"
-        yield StoryFacts(step=event.step, title="The longest search", words=words)
+        who = [event.entity, event.detail]
+        yield StoryFacts(step=event.step, title="The longest search", words=words, who=who)
+        if first is not None and first is not event:
+            words = f"{_title(first.entity)} looks for {_title(first.detail)}, and finds"
+            who = [first.entity, first.detail]
+            yield StoryFacts(step=first.step, title="The first find", words=words, who=who)
 
 
 def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
@@ -106,11 +115,11 @@ def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
         lasted, step, user = max(unseen)
         if lasted >= LEAST_UNSEEN:
             words = f"{_title(user)} is up and at home, and out of view for {_duration(lasted)}"
-            yield StoryFacts(step=step, title="The longest out of view", words=words)
+            yield StoryFacts(step=step, title="The longest out of view", words=words, who=[user])
     if len(nights) > 1:
         _, step, user = max(nights)
         words = f"{_title(user)} goes to bed at {run.clock.time(step):%H:%M}"
-        yield StoryFacts(step=step, title="The latest night", words=words)
+        yield StoryFacts(step=step, title="The latest night", words=words, who=[user])
 
 
 def _unseen(
@@ -172,7 +181,17 @@ def _learning(run: Run) -> Iterator[StoryFacts]:
     if 0 < settled < len(errors) - 1:
         below = f"{100 * SETTLED * last:.0f} %"
         words = f"{name} stays below {below} from here, and ends at {100 * last:.0f} %"
-        yield StoryFacts(step=errors[settled][0], title="The beliefs have settled", words=words)
+        title = "The beliefs have settled"
+        yield StoryFacts(step=errors[settled][0], title=title, words=words, who=[])
+
+
+def _failure(run: Run) -> Iterator[StoryFacts]:
+    """Yield the first moment at which an expectation was violated."""
+    failures = [each for each in verdicts_of(run) if each.step is not None]
+    if failures:
+        first = min(failures, key=lambda verdict: verdict.step or 0)
+        words = f"{_title(first.name)}: {first.says}"
+        yield StoryFacts(step=first.step or 0, title="The first failure", words=words, who=[])
 
 
 def _title(name: str) -> str:

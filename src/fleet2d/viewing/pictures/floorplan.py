@@ -1,6 +1,7 @@
 """Pictures of floor plans, with their furniture and what is wrong with them."""
 
 import io
+import math
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,12 +14,13 @@ import matplotlib as mpl
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
+from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.configuration.problems import counted
@@ -34,15 +36,26 @@ from fleet2d.palette import (
     ACCENT_COLOR,
     BORDER_COLOR,
     DOOR_COLOR,
-    OTHER_COLOR,
     ROOM_COLORS,
     TEXT_COLOR,
-    WALL_COLOR,
 )
 from fleet2d.storage.files import write_atomically
+from fleet2d.viewing.contract import ShapeFacts
+from fleet2d.viewing.home_facts import front_of, placed_symbol
+from fleet2d.viewing.look import (
+    JOINT_M,
+    OUTLINE_EDGE,
+    OUTLINE_FILL,
+    SYMBOLS,
+    WALL_EDGE,
+    WALL_M,
+    WALL_TOP,
+    WOOD,
+    floor_of,
+    symbol_of,
+)
 
 EDGE_COLOR = "#6d737c"
-FILL_COLORS = MappingProxyType({"nothing": "none", "path": "#fbfaf7", "sight": "#c9c6bf"})
 LABEL_COLOR = "#6d737c"
 NO_GO_COLOR = "#c8452f"
 GLASS_COLOR = "#a9d5ea"
@@ -50,55 +63,22 @@ GLASS_COLOR = "#a9d5ea"
 LABEL_PT = (2.6, 5.0)
 # Width of a letter of the font, as a share of its size.
 LETTER_WIDTH = 0.62
-# Corners of a circle, and of a door's quarter of one.
-CIRCLE = 24
-SWING = 12
-
-# Symbols of architectural plans, in shares of the width of a footprint (-0.5 is the right side, 0.5
-# the left) and of its depth (-0.5 is the back): boxes (x0, y0, x1, y1), and circles (x, y, radius)
-# with the radius as a share of the smaller of both.
-_BED = ((-0.5, -0.14, 0.5, -0.14),)
-_FRONT = ((-0.5, 0.3, 0.5, 0.3),)
-SYMBOLS: MappingProxyType[str, tuple[tuple[float, ...], ...]] = MappingProxyType(
-    {
-        "bed": (*_BED, (-0.45, -0.46, -0.05, -0.22), (0.05, -0.46, 0.45, -0.22)),
-        "single_bed": (*_BED, (-0.38, -0.46, 0.38, -0.24)),
-        "sofa": ((-0.42, -0.22, 0.42, 0.5), (0.0, -0.22, 0.0, 0.5)),
-        "armchair": ((-0.3, -0.22, 0.3, 0.5),),
-        "chair": ((-0.5, -0.3, 0.5, -0.3),),
-        "stove": tuple((x, y, 0.17) for x in (-0.24, 0.24) for y in (-0.24, 0.24)),
-        "sink": ((-0.35, -0.3, 0.35, 0.35), (0.0, 0.0, 0.06)),
-        "washbasin": ((-0.35, -0.25, 0.35, 0.38), (0.0, 0.0, 0.08)),
-        "toilet": ((-0.5, -0.2, 0.5, -0.2), (0.0, 0.12, 0.4)),
-        "shower": ((-0.5, -0.5, 0.5, 0.5), (0.0, 0.0, 0.08)),
-        "bathtub": ((-0.44, -0.36, 0.44, 0.36),),
-        "washing_machine": ((0.0, 0.0, 0.34),),
-        "wardrobe": (_FRONT[0], (0.0, -0.5, 0.0, 0.3)),
-        "fridge": _FRONT,
-        "bookshelf": tuple((x, -0.5, x, 0.5) for x in (-0.25, 0.0, 0.25)),
-        "shelf": ((0.0, -0.5, 0.0, 0.5),),
-        "tv": ((-0.4, -0.1, 0.4, 0.2),),
-        "desk": ((-0.2, -0.3, 0.2, -0.15),),
-        "nightstand": ((0.0, 0.0, 0.2),),
-        "charger": ((-0.3, -0.1, 0.3, 0.5),),
-        "treadmill": ((-0.35, -0.3, 0.35, 0.45),),
-    }
-)
-
-# Their symbols are well known, and leave no space for text.
-UNLABELLED = frozenset(
-    ("chair", "nightstand", "toilet", "washbasin", "sink", "stove", "shower", "charger")
-)
+SWING = 12  # corners of the swing of a door
+ROUND = 5  # corners of a quarter of a circle
+CIRCLE = 24  # corners of an ellipse
 
 
 def draw_objects(plan: FloorPlan, axes: Axes) -> None:
     """Draw furniture with its symbols, doorways, and no-go areas of robots, in metres."""
-    for blocks, fill in FILL_COLORS.items():
-        footprints = [item.footprint for item in plan.objects if item.blocks == blocks]
-        dashes = "--" if blocks == "nothing" else "-"
-        _fill(footprints, axes, facecolor=fill, linewidths=0.6, linestyles=dashes, zorder=1.6)
-    lines = [line for item in plan.objects for line in _symbol(item)]
-    axes.add_collection(LineCollection(lines, lw=0.4, color=EDGE_COLOR, zorder=1.65))
+    shapes = [shape for item in plan.objects for shape in _shapes(item)]
+    symbols = PolyCollection(
+        [corners for corners, _, _ in shapes],
+        facecolors=[fill or "none" for _, fill, _ in shapes],
+        edgecolors=[edge or "none" for _, _, edge in shapes],
+        linewidths=0.4,
+        zorder=1.6,
+    )
+    axes.add_collection(symbols, autolim=False)
     # What is seen through, and not walked through, is drawn as glass in its walls.
     panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
     parts = shapely.get_parts(shapely.transform(panes, plan.lattice.to_metres)).tolist()
@@ -121,14 +101,14 @@ def _fill(polygons: Iterable[shapely.Polygon], axes: Axes, **style: Any) -> None
 
 
 def label_objects(plan: FloorPlan, axes: Axes) -> None:
-    """Write the type of each object on it, where it is large enough."""
+    """Write the type of each object without a symbol on it, where it is large enough."""
     points_per_m = _points_per_m(axes)
     for item in plan.objects:
         x0, y0, x1, y1 = item.footprint.bounds
         label = item.type.replace("_", " ")
         space = (x1 - x0) * points_per_m, (y1 - y0) * points_per_m
         size, rotation = _fit(space, LETTER_WIDTH * len(label), 1.2, LABEL_PT[1])
-        if size < LABEL_PT[0] or item.type in UNLABELLED:
+        if size < LABEL_PT[0] or item.type in SYMBOLS:
             continue
         middle = item.footprint.centroid
         style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
@@ -154,27 +134,46 @@ def _fit(space: tuple[float, float], width: float, height: float, most: float) -
     return min(upright if is_upright else flat, most), 90 * is_upright
 
 
-def _symbol(item: PlacedObject) -> list[F64]:
-    """Return the lines inside a footprint [m]."""
-    forward = np.array([np.cos(item.heading), np.sin(item.heading)])
-    left = np.array([-forward[1], forward[0]])
-    corners = shapely.get_coordinates(item.footprint)
-    along = corners @ forward
-    across = corners @ left
-    width = float(np.ptp(across))
-    depth = float(np.ptp(along))
-    middle = (across.min() + width / 2) * left + (along.min() + depth / 2) * forward
-    lines = []
-    for shape in SYMBOLS.get(item.type, ()):
-        if len(shape) == 4:
-            x0, y0, x1, y1 = shape
-            points = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]) * (width, depth)
-        else:
-            angles = np.linspace(0, 2 * np.pi, CIRCLE + 1)
-            ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            points = np.array(shape[:2]) * (width, depth) + ring * shape[2] * min(width, depth)
-        lines.append(middle + points[:, :1] * left + points[:, 1:] * forward)
-    return lines
+def _shapes(item: PlacedObject) -> list[tuple[F64, str | None, str | None]]:
+    """Return corners [m], fill and edge of the shapes of a piece, from the bottom to the top."""
+    place = placed_symbol(item)
+    if not place.is_box:
+        return [(shapely.get_coordinates(item.footprint), OUTLINE_FILL, OUTLINE_EDGE)]
+    front = front_of(item)
+    forward = np.array([math.cos(front), math.sin(front)])
+    right = np.array([forward[1], -forward[0]])
+    shapes = []
+    for shape in symbol_of(item.type, place.wide, place.deep):
+        points = _corners(shape)
+        corners = place.middle + points[:, :1] * right + points[:, 1:] * forward
+        shapes.append((corners, shape["fill"], shape["edge"]))
+    return shapes
+
+
+def _corners(shape: ShapeFacts) -> F64:
+    """Return the corners of a shape of a symbol [m]: float64 (n, 2)."""
+    x0, y0, x1, y1 = shape["at"]
+    if shape["kind"] == "line":
+        return np.array([(x0, y0), (x1, y1)])
+    if shape["kind"] == "ellipse":
+        turns = np.linspace(0, math.tau, CIRCLE, endpoint=False)
+        middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
+        radii = np.array([(x1 - x0) / 2, (y1 - y0) / 2])
+        return middle + np.stack([np.cos(turns), np.sin(turns)], axis=1) * radii
+    radius = min(shape["radius"], (x1 - x0) / 2, (y1 - y0) / 2)
+    turns = np.linspace(0, math.pi / 2, ROUND)
+    parts = []
+    for quarter, (x, y) in enumerate(
+        (
+            (x1 - radius, y1 - radius),
+            (x0 + radius, y1 - radius),
+            (x0 + radius, y0 + radius),
+            (x1 - radius, y0 + radius),
+        )
+    ):
+        angle = turns + quarter * math.pi / 2
+        parts.append(np.array([x, y]) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return np.concatenate(parts)
 
 
 def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
@@ -202,7 +201,13 @@ def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
 DATE_METADATA = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
 SUFFIXES = tuple(DATE_METADATA)
 
-WALL_M = 0.15  # thickness of outer walls, which files don't contain
+# Right and down, how far the shadow of walls falls [m]; the drawn pixels of a cell along its sides.
+SHADOW_M = (0.07, 0.1)
+SHADOW_COLOR = "#3c2d1938"
+JOINT_COLOR = "#6b7680"
+PLANK_LENGTH_M = 1.45
+FINER = 4
+MOST_PATTERNED_M2 = 2_500
 LONG_SIDE_IN = 10.0
 SHORT_SIDE_IN = 3.2
 DPI = 150
@@ -359,22 +364,84 @@ def _limits(plan: FloorPlan) -> tuple[float, float, float, float]:
 
 
 def _draw_walls(plan: FloorPlan, axes: Axes) -> None:
-    """Draw the walls: the free space enlarged by the thickness of a wall, under the free space."""
-    thickness = WALL_M * plan.lattice.units_per_m
+    """Draw the walls: the free space enlarged by the thickness of a wall, under the free space.
+
+    Their shadow falls into the rooms.
+    """
+    units = plan.lattice.units_per_m
+    thickness = WALL_M * units
+    free = shapely.union_all(plan.polygons)
     # Without steps of a few centimetres in traced outlines, which look like notches in outer walls.
-    smooth = shapely.simplify(shapely.union_all(plan.polygons), thickness / 5)
+    smooth = shapely.simplify(free, thickness / 5)
     solid = shapely.buffer(smooth, thickness, join_style="mitre")
     walls = _outline(plan, shapely.get_parts(solid).tolist())
-    axes.add_patch(PathPatch(walls, facecolor=WALL_COLOR, edgecolor="none", zorder=0))
+    style: dict[str, Any] = {"edgecolor": WALL_EDGE, "lw": 0.6}
+    axes.add_patch(PathPatch(walls, facecolor=WALL_TOP, **style, zorder=0))
+    right, down = SHADOW_M
+    fallen = translate(shapely.difference(solid, free), right * units, -down * units)
+    parts = shapely.get_parts(shapely.intersection(fallen, free)).tolist()
+    shade = [part for part in parts if part.geom_type == "Polygon"]
+    if shade:
+        shadow = _outline(plan, shade)
+        axes.add_patch(PathPatch(shadow, facecolor=SHADOW_COLOR, edgecolor="none", zorder=1.68))
+    edges = _outline(plan, plan.polygons)
+    axes.add_patch(PathPatch(edges, facecolor="none", **style, zorder=1.69))
 
 
 def _draw_rooms(plan: FloorPlan, axes: Axes) -> None:
-    """Draw the cells of rooms as an image, clipped at the walls."""
-    colors = [to_rgb(ROOM_COLORS.get(room.type, OTHER_COLOR)) for room in plan.rooms]
-    table = np.array([*colors, to_rgb(ROOM_COLORS["unknown"])])
-    image = table[_spread(plan.room_of_cell)]  # index -1 is the last colour
+    """Draw the floors of rooms as an image, clipped at the walls."""
     free_space = PathPatch(_outline(plan, plan.polygons), transform=axes.transData)
-    draw_cells(plan, image, axes, interpolation="nearest", zorder=1).set_clip_path(free_space)
+    image = draw_cells(plan, floor_image(plan), axes, interpolation="nearest", zorder=1)
+    image.set_clip_path(free_space)
+
+
+def floor_image(plan: FloorPlan) -> F64:
+    """Return the floors of rooms, each of the material of its type: float64 (rows, columns, 3).
+
+    Each cell has several pixels; in homes so large that a pattern would be finer than a pixel, one.
+    """
+    finer = FINER if plan.area_m2 <= MOST_PATTERNED_M2 else 1
+    rooms = np.kron(_spread(plan.room_of_cell), np.ones((finer, finer), np.int16))
+    image = np.empty((*rooms.shape, 3))
+    image[:] = to_rgb(ROOM_COLORS["unknown"])
+    pixel = plan.lattice.cell / finer
+    for room in plan.rooms:
+        rows, columns = np.nonzero(rooms == room.index)
+        if len(rows):
+            x = (columns - columns.min() + 0.5) * pixel
+            y = (rows - rows.min() + 0.5) * pixel
+            image[rows, columns] = _floor_colors(room, x, y, patterned=finer > 1)
+    return image
+
+
+def _floor_colors(room: Room, x: F64, y: F64, *, patterned: bool) -> F64:
+    """Return the colours of a floor at places [m] from its corner: float64 (n, 3)."""
+    material, color, pitch = floor_of(room.type, room.index)
+    colors = np.tile(to_rgb(color), (len(x), 1))
+    if material in ("carpet", "plain") or not patterned:
+        return colors
+    if material == "tiles":
+        column, row = x // pitch, y // pitch
+        paler = 0.45 * _noise(column, row)[:, None]
+        colors += (1 - colors) * paler
+        is_joint = (x % pitch < JOINT_M) | (y % pitch < JOINT_M)
+        colors[is_joint] = 0.86 * np.array(to_rgb(color)) + 0.14 * np.array(to_rgb(JOINT_COLOR))
+        return colors
+    along, across = (x, y) if np.ptp(x) > np.ptp(y) else (y, x)
+    row = across // pitch
+    begun = along + PLANK_LENGTH_M * _noise(row, np.full_like(row, 7.0))
+    number = (len(WOOD) * _noise(row, begun // PLANK_LENGTH_M)).astype(np.int64)
+    wood: F64 = np.array([to_rgb(each) for each in WOOD])[number]
+    is_joint = (across % pitch < JOINT_M) | (begun % PLANK_LENGTH_M < JOINT_M)
+    wood[is_joint] *= 0.96
+    return wood
+
+
+def _noise(one: F64, other: F64) -> F64:
+    """Return numbers from 0 to below 1 that are the same for the same pair of whole numbers."""
+    mixed = one.astype(np.int64) * 73_856_093 ^ other.astype(np.int64) * 19_349_663
+    scattered: F64 = (mixed * 2_654_435_761 >> 7) % 1024 / 1024
+    return scattered
 
 
 def draw_cells(plan: FloorPlan, image: Any, axes: Axes, **style: Any) -> AxesImage:

@@ -1,0 +1,81 @@
+"""Postures derived from key frames are those that the simulator had."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+import fleet2d
+from fleet2d.viewing.postures import USED_WITHIN_M, Postures, postures_of
+
+HOME = {"simulation": {"start": "2026-01-05", "duration": "20 h", "seed": 3}}
+FURNISHED = {**HOME, "floorplan": {"type": "bundled", "furnish": True}}
+PEOPLE = {"users": {"ana": {"type": "routine"}, "ben": {"type": "routine"}}}
+WIDE = {"angle_deg": 360, "range": [0, 9], "detection": 1}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A run whose cameras recorded the true postures of whom they saw."""
+    scenario = {
+        "extends": "bundled:family",
+        "simulation": {"duration": "1 d", "seed": 3},
+        "robots": {"astro": {"camera": None, "cameras": {"a": WIDE, "b": WIDE}, "keep_out": []}},
+    }
+    return fleet2d.run(scenario, out=tmp_path_factory.mktemp("postures") / "run")
+
+
+@pytest.mark.slow
+def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run: Any) -> None:
+    postures = Postures(run, run.plan)
+    step_us = run.manifest["step_us"]
+    rests = np.array(
+        [(u.x, u.y) for item in run.plan.objects for u in item.uses if u.posture != "stand"]
+    )
+    pairs: Counter[tuple[str, str]] = Counter()
+    for row in run.tables["observations"].to_pylist():
+        derived = postures.at(row["true_user"], row["step"] * step_us)
+        posture = "stand" if derived is None else derived["posture"]
+        if posture == "stand" and row["true_posture"] != "stand":
+            far = np.hypot(*(rests - (row["true_x"], row["true_y"])).T).min()
+            assert far >= USED_WITHIN_M
+            continue
+        pairs[posture, row["true_posture"]] += 1
+    same = sum(count for (derived, true), count in pairs.items() if derived == true)
+    assert pairs["sit", "sit"] > 1_000
+    assert same > 0.99 * pairs.total(), pairs
+
+
+@pytest.mark.slow
+def test_postures_are_in_order_and_within_the_run(run: Any) -> None:
+    table = postures_of(run, run.plan)
+    end = run.manifest["steps"] * run.manifest["step_us"]
+    last: dict[str, int] = {}
+    for row in table.to_pylist():
+        assert last.get(row["user"], 0) <= row["time_us"] < row["end_us"] <= end
+        assert row["posture"] in ("sit", "lie")
+        last[row["user"]] = row["end_us"]
+    assert set(last) == set(run.manifest["entities"]["users"])
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        {**HOME, "floorplan": {"type": "bundled", "furnish": False}, **PEOPLE},
+        {**FURNISHED, "robots": {"astro": {"type": "patrol"}}},
+        {**FURNISHED, **PEOPLE, "artifacts": {"key_frames": False}},
+    ],
+    ids=["no furniture", "nobody", "no key frames"],
+)
+def test_without_furniture_people_or_key_frames_nobody_sits(
+    scenario: dict[str, Any], tmp_path: Path
+) -> None:
+    scenario["simulation"] = {**HOME["simulation"], "duration": "10 min"}
+    run = fleet2d.run(scenario, out=tmp_path / "run")
+    table: pa.Table = postures_of(run, run.plan)
+    if scenario["floorplan"].get("furnish"):
+        assert table.num_rows == 0
+    assert table.column_names[:3] == ["step", "time_us", "end_us"]

@@ -1,0 +1,322 @@
+"""Odd states of the page, in Chromium: each says what is, and what to do."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.request import Request, urlopen
+
+import pytest
+
+import fleet2d
+from fleet2d.viewing.page_data import export_html
+from fleet2d.viewing.page_server import PageServer
+
+from .browser import chromium, page_at
+from .test_browser import AXE, served, shown_clock, shown_step, until
+
+START = {"start": "2026-01-05", "duration": "2 d", "seed": 1}
+HOME = {"simulation": START, "floorplan": {"type": "bundled"}}
+ANA = {"users": {"ana": {"type": "routine"}}}
+PATROL = {"type": "patrol", "camera": {}}
+TEN = {f"r{number}": PATROL for number in range(10)}
+PAPER = {"extends": "bundled:paper"}
+LATE = {"duration": "2 d", "start": "2026-01-05T14:37:00", "seed": 1}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as started:
+        yield started
+
+
+STATES: dict[str, tuple[dict[str, Any], str, str]] = {
+    "nobody": ({**HOME, "robots": {"astro": PATROL}}, "#view=calendar", "Nobody lives here"),
+    "empty": (HOME, "#", "Nobody is in this home, neither people nor robots"),
+    "no robots": ({**HOME, **ANA}, "#view=calendar", "Bedroom"),
+    "no events": ({**PAPER, "simulation": START, "artifacts": {"events": False}}, "#", "Ana"),
+    "an hour": ({**PAPER, "simulation": {**START, "duration": "1 h"}}, "#", "1.0 h"),
+    "beyond the end": (PAPER | {"simulation": START}, "#at=2031-01-01T00:00:00", "lasts from"),
+    "unknown name": (PAPER | {"simulation": START}, "#select=zoe&layer=gold", "names 'zoe'"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STATES)
+def test_odd_run_or_link_says_what_is(browser: Any, tmp_path: Path, name: str) -> None:
+    scenario, link, words = STATES[name]
+    fleet2d.run(scenario, out=tmp_path / "run")
+    with served(tmp_path / "run") as address, page_at(browser, address + link) as page:
+        until(page, lambda: words in page.inner_text("body"))
+        page.click(".overview")
+        page.keyboard.press("y")
+        page.wait_for_timeout(200)
+        assert 0 == page.locator(".failure").count()
+
+
+@pytest.mark.slow
+def test_run_that_starts_at_any_minute_keeps_its_clock(browser: Any, tmp_path: Path) -> None:
+    fleet2d.run({**PAPER, "simulation": LATE}, out=tmp_path / "run")
+    with served(tmp_path / "run") as address, page_at(browser, f"{address}#view=calendar") as page:
+        assert shown_clock(page).startswith("14:37:00Mon 5 Jan")
+        page.fill("#goto", "day 2 00:00")
+        page.press("#goto", "Enter")
+        until(page, lambda: shown_step(page) == (9 * 60 + 23) * 60)
+        page.fill("#goto", "day 9 00:00")
+        page.press("#goto", "Enter")
+        page.wait_for_selector("text=No time of this run, which lasts from Mon 5 Jan 14:37")
+
+
+@pytest.mark.slow
+def test_ten_robots_on_one_spot_are_ten(browser: Any, tmp_path: Path) -> None:
+    simulation = {**START, "duration": "8 h"}
+    fleet2d.run({**HOME, "simulation": simulation, "robots": TEN}, out=tmp_path / "run")
+    at = "#at=2026-01-05T07:00:00"
+    with served(tmp_path / "run") as address, page_at(browser, address + at) as page:
+        box = page.locator(".plan canvas.top").bounding_box()
+        found = set()
+        for row in range(40):
+            for column in range(40):
+                x = box["x"] + box["width"] * (column + 0.5) / 40
+                y = box["y"] + box["height"] * (row + 0.5) / 40
+                page.mouse.move(x, y)
+                found |= set(page.locator(".plan .hover").all_inner_texts())
+        together = [words for words in found if "here:" in words]
+        assert together == ["10 here: R0, R1, R2, R3, R4, R5, R6, R7, R8, R9"]
+
+
+@pytest.mark.slow
+def test_stopped_server_is_told_and_what_was_read_stays(browser: Any, run_dir: Path) -> None:
+    server = PageServer([run_dir])
+    stop = server.start()
+    with page_at(browser, server.address) as page:
+        stop()
+        page.click("#tab-inspect")
+        page.click(".label .name >> text=/^astro$/")  # why it does so is asked of the server
+        page.wait_for_selector("text=The server no longer answers: start fleet2d view again")
+        assert page.locator(".label .name >> text=/^ana$/").is_visible()
+
+
+@pytest.mark.slow
+def test_deleted_run_is_told(browser: Any, run_dir: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(run_dir, tmp_path / "copy")
+    server = PageServer([copy])
+    stop = server.start()
+    shutil.rmtree(copy)
+    with page_at(browser, server.address) as page:
+        assert "copy" in page.inner_text(".failure [role=alert]")
+    stop()
+
+
+def test_old_link_shows_a_page_that_says_what_to_do(run_dir: Path) -> None:
+    server = PageServer([run_dir])
+    stop = server.start()
+    host, port = server.listens_at
+    request = Request(f"http://{host}:{port}/old/", headers={"Accept": "text/html"})
+    with pytest.raises(Exception, match="403") as refusal:
+        urlopen(request)
+    content = refusal.value.read().decode()  # type: ignore[attr-defined]
+    stop()
+    assert content.startswith("<!doctype html>")
+    assert "open the address that fleet2d view printed" in content
+
+
+@pytest.mark.slow
+def test_palette_asks_goes_and_does(browser: Any, run_dir: Path) -> None:
+    with served(run_dir) as address, page_at(browser, address) as page:
+        page.keyboard.press("Control+k")
+        page.keyboard.type("how often was ana in the bathroom")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#palette [role=option] canvas")
+        count = int(page.get_attribute("#ask-answer", "data-count"))
+        assert page.locator("#palette [role=option]").count() == min(count, 24)
+        step = shown_step(page)
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("Enter")
+        until(page, lambda: shown_step(page) > step)
+        theme = page.get_attribute("html", "data-theme")
+        page.fill("#ask", "light or dark")
+        page.press("#ask", "Enter")
+        until(page, lambda: page.get_attribute("html", "data-theme") != theme)
+        page.fill("#ask", "where is anna")
+        page.press("#ask", "Enter")
+        page.click("#palette >> text=where is ana")
+        until(
+            page,
+            lambda: (
+                page.inner_text("#ask-answer").endswith(")")
+                or "Ana is" in page.inner_text("#ask-answer")
+            ),
+        )
+
+
+@pytest.mark.slow
+def test_link_keeps_question_marked_range_and_pinned_lanes(browser: Any, run_dir: Path) -> None:
+    with served(run_dir) as address, page_at(browser, address) as page:
+        page.fill("#ask", "ana in bathroom")
+        page.press("#ask", "Enter")
+        count = page.get_attribute("#ask-answer", "data-count")
+        page.keyboard.press("Escape")
+        page.locator(".label", has_text="astro").first.hover()
+        page.click("[aria-label='Pin astro']")
+        box = page.locator(".lanes").bounding_box()
+        page.keyboard.down("Shift")
+        page.mouse.move(box["x"] + 100, box["y"] + 60)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 300, box["y"] + 60, steps=3)
+        page.mouse.up()
+        page.keyboard.up("Shift")
+        totals = page.inner_text(".totals strong")
+        until(page, lambda: "marked=" in page.url and "pin=" in page.url and "ask=" in page.url)
+        with page_at(browser, page.url) as other:
+            until(other, lambda: other.get_attribute("#ask-answer", "data-count") == count)
+            assert totals == other.inner_text(".totals strong")
+            assert other.locator(".label.pinned").count() == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("key", "endings"), [("s", ("png",)), ("w", ("webm", "mp4"))])
+def test_view_is_stored_by_one_key_in_a_file_without_a_server(
+    browser: Any, run_dir: Path, tmp_path: Path, key: str, endings: tuple[str, ...]
+) -> None:
+    export_html(fleet2d.open_run(run_dir), tmp_path / "run.html")
+    link = f"{(tmp_path / 'run.html').as_uri()}#view=lanes&at=2026-01-05T07:00:00"
+    with page_at(browser, link) as page:
+        with page.expect_download(timeout=60_000) as download:
+            page.keyboard.press(key)
+        path = tmp_path / download.value.suggested_filename
+        download.value.save_as(path)
+        assert path.suffix[1:] in endings
+        assert path.stat().st_size > 20_000
+        assert shown_step(page) == 7 * 3600
+
+
+@pytest.mark.slow
+def test_reel_plays_every_card_and_a_key_ends_it(browser: Any, run_dir: Path) -> None:
+    with served(run_dir) as address, page_at(browser, address) as page:
+        titles = [
+            card["title"]
+            for card in json.loads(urlopen(f"{address}run/0/facts.json").read())["story"]
+        ]
+        assert titles
+        page.keyboard.press("r")
+        until(page, lambda: titles[0] in page.inner_text(".reel"))
+        page.keyboard.press("Escape")
+        page.wait_for_selector(".reel", state="detached")
+        page.wait_for_selector("button.play[aria-pressed=false]")
+
+
+@pytest.mark.slow
+def test_popovers_are_inside_the_window(browser: Any, run_dir: Path) -> None:
+    small = {"viewport": {"width": 900, "height": 480}}
+    with served(run_dir) as address, page_at(browser, f"{address}#view=calendar", **small) as page:
+        box = page.locator(".days").bounding_box()
+        for x in (box["x"] + 100, box["x"] + box["width"] - 4):
+            page.mouse.move(x, box["y"] + 30)
+            page.wait_for_selector(".with-home")
+            assert is_inside(page, ".with-home")
+        page.click("details.help summary")
+        assert is_inside(page, ".help dl")
+        page.keyboard.press("Escape")
+        page.keyboard.press("Control+k")
+        assert is_inside(page, ".palette")
+
+
+def is_inside(page: Any, selector: str) -> bool:
+    box = page.locator(selector).bounding_box()
+    right, bottom = box["x"] + box["width"], box["y"] + box["height"]
+    return box["x"] >= 0 and box["y"] >= 0 and right <= 900 and bottom <= 480
+
+
+@pytest.mark.slow
+def test_zoomed_plan_has_a_button_to_the_whole(browser: Any, run_dir: Path) -> None:
+    with served(run_dir) as address, page_at(browser, address) as page:
+        assert 0 == page.locator("button.fit").count()
+        box = page.locator(".plan canvas.top").bounding_box()
+        page.mouse.move(box["x"] + 50, box["y"] + 50)
+        page.mouse.wheel(0, -8000)
+        page.click("button.fit")
+        page.wait_for_selector("button.fit", state="detached")
+
+
+@pytest.mark.slow
+def test_click_on_a_plan_inspects_that_plan(browser: Any, run_dir: Path, other_dir: Path) -> None:
+    with served(run_dir, other_dir) as address, page_at(browser, address) as page:
+        for number, name in enumerate((run_dir.name, other_dir.name)):
+            page.click("#tab-now")
+            page.locator("tr[data-body=ana] button").nth(number).click()
+            page.wait_for_selector(f"[data-inspected=ana] h2 >> text=Ana · {name}")
+
+
+@pytest.mark.slow
+def test_two_runs_have_a_table_of_what_differs(
+    browser: Any, run_dir: Path, other_dir: Path
+) -> None:
+    with served(run_dir, other_dir) as address, page_at(browser, address) as page:
+        page.wait_for_selector(".differences >> text=Ana elsewhere")
+        rows = page.locator(".differences tbody tr")
+        for number in range(rows.count()):
+            one, other = rows.nth(number).locator("td").all_inner_texts()
+            assert one != other
+    with served(run_dir, run_dir) as address, page_at(browser, address) as page:
+        page.wait_for_selector(".differences >> text=Nothing does")
+
+
+def open_palette(page: Any) -> None:
+    page.keyboard.press("Control+k")
+    page.keyboard.type("how long was ana in the bathroom")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#palette [role=option] canvas")
+
+
+def open_menu(page: Any) -> None:
+    page.click(".menu summary")
+
+
+def play_reel(page: Any) -> None:
+    page.keyboard.press("r")
+    page.wait_for_selector(".reel")
+
+
+def show_calendar(page: Any) -> None:
+    page.keyboard.press("y")
+    page.wait_for_selector(".calendar")
+
+
+def ask_wrongly(page: Any) -> None:
+    page.fill("#ask", "where is anna")
+    page.press("#ask", "Enter")
+    page.fill("#goto", "day 99")
+    page.press("#goto", "Enter")
+
+
+NEW_STATES = (open_palette, open_menu, play_reel, show_calendar, ask_wrongly)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_in_new_states(
+    browser: Any, run_dir: Path, other_dir: Path, scheme: str
+) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not installed: npm ci in page/")
+    script = AXE.read_text(encoding="utf-8")
+    found = []
+    for show in NEW_STATES:
+        with served(run_dir) as address, page_at(browser, address, color_scheme=scheme) as page:
+            page.evaluate(script)
+            show(page)
+            page.wait_for_timeout(200)
+            found += [
+                f"{show.__name__}: {entry['id']}: {entry['nodes'][0]['html'][:120]}"
+                for entry in page.evaluate("axe.run()")["violations"]
+            ]
+    with (
+        served(run_dir, other_dir) as address,
+        page_at(browser, address, color_scheme=scheme) as page,
+    ):
+        page.evaluate(script)
+        page.wait_for_selector(".differences tbody tr")
+        found += [f"two: {entry['id']}" for entry in page.evaluate("axe.run()")["violations"]]
+    assert [] == found
