@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import yaml
 from pydantic import TypeAdapter, ValidationError
+from tests.pages import text_of as page
 from tests.scenes import Cli, run, table
 from tests.test_docs_tables import is_default
 
@@ -29,11 +30,6 @@ from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.claim import rate_test
 
 ROOT = Path(__file__).parent.parent
-
-
-def page(name: str) -> str:
-    path = ROOT / ("README.md" if name == "README" else f"docs/{name}.md")
-    return path.read_text(encoding="utf-8")
 
 
 def rows(text: str, head: str) -> Iterator[list[str]]:

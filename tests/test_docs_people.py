@@ -1,4 +1,4 @@
-"""The figures of docs/people.md and docs/fit.md, computed again by the commands that they name.
+"""The figures of docs/how-to/people.md and docs/how-to/fit.md, computed again by the commands that they name.
 
 All are drawn from fixed seeds, so that they must be equal to the digits that the pages print.
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.visits import grouped_stays, traces_of_persona
+from tests.pages import text_of
 from tests.thorough import THOROUGH
 
 import fleet2d
@@ -38,7 +39,7 @@ def printed(script: str, *arguments: str) -> list[str]:
 
 def rows(page: str, head: str) -> Iterator[tuple[str, list[str]]]:
     """Yield the first cell and the others of the rows of the table whose heading begins so."""
-    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    text = text_of(page)
     for line in text[text.index(head) :].split("\n\n", 1)[0].splitlines()[2:]:
         name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
         yield name.replace("\\_", "_"), cells
@@ -173,7 +174,7 @@ def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
         assert all(map(agrees, cells, values)), (log, name, values)
 
     worse = re.findall(r"(\d\.\d+), copies (\d\.\d+)", text)
-    page = (ROOT / "docs/fit.md").read_text(encoding="utf-8")
+    page = text_of("fit")
     most = max(float(persona) - float(copies) for persona, copies in worse)
     assert f"worse than copies by up to {most:.3f}" in " ".join(page.split())
 

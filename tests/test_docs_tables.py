@@ -10,6 +10,7 @@ import typer
 import yaml
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from tests.hostile.defences import DEFENCES
+from tests.pages import ROOT, text_of
 
 from fleet2d.cli.__main__ import app
 from fleet2d.configuration.components import lookup
@@ -17,7 +18,6 @@ from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.equipment import Localization
 from fleet2d.sight.camera import Camera
 
-DOCS = Path(__file__).parent.parent / "docs"
 # The tables of keys: page, section, and the component whose keys they have.
 TABLES = [
     *(("behaviors", name, name) for name in ("schedule", "meander", "patrol")),
@@ -42,7 +42,7 @@ def fields_of(component: str | type[BaseModel], kind: str = "behavior") -> type[
 
 def tables(page: str, section: str) -> Iterator[tuple[list[str], list[str]]]:
     """Yield the keys and the defaults of each row of the first table of a section."""
-    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
+    text = text_of(page)
     part = text.split(f"\n## {section}\n", 1)[1].split("\n## ", 1)[0]
     rows = part[part.index("| key | default |") :].split("\n\n", 1)[0].splitlines()[2:]
     for row in rows:
@@ -87,7 +87,7 @@ def test_keys_of_a_table_exist_with_their_defaults(
 def test_keys_of_the_other_behaviors_and_of_drives_exist_with_their_defaults(
     kind: str, verb: str
 ) -> None:
-    text = (DOCS / "robots.md").read_text(encoding="utf-8")
+    text = text_of("robots")
     rows = text.split(f"| type | {verb} | keys (default) |")[1].split("\n\n", 1)[0].splitlines()[2:]
     wrong = []
     for row in rows:
@@ -102,7 +102,7 @@ def test_keys_of_the_other_behaviors_and_of_drives_exist_with_their_defaults(
 
 def commands() -> Iterator[tuple[list[str], set[str]]]:
     """Yield the words and the options of each command in the table of the page of commands."""
-    text = (DOCS / "cli.md").read_text(encoding="utf-8")
+    text = text_of("cli")
     for usage in re.findall(r"^\| `fleet2d ([a-z][^`]*)`", text, re.MULTILINE):
         words = re.match(r"[a-z-]+(?: [a-z-]+\b)?", usage)
         assert words is not None
@@ -124,24 +124,24 @@ def test_options_of_the_table_of_commands_exist() -> None:
         }
         assert options - {"--help"} <= has, words
     missing = set(group.list_commands(typer.Context(group))) - seen
-    assert not missing, f"add to the table in docs/cli.md: {sorted(missing)}"
+    assert not missing, f"add to the table in docs/reference/cli.md: {sorted(missing)}"
 
 
 def test_page_on_security_says_of_every_command_whether_it_runs_code() -> None:
-    text = (DOCS / "security.md").read_text(encoding="utf-8")
+    text = text_of("security")
     table = text.split("| command | runs code", 1)[1].split("\n\n", 1)[0]
     group = typer.main.get_command(app)
     stated = {name.split()[0] for name in re.findall(r"`([^`]+)`", table)}
 
     missing = set(group.list_commands(typer.Context(group))) - stated
 
-    assert not missing, f"add to the table in docs/security.md: {sorted(missing)}"
+    assert not missing, f"add to the table in docs/explanation/security.md: {sorted(missing)}"
 
 
 def test_each_line_of_the_threat_model_names_its_tests() -> None:
-    text = (DOCS / "security.md").read_text(encoding="utf-8")
+    text = text_of("security")
     table = text.split("| defended | against | test |\n| --- | --- | --- |\n", 1)[1]
-    tests = DOCS.parent / "tests"
+    tests = ROOT / "tests"
 
     lines = [line.split("|")[3] for line in table.split("\n\n", 1)[0].splitlines()]
 

@@ -9,7 +9,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furniture import FURNITURE, Furniture, furniture_type, stand_furniture
 from fleet2d.kernels import QUARTER, TURN
 
-PAGE = Path(__file__).parents[2] / "docs" / "objects.md"
+PAGE = Path(__file__).parents[2] / "docs/how-to/objects.md"
 TALL = {"wardrobe", "fridge", "bookshelf", "shelf"}
 ALL = [pytest.param(furniture, id=furniture.type) for furniture in FURNITURE.values()]
 

@@ -91,7 +91,7 @@ def test_every_other_name_is_spelled_as_labels_are_and_means_one_type() -> None:
 
 
 def test_documentation_lists_the_vocabulary_as_it_is() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "rooms.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs/how-to/rooms.md").read_text(encoding="utf-8")
     rows = {row.split("`")[1]: row for row in page.splitlines() if row.startswith("| `")}
 
     for kind in PRIORITY:

@@ -61,7 +61,7 @@ COLUMNS = (
     # The same in all rooms
     *("hour_sin", "hour_cos", "weekend", "away", "charge", "last_seen", "elapsed"),
 )
-"""The columns of an observation, in their order: see docs/gym.md."""
+"""The columns of an observation, in their order: see docs/how-to/gym.md."""
 _AT = {name: number for number, name in enumerate(COLUMNS)}
 HERE = _AT["here"]
 WAY = _AT["way"]
@@ -302,7 +302,7 @@ class Policy(BeliefBehavior):
     # What it knows
 
     def observe(self, now: Situation) -> F32:
-        """Return the observation, float32 (rooms, columns): see docs/gym.md."""
+        """Return the observation, float32 (rooms, columns): see docs/how-to/gym.md."""
         actor = now.actor
         room = now.room
         time = now.time
