@@ -19,6 +19,7 @@ from typing import Any
 import typer
 
 import fleet2d
+from fleet2d.bounds import BOUNDS
 from fleet2d.cli.__main__ import GROUPS, app
 from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.native import native_schema
@@ -45,9 +46,13 @@ KINDS = {
     "algorithm": "Algorithms",
     "metric": "Metrics",
 }
-ABOUT_COMPONENTS = (
-    "Every type with its keys, as `fleet2d components` prints them. JSON Schemas for an editor:"
-    " [of a scenario](../scenario.schema.json), [of a floor plan](../floorplan.schema.json)."
+CATALOGUES = {
+    "furniture": "Furniture",
+    "room-types": "Types of rooms",
+    "bounds": "Bounds on input",
+}
+ABOUT_SCHEMAS = (
+    "JSON Schemas: [of a scenario](scenario.schema.json), [of a floor plan](floorplan.schema.json)."
 )
 # The modules whose public names have pages, beside those of the package itself.
 MODULES = ("fleet2d.testing", "fleet2d.interventions", "fleet2d.expectations", "fleet2d.live")
@@ -78,6 +83,8 @@ def written_pages() -> dict[str, str | bytes]:
             pages[uri] = path.read_bytes()
     for source in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
         pages[COPIES[source]] = page_of(source, COPIES[source])
+    for uri, more in (("cli", commands_part()), ("components", components_part())):
+        pages[f"reference/{uri}.md"] = f"{pages[f'reference/{uri}.md']!s}\n{more}"
     return pages
 
 
@@ -85,9 +92,9 @@ def generated_pages() -> dict[str, str]:
     """Return the pages that are made from the package and the examples."""
     examples = {f"{file.relative_to(ROOT)}": file.read_text("utf-8") for file in example_files()}
     return {
-        "reference/commands.md": commands_page(),
-        "reference/furniture.md": furniture_page(),
-        "reference/room-types.md": rooms_page(),
+        "reference/components/furniture.md": furniture_page(),
+        "reference/components/room-types.md": rooms_page(),
+        "reference/components/bounds.md": bounds_page(),
         "reference/examples.md": examples_page(),
         "reference/scenario.schema.json": json.dumps(schema(), indent=2),
         "reference/floorplan.schema.json": json.dumps(native_schema(), indent=2),
@@ -126,26 +133,39 @@ def place_of(target: str) -> str:
     return COPIES["examples"] if path.is_dir() else target
 
 
+def components_by_kind() -> dict[str, list[Any]]:
+    """Return all components by their kind, in the order of the pages."""
+    found: dict[str, list[Any]] = {kind: [] for kind in KINDS}
+    for component in describe_components():
+        found.setdefault(component.kind, []).append(component)
+    return found
+
+
+def title_of(kind: str) -> str:
+    """Return the heading of a kind of component."""
+    return KINDS.get(kind, kind.replace("_", " ").capitalize())
+
+
+def components_part() -> str:
+    """Return the table of all components, and of what is no component."""
+    rows = [
+        f"| [{title_of(kind)}](components/{kind}.md) | {names_of(components)} |"
+        for kind, components in components_by_kind().items()
+    ]
+    rows += [f"| [{title}](components/{page}.md) | |" for page, title in CATALOGUES.items()]
+    return "\n".join(["| kind | types |", "| --- | --- |", *rows, "", ABOUT_SCHEMAS, ""])
+
+
+def names_of(components: list[Any]) -> str:
+    """Return the names of components as text."""
+    return ", ".join(f"`{component.type}`" for component in components)
+
+
 def component_pages() -> Iterator[tuple[str, str]]:
     """Yield a page of each kind of component, with all keys, units and defaults."""
-    kinds: dict[str, list[Any]] = {}
-    for component in describe_components():
-        kinds.setdefault(component.kind, []).append(component)
-    order = [kind for kind in KINDS if kind in kinds]
-    order += [kind for kind in kinds if kind not in KINDS]
-    rows = []
-    for kind in order:
-        title = KINDS.get(kind, kind.replace("_", " ").capitalize())
-        parts = "\n".join(component_part(component) for component in kinds[kind])
-        names = ", ".join(f"`{component.type}`" for component in kinds[kind])
-        rows.append(f"| [{title}]({kind}.md) | {names} |")
-        yield f"reference/components/{kind}.md", f"# {title}\n\n{parts}"
-    index = "\n".join(["| kind | types |", "| --- | --- |", *rows])
-    about = (
-        "Every type with its keys, as `fleet2d components` prints them. JSON Schemas for an editor:"
-    )
-    files = "[of a scenario](../scenario.schema.json), [of a floor plan](../floorplan.schema.json)."
-    yield "reference/components/index.md", f"# Components\n\n{about} {files}\n\n{index}\n"
+    for kind, components in components_by_kind().items():
+        parts = "\n".join(component_part(component) for component in components)
+        yield f"reference/components/{kind}.md", f"# {title_of(kind)}\n\n{parts}"
 
 
 def component_part(component: Any) -> str:
@@ -177,11 +197,11 @@ def plain(text: str) -> str:
     return "`".join(parts)
 
 
-def commands_page() -> str:
-    """Return the page of all commands, from their help."""
+def commands_part() -> str:
+    """Return what all commands say of themselves."""
     group: Any = typer.main.get_command(app)
     context = typer.Context(group, info_name="fleet2d")
-    parts = ["# Commands", "", "What `fleet2d COMMAND --help` says.", ""]
+    parts: list[str] = []
     for heading, names in GROUPS.items():
         parts += [f"## {heading}", ""]
         for name in names:
@@ -226,6 +246,14 @@ def rooms_page() -> str:
     return "\n".join(
         ["# Types of rooms", "", text, "", "| type | also called |", "| --- | --- |", *rows, ""]
     )
+
+
+def bounds_page() -> str:
+    """Return the page of the bounds on what is read."""
+    rows = [f"| `{b.variable}` | {b.default:,} | {b.noun} |" for b in BOUNDS]
+    text = "A file that exceeds a bound is refused; an environment variable raises it."
+    head = ["| variable | bound | of |", "| --- | ---: | --- |"]
+    return "\n".join(["# Bounds on input", "", text, "", *head, *rows, ""])
 
 
 def example_files() -> Iterable[Path]:

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import pytest
 
 from fleet2d.floorplan.rooms.room import (
@@ -88,14 +86,3 @@ def test_every_other_name_is_spelled_as_labels_are_and_means_one_type() -> None:
     assert names == [room_type(name) for name in names]
     assert len(names) == len(set(names))
     assert set() == set(names) & set(PRIORITY)
-
-
-def test_documentation_lists_the_vocabulary_as_it_is() -> None:
-    page = (Path(__file__).parents[3] / "docs/how-to/rooms.md").read_text(encoding="utf-8")
-    rows = {row.split("`")[1]: row for row in page.splitlines() if row.startswith("| `")}
-
-    for kind in PRIORITY:
-        for name in ALSO_CALLED.get(kind, ()):
-            assert name.replace("_", " ") in rows[kind], (kind, name)
-    for label in HOUSEEXPO:
-        assert label in rows[room_type(label)], label
