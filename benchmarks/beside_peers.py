@@ -3,10 +3,10 @@
     python benchmarks/beside_peers.py            # needs the network; some minutes
 
 Each has an environment of its own, with the newest version of the package index; of Fleet2D it is
-this clone. The hour is that of a person and a robot who walk at random in steps of 1 s: in Fleet2D in
-the bundled home, in IR-SIM in a room of 10 by 8 m, in which the robot looks for the person in every
-step; in Mesa on a grid of 50 by 40 cells, as it has neither walls nor sight. pyrobosim sleeps between
-the steps of a path, so that its processor time would tell nothing.
+this clone. The hour is that of a person and a robot who walk at random in steps of 1 s: in Fleet2D
+in the bundled home, in IR-SIM in a room of 10 by 8 m, in which the robot looks for the person in
+every step; in Mesa on a grid of 50 by 40 cells, as it has neither walls nor sight. pyrobosim sleeps
+between the steps of a path, so that its processor time would tell nothing.
 """
 
 import json

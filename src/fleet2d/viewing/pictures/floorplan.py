@@ -5,6 +5,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import get_font_names
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
@@ -269,9 +271,26 @@ def check_picture(path: Path) -> None:
 
 def drawing_style() -> AbstractContextManager[Any]:
     """Return the context for drawing in the style of Fleet2D, whatever the user's settings."""
-    style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": "DejaVu Sans"}
+    style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": _fonts()}
     style.pop("backend")
     return mpl.rc_context(style)
+
+
+# Fonts of systems with letters that DejaVu Sans lacks, for names in Chinese, Japanese and others.
+OTHER_FONTS = (
+    "Noto Sans CJK JP",
+    "Noto Sans",
+    "Arial Unicode MS",
+    "Microsoft YaHei",
+    "Malgun Gothic",
+)
+
+
+@cache
+def _fonts() -> list[str]:
+    """Return the fonts of pictures: what the first one lacks is taken from the next ones."""
+    installed = get_font_names()
+    return ["DejaVu Sans", *(name for name in OTHER_FONTS if name in installed)]
 
 
 def save_figure(figure: Figure, path: Path) -> None:
