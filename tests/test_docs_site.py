@@ -1,5 +1,6 @@
 """The site of the documentation: every page has its place, a kind and few words; what it shows is of today."""
 
+import importlib
 import json
 import os
 import re
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 from tests.pages import DOCS, PAGES, ROOT
-from tools import docstrings, gallery, site_versions
+from tools import gallery, site_versions
 
 KINDS = {"tutorials", "how-to", "reference", "explanation", "results"}
 NOTEBOOKS = sorted((DOCS / "tutorials").glob("*.ipynb"))
@@ -117,6 +118,8 @@ def test_a_picture_of_the_gallery_shows_the_home_or_run_of_today(piece: gallery.
 
 
 def test_examples_of_docstrings_become_code() -> None:
+    pytest.importorskip("griffe", reason="needs the extra docs")
+    docstrings = importlib.import_module("tools.docstrings")
     text = "Add.\n\n    >>> 1 + 1\n    2\n\nArgs:\n    a: [b]."
     assert docstrings.fenced(text) == (
         "Add.\n\n    ```pycon\n    >>> 1 + 1\n    2\n    ```\n\nArgs:\n    a: [b]."
