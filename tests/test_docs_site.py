@@ -103,7 +103,7 @@ def test_gallery_has_at_least_twelve_homes_and_scenarios() -> None:
 
 def test_page_of_the_gallery_is_that_of_its_pieces() -> None:
     page = (DOCS / "gallery.md").read_text(encoding="utf-8")
-    assert gallery.page() == page, "run python tools/gallery.py"
+    assert gallery.page() == page, "run python -m tools.gallery"
 
 
 @pytest.mark.slow
@@ -111,7 +111,20 @@ def test_page_of_the_gallery_is_that_of_its_pieces() -> None:
 def test_a_picture_of_the_gallery_shows_the_home_or_run_of_today(piece: gallery.Piece) -> None:
     digests = json.loads(gallery.DIGESTS.read_text(encoding="utf-8"))
     digest = gallery.digest_of(gallery.open_piece(piece))
-    assert digest == digests[piece.name], "run python tools/gallery.py"
+    assert digest == digests[piece.name], "run python -m tools.gallery"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", gallery.FIGURES)
+def test_a_figure_of_a_page_shows_the_run_of_today(name: str) -> None:
+    digests = json.loads(gallery.DIGESTS.read_text(encoding="utf-8"))
+    assert gallery.run_figure(name).digest == digests[name], "run python -m tools.gallery"
+
+
+def test_every_picture_is_shown_by_a_page() -> None:
+    shown = {name for page in PAGES for name in re.findall(r"images/([\w./]+)\)", page.read_text())}
+    files = {path.relative_to(DOCS / "images") for path in (DOCS / "images").rglob("*.*")}
+    assert set() == {path.as_posix() for path in files if path.suffix != ".json"} - shown
 
 
 # Tools

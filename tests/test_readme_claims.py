@@ -100,10 +100,10 @@ def test_the_film_shows_the_family_s_day_of_today() -> None:
     digests = json.loads((IMAGES / "digests.json").read_text(encoding="utf-8"))
     pictures = set(re.findall(r"docs/images/([\w.]+)\)", text()))
     assert pictures == set(digests)
-    assert family(1).digest == digests["day.webp"], "run python tools/pictures.py"
+    assert family(1).digest == digests["day.webp"], "run python -m tools.pictures"
 
 
 @pytest.mark.slow
 def test_the_picture_shows_the_family_s_month_of_today() -> None:
     digests = json.loads((IMAGES / "digests.json").read_text(encoding="utf-8"))
-    assert family(30).digest == digests["month.png"], "run python tools/pictures.py"
+    assert family(30).digest == digests["month.png"], "run python -m tools.pictures"

@@ -1,11 +1,14 @@
-"""Draws the gallery of the documentation: homes and scenarios, with their sources.
+"""Draws the gallery of the documentation, homes and scenarios with their sources, and its figures.
 
-python tools/gallery.py             # writes docs/gallery.md, its pictures, and their digests
+python -m tools.gallery             # writes docs/gallery.md, all pictures, and their digests
 """
 
 import hashlib
 import io
 import json
+import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -150,16 +153,48 @@ PIECES = (
 )
 
 
+# Figures of pages: the scenario, changes of it, and how `fleet2d show` draws it.
+FIGURES = {
+    "heights": ("examples/behind_the_sofa.yaml", (), ("--at", "day 1 10:02")),
+    "people_occlude": ("examples/party.yaml", (), ("--at", "day 1 11:25")),
+    "time_since_seen": (
+        "bundled:paper",
+        ("simulation.duration=1 d", "floorplan.layers={time_since_seen: {}}"),
+        ("--layer", "time_since_seen.astro"),
+    ),
+}
+FOV = ("--fov", "11.2,4.2,100,6,108")
+
+
 def main() -> None:
-    """Draw all pieces, and write the page and the digests."""
+    """Draw all pieces and figures, and write the page and the digests."""
     IMAGES.mkdir(exist_ok=True)
     digests = {}
     for piece in PIECES:
         shown = open_piece(piece)
         digests[piece.name] = digest_of(shown)
         save(fleet2d.draw(shown, at=piece.at), IMAGES / f"{piece.name}.webp")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, (_, _, options) in FIGURES.items():
+            digests[name] = run_figure(name, Path(folder, name)).digest
+            show(str(Path(folder, name)), *options, name=name)
+    show(*FOV, name="fov_methods")
     DIGESTS.write_text(json.dumps(digests, indent=2) + "\n", encoding="utf-8")
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
+
+
+def run_figure(name: str, out: Path | None = None) -> fleet2d.Run:
+    """Return the run that a figure shows."""
+    source, changes, _ = FIGURES[name]
+    scenario = str(ROOT / source) if source.startswith("examples/") else source
+    return fleet2d.run(scenario, *changes, seed=4, out=out)
+
+
+def show(*words: str, name: str) -> None:
+    """Draw a figure by `fleet2d show`."""
+    out = str(DOCS / "images" / f"{name}.png")
+    command = [sys.executable, "-m", "fleet2d", "show", *words, "--out", out]
+    subprocess.run(command, check=True)  # noqa: S603 - its words are those above
 
 
 def open_piece(piece: Piece) -> Any:
