@@ -6,10 +6,12 @@ python -m tools.tutorials algorithm --check    # says whether a notebook prints 
 
 import argparse
 import base64
+import io
 import json
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from IPython.core.displayhook import DisplayHook
 from IPython.core.interactiveshell import InteractiveShell
 from IPython.utils.capture import capture_output
 
+os.environ["MPLBACKEND"] = "agg"  # no windows
 NOTEBOOKS = Path(__file__).parents[1] / "docs" / "tutorials"
 MOST_TEXT = 4_000  # characters of an output
 FORMATS = ("image/png", "text/plain")
@@ -86,10 +89,20 @@ def outputs_of(source: str, shell: InteractiveShell) -> list[dict[str, Any]]:
     if captured.stdout:
         text = lines_of(captured.stdout[:MOST_TEXT])
         outputs.append({"output_type": "stream", "name": "stdout", "text": text})
-    for shown in (*(output.data for output in captured.outputs), *Shown.kept):
+    for shown in (*(output.data for output in captured.outputs), *Shown.kept, *open_figures()):
         data = {kind: stored(shown[kind]) for kind in FORMATS if kind in shown}
         outputs.append({"output_type": "display_data", "metadata": {}, "data": data})
     return outputs
+
+
+def open_figures() -> Iterator[dict[str, Any]]:
+    """Yield the figures that a cell left open, and close them, as notebooks show them."""
+    if (pyplot := sys.modules.get("matplotlib.pyplot")) is not None:
+        for number in pyplot.get_fignums():
+            picture = io.BytesIO()
+            pyplot.figure(number).savefig(picture, format="png", metadata={"Software": None})
+            pyplot.close(number)
+            yield {"image/png": picture.getvalue(), "text/plain": "a figure"}
 
 
 def stored(value: Any) -> str | list[str]:
