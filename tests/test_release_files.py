@@ -64,3 +64,10 @@ def test_security_policy_leads_to_the_threat_model() -> None:
 def test_changelog_has_the_version_of_the_package_in_at_most_forty_lines() -> None:
     assert f"## {fleet2d.__version__}" in text("CHANGELOG.md")
     assert 40 >= len(text("CHANGELOG.md").splitlines())
+
+
+def test_source_distribution_takes_nothing_from_an_environment_in_the_clone() -> None:
+    build = tomllib.loads(text("pyproject.toml"))["tool"]["scikit-build"]["sdist"]
+    assert [] == [pattern for pattern in build["include"] if not pattern.startswith("/")]
+    assert all((ROOT / pattern[1:]).exists() for pattern in build["include"])
+    assert {"/.venv", "/.git", "/build"} <= set(build["exclude"])
