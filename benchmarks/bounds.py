@@ -1,6 +1,6 @@
 """Every bound on time and memory, measured: what it is now beside must, aim and what it was before.
 
-    python benchmarks/bounds.py [NAMES…] [--page docs/speed.md]
+    python benchmarks/bounds.py [NAMES…] [--page docs/results/speed.md]
 
 The bounds are in `bounds.toml`. Each is measured in a process of its own. Times are of the
 processor, least of several, so that other work on the machine counts little. `--page` writes the
@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 DATA = Path(os.environ.get("FLEET2D_SHARED_DATA", HERE.parent.parent / "shared" / "data"))
 PAGE = """# How fast
 
-Made by `python benchmarks/bounds.py --page docs/speed.md` from
+Made by `python benchmarks/bounds.py --page docs/results/speed.md` from
 [bounds.toml](../benchmarks/bounds.toml): every bound that the project sets itself, and what was
 measured on {machine}. A measured value in bold misses `must`, which a release keeps; it
 should get to `aim`. `before` is the version whose kernels Numba compiled. A dash stands for what

@@ -4,18 +4,19 @@ import re
 import shlex
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
 import typer
+from tests.pages import PAGES, ROOT, text_of
+from tests.pages import page as page_of
 from typer.testing import CliRunner
 
 from fleet2d.cli.__main__ import app
 from fleet2d.engine.simulation import Simulation
 from fleet2d.scenario.load import load_scenario
 
-ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCE = re.compile(r"^```(\w+)(?: title=(\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 
@@ -149,14 +150,29 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
     assert [] == [link for link in local if not (page.parent / link).exists()]
 
 
-def test_index_names_every_page() -> None:
-    linked = set(LINK.findall((ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
-    assert set() == {page.name for page in PAGES[1:]} - linked - {"index.md"}
+@pytest.mark.parametrize("page", [pytest.param(p, id=str(p.relative_to(ROOT))) for p in PAGES])
+def test_anchors_of_a_page_are_headings(page: Path) -> None:
+    links = re.findall(r"\]\(([^)#\s]*\.md)?#([^)\s]+)\)", page.read_text(encoding="utf-8"))
+    wrong = [
+        (name, anchor)
+        for name, anchor in links
+        if anchor not in anchors(page.parent / name if name else page)
+    ]
+    assert [] == wrong
+
+
+@cache
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub and the site make them."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    plain = [re.sub(r"[`*]|\]\([^)]*\)|\[", "", heading) for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in plain}
 
 
 def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> None:
     """Up to five minutes nobody; up to a quarter of an hour some, by 0.02."""
-    text = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    text = text_of("paper")
     table = text[text.index("| routine | 0.9") :].split("\n\n")[0]
     rows = {row.split("|")[1].strip(): row.split("|")[2:5] for row in table.splitlines()}
     naive = [float(cell) for cell in rows.pop("naive")]
@@ -167,7 +183,7 @@ def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> N
 
 
 def test_concepts_deny_nothing_that_there_is() -> None:
-    text = (ROOT / "docs" / "concepts.md").read_text(encoding="utf-8")
+    text = text_of("concepts")
     for denial in ("no furniture", "no doors", "no false detections", "don't react to the robot"):
         assert denial not in text
 
@@ -179,9 +195,9 @@ NOT_RUN = {"view", "fit", "convert"}
 @pytest.mark.slow
 def test_commands_of_the_command_line_page_run_in_its_folder(folder: Path) -> None:
     """All that need nothing but the page's own file, in order, at a day instead of sixty."""
-    page = ROOT / "docs" / "cli.md"
-    write_titled_blocks(page, folder)
-    lines = [line for block in blocks(page, "sh") for line in block.text.splitlines()]
+    commands = page_of("cli")
+    write_titled_blocks(commands, folder)
+    lines = [line for block in blocks(commands, "sh") for line in block.text.splitlines()]
     ran = 0
     for words in (words[1:] for line in lines for words in split_commands(line)):
         if words[0] in NOT_RUN or (words[0] == "run" and "home.yaml" not in words):

@@ -8,32 +8,22 @@ from typing import Any
 
 import pytest
 import yaml
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
+from tests.pages import text_of as page
 from tests.scenes import Cli, run, table
-from tests.test_docs_tables import is_default
 
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
-from fleet2d.bounds import BOUNDS
 from fleet2d.configuration.components import lookup
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, Speed, TurnRateDeg
 from fleet2d.errors import InputError
 from fleet2d.expectations.parse import parse_expectation
-from fleet2d.floorplan.costmap import CostmapSettings
-from fleet2d.floorplan.layers import LayerSettings
-from fleet2d.homes.synthetic.source import Synthetic
 from fleet2d.interventions.intervention import verbs
 from fleet2d.kernels import SUB, TURN
-from fleet2d.routines.persona import Manners
 from fleet2d.studies.specification import StudyFile
 from fleet2d.testing.claim import rate_test
 
 ROOT = Path(__file__).parent.parent
-
-
-def page(name: str) -> str:
-    path = ROOT / ("README.md" if name == "README" else f"docs/{name}.md")
-    return path.read_text(encoding="utf-8")
 
 
 def rows(text: str, head: str) -> Iterator[list[str]]:
@@ -149,40 +139,20 @@ def test_keys_of_the_manifest_are_those_of_the_page(day: fleet2d.Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("where", "head", "subject"),
+    ("where", "begin", "subject"),
     [
-        ("behaviors", "| `now.` |", Situation),
-        ("behaviors", "| call |", Plan),
-        ("algorithms", "| `state.` |", Present),
-        ("algorithms", "| `history.` |", History),
+        ("behaviors", "The argument of `decide` tells", Situation),
+        ("behaviors", "calls add to it:", Plan),
+        ("algorithms", "`history` has what", History),
+        ("algorithms", "`state` has", Present),
     ],
 )
-def test_what_the_page_lists_exists(where: str, head: str, subject: type) -> None:
+def test_what_the_page_lists_exists(where: str, begin: str, subject: type) -> None:
     has = {*dir(subject), *getattr(subject, "__dataclass_fields__", {})}
-    listed = [name for cells in rows(page(where), head) for name in names(cells[0])]
+    part = page(where).split(begin, 1)[1].split(". ", 1)[0].split(";", 1)[0]
+    listed = [name for name in names(part) if name not in {"needs", "looks_back"}]
     assert len(listed) > 4
-    assert [] == [name for name in listed if name != "len" and name not in has]
-
-
-@pytest.mark.parametrize(
-    ("where", "head", "model"),
-    [("layers", "| key | default | |", LayerSettings),
-     ("layers", "| `floorplan.costmap.` |", CostmapSettings)],
-)  # fmt: skip
-def test_keys_of_layers_have_their_defaults(where: str, head: str, model: Any) -> None:
-    for cells in rows(page(where), head):
-        for name in names(cells[0]):
-            assert name in model.model_fields
-            if cells[1] and not cells[1].startswith("only"):
-                said = cells[1].removesuffix(" %")
-                assert is_default(model, name, said), (name, said)
-
-
-def test_manners_have_their_defaults() -> None:
-    for cells in rows(page("people"), "| of `manners` |"):
-        for name, said in zip(names(cells[0]), cells[1].split(", "), strict=True):
-            if " to " not in said and "±" not in said:
-                assert is_default(Manners, name, said), (name, said)
+    assert [] == [name for name in listed if name not in has]
 
 
 # Commands
@@ -276,15 +246,6 @@ def test_rates_that_seeds_can_tell_apart_are_as_the_page_says() -> None:
     assert f"{100 * rate_test(100, 0.95).alternative:.1f} %" in text
 
 
-def test_bounds_of_the_page_are_those_of_the_program() -> None:
-    units = {"MiB": 1 << 20, "GiB": 1 << 30}
-    said = {}
-    for cells in rows(page("security"), "| variable | bound |"):
-        number, _, unit = cells[1].replace(",", "").partition(" ")
-        said[cells[0].strip("`")] = int(number) * units.get(unit, 1)
-    assert {bound.variable: bound.limit for bound in BOUNDS} == said
-
-
 def test_keys_of_a_study_are_those_of_the_page() -> None:
     said = {n for cells in rows(page("studies"), "| key | |") for n in names(cells[0])}
     assert set(StudyFile.model_fields) == said
@@ -322,25 +283,6 @@ def test_the_bundled_home_is_as_large_as_the_page_says() -> None:
     assert said is not None
     plan = fleet2d.load_floorplan()
     assert (round(plan.area_m2), len(plan.rooms)) == (int(said[1]), int(said[2]))
-
-
-def test_synthetic_homes_have_the_ranges_of_the_page() -> None:
-    ranges = {
-        cells[0].strip("`"): cells[2]
-        for cells in rows(page("synthetic"), "| key | default | range")
-    }
-    for key, less, more in (
-        ("area_m2", 17, 451),
-        ("bedrooms", 0, 9),
-        ("bathrooms", 0, 7),
-        ("corridor_width", 0.85, 2.05),
-        ("door_width", 0.65, 1.25),
-    ):
-        low, high = (float(number) for number in re.findall(r"\d+(?:\.\d+)?", ranges[key])[:2])
-        assert less < low < high < more
-        for value in (less, more):
-            with pytest.raises(ValidationError):
-                Synthetic(**{key: value})
 
 
 def test_expectations_of_the_page_are_read() -> None:

@@ -1,4 +1,4 @@
-"""The figures of docs/people.md and docs/fit.md, computed again by the commands that they name.
+"""The figures of docs/results/routines.md and docs/results/estimators.md, computed again by the commands that they name.
 
 All are drawn from fixed seeds, so that they must be equal to the digits that the pages print.
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.visits import grouped_stays, traces_of_persona
+from tests.pages import text_of
 from tests.thorough import THOROUGH
 
 import fleet2d
@@ -38,7 +39,7 @@ def printed(script: str, *arguments: str) -> list[str]:
 
 def rows(page: str, head: str) -> Iterator[tuple[str, list[str]]]:
     """Yield the first cell and the others of the rows of the table whose heading begins so."""
-    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    text = text_of(page)
     for line in text[text.index(head) :].split("\n\n", 1)[0].splitlines()[2:]:
         name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
         yield name.replace("\\_", "_"), cells
@@ -62,7 +63,7 @@ def test_measures_of_days_are_those_of_the_page(data: str) -> None:
     found = {re.split(r"  +", line)[0]: re.findall(r"\d+\.\d+|nan", line) for line in lines[3:21]}
     columns = (3, 4, 5, 6, 13, 14, 15, 16, 17)
     base, sums = "", {False: set(), True: set()}
-    for name, cells in rows("people", "| | short visits | changes"):
+    for name, cells in rows("routines", "| | short visits | changes"):
         has_part = name == "the same, with `short_stays`"
         base = base if has_part else name.replace("`", "")
         key = f"{base}, short_stays" if has_part else base
@@ -82,7 +83,7 @@ def test_stays_in_the_living_room_are_as_long_with_another_seed_as_the_page_says
 def test_visits_are_those_of_the_page(data: str) -> None:
     lines = printed("people", "visits", "--data", data)
     found = {line[:18].strip(): NUMBER.findall(line[18:]) for line in lines[3:14]}
-    for name, cells in rows("people", "| mean (lowest to highest day)"):
+    for name, cells in rows("routines", "| mean (lowest to highest day)"):
         assert found[name] == NUMBER.findall(" ".join(cells)), name
 
 
@@ -125,7 +126,7 @@ def test_patrols_that_stop_where_they_see_err_as_the_page_says(
     (tmp_path / "studies/houseexpo").symlink_to(shared_data / "houseexpo")
     found = fleet2d.study(tmp_path / "studies/presence_views.yaml", tmp_path / "views").complete
     errors = []
-    for stops, cells in rows("presence", "| stops | `likelihood` | the worst home"):
+    for stops, cells in rows("estimators", "| stops | `likelihood` | the worst home"):
         of_it = found.filter(found["stops"] == stops.removeprefix("in "))
         assert 8 == len(of_it), stops
         error = of_it["likelihood_error.ana.tv"]
@@ -140,7 +141,7 @@ def test_patrols_that_stop_where_they_see_err_as_the_page_says(
 def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path: Path) -> None:
     found = fleet2d.study(ROOT / "examples/studies/presence_year.yaml", tmp_path / "year").complete
     columns = ("exposure_ratio", "exposure_ratio_14", "likelihood", "likelihood_14", "likelihood_5")
-    for event, cells in rows("presence", "| event | `exposure_ratio`"):
+    for event, cells in rows("estimators", "| event | `exposure_ratio`"):
         of_it = found.filter(found["event"] == event)
         for column, cell in zip(columns, cells, strict=True):
             values = of_it[f"{column}_error.ana.tv"].to_list()
@@ -161,7 +162,7 @@ def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
         "the other days": "  the days they were fitted on ", "`--model laws`": "laws ",
     }  # fmt: skip
     part: list[str] = []
-    for log, (name, *cells) in rows("fit", "| log (days) | |"):
+    for log, (name, *cells) in rows("routines", "| log (days) | |"):
         if log:
             part = next(logs).splitlines()
         of_it = [line for line in part if line.startswith(starts[name])]
@@ -173,11 +174,11 @@ def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
         assert all(map(agrees, cells, values)), (log, name, values)
 
     worse = re.findall(r"(\d\.\d+), copies (\d\.\d+)", text)
-    page = (ROOT / "docs/fit.md").read_text(encoding="utf-8")
+    page = text_of("routines")
     most = max(float(persona) - float(copies) for persona, copies in worse)
     assert f"worse than copies by up to {most:.3f}" in " ".join(page.split())
 
-    for log, cells in rows("fit", "| log | persona | `--private`"):
+    for log, cells in rows("routines", "| log | persona | `--private`"):
         part = next(p for p in text.split("\n## ")[1:] if p.startswith(FOLDERS[log])).splitlines()
         counted = [
             re.findall(r"[\d.]+", line.partition(":")[2])

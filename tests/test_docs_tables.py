@@ -1,34 +1,19 @@
 """Tables of keys and commands in the docs name what there is, with the defaults that it has."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, cast
 
 import pytest
 import typer
 import yaml
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter
 from tests.hostile.defences import DEFENCES
+from tests.pages import ROOT, text_of
 
 from fleet2d.cli.__main__ import app
 from fleet2d.configuration.components import lookup
-from fleet2d.entities.behavior import Behavior
-from fleet2d.entities.equipment import Localization
-from fleet2d.sight.camera import Camera
 
-DOCS = Path(__file__).parent.parent / "docs"
-# The tables of keys: page, section, and the component whose keys they have.
-TABLES = [
-    *(("behaviors", name, name) for name in ("schedule", "meander", "patrol")),
-    *(("people", name, name) for name in ("routine", "population", "room_sampling", "pet")),
-    *(("robots", name, name) for name in ("hangout", "find")),
-    ("gym", "Tasks of your own", "policy"),
-    ("robots", "Several behaviors", Behavior),
-    ("perception", "Cameras", Camera),
-    ("perception", "Errors of localization", Localization),
-    ("replay", "Keys", "replay"),
-]
 # What a page says of a default that is no value of the key, or a value that depends on others.
 IN_WORDS = re.compile(
     r"required|none|always|all|every step|until the next item|see .*|the .*|.* ± .*|.*, positions .*"
@@ -38,18 +23,6 @@ IN_WORDS = re.compile(
 
 def fields_of(component: str | type[BaseModel], kind: str = "behavior") -> type[BaseModel]:
     return lookup(kind, component) if isinstance(component, str) else component
-
-
-def tables(page: str, section: str) -> Iterator[tuple[list[str], list[str]]]:
-    """Yield the keys and the defaults of each row of the first table of a section."""
-    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
-    part = text.split(f"\n## {section}\n", 1)[1].split("\n## ", 1)[0]
-    rows = part[part.index("| key | default |") :].split("\n\n", 1)[0].splitlines()[2:]
-    for row in rows:
-        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:3]]
-        keys = re.findall(r"`([^`]+)`", cells[0])
-        values = cells[1].split(", ") if len(keys) > 1 else [cells[1]]
-        yield keys, values
 
 
 def is_default(model: type[BaseModel], key: str, said: str) -> bool:
@@ -62,32 +35,11 @@ def is_default(model: type[BaseModel], key: str, said: str) -> bool:
     return bool(value == default or adapter.validate_python(default) == value)
 
 
-@pytest.mark.parametrize(
-    ("page", "section", "component"), TABLES, ids=lambda value: str(value)[:20]
-)
-def test_keys_of_a_table_exist_with_their_defaults(
-    page: str, section: str, component: str | type[BaseModel]
-) -> None:
-    model, wrong = fields_of(component), []
-    for keys, values in tables(page, section):
-        for key, said in zip(keys, values, strict=False):
-            name = key.partition(".")[0]
-            if "." in key:
-                continue
-            assert name in model.model_fields, (page, section, key)
-            try:
-                if not IN_WORDS.fullmatch(said) and not is_default(model, name, said):
-                    wrong.append((key, said, model.model_fields[name].default))
-            except (ValidationError, yaml.YAMLError) as error:
-                wrong.append((key, said, str(error)))
-    assert [] == wrong
-
-
 @pytest.mark.parametrize(("kind", "verb"), [("behavior", "does"), ("drive", "moves")])
 def test_keys_of_the_other_behaviors_and_of_drives_exist_with_their_defaults(
     kind: str, verb: str
 ) -> None:
-    text = (DOCS / "robots.md").read_text(encoding="utf-8")
+    text = text_of("robots")
     rows = text.split(f"| type | {verb} | keys (default) |")[1].split("\n\n", 1)[0].splitlines()[2:]
     wrong = []
     for row in rows:
@@ -100,48 +52,21 @@ def test_keys_of_the_other_behaviors_and_of_drives_exist_with_their_defaults(
     assert [] == wrong
 
 
-def commands() -> Iterator[tuple[list[str], set[str]]]:
-    """Yield the words and the options of each command in the table of the page of commands."""
-    text = (DOCS / "cli.md").read_text(encoding="utf-8")
-    for usage in re.findall(r"^\| `fleet2d ([a-z][^`]*)`", text, re.MULTILINE):
-        words = re.match(r"[a-z-]+(?: [a-z-]+\b)?", usage)
-        assert words is not None
-        yield words[0].split(), set(re.findall(r"--[a-z-]+", usage))
-
-
-def test_options_of_the_table_of_commands_exist() -> None:
-    group = typer.main.get_command(app)
-    seen = set()
-    for words, options in commands():
-        context = typer.Context(group)
-        command = group.get_command(context, words[0])
-        assert command is not None, words
-        seen.add(words[0])
-        if len(words) > 1 and hasattr(command, "get_command"):
-            command = command.get_command(context, words[1])
-        has = {
-            option for param in command.params for option in [*param.opts, *param.secondary_opts]
-        }
-        assert options - {"--help"} <= has, words
-    missing = set(group.list_commands(typer.Context(group))) - seen
-    assert not missing, f"add to the table in docs/cli.md: {sorted(missing)}"
-
-
 def test_page_on_security_says_of_every_command_whether_it_runs_code() -> None:
-    text = (DOCS / "security.md").read_text(encoding="utf-8")
+    text = text_of("security")
     table = text.split("| command | runs code", 1)[1].split("\n\n", 1)[0]
     group = typer.main.get_command(app)
     stated = {name.split()[0] for name in re.findall(r"`([^`]+)`", table)}
 
     missing = set(group.list_commands(typer.Context(group))) - stated
 
-    assert not missing, f"add to the table in docs/security.md: {sorted(missing)}"
+    assert not missing, f"add to the table in docs/explanation/security.md: {sorted(missing)}"
 
 
 def test_each_line_of_the_threat_model_names_its_tests() -> None:
-    text = (DOCS / "security.md").read_text(encoding="utf-8")
+    text = text_of("security")
     table = text.split("| defended | against | test |\n| --- | --- | --- |\n", 1)[1]
-    tests = DOCS.parent / "tests"
+    tests = ROOT / "tests"
 
     lines = [line.split("|")[3] for line in table.split("\n\n", 1)[0].splitlines()]
 

@@ -33,11 +33,11 @@ def test_unknown_name_is_an_attribute_error() -> None:
 
 def test_documented_modules_are_named_as_public() -> None:
     """What the documentation imports is public, and the page of the interface lists it."""
-    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/reference/api.md").read_text(encoding="utf-8")
     documented = set()
     for file in [
         ROOT / "README.md",
-        *(ROOT / "docs").glob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
         *(ROOT / "examples").glob("*.py"),
     ]:
         text = file.read_text(encoding="utf-8")
@@ -48,4 +48,6 @@ def test_documented_modules_are_named_as_public() -> None:
         if module.startswith("fleet2d.learning.gym"):
             pytest.importorskip("gymnasium", reason="needs the extra gym")
         import_module(module)
-        assert f"`{module}`" in page, f"{module} is documented, and docs/api.md doesn't list it"
+        assert f"`{module}`" in page, (
+            f"{module} is documented, and docs/reference/api.md doesn't list it"
+        )

@@ -91,7 +91,7 @@ def test_the_robot_of_the_scenario_sees_ana_as_often_as_it_says(tmp_path: Path) 
 
 def test_times_are_those_of_the_page_on_speed() -> None:
     rows = re.findall(r"^\| `bundled:paper`.*\| ([\d.]+) \|$", text(), re.MULTILINE)
-    measured = (ROOT / "docs" / "speed.md").read_text(encoding="utf-8")
+    measured = (ROOT / "docs/results/speed.md").read_text(encoding="utf-8")
     assert 4 == len(rows)
     assert [] == [seconds for seconds in rows if f"| {seconds} s |" not in measured]
 
@@ -100,10 +100,10 @@ def test_the_film_shows_the_family_s_day_of_today() -> None:
     digests = json.loads((IMAGES / "digests.json").read_text(encoding="utf-8"))
     pictures = set(re.findall(r"docs/images/([\w.]+)\)", text()))
     assert pictures == set(digests)
-    assert family(1).digest == digests["day.webp"], "run python tools/pictures.py"
+    assert family(1).digest == digests["day.webp"], "run python -m tools.pictures"
 
 
 @pytest.mark.slow
 def test_the_picture_shows_the_family_s_month_of_today() -> None:
     digests = json.loads((IMAGES / "digests.json").read_text(encoding="utf-8"))
-    assert family(30).digest == digests["month.png"], "run python tools/pictures.py"
+    assert family(30).digest == digests["month.png"], "run python -m tools.pictures"

@@ -15,7 +15,7 @@ from tests.thorough import some
 import fleet2d
 from fleet2d.live import Bridge, open_peers
 
-PAGE = (Path(__file__).parent.parent / "docs" / "real-parts.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parent.parent / "docs/how-to/real-parts.md").read_text(encoding="utf-8")
 ROWS = [
     [re.findall(r"`([a-z][^`]*=[^`]*)`", cell) for cell in line.split(" | ")[1:]]
     for line in PAGE.splitlines()

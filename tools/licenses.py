@@ -1,4 +1,4 @@
-"""Write the licences of all dependencies, those of the page among them, in docs/dependencies.md.
+"""Write the licences of all dependencies, those of the page too, into docs/explanation.
 
 python tools/licenses.py          # write; all of requirements.lock must be installed
 python tools/licenses.py --check  # say whether it is as it should be
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-PAGE = ROOT / "docs" / "dependencies.md"
+PAGE = ROOT / "docs/explanation/dependencies.md"
 BEGIN, END = "<!-- licences: made by tools/licenses.py -->\n", "<!-- end of licences -->\n"
 REQUIREMENT = re.compile(
     r"^(?P<name>[a-z0-9._-]+)==(?P<version>\S+)(?: ; (?P<marker>[^\\]+))? ", re.M

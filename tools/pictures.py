@@ -1,10 +1,14 @@
-"""Redraws the README's pictures from the bundled family, with the digests of the runs they show.
+"""Redraws all pictures of README, gallery, pages and tutorials, with digests of what they show.
 
-python tools/pictures.py            # some minutes; needs the extra `browser` and Debian's chromium
+python -m tools.pictures            # some minutes; needs the extra `browser` and Debian's chromium
+
+Those of measurements are drawn by their benchmarks, as the pages of results say.
 """
 
 import io
 import json
+import subprocess
+import sys
 from collections.abc import Sequence
 from datetime import timedelta
 from pathlib import Path
@@ -12,6 +16,7 @@ from typing import Any
 
 from PIL import Image
 from playwright.sync_api import sync_playwright
+from tools import gallery
 
 import fleet2d
 from fleet2d.runs.run import Run
@@ -31,7 +36,9 @@ STILL_H = 18.75
 
 
 def main() -> None:
-    """Draw the pictures, and write `digests.json`."""
+    """Draw all pictures, and write `digests.json`."""
+    gallery.main()
+    subprocess.run([sys.executable, "-m", "tools.tutorials"], check=True)
     month = fleet2d.run("bundled:family")
     draw_run(month, IMAGES / "month.png")
     day = fleet2d.run("bundled:family", DAY)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import pytest
 import typer
@@ -156,3 +157,15 @@ def test_command_imports_no_other() -> None:
     )
 
     assert "fleet2d.cli.results fleet2d.cli.run" == done.stdout.splitlines()[-1]
+
+
+def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(tmp_path: Path) -> None:
+    words = ("bundled:family", "simulation.duration=3 h", "simulation.start=2026-01-05T17:00")
+    tables = []
+    for columns in ("20", "200"):
+        out = str(tmp_path / columns)
+        done = process("-m", "fleet2d", "run", *words, "--out", out, COLUMNS=columns)
+        lines = [line.split() for line in done.stdout.splitlines()]
+        tables.append([line for line in lines if line[:1] != ["stored"] and " x " not in str(line)])
+    narrow, wide = ([line for line in table if "real" not in line] for table in tables)
+    assert narrow == wide

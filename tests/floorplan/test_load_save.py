@@ -173,7 +173,7 @@ def test_schema_is_one_and_what_is_written_fits() -> None:
 
 
 def test_example_in_the_docs_fits_the_schema() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "floorplans.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs/how-to/floorplans.md").read_text(encoding="utf-8")
     example = page.partition("```yaml title=own.yaml\n")[2].partition("```")[0]
 
     assert set(native_schema()["properties"]) == set(yaml.safe_load(example))

@@ -1,4 +1,4 @@
-"""Count the attacks of `tests/hostile` and those that broke something, as docs/security.md lists them.
+"""Count the attacks of `tests/hostile` and those that broke something, as docs/explanation/security.md lists them.
 
     python -m tests.hostile               # a part of the attacks
     FLEET2D_THOROUGH=1 python -m tests.hostile

@@ -1,4 +1,4 @@
-"""The defences of docs/security.md: the line of each, what takes it out, and the test that fails then."""
+"""The defences of docs/explanation/security.md: the line of each, what takes it out, and the test that fails then."""
 
 from typing import NamedTuple
 

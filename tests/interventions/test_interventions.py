@@ -41,7 +41,7 @@ def test_stub_has_the_signature_of_each_constructor(name: str) -> None:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_each_intervention_is_documented_with_an_example(name: str) -> None:
-    page = (ROOT / "docs" / "interventions.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/interventions.md").read_text(encoding="utf-8")
 
     assert f"`{name}`" in page
     assert f">>> {name}(" in (BUILT_IN[name].__doc__ or "")

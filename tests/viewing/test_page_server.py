@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 
 import fleet2d
 from fleet2d.errors import InputError
+from fleet2d.viewing import page_server
 from fleet2d.viewing.page_data import PageData
 from fleet2d.viewing.page_server import PageServer, kept_token, new_token, page_app
 from fleet2d.viewing.served_runs import ServedRuns
@@ -331,3 +332,17 @@ def test_a_page_behind_a_tunnel_or_proxy_answers_under_the_stated_address_only(
 def test_what_is_no_address_of_a_proxy_is_refused(run_dir: Path) -> None:
     with pytest.raises(InputError, match="http://localhost:9000"):
         PageServer([run_dir], seen_at="localhost:9000")
+
+
+@pytest.mark.parametrize(("opens", "said"), [(True, False), (False, True)])
+def test_no_browser_is_said_with_what_helps(
+    opens: bool, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page_server.webbrowser, "open", lambda _: opens)
+    monkeypatch.setattr(PageServer, "run", lambda _: None)
+    lines: list[str] = []
+    server = PageServer([])
+    server.show(open_browser=True, announce=lines.append)
+    server.close()
+    assert server.address in lines[0]
+    assert said == (page_server.NO_BROWSER in lines)

@@ -294,8 +294,8 @@ def _check_time(text: str) -> str:
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 # The name of a table is that of its file: it must not lead out of the directory.
-TableName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
-FileName = Annotated[str, Field(pattern=r"^(learned/)?[A-Za-z0-9_][A-Za-z0-9_.\-]*$")]
+TableName = Annotated[str, Field(pattern=r"^\w[\w.\-]*$")]
+FileName = Annotated[str, Field(pattern=r"^(learned/)?\w[\w.\-]*$")]
 
 
 class Record(BaseModel):

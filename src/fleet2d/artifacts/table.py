@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, Bool
 from fleet2d.runtime.local_time import Zone, rules_of
+from fleet2d.storage.names import is_word
 
 Kind = Literal["step", "time", "int32", "int64", "float64", "bool", "category", "string"]
 
@@ -30,7 +30,6 @@ DTYPES: dict[str, np.dtype[Any]] = {
 }
 KINDS: dict[str, Kind] = {"b": "bool", "i": "int64", "u": "int64", "f": "float64", "O": "category"}
 """The kind of column for values of each kind of NumPy's types."""
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
 
 TRACK = 0
 PLANNED = 1
@@ -116,7 +115,7 @@ class TableSpec:
     def __post_init__(self) -> None:
         """Refuse a table that can't be stored."""
         object.__setattr__(self, "columns", tuple(self.columns))
-        if not _NAME.fullmatch(self.name):
+        if self.name[:1] in ("", ".", "-") or not is_word(self.name.replace(".", "_")):
             raise ArtifactError(
                 f"a table can't be named {self.name!r}, because it becomes the file name: "
                 "use letters, digits, '_', '-' and '.'"

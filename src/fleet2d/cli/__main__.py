@@ -147,7 +147,7 @@ app = typer.Typer(
     "  fleet2d demo\n"
     "  fleet2d run bundled:paper simulation.duration.days=60 --out sixty\n"
     "  fleet2d view sixty\n\n"
-    "fleet2d COMMAND --help describes a command; docs/cli.md describes all.",
+    "fleet2d COMMAND --help describes a command; docs/reference/cli.md describes all.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )

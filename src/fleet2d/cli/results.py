@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 _LOADED = time.perf_counter()
+UNIT_WIDTH = 12  # of units, whose words may go on in further lines
+LONGEST = 10_000  # characters of a line
 
 
 def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
@@ -71,6 +73,7 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
 
     print_verdict(run)
     console = Console(highlight=False, markup=False, soft_wrap=True)
+    wide = Console(highlight=False, markup=False, width=LONGEST)
     wall = summary["wall_s"]
     simulated = format_duration(timedelta(seconds=summary["simulated_s"]))
     seconds = wall["setup"] + wall["simulate"] + wall["save"]
@@ -84,16 +87,20 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
     blocks = blocks_of(run.metrics, run.manifest["scenario"]["metrics"])
     width = max((len(row.name) for block in blocks for row in block.rows), default=0)
     for block in blocks:
+        columns = zip(*(row.values for row in block.rows), strict=True)
+        value_width = sum(max(map(len, column)) + 2 for column in columns)
+        # Where columns would be cut, lines are as long as they are, and the terminal breaks them.
+        is_narrow = console.width < width + 4 + value_width + UNIT_WIDTH
         table = Table.grid(padding=(0, 2, 0, 0))
-        table.add_column(min_width=width + 2)
+        table.add_column(min_width=width + 2, no_wrap=is_narrow)
         head, *rows = block.rows
         for _ in head.values:
-            table.add_column(justify="right")
-        table.add_column(style="dim")
+            table.add_column(justify="right", no_wrap=True)
+        table.add_column(style="dim", no_wrap=is_narrow)
         table.add_row(head.name, *head.values)
         for row in rows:
             table.add_row(f"  {row.name}", *row.values, row.unit)
-        console.print(table, soft_wrap=False)
+        (wide if is_narrow else console).print(table, soft_wrap=False)
     hidden = sum(block.hidden for block in blocks)
     lines = [f"{hidden} more numbers are in the run: --json shows them"] if hidden else []
     lines += [verdict.says for verdict in verdicts_of(run) if verdict.outcome != "violated"]

@@ -67,6 +67,7 @@ from fleet2d.errors import (
     may_be_ctrl_c,
     text_of,
 )
+from fleet2d.storage.names import problem_of
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
@@ -132,9 +133,6 @@ class DescribedModel(BaseModel):
         return result
 
 
-_FORM = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
-
-
 # What YAML takes for no text, so that a name couldn't be referred to without quotes.
 _NO_TEXT = frozenset({"null", "true", "false"})
 
@@ -144,12 +142,8 @@ def _check_names(entries: Any) -> Any:
     if isinstance(entries, Mapping):
         _check_count(ENTRIES, (), entries)
         for name in entries:
-            if not _FORM.fullmatch(str(name)):
-                raise problem_at(
-                    (name,),
-                    f"the name {one_line(repr(name))} must be letters, digits, '_' and '-', a"
-                    " letter first, 100 characters at most",
-                )
+            if problem := problem_of(str(name)):
+                raise problem_at((name,), f"the name {one_line(repr(name))} {problem}")
             if str(name).lower() in _NO_TEXT:
                 raise problem_at((name,), f"{name} is not text in YAML: choose another name")
     return entries

@@ -1,7 +1,6 @@
 """Layers: named arrays with a value for each cell."""
 
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping
 from datetime import timedelta
 from typing import Any, Literal, Self, get_args
@@ -15,6 +14,7 @@ from fleet2d.configuration.problems import problem_at, suggest
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.storage.names import problem_of
 
 LayerType = Literal[
     "bool", "int", "float", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
@@ -24,8 +24,6 @@ LayerType = Literal[
 SEEN_LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")
 """Layers that a run itself maintains for each robot with a camera, as NAME.ROBOT."""
 COSTMAP = "costmap"
-
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*(\.[A-Za-z][A-Za-z0-9_-]*)?")
 
 
 class LayerSettings(Settings):
@@ -59,10 +57,8 @@ class LayerSettings(Settings):
 def check_layers(layers: dict[str, LayerSettings]) -> dict[str, LayerSettings]:
     """Refuse invalid names, and settings that don't apply to layers which the run maintains."""
     for name, settings in layers.items():
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
-            raise problem_at(
-                (name,), f"the name {name!r} must be letters, digits, '_' and '-', a letter first"
-            )
+        if problem := problem_of(name):
+            raise problem_at((name,), f"the name {name!r} {problem}")
         if name in (*SEEN_LAYERS, COSTMAP):
             for key, value in LayerSettings():
                 if key in ("store", "every") or getattr(settings, key) == value:
@@ -256,10 +252,9 @@ class Layers(Mapping[str, Layer]):
         self, name: str, settings: LayerSettings, source: Callable[[], NDArray[Any]] | None = None
     ) -> Layer:
         """Add a layer as a scenario describes it; see `add`."""
-        if not _NAME.fullmatch(name):
-            raise ComponentError(
-                f"a layer can't be named {name!r}: use letters, digits, '_' and '-', a letter first"
-            )
+        base, dot, body = name.partition(".")  # `body`: that of a layer of what a robot has seen
+        if problem := problem_of(base) or (problem_of(body) if dot else None):
+            raise ComponentError(f"a layer can't be named {name!r}: the name {problem}")
         layer = self._layers.get(name)
         if layer is None:
             layer = self._layers[name] = Layer(name, self._plan, settings, source)

@@ -2,8 +2,8 @@
 
 A person *notices* the robot, is *available*, and *accepts*; each is a draw with the probability
 logistic(sum of parts), addressed by person, interaction and step. After Choi et al. (2019), Cha et
-al. (2020) and the structure of Oralytics' simulation environment; docs/interactions.md has the
-source and the range of each number.
+al. (2020) and the structure of Oralytics' simulation environment; docs/how-to/interactions.md has
+the source and the range of each number.
 """
 
 from collections.abc import Mapping

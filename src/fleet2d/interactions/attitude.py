@@ -1,7 +1,7 @@
 """Attitude: what months with a robot make of a person; truth, which only metrics read.
 
-Numbers for which no study is known are defaults of Fleet2D; docs/interactions.md has the sources
-and ranges of all of them.
+Numbers for which no study is known are defaults of Fleet2D; docs/how-to/interactions.md has the
+sources and ranges of all of them.
 """
 
 from dataclasses import dataclass, field

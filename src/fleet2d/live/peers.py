@@ -439,7 +439,8 @@ class MqttPeer(Peer):
             "device": {"identifiers": [node], "name": "Fleet2D", "manufacturer": "Fleet2D"},
             **config,
         }
-        place = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        # Home Assistant takes ASCII only: other letters by their numbers, so that no two are alike.
+        place = re.sub(r"[^A-Za-z0-9_-]", lambda letter: f"_{ord(letter[0]):x}", name)
         self._retain(f"{DISCOVERY}/{component}/{node}/{place}/config", json.dumps(content))
 
     def _retain(self, topic: str, text: str) -> None:

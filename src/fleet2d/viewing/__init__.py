@@ -12,12 +12,20 @@ def load_ipython_extension(shell: Any) -> None:
     formatters["text/html"].for_type_by_name("fleet2d.runs.run", "Run", _run_html)
     for module, name in (("plan", "FloorPlan"), ("home", "Home")):
         formatters["image/png"].for_type_by_name(f"fleet2d.floorplan.{module}", name, _home_png)
+    # What `draw` returns; pyplot's own formatter, where there is one, comes first.
+    formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", _figure_png)
 
 
 def _run_html(run: Any) -> str:
     from fleet2d.viewing.notebook import run_html
 
     return run_html(run)
+
+
+def _figure_png(figure: Any) -> bytes:
+    from fleet2d.viewing.notebook import figure_png
+
+    return figure_png(figure)
 
 
 def _home_png(home: Any) -> bytes | None:

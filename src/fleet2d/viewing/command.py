@@ -59,7 +59,7 @@ def view(
     server = PageServer([], port=port, live=live, seen_at=seen_at or "")
     live.start()
     try:
-        server.show(open_browser=browser, announce=_announce)
+        server.show(open_browser=browser, announce=typer.echo)
     finally:
         live.end()
         server.end_branches()
@@ -98,11 +98,7 @@ def _view_runs(
         show_code(run.manifest)
     sources = [PageData(run) for run in trusted] or directories
     server = PageServer(sources, port=port, seen_at=seen_at)
-    server.show(open_browser=browser, announce=_announce)
+    server.show(open_browser=browser, announce=typer.echo)
     for run in server.end_branches():
         typer.echo(_where(run), err=True)
     raise typer.Exit(130)
-
-
-def _announce(address: str) -> None:
-    typer.echo(f"{address}\nshown until you press Ctrl-C; the address works on this machine only")

@@ -209,6 +209,13 @@ class _Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
+UNTIL = "shown until you press Ctrl-C; the address works on this machine only"
+NO_BROWSER = (
+    "no browser could be opened: open the address in one, forward its port if this machine is"
+    " another one (ssh -L PORT:127.0.0.1:PORT), or write a file: `fleet2d export RUN_DIR run.html`"
+)
+
+
 class PageServer:
     """The server of the page, with its port.
 
@@ -266,9 +273,9 @@ class PageServer:
 
     def show(self, *, open_browser: bool, announce: Callable[[str], None]) -> None:
         """Announce the address, open a browser if requested, serve until Ctrl-C or SIGTERM."""
-        announce(self.address)
-        if open_browser:
-            webbrowser.open(self.address)
+        announce(f"{self.address}\n{UNTIL}")
+        if open_browser and not webbrowser.open(self.address):
+            announce(NO_BROWSER)
         # The server raises a signal again when it has ended: whoever called it still has to close.
         before = signal.signal(signal.SIGTERM, end_by_signal)
         try:

@@ -1,5 +1,4 @@
 from collections import Counter
-from pathlib import Path
 
 import pytest
 
@@ -92,17 +91,6 @@ def test_every_other_name_is_spelled_as_labels_are_and_means_its_types() -> None
     for kind, others in ALSO_CALLED.items():
         assert all(kind in usual_types(name) for name in others)
     assert set() == set(names) & set(PRIORITY)
-
-
-def test_documentation_lists_the_vocabulary_as_it_is() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "rooms.md").read_text(encoding="utf-8")
-    rows = {row.split("`")[1]: row for row in page.splitlines() if row.startswith("| `")}
-
-    for kind in PRIORITY:
-        for name in ALSO_CALLED.get(kind, ()):
-            assert name.replace("_", " ") in rows[kind], (kind, name)
-    for label in HOUSEEXPO:
-        assert label in rows[room_type(label)], label
 
 
 @pytest.mark.parametrize(

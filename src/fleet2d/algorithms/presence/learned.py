@@ -235,7 +235,7 @@ class LearnedModel(CorrectedRoutine):
     homes and people are like those of the training.
 
     It is right where `routine` is too sure, or too slow to give up a room. It fails where people
-    live unlike those it was trained on; docs/datasets.md has the numbers.
+    live unlike those it was trained on; docs/how-to/datasets.md has the numbers.
 
     Attributes:
         weights: A file that `fleet2d train rtp` wrote; left out: the weights that ship.

@@ -64,7 +64,7 @@ COLUMNS = (
     # The same in all rooms
     *("hour_sin", "hour_cos", "weekend", "away", "charge", "last_seen", "elapsed"),
 )
-"""The columns of an observation, in their order: see docs/gym.md."""
+"""The columns of an observation, in their order: see docs/how-to/gym.md."""
 _AT = {name: number for number, name in enumerate(COLUMNS)}
 HERE = _AT["here"]
 WAY = _AT["way"]
@@ -422,7 +422,7 @@ class Policy(LearnedBehavior):
     # What it knows
 
     def observe(self, now: Situation) -> F32:
-        """Return the observation, float32 (rooms, columns): see docs/gym.md."""
+        """Return the observation, float32 (rooms, columns): see docs/how-to/gym.md."""
         actor = now.actor
         room = now.room
         time = now.time

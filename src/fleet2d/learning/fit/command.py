@@ -41,7 +41,8 @@ def fit_routine(  # noqa: PLR0913 - each is an option
     ],
     out: Annotated[Path, typer.Option(help="The persona to write.")] = Path("persona.yaml"),
     layout: Annotated[
-        str, typer.Option("--format", help="Its layout, see docs/replay.md; auto recognizes it.")
+        str,
+        typer.Option("--format", help="Its layout (docs/how-to/replay.md); auto recognizes it."),
     ] = "auto",
     picture: Annotated[
         Path | None, typer.Option(help="Picture of the fit to write, .png or .svg.")
@@ -182,7 +183,7 @@ def privacy(fitted: "FittedPersona", private: bool) -> list[str]:
         f"  days of the log, with each other: {repeats(fitted.log, fitted.log)}",
     ]
     verdict = (
-        "no day of the log is in the persona; docs/fit.md says what it still tells"
+        "no day of the log is in the persona; docs/how-to/fit.md says what it still tells"
         if private
         else "the persona holds every day of the log to the second: --private, to give it away"
     )

@@ -4,8 +4,10 @@ import io
 import math
 import re
 import textwrap
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,9 +19,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font, get_font_names
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
+from matplotlib.text import Text
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
@@ -272,11 +276,46 @@ def check_picture(path: Path) -> None:
         )
 
 
-def drawing_style() -> AbstractContextManager[Any]:
-    """Return the context for drawing in the style of Fleet2D, whatever the user's settings."""
-    style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": "DejaVu Sans"}
+@contextmanager
+def drawing_style() -> Iterator[None]:
+    """Draw in the style of Fleet2D, whatever the user's settings."""
+    style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": _fonts()}
     style.pop("backend")
-    return mpl.rc_context(style)
+    with mpl.rc_context(style), _no_warning_of_each_letter():
+        yield
+
+
+@contextmanager
+def _no_warning_of_each_letter() -> Iterator[None]:
+    """Leave out Matplotlib's warnings of letters that no font has: `save_figure` warns of all."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        yield
+
+
+# Fonts of systems with letters that DejaVu Sans lacks, for names in Chinese, Japanese and others.
+OTHER_FONTS = (
+    "Noto Sans CJK JP",
+    "Noto Sans",
+    "Arial Unicode MS",
+    "Microsoft YaHei",
+    "Malgun Gothic",
+)
+
+
+@cache
+def _fonts() -> list[str]:
+    """Return the fonts of pictures: what the first one lacks is taken from the next ones."""
+    installed = get_font_names()
+    return ["DejaVu Sans", *(name for name in OTHER_FONTS if name in installed)]
+
+
+def _letters_without_font(figure: Figure) -> str:
+    """Return the letters of a figure's texts that none of the fonts has."""
+    fonts = [get_font(findfont(name)) for name in _fonts()]
+    texts = {text.get_text() for text in figure.findobj(Text)}
+    letters = sorted(set("".join(texts)) - {"\n"})
+    return "".join(c for c in letters if not any(font.get_char_index(ord(c)) for font in fonts))
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -287,7 +326,14 @@ def save_figure(figure: Figure, path: Path) -> None:
     """
     unstamped = {DATE_METADATA[path.suffix.lower()]: None}
     content = io.BytesIO()
-    figure.savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
+    with _no_warning_of_each_letter():
+        figure.savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
+    if letters := _letters_without_font(figure):
+        warnings.warn(
+            f"the fonts of this machine lack the letters {letters}, which {path} shows as boxes:"
+            " install one that has them, such as Debian's fonts-noto-cjk",
+            stacklevel=2,
+        )
     with os_errors_as(InputError, f"can't write the picture {path}"):
         write_atomically(path, content.getvalue())
 
