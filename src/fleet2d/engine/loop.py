@@ -92,6 +92,8 @@ def change_home(state: State, span: Span) -> None:
 def decide(state: State, span: Span) -> None:
     """Ask bodies that have no plan left, and those about to hit another one, for a decision."""
     step = span.first
+    yielding = state.yielding
+    begun = set[int]()  # robots whose plans may still be replaced, as others are in their way
     for row in _asked(state, step):
         actor = state.actors[row]
         if any(watcher.looks(row, step) for watcher in state.steering):
@@ -110,9 +112,19 @@ def decide(state: State, span: Span) -> None:
         for watcher in state.steering:
             if row in watcher.steered:
                 begins |= _evade(state, watcher, row, step, begins=begins)
-        if begins:
-            state.changes.expect(row, actor)
-            state.begin_plan(row, step)
+        if begins and yielding is not None and row in yielding.rows:
+            begun.add(row)
+        elif begins:
+            _begin_plan(state, row, step)
+    if yielding is not None:
+        yielding.answer(state, step, begun)
+    for row in sorted(begun):
+        _begin_plan(state, row, step)
+
+
+def _begin_plan(state: State, row: int, step: int) -> None:
+    state.changes.expect(row, state.actors[row])
+    state.begin_plan(row, step)
 
 
 def _asked(state: State, step: int) -> Sequence[int]:

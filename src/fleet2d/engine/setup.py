@@ -22,6 +22,7 @@ from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import EventStream, InView, Recall, State
 from fleet2d.engine.world import schedule_script
+from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.home_object import Door
@@ -62,6 +63,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     watchers = [
         Clearance(basis.users, basis.robots),
         BlockedWays(basis),
+        Yielding(basis),
         *user_cameras,
         *cameras,
         Encounters(basis.users, basis.robots),

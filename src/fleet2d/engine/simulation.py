@@ -186,7 +186,9 @@ class Simulation:
         of_sensors = self._state.find(Sensors)
         sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
-        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
+        yielding = self._state.yielding
+        overlaps = [] if yielding is None else yielding.notes
+        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies, *overlaps]
 
     @property
     def _unused_heights(self) -> Iterator[str]:

@@ -20,6 +20,7 @@ from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
+from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
@@ -183,6 +184,7 @@ class State:
         changes: The changes of the home.
         watchers: All followers of the bodies that the run needs, in their order.
         steering: Those of them that may replace plans at any step.
+        yielding: The one by which robots keep clear of others; None if none does.
         user_cameras: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
@@ -228,6 +230,7 @@ class State:
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
     steering: list[Watcher] = field(init=False)
+    yielding: Yielding | None = field(init=False)
     _situation: Situation | None = None  # the newest one
 
     def __getstate__(self) -> dict[str, object]:
@@ -239,6 +242,7 @@ class State:
         self.notes_emitted = [0] * len(self.actors)
         self.capacity = capacity_of(len(self.actors))
         self.steering = [watcher for watcher in self.watchers if watcher.steered]
+        self.yielding = self.find(Yielding)
 
     def find(self, kind: type[W]) -> W | None:
         """Return the watcher of a kind; None if the run needs none."""

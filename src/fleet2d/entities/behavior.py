@@ -328,6 +328,8 @@ class Behavior(Component):
     listens: ClassVar[frozenset[str]] = frozenset()
     # Whether it does nothing in a scenario in which its robot wants nothing of people.
     serves_requests: ClassVar[bool] = False
+    # Whether it is where a log or a real body is, which nothing in the run may change.
+    is_recorded: ClassVar[bool] = False
     # Whether it reads what its robot remembers of its sightings, by `actor.recall`.
     remembers: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.

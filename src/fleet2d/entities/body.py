@@ -33,7 +33,18 @@ from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I8, I64, TURN, Breakpoints, PoseBlock, Poses, Timelines, Window
+from fleet2d.kernels import (
+    F64,
+    I8,
+    I64,
+    TURN,
+    Breakpoints,
+    Distances,
+    PoseBlock,
+    Poses,
+    Timelines,
+    Window,
+)
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
@@ -227,6 +238,18 @@ class Bodies:
         if window is None or (window.first, window.end) != (first, end):
             window = self._window = self._timelines.window(first, end)
         return window
+
+    def meetings(
+        self, rows: I64, distances: Distances, first: int, end: int
+    ) -> list[tuple[int, int, int, int]]:
+        """Return to whom bodies have to react in some steps: see `Timelines.meetings`."""
+        return self._timelines.meetings(rows, distances, first, end)
+
+    def meeting_on(
+        self, row: int, track: Breakpoints, distances: Distances, first: int, end: int
+    ) -> tuple[int, int]:
+        """Return whom a body would meet on a track: see `Timelines.meeting_on`."""
+        return self._timelines.meeting_on(row, track, distances, first, end)
 
     def runs(self, row: int, first: int, end: int) -> Window:
         """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""

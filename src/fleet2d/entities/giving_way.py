@@ -292,19 +292,19 @@ class RoutesAround:
         return route_by_cost(self._space, self.cost, start, goal)
 
 
-def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
-    """Return a plan that stands for a step, and then continues the present one.
+def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Note] = ()) -> Plan:
+    """Return a plan that stands until a step, and then continues the present one.
 
     A random walk isn't continued: the behavior is asked again.
 
     Args:
         now: The situation.
         interrupted: The present plan.
+        step: The step until which it stands.
         notes: Rows for the events table at the stop.
     """
     begin_us = now.step * interrupted.step_us
-    step_us = interrupted.step_us
-    plan = now.plan().stay_until(begin_us + step_us)
+    plan = now.plan().stay_until(step * interrupted.step_us)
     motion = interrupted.finish()
     plan.notes += notes
     if isinstance(motion, Track):
@@ -313,7 +313,35 @@ def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = (
     return plan
 
 
-def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
+def plan_aside(now: Situation, interrupted: Plan, place: LatticePoint, step: int) -> Plan | None:
+    """Return a plan that steps aside to a place until a step, and then continues the present one.
+
+    After a random walk, the behavior is asked again.
+
+    Returns:
+        The plan; None if no way leads there, or on from there.
+    """
+    motion = interrupted.finish()
+    begin_us = now.step * interrupted.step_us
+    try:
+        plan = now.plan().go_to_point(*place).stay_until(step * interrupted.step_us)
+        if not isinstance(motion, Track):
+            return plan
+        rows = _rows(motion.breakpoints)
+        stop = next_stop(now.actor, motion.breakpoints, begin_us)
+        stop = len(rows) - 1 if stop is None else stop
+        plan.go_to_point(int(rows[stop, 1]), int(rows[stop, 2]))
+    except NoWayError:
+        return None
+    since_us = max(int(rows[stop, 0]), begin_us)
+    if stop < len(rows) - 1:
+        plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
+    return _continue(plan, interrupted, begin_us, since_us, rows[stop + 1 :])
+
+
+def plan_around(
+    now: Situation, interrupted: Plan, bodies: I64, waits_for: LatticePoint | None = None
+) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
     If a body stands at that stop, and it is the last one, it stops beside it in the room. A body on
@@ -323,6 +351,7 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
         now: The situation.
         interrupted: The present plan.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
+        waits_for: A place beside which it doesn't stop: its charger.
 
     Returns:
         The plan; None if there is no way round.
@@ -342,10 +371,10 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
     if detour.cost[goal[1] // SUB, goal[0] // SUB] < 0:
         if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or interrupted.postures:
             return None
-        beside = _beside(actor, goal, detour)
-        if beside is None:
+        free = None if goal == waits_for else beside(actor, goal, detour)
+        if free is None:
             return None
-        goal = beside
+        goal = free
         rest[:, 1:3] = goal
     plan = now.plan()
     route = detour(plan.position, goal)
@@ -402,7 +431,7 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def _beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
+def beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan = actor.home.plan
     space = actor.space
