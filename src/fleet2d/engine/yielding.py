@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from fleet2d.entities.place import is_point
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.lattice import LatticePoint
-from fleet2d.kernels import I64, SUB, Distances
+from fleet2d.kernels import I64, SUB, Bool, Breakpoints, Distances, walking_distance
 from fleet2d.runtime.events import EventKind
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ AHEAD = timedelta(seconds=5)
 FREE_FOR = timedelta(seconds=15)
 # The waits that it tries, in order.
 WAITS = tuple(timedelta(seconds=seconds) for seconds in (1, 2, 4, 8))
+WAITS_ASIDE = timedelta(seconds=2), timedelta(seconds=8)
 # How long a plan that isn't free for long is kept before the next try.
 PAUSE = timedelta(seconds=2)
 # Waiting for another robot for this long is a deadlock: the other one yields, for a while.
@@ -55,7 +57,10 @@ GIVES_UP = timedelta(minutes=2)
 # Gap at which bodies pass, and gap at which a robot with the right of way stops [m].
 PASSING_GAP_M = 0.05
 LEAST_GAP_M = 0.01
-# Places to step aside to: the distance between them, and how many are tried [cells].
+# Places to step aside to: how far away they may be [m], the distance between them [cells], and how
+# many are tried.
+NEAR_M = 1.2
+FAR_M = 5.0
 ASIDE_CELLS = 4
 ASIDE_TRIES = 12
 
@@ -108,6 +113,7 @@ class Yielding(Watcher):
         self._step_us = basis.clock.step_us
         self._ahead = self._steps(AHEAD)
         self._waits: dict[int, Wait] = {}
+        self._looked_round: dict[int, int] = {}  # when it last found no way round
         self._told: dict[tuple[int, int], int] = {}
         self._patience: dict[tuple[int, int], Patience] = {}
         self._swapped: dict[tuple[int, int], int] = {}
@@ -270,11 +276,13 @@ class Yielding(Watcher):
         own = self._present(step).own
         return other in self._number and bool(own[self._number[row], other])
 
-    def _have_patience(self, now: Situation, other: int, *, ignores: bool = False) -> None:
-        """Let a robot not react to another body for a moment."""
-        until = now.step + self._steps(PAUSE)
+    def _have_patience(
+        self, now: Situation, other: int, steps: int, *, ignores: bool = False
+    ) -> None:
+        """Let a robot not react to another body for some steps."""
         planned_at = self._actors[other].planned_at
-        self._patience[now.actor.row, other] = Patience(until, planned_at, ignores)
+        patience = Patience(now.step + steps, planned_at, ignores)
+        self._patience[now.actor.row, other] = patience
         self._distances = None
 
     def _swap(self, row: int, other: int, step: int) -> None:
@@ -293,40 +301,50 @@ class Yielding(Watcher):
     def _plan(self, now: Situation, at: int, other: int) -> Plan | None:
         """Return another plan for a robot that meets somebody at a step; None to go on."""
         if self._goes_first(now.actor.row, other, now.step):
-            return self._blocked(now, other, self._stop(now))
+            return self._blocked(now, at, other, self._stop(now))
         stays = self._met(now, now.plan().stay(), self._everybody)
         if stays is None:
-            plan = self._by_waiting(now, other)
-        elif self._keeps_its_place(now, other):
+            plan = self._by_waiting(now, at, other)
+        elif self._keeps_its_place(now, at, other):
             return None
         else:
-            plan = next(self._asides(now), None)
+            plan = next(self._asides(now, at), None)
         if plan is not None:
             return self._noted(now, other, plan)
-        self._have_patience(now, other)
+        pause = self._pause(now)
+        self._have_patience(now, other, pause)
         is_hit = stays is not None and stays[0] <= at and other not in self._number
         if is_hit and at > now.step:
             return None  # it is hit as early if it stops
         if is_hit:
-            self._have_patience(now, other, ignores=True)
+            self._have_patience(now, other, pause, ignores=True)
             return self._overlapping(now, other)
-        return self._blocked(now, other, self._stop(now))
+        return self._blocked(now, at, other, self._stop(now, pause))
 
-    def _by_waiting(self, now: Situation, other: int) -> Plan | None:
+    def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
         """Return a plan that goes on later, or round bodies that stand; None if none is free."""
         actor = self._actors[now.actor.row]
         for wait in () if self._rests(other, now.step) else WAITS:
-            plan = plan_after(now, actor.plan, now.step + self._steps(wait))
-            if self._is_free(now, plan):
-                return plan
+            until = now.step + self._steps(wait)
+            if self._is_free_after(now, until):
+                return plan_after(now, actor.plan, until)
+        last = self._looked_round.get(actor.row)
+        if last is not None and now.step - last < self._ahead:
+            return None
         charger = None if actor.charge is None else actor.charge.charger
-        around = plan_around(now, actor.plan, self._standing(now), charger)
-        return around if around is not None and self._is_free(now, around) else None
+        around = plan_around(now, actor.plan, self._standing(now), at, charger)
+        if around is not None and self._is_free(now, around):
+            return around
+        self._looked_round[actor.row] = now.step
+        return None
 
-    def _asides(self, now: Situation) -> Iterator[Plan]:
+    def _asides(self, now: Situation, at: int) -> Iterator[Plan]:
         """Yield plans to step aside and come back, the nearest place first."""
         actor = self._actors[now.actor.row]
-        for place in self._places_aside(actor, now.step):
+        places = chain.from_iterable(
+            self._places_aside(actor, now.step, metres) for metres in (NEAR_M, FAR_M)
+        )
+        for place in places:
             try:
                 plan = now.plan().go_to_point(*place)
             except NoWayError:
@@ -334,18 +352,25 @@ class Yielding(Watcher):
             if not self._is_free(now, plan):
                 continue
             arrives = actor.clock.step_at_or_after(plan.time_us)
-            for wait in WAITS:
-                back = plan_aside(now, actor.plan, place, arrives + self._steps(wait))
+            for wait in WAITS_ASIDE:
+                back = plan_aside(now, actor.plan, place, arrives + self._steps(wait), at)
                 if back is not None and self._is_free(now, back):
                     yield back
             # It waits aside for as long as is known, and then looks again.
-            later = plan_aside(now, actor.plan, place, arrives + self._steps(FREE_FOR))
+            later = plan_aside(now, actor.plan, place, arrives + self._steps(FREE_FOR), at)
             if later is not None:
                 yield later
 
-    def _stop(self, now: Situation) -> Plan:
+    def _stop(self, now: Situation, steps: int = 0) -> Plan:
         """Return a plan to stop for a moment, and then to go on."""
-        return plan_after(now, self._actors[now.actor.row].plan, now.step + self._steps(PAUSE))
+        until = now.step + max(steps, self._steps(PAUSE))
+        return plan_after(now, self._actors[now.actor.row].plan, until)
+
+    def _pause(self, now: Situation) -> int:
+        """Return for how many steps a robot waits before it looks again: longer and longer."""
+        wait = self._waits.get(now.actor.row)
+        waited = 0 if wait is None or not self._goes_on(wait, now) else now.step - wait.since
+        return min(max(self._steps(PAUSE), waited // 2), self._steps(DEADLOCK))
 
     def _overlapping(self, now: Situation, other: int) -> Plan | None:
         """Write once that somebody walks into a robot, which goes on as before."""
@@ -365,13 +390,7 @@ class Yielding(Watcher):
         """Add to a plan that the robot gives way, at the beginning of a wait."""
         row = now.actor.row
         wait = self._waits.get(row)
-        goes_on = (
-            wait is not None
-            and now.step - wait.last <= self._steps(SAME_WAIT)
-            and math.dist(wait.place, now.actor.state.position) <= self._same_place
-        )
-        if goes_on:
-            assert wait is not None
+        if wait is not None and self._goes_on(wait, now):
             self._waits[row] = wait._replace(last=now.step)
         else:
             self._waits[row] = Wait(now.step, now.step, now.actor.state.position)
@@ -379,7 +398,12 @@ class Yielding(Watcher):
             plan.notes.insert(0, note)
         return plan
 
-    def _blocked(self, now: Situation, other: int, plan: Plan) -> Plan:
+    def _goes_on(self, wait: Wait, now: Situation) -> bool:
+        """Return whether a robot that has to wait now does so still."""
+        is_soon = now.step - wait.last <= self._steps(SAME_WAIT)
+        return is_soon and math.dist(wait.place, now.actor.state.position) <= self._same_place
+
+    def _blocked(self, now: Situation, at: int, other: int, plan: Plan) -> Plan:
         """Return what a robot does for which nothing is free: it waits, or skips its stop."""
         row = now.actor.row
         actor = self._actors[row]
@@ -387,9 +411,9 @@ class Yielding(Watcher):
         wait = self._waits[row]
         waited = now.step - wait.since
         name = self._actors[other].name
-        taken = self._is_taken(actor, other, now.step)
+        taken = self._is_taken(actor, other, now.step, at)
         charger = None if actor.charge is None else actor.charge.charger
-        if taken and self._stop_of(actor, now.step) == charger:
+        if taken and self._stop_of(actor, at) == charger:
             return plan  # it queues
         patience = DEADLOCK if taken else GIVES_UP
         if waited >= self._steps(patience) and _goes_somewhere(actor):
@@ -417,17 +441,39 @@ class Yielding(Watcher):
 
     def _met(self, now: Situation, plan: Plan, distances: Distances) -> tuple[int, int] | None:
         """Return the step at which a plan would meet somebody first, and whom."""
-        row = now.actor.row
         motion = plan.finish()
         if not isinstance(motion, Track):
             return None
+        return self._meets(now, motion.breakpoints, distances)
+
+    def _meets(
+        self, now: Situation, track: Breakpoints, distances: Distances
+    ) -> tuple[int, int] | None:
+        row = now.actor.row
         number = self._number[row]
         lead, near, hard, own = distances
         mine = slice(number, number + 1)
         kept = Distances(lead[mine], near[mine], hard[mine], own[mine])
         end = now.step + self._steps(FREE_FOR)
-        step, other = self._bodies.meeting_on(row, motion.breakpoints, kept, now.step, end)
+        step, other = self._bodies.meeting_on(row, track, kept, now.step, end)
         return None if step < 0 else (step, other)
+
+    def _is_free_after(self, now: Situation, step: int) -> bool:
+        """Return whether a robot may stand until a step, and then go on as it planned."""
+        motion = self._actors[now.actor.row].plan.finish()
+        if not isinstance(motion, Track):
+            return True
+        track = motion.breakpoints
+        now_us = now.step * self._step_us
+        first = int(np.searchsorted(track.time, now_us, side="right"))
+        begins = np.array([now_us, step * self._step_us], np.int64)
+        pose = now.actor.state
+        begin = (
+            np.full(2, value, column.dtype) for value, column in zip(pose, track[1:], strict=True)
+        )
+        later = np.concatenate([begins, track.time[first:] + (begins[1] - begins[0])])
+        columns = [np.concatenate([b, c[first:]]) for b, c in zip(begin, track[1:], strict=True)]
+        return self._meets(now, Breakpoints(later, *columns), self._passing) is None
 
     def _is_free(self, now: Situation, plan: Plan) -> bool:
         """Return whether a plan brings a robot too near to nobody, as far as is known."""
@@ -462,53 +508,71 @@ class Yielding(Watcher):
         stop = len(track.time) - 1 if stop is None else stop
         return int(track.x[stop]), int(track.y[stop])
 
-    def _is_taken(self, actor: DecidingActor, other: int, step: int) -> bool:
+    def _is_taken(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
         """Return whether another body stays where a robot wants to stop next."""
-        stop = self._stop_of(actor, step)
+        stop = self._stop_of(actor, at)
         if stop is None or not self._rests(other, step):
             return False
         near = int(self._near[self._number[actor.row], other])
         return math.dist(stop, self._actors[other].state.position) < near
 
-    def _keeps_its_place(self, now: Situation, other: int) -> bool:
+    def _keeps_its_place(self, now: Situation, at: int, other: int) -> bool:
         """Let a robot that wants to stop where this one stands yield; return whether it does."""
         row = now.actor.row
         if other not in self._number or (min(row, other), max(row, other)) in self._swapped:
             return False
-        if not self._is_taken(self._actors[other], row, now.step):
+        if not self._is_taken(self._actors[other], row, now.step, at):
             return False
         self._swap(row, other, now.step)
         return True
 
-    def _places_aside(self, actor: DecidingActor, step: int) -> list[LatticePoint]:
+    def _places_aside(
+        self, actor: DecidingActor, step: int, within_m: float
+    ) -> Iterator[LatticePoint]:
         """Return places that nobody else comes near to on the ways known, by their distance."""
         lattice = actor.home.plan.lattice
-        space = actor.space
-        part = space.part_of_cell[::ASIDE_CELLS, ::ASIDE_CELLS] == actor.part
-        cells = np.argwhere(part) * ASIDE_CELLS
+        x, y = self._inside(actor)
+        reach = int(within_m / lattice.cell)
+        row0, column0 = max(y // SUB - reach, 0), max(x // SUB - reach, 0)
+        window = (slice(row0, y // SUB + reach + 1), slice(column0, x // SUB + reach + 1))
+        mask = actor.space.part_of_cell[window] == actor.part
+        here = np.array([[y // SUB - row0, x // SUB - column0]], np.int64)
+        steps = walking_distance(mask, here)
+        cells = np.argwhere(steps[::ASIDE_CELLS, ::ASIDE_CELLS] > 0) * ASIDE_CELLS
+        steps = steps[cells[:, 0], cells[:, 1]]
         xs, ys = lattice.centre_axes()
-        places = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], axis=-1)
-        x, y = actor.state.position
-        number = self._number[actor.row]
-        reach = self._near[number] + lattice.units_per_m * lattice.cell
-        farthest = 6 * lattice.units_per_m
-        close = ((places - [x, y]) ** 2).sum(axis=1) <= farthest * farthest
-        places = places[close]
-        steps = np.arange(step, step + self._steps(FREE_FOR) + 1)
-        poses = self._bodies.poses(steps)
+        places = np.stack([xs[cells[:, 1] + column0], ys[cells[:, 0] + row0]], axis=-1)
+        free = self._clear_of_ways(actor, step, places)
+        order = np.argsort(steps[free], kind="stable")[:ASIDE_TRIES]
+        yield from map(tuple, places[free][order].tolist())
+
+    def _clear_of_ways(self, actor: DecidingActor, step: int, places: I64) -> Bool:
+        """Return near which of some places, int64 (n, 2), nobody else comes on the ways known."""
+        lattice = actor.home.plan.lattice
+        reach = self._near[self._number[actor.row]] + int(lattice.units_per_m * lattice.cell)
+        poses = self._bodies.poses(np.arange(step, step + self._steps(FREE_FOR) + 1))
         free = np.ones(len(places), np.bool_)
-        for other in range(len(self._actors)):
-            ways = np.unique(poses[:, other][poses[:, other, 3] == 0][:, :2], axis=0)
-            if other == actor.row or not len(ways):
-                continue
-            apart = ((places[:, None] - ways[None]) ** 2).sum(axis=2).min(axis=1)
-            free &= apart > reach[other] ** 2
-        places = places[free]
         if not len(places):
-            return []
-        metres = space.distances(_inside(actor), places)
-        order = np.argsort(metres, kind="stable")[:ASIDE_TRIES]
-        return [tuple(places[i].tolist()) for i in order if np.isfinite(metres[i])]
+            return free
+        low, high = places.min(axis=0), places.max(axis=0)
+        for other in range(len(self._actors)):
+            ways = poses[:, other]
+            ways = ways[ways[:, 3] == 0][:, :2]
+            near = ((ways > low - reach[other]) & (ways < high + reach[other])).all(axis=1)
+            if other == actor.row or not near.any():
+                continue
+            ways = np.unique(ways[near], axis=0)
+            dx = places[:, 0, None] - ways[:, 0]
+            dy = places[:, 1, None] - ways[:, 1]
+            free &= (dx * dx + dy * dy > reach[other] ** 2).all(axis=1)
+        return free
+
+    def _inside(self, actor: DecidingActor) -> LatticePoint:
+        """Return where a robot is, or the nearest place in its space."""
+        x, y = actor.state.position
+        if actor.space.part_of_cell[y // SUB, x // SUB] == actor.part:
+            return x, y
+        return actor.space.nearest(x, y, actor.part) or (x, y)
 
     def _begin_apart(self, actor: DecidingActor) -> None:
         """Move a robot that was drawn into somebody to the nearest free place."""
@@ -540,11 +604,3 @@ def _goes_somewhere(actor: DecidingActor) -> bool:
         return True
     track = motion.breakpoints
     return bool((track.x != track.x[0]).any() or (track.y != track.y[0]).any())
-
-
-def _inside(actor: DecidingActor) -> LatticePoint:
-    """Return where a robot is, or the nearest place in its space."""
-    x, y = actor.state.position
-    if actor.space.part_of_cell[y // SUB, x // SUB] == actor.part:
-        return x, y
-    return actor.space.nearest(x, y, actor.part) or (x, y)

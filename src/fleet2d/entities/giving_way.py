@@ -285,7 +285,12 @@ class RoutesAround:
         xs, ys = body.home.plan.lattice.centre_axes()
         self.cost = np.zeros(body.space.part_of_cell.shape, np.int32)
         for x, y, reach in people.tolist():
-            self.cost[(xs - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach] = CLOSED
+            rows, columns = (
+                slice(*np.searchsorted(axis, [middle - reach, middle + reach + 1]).tolist())
+                for axis, middle in ((ys, y), (xs, x))
+            )
+            away = (xs[columns] - x) ** 2 + (ys[rows, None] - y) ** 2
+            self.cost[rows, columns][away <= reach * reach] = CLOSED
 
     def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
@@ -313,10 +318,19 @@ def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Not
     return plan
 
 
-def plan_aside(now: Situation, interrupted: Plan, place: LatticePoint, step: int) -> Plan | None:
+def plan_aside(
+    now: Situation, interrupted: Plan, place: LatticePoint, step: int, met_at: int
+) -> Plan | None:
     """Return a plan that steps aside to a place until a step, and then continues the present one.
 
     After a random walk, the behavior is asked again.
+
+    Args:
+        now: The situation.
+        interrupted: The present plan.
+        place: Where it steps.
+        step: The step until which it stays there.
+        met_at: The step from which on somebody is in the way: it goes on with the next stop then.
 
     Returns:
         The plan; None if no way leads there, or on from there.
@@ -328,7 +342,7 @@ def plan_aside(now: Situation, interrupted: Plan, place: LatticePoint, step: int
         if not isinstance(motion, Track):
             return plan
         rows = _rows(motion.breakpoints)
-        stop = next_stop(now.actor, motion.breakpoints, begin_us)
+        stop = next_stop(now.actor, motion.breakpoints, met_at * interrupted.step_us)
         stop = len(rows) - 1 if stop is None else stop
         plan.go_to_point(int(rows[stop, 1]), int(rows[stop, 2]))
     except NoWayError:
@@ -340,7 +354,11 @@ def plan_aside(now: Situation, interrupted: Plan, place: LatticePoint, step: int
 
 
 def plan_around(
-    now: Situation, interrupted: Plan, bodies: I64, waits_for: LatticePoint | None = None
+    now: Situation,
+    interrupted: Plan,
+    bodies: I64,
+    met_at: int | None = None,
+    waits_for: LatticePoint | None = None,
 ) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
@@ -351,6 +369,7 @@ def plan_around(
         now: The situation.
         interrupted: The present plan.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
+        met_at: The step at which they are in the way; left out: now.
         waits_for: A place beside which it doesn't stop: its charger.
 
     Returns:
@@ -361,7 +380,8 @@ def plan_around(
     begin_us = now.step * interrupted.step_us
     if not isinstance(motion, Track):
         return now.plan().turn_by(0.5)
-    stop = next_stop(actor, motion.breakpoints, begin_us)
+    met_us = begin_us if met_at is None else met_at * interrupted.step_us
+    stop = next_stop(actor, motion.breakpoints, met_us)
     if stop is None:
         return None
     rows = _rows(motion.breakpoints)
