@@ -7,6 +7,7 @@ namespace fleet2d {
 namespace {
 
 constexpr i64 ENDLESS = std::numeric_limits<i64>::max();
+constexpr i64 ROUNDED = 8;  // more than all coordinates that a distance depends on are rounded by [lattice units]
 
 std::size_t number_of(i64 i) { return static_cast<std::size_t>(i); }
 
@@ -125,24 +126,33 @@ bool do_meet(const Straight& body, const Straight& other, i64 begin, i64 end, co
     return beside * beside < near * static_cast<f64>(way);
 }
 
-// The first step in which two bodies meet, -1 for none.
+// Whether two bodies are surely farther apart between two moments than their limits, whatever is rounded.
+bool is_far(const Straight& body, const Straight& other, i64 begin, i64 end, i64 limit) {
+    const Point a0 = body.where(begin), a1 = body.where(end), b0 = other.where(begin), b1 = other.where(end);
+    const i64 px = b0.x - a0.x, py = b0.y - a0.y, qx = b1.x - a1.x, qy = b1.y - a1.y;
+    const i64 reach = limit + ROUNDED;
+    return (px > reach && qx > reach) || (px < -reach && qx < -reach) || (py > reach && qy > reach) ||
+           (py < -reach && qy < -reach);
+}
+
+// The first step in which two bodies meet, -1 for none. Each step is looked at by itself, as what is rounded must not
+// depend on where the ways begin.
 i64 first_meeting_step(const Way& body, const Way& other, const MeetingLimits& limits, i64 step_us) {
-    if (!body.is_near(other, std::max(limits.near, limits.hard))) return -1;
+    const i64 limit = std::max(limits.near, limits.hard);
+    if (!body.is_near(other, limit)) return -1;
     auto a = body.straights.begin();
     auto b = other.straights.begin();
     while (a != body.straights.end() && b != other.straights.end()) {
         const i64 begin = std::max(a->begin, b->begin), end = std::min(a->end, b->end);
-        if (begin < end && !a->away && !b->away && do_meet(*a, *b, begin, end, limits)) {
-            i64 from = begin;
-            while (from < end) {
-                const i64 until = std::min(end, (floor_div(from, step_us) + 1) * step_us);
-                // The last part has it if rounding hides it in all others.
-                if (until == end || do_meet(*a, *b, from, until, limits)) return floor_div(from, step_us);
-                from = until;
-            }
+        const bool counts = begin < end && !a->away && !b->away && !is_far(*a, *b, begin, end, limit);
+        const bool rest = a->whole == 0 && b->whole == 0;
+        for (i64 from = begin; counts && from < end;) {
+            const i64 until = rest ? end : std::min(end, (floor_div(from, step_us) + 1) * step_us);
+            if (do_meet(*a, *b, from, until, limits)) return floor_div(from, step_us);
+            from = until;
         }
         if (a->end == end) ++a;
-        if (b != other.straights.end() && b->end == end) ++b;
+        if (b->end == end) ++b;
     }
     return -1;
 }

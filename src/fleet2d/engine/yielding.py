@@ -27,7 +27,7 @@ from fleet2d.entities.behavior import Situation
 from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.giving_way import plan_after, plan_around, plan_aside
-from fleet2d.entities.place import is_point
+from fleet2d.entities.place import is_point, points_at_distance
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.lattice import LatticePoint
@@ -55,14 +55,15 @@ SAME_PLACE_M = 1.5
 # How long it waits in vain before it skips its stop.
 GIVES_UP = timedelta(minutes=2)
 # Gap at which bodies pass, and gap at which a robot with the right of way stops [m].
-PASSING_GAP_M = 0.05
+PASSING_GAP_M = 0.02
 LEAST_GAP_M = 0.01
 # Places to step aside to: how far away they may be [m], the distance between them [cells], and how
-# many are tried.
+# many are tried; and the number of directions in which it passes somebody who stands.
 NEAR_M = 1.2
 FAR_M = 5.0
 ASIDE_CELLS = 4
 ASIDE_TRIES = 12
+VIAS = 8
 
 
 class Wait(NamedTuple):
@@ -165,15 +166,15 @@ class Yielding(Watcher):
         """
         self._refresh(step)
         outputs = state.learners.readable_outputs
-        for row, _, at, other in self._bodies.meetings(
-            self._rows, self._present(step), step, step + 1
-        ):
+        found = self._bodies.meetings(self._rows, self._present(step), step, step + 1)
+        for row, _, at, other in found:
             now = Situation(self._actors[row], step, (), outputs)
             plan = self._plan(now, at, other)
             if plan is not None:
                 self._follow(state, now, plan, begun)
         # Who would still drive into somebody within this step stops, then who drives into those.
-        while found := self._bodies.meetings(self._rows, self._strict, step, step + 1):
+        while found:
+            found = self._bodies.meetings(self._rows, self._strict(step), step, step + 1)
             for row, *_ in found:
                 now = Situation(self._actors[row], step, (), outputs)
                 self._follow(state, now, self._stop(now), begun)
@@ -204,11 +205,11 @@ class Yielding(Watcher):
         self._hard = lattice(0.0)
         self._near = lattice(PASSING_GAP_M)
         self._least = lattice(LEAST_GAP_M)
-        nothing = np.zeros_like(self._near)
-        mutual = np.zeros(touch.shape, np.uint8)
-        self._passing = Distances(nothing, self._near, nothing, mutual)
-        self._everybody = Distances(nothing, self._near, self._hard, mutual)
-        self._strict = Distances(nothing, self._least, nothing, np.ones_like(mutual))
+        self._nothing = np.zeros_like(self._near)
+        self._alone = np.ones(touch.shape, np.uint8)
+        mutual = np.zeros_like(self._alone)
+        self._passing = Distances(self._nothing, self._near, self._nothing, mutual)
+        self._everybody = Distances(self._nothing, self._near, self._hard, mutual)
         self._same_place = SAME_PLACE_M * units
         self._order()
         for row in self.rows:
@@ -271,6 +272,11 @@ class Yielding(Watcher):
                 lead[number] = -1
         return Distances(lead, near, hard, own)
 
+    def _strict(self, step: int) -> Distances:
+        """Return the distances at which robots stop at the last moment."""
+        lead = np.minimum(self._present(step).lead, 0)
+        return Distances(lead, self._least, self._nothing, self._alone)
+
     def _goes_first(self, row: int, other: int, step: int) -> bool:
         """Return whether a robot only has to stop before another one, and needn't yield."""
         own = self._present(step).own
@@ -328,6 +334,11 @@ class Yielding(Watcher):
             until = now.step + self._steps(wait)
             if self._is_free_after(now, until):
                 return plan_after(now, actor.plan, until)
+        if not self._is_taken(actor, other, now.step, at):
+            for via in self._beside(actor, other):
+                plan = plan_aside(now, actor.plan, via, now.step, at)
+                if plan is not None and self._is_free(now, plan):
+                    return plan
         last = self._looked_round.get(actor.row)
         if last is not None and now.step - last < self._ahead:
             return None
@@ -337,6 +348,13 @@ class Yielding(Watcher):
             return around
         self._looked_round[actor.row] = now.step
         return None
+
+    def _beside(self, actor: DecidingActor, other: int) -> list[LatticePoint]:
+        """Return points by which a robot may pass a body that stands, the nearest two."""
+        near = 3 * int(self._near[self._number[actor.row], other]) // 2
+        middle = self._actors[other].state.position
+        points = points_at_distance(actor, middle, near, VIAS)
+        return sorted(points, key=lambda at: math.dist(at, actor.state.position))[1:4]
 
     def _asides(self, now: Situation, at: int) -> Iterator[Plan]:
         """Yield plans to step aside and come back, the nearest place first."""
@@ -468,11 +486,11 @@ class Yielding(Watcher):
         first = int(np.searchsorted(track.time, now_us, side="right"))
         begins = np.array([now_us, step * self._step_us], np.int64)
         pose = now.actor.state
-        begin = (
-            np.full(2, value, column.dtype) for value, column in zip(pose, track[1:], strict=True)
-        )
         later = np.concatenate([begins, track.time[first:] + (begins[1] - begins[0])])
-        columns = [np.concatenate([b, c[first:]]) for b, c in zip(begin, track[1:], strict=True)]
+        columns = [
+            np.concatenate([np.full(2, value, column.dtype), column[first:]])
+            for value, column in zip(pose, track[1:], strict=True)
+        ]
         return self._meets(now, Breakpoints(later, *columns), self._passing) is None
 
     def _is_free(self, now: Situation, plan: Plan) -> bool:
@@ -492,19 +510,20 @@ class Yielding(Watcher):
         end = now.step + self._steps(FREE_FOR)
         rows = []
         for other in self._actors:
-            x, y, _, away = self._bodies.pose_at(other.row, end)
-            if other.row == now.actor.row or away or not self._rests(other.row, end):
+            at = now.step if self._rests(other.row, now.step) else end
+            x, y, _, away = self._bodies.pose_at(other.row, at)
+            if other.row == now.actor.row or away or not self._rests(other.row, at):
                 continue
             rows.append((x, y, int(self._near[number, other.row]) + cell))
         return np.array(rows, np.int64).reshape(-1, 3)
 
     def _stop_of(self, actor: DecidingActor, step: int) -> LatticePoint | None:
-        """Return where a body stops next, or is; None if it walks at random."""
+        """Return where a body stops after a step, or is; None if it walks at random."""
         motion = actor.plan.finish()
         if not isinstance(motion, Track):
             return None
         track = motion.breakpoints
-        stop = giving_way.next_stop(actor, track, step * self._step_us)
+        stop = giving_way.next_stop(actor, track, (step + 1) * self._step_us)
         stop = len(track.time) - 1 if stop is None else stop
         return int(track.x[stop]), int(track.y[stop])
 
@@ -561,7 +580,7 @@ class Yielding(Watcher):
             near = ((ways > low - reach[other]) & (ways < high + reach[other])).all(axis=1)
             if other == actor.row or not near.any():
                 continue
-            ways = np.unique(ways[near], axis=0)
+            ways = ways[near]
             dx = places[:, 0, None] - ways[:, 0]
             dy = places[:, 1, None] - ways[:, 1]
             free &= (dx * dx + dy * dy > reach[other] ** 2).all(axis=1)

@@ -330,7 +330,7 @@ def plan_aside(
         interrupted: The present plan.
         place: Where it steps.
         step: The step until which it stays there.
-        met_at: The step from which on somebody is in the way: it goes on with the next stop then.
+        met_at: The step in which somebody is in the way: it goes on with the stop after that.
 
     Returns:
         The plan; None if no way leads there, or on from there.
@@ -342,7 +342,7 @@ def plan_aside(
         if not isinstance(motion, Track):
             return plan
         rows = _rows(motion.breakpoints)
-        stop = next_stop(now.actor, motion.breakpoints, met_at * interrupted.step_us)
+        stop = next_stop(now.actor, motion.breakpoints, (met_at + 1) * interrupted.step_us)
         stop = len(rows) - 1 if stop is None else stop
         plan.go_to_point(int(rows[stop, 1]), int(rows[stop, 2]))
     except NoWayError:
@@ -369,7 +369,7 @@ def plan_around(
         now: The situation.
         interrupted: The present plan.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
-        met_at: The step at which they are in the way; left out: now.
+        met_at: The step in which they are in the way; left out: now.
         waits_for: A place beside which it doesn't stop: its charger.
 
     Returns:
@@ -380,7 +380,7 @@ def plan_around(
     begin_us = now.step * interrupted.step_us
     if not isinstance(motion, Track):
         return now.plan().turn_by(0.5)
-    met_us = begin_us if met_at is None else met_at * interrupted.step_us
+    met_us = begin_us if met_at is None else (met_at + 1) * interrupted.step_us
     stop = next_stop(actor, motion.breakpoints, met_us)
     if stop is None:
         return None
