@@ -100,7 +100,7 @@ Way way_of(Timelines& timelines, i64 body, i64 first, i64 end) {
 
 struct MeetingLimits {
     i64 near, hard;
-    bool own;
+    MotionCounts counts;
 };
 
 // Whether two bodies meet between two moments within one stretch of each.
@@ -110,10 +110,12 @@ bool do_meet(const Straight& body, const Straight& other, i64 begin, i64 end, co
     const i64 own_x = a1.x - a0.x, own_y = a1.y - a0.y;
     const i64 dx = b1.x - b0.x - own_x, dy = b1.y - b0.y - own_y;
     const i64 parting = px * dx + py * dy;
-    if (!limits.own && px * px + py * py < limits.hard * limits.hard && parting <= 0) return true;
+    if (limits.counts != OWN_MOTION && px * px + py * py < limits.hard * limits.hard && parting <= 0) return true;
     if (parting >= 0) return false;
-    if (limits.own) {
-        const i64 towards = px * own_x + py * own_y, then = (px + dx) * own_x + (py + dy) * own_y;
+    if (limits.counts != ALL_MOTION) {
+        const bool mine = limits.counts == OWN_MOTION;
+        const i64 vx = mine ? own_x : -dx - own_x, vy = mine ? own_y : -dy - own_y;  // towards the other one
+        const i64 towards = px * vx + py * vy, then = (px + dx) * vx + (py + dy) * vy;
         if (towards <= 0 && then <= 0) return false;
     }
     const i64 way = dx * dx + dy * dy;
@@ -164,7 +166,7 @@ std::optional<Meeting> first_meeting(const std::vector<Way>& ways, const Way& wa
         const i64 lead = distances.lead(number, other);
         if (other == row || lead < 0) continue;
         const MeetingLimits limits{distances.near(number, other), distances.hard(number, other),
-                            distances.own(number, other) != 0};
+                            static_cast<MotionCounts>(distances.counts(number, other))};
         const i64 step = first_meeting_step(way, ways[number_of(other)], limits, step_us);
         if (step < 0) continue;
         const i64 due = std::max(first, step - lead);

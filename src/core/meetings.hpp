@@ -18,12 +18,19 @@ struct Meeting {
     i64 other;  // the row of the other one
 };
 
+// Whose motion brings two bodies too near to each other.
+enum MotionCounts : u8 {
+    ALL_MOTION = 0,
+    OWN_MOTION = 1,    // only that of the body itself: the other one may come as near as it likes
+    OTHER_MOTION = 2,  // only that of the other one
+};
+
 // What each of some bodies keeps from all bodies, (rows, bodies) each.
 struct Distances {
     View<const i64, 2> lead;  // steps by which it reacts before a meeting; below 0: it ignores the other one
     View<const i64, 2> near;  // distance of the middles below which they mustn't approach [lattice units]
     View<const i64, 2> hard;  // distance below which they overlap, and must part [lattice units]; 0: they needn't
-    View<const u8, 2> own;    // not 0: only its own motion counts, and the other one may come as near as it likes
+    View<const u8, 2> counts; // whose motion counts: a MotionCounts
 };
 
 // For each of some bodies, the first meeting that is due in the steps first to end - 1; of several that are due at a

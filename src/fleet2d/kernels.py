@@ -397,7 +397,7 @@ class Distances(NamedTuple):
     lead: I64  # steps by which it reacts before a meeting; below 0: it ignores the other one
     near: I64  # distance of the middles below which they mustn't approach [lattice]
     hard: I64  # distance below which they overlap, and must part [lattice]; 0: they needn't
-    own: U8  # not 0: only its own motion counts
+    counts: U8  # whose motion counts: 0 that of both, 1 its own, 2 that of the other one
 
 
 class Poses(NamedTuple):

@@ -179,7 +179,7 @@ private:
         require(first <= end && end - first <= FAR, "end must not be before first");
         const std::array<i64, 2> shape{rows, timelines_.bodies()};
         require(distances.lead.shape == shape && distances.near.shape == shape && distances.hard.shape == shape &&
-                    distances.own.shape == shape,
+                    distances.counts.shape == shape,
                 "all distances must be (rows, bodies)");
         i64 longest = 0;
         for (i64 i = 0; i < rows; ++i) {

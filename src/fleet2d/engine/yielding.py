@@ -12,13 +12,14 @@ can't get out of the way, the two overlap, with an event.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis, Watcher
@@ -64,6 +65,11 @@ FAR_M = 5.0
 ASIDE_CELLS = 4
 ASIDE_TRIES = 12
 VIAS = 8
+
+
+# Whose motion counts.
+OWN = 1
+OTHERS = 2
 
 
 class Wait(NamedTuple):
@@ -169,9 +175,8 @@ class Yielding(Watcher):
         found = self._bodies.meetings(self._rows, self._present(step), step, step + 1)
         for row, _, at, other in found:
             now = Situation(self._actors[row], step, (), outputs)
-            plan = self._plan(now, at, other)
-            if plan is not None:
-                self._follow(state, now, plan, begun)
+            for each, plan in self._plans(now, at, other):
+                self._follow(state, each, plan, begun)
         # Who would still drive into somebody within this step stops, then who drives into those.
         while found:
             found = self._bodies.meetings(self._rows, self._strict(step), step, step + 1)
@@ -206,10 +211,18 @@ class Yielding(Watcher):
         self._near = lattice(PASSING_GAP_M)
         self._least = lattice(LEAST_GAP_M)
         self._nothing = np.zeros_like(self._near)
-        self._alone = np.ones(touch.shape, np.uint8)
-        mutual = np.zeros_like(self._alone)
-        self._passing = Distances(self._nothing, self._near, self._nothing, mutual)
-        self._everybody = Distances(self._nothing, self._near, self._hard, mutual)
+        self._alone = np.full(touch.shape, OWN, np.uint8)
+        both = np.zeros_like(self._alone)
+        self._counts = both.copy()
+        polite = self._near.copy()
+        for number, row in enumerate(self.rows):
+            gives_way = getattr(actors[row].entity, "gives_way", None)
+            if gives_way is not None:  # `Clearance` lets it mind people that stand
+                self._counts[number, : self._users] = OTHERS
+                polite[number, : self._users] = lattice(gives_way.distance)[number, : self._users]
+        self._passing = Distances(self._nothing, self._near, self._nothing, both)
+        self._politely = Distances(self._nothing, polite, self._nothing, both)
+        self._everybody = Distances(self._nothing, self._near, self._hard, both)
         self._same_place = SAME_PLACE_M * units
         self._order()
         for row in self.rows:
@@ -260,17 +273,17 @@ class Yielding(Watcher):
         lead = np.where(first, 0, self._ahead)
         near = np.where(first, self._least, self._near)
         hard = np.where(first, 0, self._hard)
-        own = first.astype(np.uint8)
+        counts = np.where(first, OWN, self._counts).astype(np.uint8)
         for (row, other), patience in self._patience.items():
             i = self._number[row]
             lead[i, other] = -1 if patience.ignores else 0
             near[i, other] = self._least[i, other]
             hard[i, other] = 0
-            own[i, other] = other in self._number
+            counts[i, other] = OWN if other in self._number else self._counts[i, other]
         for number, is_stuck in enumerate(self._stuck):
             if is_stuck:
                 lead[number] = -1
-        return Distances(lead, near, hard, own)
+        return Distances(lead, near, hard, counts)
 
     def _strict(self, step: int) -> Distances:
         """Return the distances at which robots stop at the last moment."""
@@ -279,8 +292,8 @@ class Yielding(Watcher):
 
     def _goes_first(self, row: int, other: int, step: int) -> bool:
         """Return whether a robot only has to stop before another one, and needn't yield."""
-        own = self._present(step).own
-        return other in self._number and bool(own[self._number[row], other])
+        counts = self._present(step).counts
+        return other in self._number and bool(counts[self._number[row], other] == OWN)
 
     def _have_patience(
         self, now: Situation, other: int, steps: int, *, ignores: bool = False
@@ -304,19 +317,32 @@ class Yielding(Watcher):
 
     # Plans
 
-    def _plan(self, now: Situation, at: int, other: int) -> Plan | None:
-        """Return another plan for a robot that meets somebody at a step; None to go on."""
-        if self._goes_first(now.actor.row, other, now.step):
-            return self._blocked(now, at, other, self._stop(now))
+    def _plans(self, now: Situation, at: int, other: int) -> list[tuple[Situation, Plan]]:
+        """Return other plans for a robot, or for the one that it meets at a step; none to go on."""
+        row = now.actor.row
+        if self._goes_first(row, other, now.step):
+            return [(now, self._blocked(now, at, other, self._stop(now)))]
         stays = self._met(now, now.plan().stay(), self._everybody)
         if stays is None:
             plan = self._by_waiting(now, at, other)
         elif self._keeps_its_place(now, at, other):
-            return None
+            return []
+        elif (passing := self._passed(now, at, other)) is not None:
+            return [passing]
         else:
-            plan = next(self._asides(now, at), None)
-        if plan is not None:
-            return self._noted(now, other, plan)
+            plan = next(self._asides(now, at, politely=True), None)
+            if plan is None and self._is_polite(row):
+                plan = next(self._asides(now, at, politely=False), None)
+        if plan is None:
+            plan = self._in_vain(now, at, other, stays)
+        else:
+            plan = self._noted(now, other, plan)
+        return [] if plan is None else [(now, plan)]
+
+    def _in_vain(
+        self, now: Situation, at: int, other: int, stays: tuple[int, int] | None
+    ) -> Plan | None:
+        """Return what a robot does that found nothing better than to stop; None to go on."""
         pause = self._pause(now)
         self._have_patience(now, other, pause)
         is_hit = stays is not None and stays[0] <= at and other not in self._number
@@ -334,11 +360,9 @@ class Yielding(Watcher):
             until = now.step + self._steps(wait)
             if self._is_free_after(now, until):
                 return plan_after(now, actor.plan, until)
-        if not self._is_taken(actor, other, now.step, at):
-            for via in self._beside(actor, other):
-                plan = plan_aside(now, actor.plan, via, now.step, at)
-                if plan is not None and self._is_free(now, plan):
-                    return plan
+        plan = self._by_via(now, at, other)
+        if plan is not None:
+            return plan
         last = self._looked_round.get(actor.row)
         if last is not None and now.step - last < self._ahead:
             return None
@@ -349,14 +373,38 @@ class Yielding(Watcher):
         self._looked_round[actor.row] = now.step
         return None
 
+    def _by_via(self, now: Situation, at: int, other: int) -> Plan | None:
+        """Return a plan to pass a body that stands, by a point beside it; None without one."""
+        actor = self._actors[now.actor.row]
+        if self._is_taken(actor, other, now.step, at):
+            return None
+        for via in self._beside(actor, other):
+            plan = plan_aside(now, actor.plan, via, now.step, at)
+            if plan is not None and self._is_free(now, plan):
+                return plan
+        return None
+
+    def _passed(self, now: Situation, at: int, other: int) -> tuple[Situation, Plan] | None:
+        """Return how a robot with the right of way passes one that stands; None if it can't."""
+        row = now.actor.row
+        if other not in self._number or not self._rests(row, now.step):
+            return None
+        theirs = Situation(self._actors[other], now.step, (), now.outputs)
+        plan = self._by_via(theirs, at, row)
+        return None if plan is None else (theirs, self._noted(theirs, row, plan))
+
+    def _is_polite(self, row: int) -> bool:
+        """Return whether a robot keeps clear of people that stand by its own `gives_way`."""
+        return getattr(self._actors[row].entity, "gives_way", None) is not None
+
     def _beside(self, actor: DecidingActor, other: int) -> list[LatticePoint]:
         """Return points by which a robot may pass a body that stands, the nearest two."""
-        near = 3 * int(self._near[self._number[actor.row], other]) // 2
+        near = 3 * int(self._politely.near[self._number[actor.row], other]) // 2
         middle = self._actors[other].state.position
         points = points_at_distance(actor, middle, near, VIAS)
         return sorted(points, key=lambda at: math.dist(at, actor.state.position))[1:4]
 
-    def _asides(self, now: Situation, at: int) -> Iterator[Plan]:
+    def _asides(self, now: Situation, at: int, *, politely: bool) -> Iterator[Plan]:
         """Yield plans to step aside and come back, the nearest place first."""
         actor = self._actors[now.actor.row]
         places = chain.from_iterable(
@@ -367,12 +415,12 @@ class Yielding(Watcher):
                 plan = now.plan().go_to_point(*place)
             except NoWayError:
                 continue
-            if not self._is_free(now, plan):
+            if not self._is_free(now, plan, politely=politely):
                 continue
             arrives = actor.clock.step_at_or_after(plan.time_us)
             for wait in WAITS_ASIDE:
                 back = plan_aside(now, actor.plan, place, arrives + self._steps(wait), at)
-                if back is not None and self._is_free(now, back):
+                if back is not None and self._is_free(now, back, politely=politely):
                     yield back
             # It waits aside for as long as is known, and then looks again.
             later = plan_aside(now, actor.plan, place, arrives + self._steps(FREE_FOR), at)
@@ -469,9 +517,9 @@ class Yielding(Watcher):
     ) -> tuple[int, int] | None:
         row = now.actor.row
         number = self._number[row]
-        lead, near, hard, own = distances
+        lead, near, hard, counts = distances
         mine = slice(number, number + 1)
-        kept = Distances(lead[mine], near[mine], hard[mine], own[mine])
+        kept = Distances(lead[mine], near[mine], hard[mine], counts[mine])
         end = now.step + self._steps(FREE_FOR)
         step, other = self._bodies.meeting_on(row, track, kept, now.step, end)
         return None if step < 0 else (step, other)
@@ -486,16 +534,17 @@ class Yielding(Watcher):
         first = int(np.searchsorted(track.time, now_us, side="right"))
         begins = np.array([now_us, step * self._step_us], np.int64)
         pose = now.actor.state
+        columns: Sequence[NDArray[Any]] = track[1:]
         later = np.concatenate([begins, track.time[first:] + (begins[1] - begins[0])])
-        columns = [
+        delayed = [
             np.concatenate([np.full(2, value, column.dtype), column[first:]])
-            for value, column in zip(pose, track[1:], strict=True)
+            for value, column in zip(pose, columns, strict=True)
         ]
-        return self._meets(now, Breakpoints(later, *columns), self._passing) is None
+        return self._meets(now, Breakpoints(later, *delayed), self._politely) is None
 
-    def _is_free(self, now: Situation, plan: Plan) -> bool:
+    def _is_free(self, now: Situation, plan: Plan, *, politely: bool = True) -> bool:
         """Return whether a plan brings a robot too near to nobody, as far as is known."""
-        return self._met(now, plan, self._passing) is None
+        return self._met(now, plan, self._politely if politely else self._passing) is None
 
     def _rests(self, row: int, step: int) -> bool:
         """Return whether a body stays where it is for a while, as far as is known."""

@@ -362,8 +362,8 @@ def plan_around(
 ) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
-    If a body stands at that stop, and it is the last one, it stops beside it in the room. A body on
-    a random walk turns round, and its behavior is asked again.
+    If a body stands at that stop, it stops beside it in the room. A body on a random walk turns
+    round, and its behavior is asked again.
 
     Args:
         now: The situation.
@@ -387,15 +387,12 @@ def plan_around(
     rows = _rows(motion.breakpoints)
     detour = RoutesAround(actor, bodies)
     goal = (int(rows[stop, 1]), int(rows[stop, 2]))
-    rest = rows[stop + 1 :]
-    if detour.cost[goal[1] // SUB, goal[0] // SUB] < 0:
-        if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or interrupted.postures:
-            return None
-        free = None if goal == waits_for else beside(actor, goal, detour)
+    is_taken = detour.cost[goal[1] // SUB, goal[0] // SUB] < 0
+    if is_taken:
+        free = None if goal == waits_for or interrupted.postures else beside(actor, goal, detour)
         if free is None:
             return None
         goal = free
-        rest[:, 1:3] = goal
     plan = now.plan()
     route = detour(plan.position, goal)
     if route is None:
@@ -403,7 +400,53 @@ def plan_around(
     since_us = max(int(rows[stop, 0]), begin_us)
     plan.go_to_point(*goal, route=route)
     plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
-    return _continue(plan, interrupted, begin_us, since_us, rest)
+    rest = rows[stop + 1 :]
+    if not is_taken:
+        return _continue(plan, interrupted, begin_us, since_us, rest)
+    return _continue_beside(plan, interrupted, begin_us, since_us, stop, rows)
+
+
+def _continue_beside(
+    plan: Plan, interrupted: Plan, begin_us: int, since_us: int, stop: int, rows: I64
+) -> Plan | None:
+    """Continue a plan that stops beside a stop of another one, which is taken.
+
+    Args:
+        plan: The plan, up to that stop.
+        interrupted: The other plan.
+        begin_us: The moment up to which the other plan was followed.
+        since_us: The moment at which it would have stopped, or the present one.
+        stop: The row at which the other plan stops.
+        rows: All rows of the other plan, int64 (n, 5).
+
+    Returns:
+        The plan; None if no way leads on to the stop after that one.
+    """
+    leaves = np.flatnonzero((rows[stop:, 1:3] != rows[stop, 1:3]).any(axis=1))
+    here = rows[stop + 1 :] if not len(leaves) else rows[stop + 1 : stop + leaves[0]]
+    here[:, 1:3] = plan.position
+    if not len(leaves):
+        return _continue(plan, interrupted, begin_us, since_us, here)
+    left_us = int(rows[stop + leaves[0] - 1, 0])
+    motion = interrupted.finish()
+    assert isinstance(motion, Track)
+    after = next_stop(plan.body, motion.breakpoints, int(rows[stop + leaves[0], 0]) - 1)
+    if after is None or rows[stop:, 4].any():
+        return None
+    later = plan.time_us - since_us
+    plan.notes += [
+        Note(max(at, since_us) + later, event, detail)
+        for at, event, detail in interrupted.notes
+        if begin_us < at <= left_us
+    ]
+    here[:, 0] = np.maximum(here[:, 0], since_us) + later
+    try:
+        plan.follow(here).go_to_point(int(rows[after, 1]), int(rows[after, 2]))
+    except NoWayError:
+        return None
+    arrives_us = int(rows[after, 0])
+    plan.turn_to(heading_at(motion.breakpoints, after, arrives_us)).stay_until(arrives_us)
+    return _continue(plan, interrupted, left_us, arrives_us, rows[after + 1 :])
 
 
 def _continue(
