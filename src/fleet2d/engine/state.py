@@ -31,6 +31,7 @@ from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from fleet2d.engine.expectations import RunExpectations
+    from fleet2d.entities.keep_out import SleepMemory
     from fleet2d.entities.robots.policy import SightingMemory
     from fleet2d.expectations.expectation import Expectation
 
@@ -431,9 +432,9 @@ class Recall:
 
     state: State
     cameras: Cameras | None
-    memory: "SightingMemory"
+    memory: "SightingMemory | SleepMemory"
 
-    def __call__(self) -> "SightingMemory":
+    def __call__(self) -> Any:
         """Return the memory."""
         if self.cameras is not None:
             self.state.take(self.cameras, self.state.bodies.step)

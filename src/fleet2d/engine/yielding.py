@@ -12,11 +12,11 @@ can't get out of the way, the two overlap, with an event.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +35,7 @@ from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import I64, SUB, Bool, Breakpoints, Distances, walking_distance
 from fleet2d.runtime.events import EventKind
 
-if TYPE_CHECKING:
-    from fleet2d.engine.state import State
+EndPlan = Callable[[int, int], None]
 
 # How far ahead a robot reacts to somebody to whom it yields.
 AHEAD = timedelta(seconds=5)
@@ -162,34 +161,36 @@ class Yielding(Watcher):
         found = bodies.meetings(self._rows, self._present(self.next_step), first, end)
         return min((due for _, due, _, _ in found), default=end)
 
-    def answer(self, state: "State", step: int, begun: set[int]) -> None:
+    def answer(
+        self, step: int, outputs: Mapping[str, Any], begun: set[int], end_plan: EndPlan
+    ) -> None:
         """Give robots that would come too near to somebody other plans.
 
         Args:
-            state: The state, in which all bodies have decided.
-            step: The present step.
+            step: The present step, at which all bodies have decided.
+            outputs: The outputs of algorithms, for behaviors.
             begun: The rows of these robots whose plans begin now; those of others are added.
+            end_plan: Called with a row and the step before its plan is replaced.
         """
         self._refresh(step)
-        outputs = state.learners.readable_outputs
         found = self._bodies.meetings(self._rows, self._present(step), step, step + 1)
         for row, _, at, other in found:
             now = Situation(self._actors[row], step, (), outputs)
             for each, plan in self._plans(now, at, other):
-                self._follow(state, each, plan, begun)
+                self._follow(each, plan, begun, end_plan)
         # Who would still drive into somebody within this step stops, then who drives into those.
         while found:
             found = self._bodies.meetings(self._rows, self._strict(step), step, step + 1)
             for row, *_ in found:
                 now = Situation(self._actors[row], step, (), outputs)
-                self._follow(state, now, self._stop(now), begun)
+                self._follow(now, self._stop(now), begun, end_plan)
 
-    def _follow(self, state: "State", now: Situation, plan: Plan, begun: set[int]) -> None:
+    def _follow(self, now: Situation, plan: Plan, begun: set[int], end_plan: EndPlan) -> None:
         """Let a robot follow another plan from now on."""
         row = now.actor.row
         actor = self._actors[row]
         if row not in begun:
-            state.end_plan(row, now.step)
+            end_plan(row, now.step)
         begun.add(row)
         plan.interrupts = actor.arbiter.own
         actor.follow_instead(plan, now)

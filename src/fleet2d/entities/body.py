@@ -4,7 +4,7 @@ import copy
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -19,7 +19,6 @@ from fleet2d.entities.place import (
     Place,
     Point,
     RoomChoice,
-    forbidden_rooms,
     furniture_of,
     is_point,
     lies_in,
@@ -48,6 +47,9 @@ from fleet2d.kernels import (
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
+
+if TYPE_CHECKING:
+    from fleet2d.entities.keep_out import KeepOutRules
 
 
 class Pose(NamedTuple):
@@ -318,8 +320,9 @@ class Body:
         people: All users of the scenario by name; None for one that isn't built yet.
         notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
         part: The connected part of its space that it is in.
-        forbidden: Indices of the rooms that its configuration keeps it out of.
-        kept_out: Indices of the rooms that its ways avoid now: these, and those of bans.
+        rules: Where its configuration keeps it out; None: nowhere.
+        forbidden: The rooms, by index, and areas that it never enters: see `Home.area`.
+        kept_out: Those that its ways avoid now: these, those of its rules, and those of bans.
         row: Its row among the bodies of the run.
         interrupts: The events that have ended, or may end, its plans so far: they are checked.
         drive: How it moves along routes; None: as `Differential`, which the core computes.
@@ -336,8 +339,11 @@ class Body:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self.forbidden = forbidden_rooms(self, getattr(self.entity, "keep_out", ()))
+        self.rules: KeepOutRules | None = self._rules()
+        self.forbidden = frozenset[int]() if self.rules is None else self.rules.always
         self.kept_out = self.forbidden
+        if self.rules is not None:
+            self.kept_out |= self.rules.active(self.clock.start, frozenset())
         try:
             space = self.space_without()
         except FloorPlanError as error:
@@ -358,6 +364,15 @@ class Body:
         self._state_step = 0
         self.row = 0
         self.interrupts: frozenset[str] = frozenset()
+
+    def _rules(self) -> "KeepOutRules | None":
+        """Return the rules of where it keeps out; None without any."""
+        entries = getattr(self.entity, "keep_out", ())
+        if not entries:
+            return None
+        from fleet2d.entities.keep_out import KeepOutRules  # it reads hours, as behaviors do
+
+        return KeepOutRules(self, entries)
 
     def join(self, bodies: Bodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""
@@ -400,7 +415,8 @@ class Body:
     @property
     def may_block_routes(self) -> bool:
         """Whether routes may be closed to it that were open before, or will be."""
-        return self.home.may_block_routes or self.kept_out != self.forbidden
+        has_hours = self.rules is not None and bool(self.rules.timed)
+        return self.home.may_block_routes or has_hours or self.kept_out != self.forbidden
 
     @property
     def whole_space(self) -> Space:
@@ -623,7 +639,7 @@ class Body:
             return x, y
         why = ""
         if lies_in(self, (x, y), self.kept_out):
-            why = "is in a room that it keeps out of (keep_out)"
+            why = "is where it keeps out (keep_out)"
         elif part >= 0:
             why = "can't be reached from where it starts"
         elif self.home.space(self.entity.radius).part_at(x, y) >= 0:

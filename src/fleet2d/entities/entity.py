@@ -15,6 +15,7 @@ from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
+from fleet2d.entities.keep_out import KeptOut
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.kernels import I64
@@ -160,8 +161,9 @@ class Robot(Entity):
         battery: Its battery, for the behavior dock; null: its charge never ends.
         gives_way: How it keeps clear of people; null: it drives on, and people go round it.
         localization: The error of its estimate of its own pose; null: there is none.
-        keep_out: Rooms, or kinds of rooms if the home has them, that it never enters: it starts,
-            stops, passes and follows nowhere there. Put there by a person, it leaves.
+        keep_out: Rooms, kinds of rooms if the home has them, and areas out of which it keeps, at
+            all times, at hours or while somebody sleeps: it starts, stops, passes and follows
+            nowhere there. Put there by a person, it leaves.
     """
 
     radius: Length = Field(default=0.15, gt=0, le=2)
@@ -179,7 +181,7 @@ class Robot(Entity):
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None
-    keep_out: tuple[str, ...] = ()
+    keep_out: tuple[KeptOut, ...] = ()
     sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
     request_events = REQUEST_EVENTS
 

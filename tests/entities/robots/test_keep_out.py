@@ -101,7 +101,9 @@ def test_a_kind_of_room_that_the_home_lacks_is_noted() -> None:
 
 def test_rooms_that_are_cut_off_are_noted_by_name() -> None:
     said = notes(flat(keep_out=["kitchen"]))
-    assert ["robots.astro.keep_out: no way is left to bathroom_0"] == said
+    assert [
+        "robots.astro.keep_out: no way is left to bathroom_0; passing: true of a room lets it through"
+    ] == said
     assert [] == notes(flat(keep_out=["bedroom"]))
 
 
@@ -118,7 +120,9 @@ def test_a_robot_put_where_it_must_not_be_leaves(place: list[float]) -> None:
 
 
 def test_a_robot_cannot_start_where_it_must_not_be() -> None:
-    with pytest.raises(PlacementError, match=r"\[1.0, 3.0\] is in a room .*keep_out") as caught:
+    with pytest.raises(
+        PlacementError, match=r"\[1.0, 3.0\] is where it keeps out .*keep_out"
+    ) as caught:
         run(flat(keep_out=["living_room"]))
     assert "\n" not in str(caught.value)
 

@@ -27,8 +27,8 @@ class Dock(Behavior):
         threshold: Charge at which it goes to the charger.
         until: Charge with which it leaves the charger.
         rest: Wait at the charger when there is nothing else to do.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it goes round on its way, as long
-            as there is another way.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it goes round on its way,
+            as long as there is another way.
     """
 
     records = frozenset({EventKind.CHARGED, EventKind.DOCKS})
@@ -62,8 +62,8 @@ class Dock(Behavior):
         self.avoided = avoided_rooms(actor, "dock.no_stops_in", self.no_stops_in)
         if lies_in(actor, actor.charge.charger, self.avoided):
             raise ScenarioError(
-                f"{actor.path}: dock.no_stops_in has the room of the charger: leave it out, or move the"
-                " charger by battery.charger"
+                f"{actor.path}: dock.no_stops_in has the room of the charger: leave it out, or move"
+                " the charger by battery.charger"
             )
 
     def busy(self) -> bool:

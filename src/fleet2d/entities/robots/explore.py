@@ -36,8 +36,8 @@ class Explore(Behavior):
     Attributes:
         enough: Share of the floor to be seen.
         reach: How near it goes to a frontier [m].
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't explore: it looks
-            round in none of them, and their floor needn't be seen.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't explore: it
+            looks round in none of them, and their floor needn't be seen.
     """
 
     records = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})

@@ -166,7 +166,8 @@ class Find(BeliefBehavior):
         views: The maximum number of places in a room from which it looks around.
         distance: How far it stays from the person it found [m].
         stay: How long it stays with the person it found.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it looks into from outside only.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it looks into from
+            outside only.
     """
 
     records = frozenset(

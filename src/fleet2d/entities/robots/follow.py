@@ -123,8 +123,8 @@ class Come(Behavior):
 
     Attributes:
         stay: How long it waits there.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't enter: called into one
-            of them, it waits outside, near the door.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't enter: called
+            into one of them, it waits outside, near the door.
     """
 
     records = frozenset({EventKind.VISITS})

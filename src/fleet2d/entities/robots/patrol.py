@@ -153,8 +153,8 @@ class Scheduled(Behavior):
     Attributes:
         visits: The visits.
         late: A visit that can't begin within this time is left out.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits there
-            are left out, with a note.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits
+            there are left out, with a note.
     """
 
     records = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
@@ -234,7 +234,8 @@ class Retrace(Behavior):
     Attributes:
         path: The map's JSON file.
         reach: A point farther than this from free space is left out [m].
-        no_stops_in: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, whose part of the path is
+            left out.
     """
 
     records = frozenset({EventKind.RETRACED, EventKind.RETRACES})
