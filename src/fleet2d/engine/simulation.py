@@ -186,9 +186,7 @@ class Simulation:
         of_sensors = self._state.find(Sensors)
         sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
-        yielding = self._state.yielding
-        overlaps = [] if yielding is None else yielding.notes
-        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies, *overlaps]
+        return [*wrong, *plan, *sources, *sensors, *self._unused_heights, *bodies]
 
     @property
     def _unused_heights(self) -> Iterator[str]:
@@ -866,6 +864,8 @@ class Simulation:
         results: dict[str, Any] = {}
         state = self._state
         manifest = self._store.manifest
+        if state.yielding is not None:
+            manifest.notes += state.yielding.notes
         if state.log:
             state.count_looks()
             try:
