@@ -222,7 +222,7 @@ def random_scenario(number: int) -> dict[str, Any]:
     for i in range(draws.below(7)):
         kinds: list[dict[str, Any]] = [
             {"type": "meander", "speed": 0.7},
-            {"type": "room_sampling"},
+            {"type": "room_sampling", "shares": {"kitchen": 0.5, "living_room": 0.5}},
             person([1.0, 3.0], 5.0, [7.0, 3.1], 20.0, [1.0, 1.0], 600.0),
         ]
         users[f"u{i}"] = kinds[draws.below(len(kinds))]
@@ -232,7 +232,7 @@ def random_scenario(number: int) -> dict[str, Any]:
         {"at": "07:03", "keep_out": "r0", "of": "kitchen", "duration": "1 min"},
         {"at": "07:02:30", "shut": "door"},
     ]
-    objects = {"door": {"type": "door", "between": ["living_room_0", "kitchen_0"]}}
+    objects = {"door": {"type": "door", "doorway": [5.05, 3.1]}}
     chosen = [act for act in script if draws.below(2)]
     return scenario("6 min", robots=robots, users=users, script=chosen, objects=objects)
 

@@ -656,6 +656,7 @@ class Yielding(Watcher):
             return
         detour = giving_way.RoutesAround(actor, np.column_stack([positions, reach]))
         beside = giving_way.beside(actor, (x, y), detour)
+        beside = beside or giving_way.beside(actor, (x, y), detour, in_room=False)
         if beside is not None:
             actor.state = Pose(*beside, actor.state.heading, 0)
 

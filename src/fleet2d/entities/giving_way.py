@@ -494,13 +494,16 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
+def beside(
+    actor: Actor, goal: LatticePoint, detour: RoutesAround, *, in_room: bool = True
+) -> LatticePoint | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan = actor.home.plan
     space = actor.space
-    room = plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
     free = (space.part_of_cell == actor.part) & (detour.cost != CLOSED)
-    cells = np.argwhere(free & (plan.room_of_cell == room))
+    if in_room:
+        free &= plan.room_of_cell == plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
+    cells = np.argwhere(free)
     if not len(cells):
         return None
     xs, ys = plan.lattice.centre_axes()
