@@ -482,7 +482,7 @@ class DecidingActor(Actor):
         if self.rules is not None and self._heeds_rules(now):
             return False
         # Bans hold for its ways once it is outside of those rooms.
-        if self.bans or self.kept_out != self.forbidden:
+        if self.bans or self.ruled or self.kept_out != self.forbidden:
             banned = self.banned(now.step)
             if banned != self.kept_out and not self._is_in(banned):
                 self.kept_out = banned

@@ -81,7 +81,7 @@ class Patrol(Behavior):
         else:
             places = available_places(actor, "patrol.rooms", self.rooms)
             stops = [stop for place in places for stop in self._stops_at(actor, place)]
-        if self.no_stops_in:
+        if self.no_stops_in or (actor.rules is not None and actor.rules.no_stops):
             avoided = avoided_rooms(actor, "patrol.no_stops_in", self.no_stops_in)
             stops = [stop for stop in stops if not lies_in(actor, stop, avoided)]
         self.stops = stops if self.waypoints else list(dict.fromkeys(stops))
