@@ -350,8 +350,7 @@ class Yielding(Watcher):
         if is_hit and at > now.step:
             return None  # it is hit as early if it stops
         if is_hit:
-            self._have_patience(now, other, pause, ignores=True)
-            return self._overlapping(now, other)
+            return self._overlapping(now, pause)
         return self._blocked(now, at, other, self._stop(now, pause))
 
     def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
@@ -439,19 +438,37 @@ class Yielding(Watcher):
         waited = 0 if wait is None or not self._goes_on(wait, now) else now.step - wait.since
         return min(max(self._steps(PAUSE), waited // 2), self._steps(DEADLOCK))
 
-    def _overlapping(self, now: Situation, other: int) -> Plan | None:
-        """Write once that somebody walks into a robot, which goes on as before."""
+    def _overlapping(self, now: Situation, pause: int) -> Plan | None:
+        """Write once who walks into a robot now; it goes on as before, and minds them no more."""
         row = now.actor.row
-        told = self._told.get((row, other))
-        self._told[row, other] = now.step
-        if told is not None and now.step - told <= self._steps(SAME_WAIT):
-            return None
         robot = self._actors[row]
-        name = self._actors[other].name
-        self.overlaps[robot.name, name] = self.overlaps.get((robot.name, name), 0) + 1
+        notes = []
+        for other in self._hits(now):
+            self._have_patience(now, other, pause, ignores=True)
+            told = self._told.get((row, other))
+            self._told[row, other] = now.step
+            if told is not None and now.step - told <= self._steps(SAME_WAIT):
+                continue
+            name = self._actors[other].name
+            self.overlaps[robot.name, name] = self.overlaps.get((robot.name, name), 0) + 1
+            notes.append(Note(now.step * self._step_us, EventKind.OVERLAPS, name))
+        if not notes:
+            return None
         plan = plan_after(now, robot.plan, now.step)
-        plan.notes.insert(0, Note(now.step * self._step_us, EventKind.OVERLAPS, name))
+        plan.notes[:0] = notes
         return plan
+
+    def _hits(self, now: Situation) -> list[int]:
+        """Return the rows of those who don't yield and walk into a robot at this step."""
+        lead, near, hard, counts = self._everybody
+        hits = []
+        for other in range(len(self._actors)):
+            only = np.full_like(lead, -1)
+            only[:, other] = 0
+            met = self._met(now, now.plan().stay(), Distances(only, near, hard, counts))
+            if other not in self._number and met is not None and met[0] == now.step:
+                hits.append(other)
+        return hits
 
     def _noted(self, now: Situation, other: int, plan: Plan) -> Plan:
         """Add to a plan that the robot gives way, at the beginning of a wait."""
