@@ -15,7 +15,7 @@ from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
-from fleet2d.entities.keep_out import KeptOut
+from fleet2d.entities.keep_out import KeptOutField
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.kernels import I64
@@ -181,7 +181,7 @@ class Robot(Entity):
     battery: Battery | None = None
     gives_way: GivesWay | None = None
     localization: Localization | None = None
-    keep_out: tuple[KeptOut, ...] = ()
+    keep_out: tuple[KeptOutField, ...] = ()
     sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
     request_events = REQUEST_EVENTS
 

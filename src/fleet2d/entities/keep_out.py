@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
+from pydantic_core import CoreSchema
 from shapely import Polygon
 
 from fleet2d.configuration.components import Settings
@@ -70,6 +71,19 @@ KeptOut: Any = create_model(
     """,
     **_KEYWORDS,
 )
+
+
+class _OrRoom:
+    """Adds to the schema of `KeptOut` that a text is a room."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string", "minLength": 1}, handler(schema)]}
+
+
+KeptOutField = Annotated[KeptOut, _OrRoom]
 
 
 class TimedZones(NamedTuple):
