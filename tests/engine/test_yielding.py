@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span
-from tests.scenes import path, run, scenario
+from tests.scenes import path, run
+from tests.scenes import scenario as of_ghosts
 from tests.thorough import some
 
 import fleet2d
@@ -17,6 +18,12 @@ from fleet2d.runs.run import Run
 from fleet2d.runtime.determinism import Draws
 
 WALK = {"type": "tests.own_components:Scripted"}
+
+
+def scenario(duration: str, **sections: Any) -> dict[str, Any]:
+    """A scenario in the flat, in which robots yield."""
+    simulation = {"ghosts": False} | sections.pop("simulation", {})
+    return of_ghosts(duration, simulation=simulation, **sections)
 
 
 def robot(start: Any, *script: Any, **more: Any) -> dict[str, Any]:
