@@ -154,7 +154,8 @@ def requests(behavior: str) -> list[str]:
     """Return overrides of ten requests a day to one person, which a behavior serves."""
     return [
         f"robots.astro.behaviors=[{behavior}, {{type: patrol, dwell: 0 s, cooldown: 4 h}},"
-        " {type: hangout, source: ltp, near: view, period: 1 h, explore: 20 %, avoid: [bathroom]}]",
+        " {type: hangout, source: ltp, near: view, period: 1 h, explore: 20 %,"
+        " no_stops_in: [bathroom]}]",
         "interactions={pill: {do: remind, to: ana, at: ['08:00', '20:00'], within: 1 h, worth: 5},"
         " music: {do: offer, to: ana, at: ['10:00', '12:00', '14:00', '16:00'], within: 1 h,"
         " worth: 3},"

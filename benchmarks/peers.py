@@ -52,7 +52,7 @@ CASES: dict[str, dict[str, tuple[str, ...]]] = {
     "navground": {
         "none": ("straight legs in a compiled loop, walls never looked at", GHOSTS, LESS),
         "lidar": (WHO, GHOSTS, LESS),
-        "avoid": (
+        "no_stops_in": (
             "more: avoidance (HL), collisions; bodies still overlap at 1 s, 0.1 s is usual",
             LESS,
         ),
@@ -115,7 +115,7 @@ def navground_scene(outline: list[Point], users: int, sensing: str) -> Scene:
     for i in range(users + 1):
         goals = GOALS[i % len(GOALS)]
         kinematics = core.kinematics.OmnidirectionalKinematics(SPEED, YAW_RATE)
-        if sensing == "avoid":
+        if sensing == "no_stops_in":
             behavior = core.behaviors.HLBehavior(kinematics, RADIUS)
             sensors = [sim.state_estimations.BoundedStateEstimation(RANGE)]
         else:
@@ -127,7 +127,7 @@ def navground_scene(outline: list[Point], users: int, sensing: str) -> Scene:
         behavior.heading = core.Behavior.Heading.velocity
         task = sim.tasks.WaypointsTask(goals, True, TOLERANCE)
         agent = sim.Agent(RADIUS, behavior, kinematics, task, sensors)
-        agent.ignore_collisions = sensing != "avoid"
+        agent.ignore_collisions = sensing != "no_stops_in"
         agent.pose = core.Pose2(goals[-1], 0.0)
         world.add_agent(agent)
 

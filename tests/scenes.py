@@ -80,8 +80,11 @@ def flat_path() -> Path:
 
 
 def scenario(duration: str = "10 min", **sections: Any) -> dict[str, Any]:
-    """A scenario in the flat, on Monday at 07:00, with seed 4, that stores a pose per minute."""
-    simulation = {"start": "2026-01-05T07:00", "duration": duration, "seed": 4}
+    """A scenario in the flat, on Monday at 07:00, with seed 4, that stores a pose per minute.
+
+    Bodies are ghosts, so that what a robot does is its own doing: `test_yielding` is of the others.
+    """
+    simulation = {"start": "2026-01-05T07:00", "duration": duration, "seed": 4, "ghosts": True}
     simulation |= sections.pop("simulation", {})
     return {
         "simulation": simulation,
@@ -112,6 +115,7 @@ def everything(duration: str = "2 h", **changes: Any) -> dict[str, Any]:
     return (
         scenario(
             duration,
+            simulation={"ghosts": False},
             users={
                 "ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"},
                 "ben": {"type": "meander", "speed": 0.7},

@@ -305,7 +305,7 @@ CHANGES: dict[tuple[type, str], dict[str, Any]] = {
     },
     (Patrol, PATROL): {
         "rooms": ["kitchen"], "waypoints": [[1, 3], [7, 1]], "dwell": "25 s", "order": "random",
-        "look_around": False, "when": "23:00-23:30", "cooldown": "2 min", "avoid": ["kitchen"],
+        "look_around": False, "when": "23:00-23:30", "cooldown": "2 min", "no_stops_in": ["kitchen"],
         "stop_at": "view",
     },
     (Meander, "users.ben.behaviors.0"): {

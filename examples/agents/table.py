@@ -44,7 +44,7 @@ def with_ltp(**behavior: Any) -> dict[str, Any]:
 
 EAGER = {"near": "view", "hysteresis": 0.02, "moving": 0.01, "explore": 0.02}
 FIND = {"type": "find", "every": "2 h", "deadline": "10 min", "out_at": 1.0}
-WAITS = with_ltp(type="hangout", near="view", avoid=ROOMS_TO_LEAVE)
+WAITS = with_ltp(type="hangout", near="view", no_stops_in=ROOMS_TO_LEAVE)
 
 
 def asking(policy: Any = None, **behavior: Any) -> tuple[Behaviors, dict[str, Any]]:
@@ -60,7 +60,7 @@ BUNDLED: dict[str, dict[str, tuple[Behaviors, dict[str, Any]]]] = {
     "hangout": {
         "`hangout`": ([{"type": "hangout"}], {}),
         "`hangout` by `ltp`, eager, out of bedrooms": (
-            [with_ltp(type="hangout", **EAGER, avoid=ROOMS_TO_LEAVE)],
+            [with_ltp(type="hangout", **EAGER, no_stops_in=ROOMS_TO_LEAVE)],
             {},
         ),
     },
@@ -68,7 +68,7 @@ BUNDLED: dict[str, dict[str, tuple[Behaviors, dict[str, Any]]]] = {
         "`find`": ([FIND], {}),
         "`find` by `ltp`": ([with_ltp(**FIND)], {}),
         "`find` by `ltp`, by day, from outside": (
-            [with_ltp(**FIND, avoid=ROOMS_TO_LEAVE, when="08:00-22:30")],
+            [with_ltp(**FIND, no_stops_in=ROOMS_TO_LEAVE, when="08:00-22:30")],
             {},
         ),
     },

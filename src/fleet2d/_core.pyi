@@ -1476,6 +1476,39 @@ class Timelines:
         Return x, y, heading and away of all bodies at some steps: int64 (steps, bodies, 4).
         """
 
+    def meetings(self, rows: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], first: int, end: int) -> list[tuple[int, int, int, int]]:
+        """
+        Return for each of some bodies the first meeting to which it has to react.
+
+        Two bodies meet when their middles come nearer than a distance while they approach, or when they
+        overlap and don't part.
+
+        Args:
+            rows: int64 (rows,), the bodies.
+            distances: What each of them keeps from all bodies: see `Distances`.
+            first: The first step at which one may react.
+            end: One past the last one.
+
+        Returns:
+            Rows of the body, the step at which it has to react, the step in which they meet, and the other body.
+            Bodies without a meeting are left out.
+        """
+
+    def meeting_on(self, row: int, track: tuple[Any, ...], distances: tuple[Any, ...], first: int, end: int) -> tuple[int, int]:
+        """
+        Return the first meeting of a body if it followed a track.
+
+        Args:
+            row: The body.
+            track: Breakpoints, which it would follow from step `first` on.
+            distances: What it keeps from all bodies, (1, bodies) each: see `Distances`.
+            first: The first step.
+            end: One past the last step at which it has to react.
+
+        Returns:
+            The step in which they meet and the other body; -1 and -1 if it meets nobody.
+        """
+
     def window(self, first: int, end: int) -> Window:
         """
         Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.

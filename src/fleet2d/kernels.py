@@ -391,6 +391,15 @@ class Breakpoints(NamedTuple):
     away: U8
 
 
+class Distances(NamedTuple):
+    """What each of some bodies keeps from all bodies, (rows, bodies) each."""
+
+    lead: I64  # steps by which it reacts before a meeting; below 0: it ignores the other one
+    near: I64  # distance of the middles below which they mustn't approach [lattice]
+    hard: I64  # distance below which they overlap, and must part [lattice]; 0: they needn't
+    counts: U8  # whose motion counts: 0 that of both, 1 its own, 2 that of the other one
+
+
 class Poses(NamedTuple):
     """Poses of one body over consecutive steps, all arrays of one length."""
 

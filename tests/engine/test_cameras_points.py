@@ -120,6 +120,7 @@ def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(
 
 def test_run_by_flashlight_is_nearly_the_same_where_users_walk() -> None:
     content = everything("20 min")
+    content["simulation"]["ghosts"] = True
     exact = run(content)
     by_cells = run({**content, "sight": {"method": {"type": "flashlight"}}})
     seen = [len(table(one, "observations")["step"]) for one in (exact, by_cells)]

@@ -28,7 +28,7 @@ STEP_S = 2
 USERS = ("ana", "ben")
 
 SCENARIO = f"""
-simulation: {{start: 2026-01-05, duration: 20 h, step: {STEP_S} s, seed: 11}}
+simulation: {{start: 2026-01-05, duration: 20 h, step: {STEP_S} s, seed: 11, ghosts: true}}
 floorplan: {{type: native, path: hall.json}}
 users:
   ana: {{type: "{OWN}:Fidget"}}

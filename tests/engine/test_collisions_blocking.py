@@ -128,8 +128,9 @@ def test_robots_wait_for_each_other_and_for_people() -> None:
         home(robots=robots, users={"ana": {"start": [3.2, 3]}}), 7
     )
 
-    assert {"astro"} == {row[1] for row in gives_way(stored)}
+    assert "astro" in {row[1] for row in gives_way(stored)}
     assert gap(stored, "astro", "bolt").min() >= 0.3
+    assert gap(stored, "bolt", "ana").min() >= 0.35
     assert gap(stored, "astro", "ana").min() >= 0.35
 
 

@@ -135,6 +135,7 @@ def test_it_never_drives_into_anybody_for_days_in_a_furnished_home() -> None:
     assert min(result.min() for result in nearest) >= 0.35
     # Nearer than it likes it comes only where it has waited, and there is no more room.
     assert sum(int((result < KEPT - 0.01).sum()) for result in nearest) < 60
+    content["simulation"]["ghosts"] = True
     rude = run({**content, "robots": {"astro": {"type": "patrol", "dwell": "1 min"}}})
     assert sum(int((own_approaches(rude, user) < 0.35).sum()) for user in ("ana", "ben")) > 10
 
@@ -204,6 +205,7 @@ def test_events_at_the_begin_of_a_plan_are_told_though_it_waits() -> None:
 
 def test_robots_that_do_not_give_way_are_as_they_were() -> None:
     content = everything("20 min")
+    content["simulation"]["ghosts"] = True
     before = run(content)
     content["robots"]["zed"] = {"type": "patrol", "gives_way": {}, "camera": None}
     after = run(content)

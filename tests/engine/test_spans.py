@@ -36,6 +36,10 @@ def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
         "activity",
         "left_home",
         "came_home",
+        "gives_way",
+        "gives_up",
+        "deadlock",
+        "overlaps",
     } == set(events["event"])
     reactions = set(zip(events["entity"], [d.split(" ")[0] for d in events["detail"]], strict=True))
     assert {
@@ -196,9 +200,16 @@ def lives(stored: Run, *names: str) -> list[Any]:
     return json.loads(json.dumps(result, default=str))
 
 
+def alone(duration: str) -> dict[str, Any]:
+    """The scenario of these tests, in which robots don't yield to anybody."""
+    content = everything(duration)
+    content["simulation"]["ghosts"] = True
+    return content
+
+
 def changed(**sections: Any) -> dict[str, Any]:
     """The scenario of these tests with entries added or replaced."""
-    content = everything("40 min")
+    content = alone("40 min")
     for section, entries in sections.items():
         content[section] = {**entries, **content[section]}  # before the others
     return content
@@ -207,7 +218,7 @@ def changed(**sections: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def reference() -> Run:
     """What the runs with somebody more are compared with."""
-    return run(everything("40 min"))
+    return run(alone("40 min"))
 
 
 EVERYBODY = ("ana", "ben", "astro", "bolt", "curio", "drift", "ego")
@@ -251,7 +262,7 @@ def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference: Ru
 
 
 def test_a_robot_that_behaves_otherwise_leaves_the_users_as_they_were(reference: Run) -> None:
-    content = everything("40 min")
+    content = alone("40 min")
     content["robots"]["astro"] = {"type": "meander", "radius": 0.3}
     assert lives(reference, "ana", "ben") == lives(run(content), "ana", "ben")
 

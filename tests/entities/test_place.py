@@ -168,7 +168,10 @@ def user(**fields: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("content", "note"),
     [
-        (robot({"type": "hangout", "avoid": ["garage", "bathroom"]}), "hangout.avoid: left out"),
+        (
+            robot({"type": "hangout", "no_stops_in": ["garage", "bathroom"]}),
+            "hangout.no_stops_in: left out",
+        ),
         (robot({"type": "patrol", "rooms": ["kitchen", "garage"]}), "patrol.rooms: left out"),
         (user(type="room_sampling", shares={"kitchen": 1, "garage": 1}), "shares: left out"),
         (user(type="pet", rooms=["kitchen", "garage"]), "pet.rooms: left out"),
@@ -183,14 +186,17 @@ def test_a_kind_that_the_home_lacks_is_left_out_with_a_note(
 
 def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too() -> None:
     """Six of 1,103 homes refused the bundled scenario, for it avoids bathrooms."""
-    content = robot({"type": "hangout", "avoid": ["storage"]}, start="kitchen")
-    assert "hangout.avoid: left out" in notes(content)
+    content = robot({"type": "hangout", "no_stops_in": ["storage"]}, start="kitchen")
+    assert "hangout.no_stops_in: left out" in notes(content)
 
 
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (robot({"type": "hangout", "avoid": ["bathroom_7"]}), ["hangout.avoid", "bathroom_7"]),
+        (
+            robot({"type": "hangout", "no_stops_in": ["bathroom_7"]}),
+            ["hangout.no_stops_in", "bathroom_7"],
+        ),
         (robot({"type": "patrol", "rooms": ["kitchen", "kitchn_0"]}), ["patrol.rooms", "kitchn_0"]),
         (robot({"type": "patrol", "rooms": ["garage"]}), ["patrol.rooms", "has none of these"]),
         (user(type="room_sampling", shares={"garage": 1}), ["room_sampling.shares", "garage"]),

@@ -21,7 +21,9 @@ def test_changed_key_changes_what_follows_and_nothing_before() -> None:
     changed.advance(6 * 3600)
     plain = copy.deepcopy(changed)
     changed.do(
-        Configure("astro", "hangout", {"avoid": ["bathroom", "living_room"], "period": "10 min"})
+        Configure(
+            "astro", "hangout", {"no_stops_in": ["bathroom", "living_room"], "period": "10 min"}
+        )
     )
     paths = [run.run().path("astro") for run in (changed, plain)]
     same = paths[0].x == paths[1].x
@@ -46,7 +48,7 @@ def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
         ("hangot", {"tau": "3 s"}, ScenarioError, "did you mean 'hangout'"),
         ("hangout", {"tao": 3}, ScenarioError, "did you mean 'tau'"),
         ("hangout", {"source": "lpt"}, ScenarioError, "did you mean 'ltp'"),
-        ("hangout", {"avoid": ["bethroom"]}, PlacementError, "did you mean 'bathroom'"),
+        ("hangout", {"no_stops_in": ["bethroom"]}, PlacementError, "did you mean 'bathroom'"),
         ("hangout", {}, ScenarioError, "at least 1"),
     ],
 )

@@ -167,7 +167,7 @@ class Chance:
     def keys(self) -> dict[str, Any]:
         return self.one(
             {"behavior": "patrol", "keys": {"dwell": self.one("1 s", "5 min")}},
-            {"behavior": "hangout", "keys": {"avoid": [self.one(*KINDS)]}},
+            {"behavior": "hangout", "keys": {"no_stops_in": [self.one(*KINDS)]}},
             {"behavior": "schedule", "keys": {"days": [{"on": "daily", "items": ITEMS[:1]}]}},
             {"behavior": "routine", "keys": {"persona": "retired"}},
         )

@@ -28,6 +28,7 @@ from fleet2d.kernels import (
     CoverageSetup,
     DayEvidence,
     DetectionRule,
+    Distances,
     ErrorTables,
     Lenses,
     Moments,
@@ -447,6 +448,11 @@ def timelines() -> _core.Timelines:
     return result
 
 
+def kept(rows: int) -> Distances:
+    numbers = np.full((rows, 2), 300)
+    return Distances(numbers // 100, numbers, numbers, np.zeros((rows, 2), np.uint8))
+
+
 Args = Callable[[], tuple[Any, ...]]
 CALLS: dict[str, Args] = {
     "Mesh": lambda: (MESH.vertices.copy(), MESH.triangles.copy(), MESH.neighbors.copy()),
@@ -775,6 +781,8 @@ CALLS: dict[str, Args] = {
     "Timelines.window": lambda: (timelines(), 2, 7),
     "Timelines.runs": lambda: (timelines(), 1, 2, 7),
     "Timelines.forget": lambda: (timelines(), 3),
+    "Timelines.meetings": lambda: (timelines(), np.array([0, 1]), kept(2), 3, 9),
+    "Timelines.meeting_on": lambda: (timelines(), 0, track(), kept(1), 3, 9),
 }
 """A call of every function, constructor and method of the core that takes anything."""
 

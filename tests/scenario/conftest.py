@@ -12,6 +12,7 @@ from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.units import Duration, InputPath, Length, Share
 from fleet2d.entities.behavior import Behavior
 from fleet2d.entities.drive import Differential
+from fleet2d.entities.right_of_way import Listed
 from fleet2d.sight.fov import LineOfSight
 
 
@@ -77,6 +78,7 @@ class Tally(Component):
 STAND_INS: dict[str, dict[str, type[Component]]] = {
     "sight": {"line_of_sight": LineOfSight},  # defaults that every scenario has
     "drive": {"differential": Differential},
+    "right_of_way": {"listed": Listed},
     "floorplan": {"houseexpo": File, "he": File, "empty": Empty},
     "behavior": {"drift": Drift, "tour": Tour},
     "algorithm": {"count": Count, "smooth": Smooth},

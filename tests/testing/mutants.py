@@ -176,9 +176,9 @@ class PatrolEverywhere(OtherSettings, Patrol):
 
 
 class PatrolWithoutAvoiding(OtherSettings, Patrol):
-    """Ignores `avoid`."""
+    """Ignores `no_stops_in`."""
 
-    settings: ClassVar = {"avoid": []}
+    settings: ClassVar = {"no_stops_in": []}
 
 
 class DockLate(OtherSettings, Dock):

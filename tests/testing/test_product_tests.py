@@ -83,6 +83,28 @@ def verdicts(scenario: str, home: int, *changes: str) -> dict[str, Verdict]:
     return simulation.verdicts()
 
 
+TWO_ROBOTS = sorted((FOLDER / "two_robots").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", TWO_ROBOTS, ids=lambda path: path.stem)
+def test_each_scenario_of_two_robots_holds_and_fails_for_ghosts(path: Path) -> None:
+
+    def failed(home: int, *changes: str) -> list[str]:
+        floorplan = f"floorplan={{type: synthetic, seed: {home}, furnish: true}}"
+        simulation = fleet2d.Simulation(path, floorplan, "artifacts.trajectories=off", *changes)
+        simulation.run()
+        return [str(verdict) for verdict in simulation.verdicts().values() if not verdict.holds]
+
+    for home in HOMES if THOROUGH else [0]:
+        assert [] == failed(home), home
+    assert failed(0, "simulation.ghosts=true")
+
+
+def test_there_are_ten_scenarios_of_two_robots_of_at_most_twenty_lines() -> None:
+    assert 10 == len(TWO_ROBOTS)
+    assert max(len(path.read_text().splitlines()) for path in TWO_ROBOTS) <= 20
+
+
 def test_scenarios_are_of_at_most_twenty_lines_and_twenty_mutants() -> None:
     assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
     assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20

@@ -2,11 +2,16 @@
 
 #include <nanobind/stl/vector.h>
 
+#include "../meetings.hpp"
 #include "mesh.hpp"
 #include "motion.hpp"
 #include "subjects.hpp"
 
 namespace fleet2d {
+
+template <>
+inline constexpr std::size_t border::members_of<Distances> = 4;
+
 namespace {
 
 template <class T>
@@ -46,18 +51,13 @@ public:
 
     void follow(i64 body, i64 step, const Breakpoints& track, View<const i64> posture_us, View<const i8> postures) {
         check(body, step);
-        const i64 count = track.size();
-        require(count > 0 && track.x.size() == count && track.y.size() == count && track.heading.size() == count &&
-                    track.away.size() == count,
-                "all arrays of a track must have one length, 1 or more");
-        require(is_traceable(track), "a track's times must ascend, and its legs be short and its coordinates small");
         require(postures.size() == posture_us.size() + 1, "postures must be one more than posture_us");
         bool ascend = true;
         for (i64 i = 1; i < posture_us.size(); ++i) ascend &= posture_us[i - 1] <= posture_us[i];
         require(ascend, "posture_us must ascend");
-        auto piece = std::make_shared<TrackPiece>();
-        *piece = {copied(track.time), copied(track.x),    copied(track.y), copied(track.heading),
-                  copied(track.away), copied(posture_us), copied(postures)};
+        auto piece = std::make_shared<TrackPiece>(piece_of(track));
+        piece->posture_us = copied(posture_us);
+        piece->postures = copied(postures);
         timelines_.put(body, {step, std::move(piece), nullptr});
     }
 
@@ -99,6 +99,25 @@ public:
             }
         }
         return poses;
+    }
+
+    using Rows = std::vector<std::tuple<i64, i64, i64, i64>>;
+    Rows meetings(View<const i64> rows, const Distances& distances, i64 first, i64 end) {
+        check_meetings(rows.size(), distances, first, end);
+        for (const i64 row : rows) check(row, first);
+        Rows result;
+        for (const auto& [row, due, step, other] : fleet2d::meetings(timelines_, rows, distances, first, end)) {
+            result.emplace_back(row, due, step, other);
+        }
+        return result;
+    }
+
+    std::tuple<i64, i64> meeting_on(i64 row, const Breakpoints& track, const Distances& distances, i64 first,
+                                    i64 end) {
+        check_meetings(1, distances, first, end);
+        check(row, first);
+        const auto found = fleet2d::meeting_on(timelines_, row, piece_of(track), distances, first, end);
+        return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
     }
 
     OwnedWindow window(i64 first, i64 end) { return window_of(0, timelines_.bodies(), first, end); }
@@ -147,6 +166,36 @@ public:
     }
 
 private:
+    static TrackPiece piece_of(const Breakpoints& track) {
+        const i64 count = track.size();
+        require(count > 0 && track.x.size() == count && track.y.size() == count && track.heading.size() == count &&
+                    track.away.size() == count,
+                "all arrays of a track must have one length, 1 or more");
+        require(is_traceable(track), "a track's times must ascend, and its legs be short and its coordinates small");
+        return {copied(track.time), copied(track.x), copied(track.y), copied(track.heading), copied(track.away), {},
+                {0}};
+    }
+    void check_meetings(i64 rows, const Distances& distances, i64 first, i64 end) const {
+        require(first <= end && end - first <= FAR, "end must not be before first");
+        const std::array<i64, 2> shape{rows, timelines_.bodies()};
+        require(distances.lead.shape == shape && distances.near.shape == shape && distances.hard.shape == shape &&
+                    distances.counts.shape == shape,
+                "all distances must be (rows, bodies)");
+        i64 longest = 0;
+        for (i64 i = 0; i < rows; ++i) {
+            for (i64 other = 0; other < timelines_.bodies(); ++other) {
+                longest = std::max(longest, distances.lead(i, other));
+                for (const i64 units : {distances.near(i, other), distances.hard(i, other)}) {
+                    require(0 <= units && units < FAR, "distances must be 0 or more, and small");
+                }
+            }
+        }
+        require(longest < FAR, "leads must be small");
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            check_known(body, first);
+            check(body, end + longest);
+        }
+    }
     static i64 checked(i64 bodies) {
         require(0 <= bodies && bodies < (i64{1} << 31), "bodies must be 0 or more");
         return bodies;
@@ -422,6 +471,33 @@ Args:
         .def("poses", &OwnedTimelines::poses, "steps"_a,
              "Return x, y, heading and away of all bodies at some steps: int64 (steps, bodies, 4).")
         // Not unlocked: random walks are drawn on as they are asked for.
+        .def("meetings", &OwnedTimelines::meetings, "rows"_a, "distances"_a, "first"_a, "end"_a,
+             R"(Return for each of some bodies the first meeting to which it has to react.
+
+Two bodies meet when their middles come nearer than a distance while they approach, or when they
+overlap and don't part.
+
+Args:
+    rows: int64 (rows,), the bodies.
+    distances: What each of them keeps from all bodies: see `Distances`.
+    first: The first step at which one may react.
+    end: One past the last one.
+
+Returns:
+    Rows of the body, the step at which it has to react, the step in which they meet, and the other body.
+    Bodies without a meeting are left out.)")
+        .def("meeting_on", &OwnedTimelines::meeting_on, "row"_a, "track"_a, "distances"_a, "first"_a, "end"_a,
+             R"(Return the first meeting of a body if it followed a track.
+
+Args:
+    row: The body.
+    track: Breakpoints, which it would follow from step `first` on.
+    distances: What it keeps from all bodies, (1, bodies) each: see `Distances`.
+    first: The first step.
+    end: One past the last step at which it has to react.
+
+Returns:
+    The step in which they meet and the other body; -1 and -1 if it meets nobody.)")
         .def("window", &OwnedTimelines::window, "first"_a, "end"_a,
              "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")
         .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a,

@@ -106,6 +106,10 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "home_empty": "fleet2d.engine.interrupt:HomeEmpty",
         "home_occupied": "fleet2d.engine.interrupt:HomeOccupied",
     },
+    "right_of_way": {
+        "listed": "fleet2d.entities.right_of_way:Listed",
+        "low_battery": "fleet2d.entities.right_of_way:LowBattery",
+    },
     "sight": {
         "flashlight": "fleet2d.sight.fov:Flashlight",
         "line_of_sight": "fleet2d.sight.fov:LineOfSight",

@@ -52,6 +52,7 @@ from fleet2d.sight.perception import Perception
 
 if TYPE_CHECKING:
     from fleet2d.engine.heights import BodyHeights
+    from fleet2d.entities.keep_out import SleepMemory
     from fleet2d.entities.robots.policy import SightingMemory
 
 # Squared distance beyond which a dark camera sees nobody.
@@ -121,7 +122,7 @@ class Cameras(Watcher):
         perceived: The last perceived place of each identity, (identities, 2); the last row is for
             somebody unknown.
         awaited: Events that algorithms wait for: they end a span, too.
-        remembered: What its owner remembers of its sightings; None: nothing.
+        remembered: What its owner remembers of its sightings.
         next_step: The first step at which it has not looked.
         knows_truth: Whether the truth behind its sightings is known.
         notes: What is to be said about its source.
@@ -151,7 +152,7 @@ class Cameras(Watcher):
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
         self.awaited: Set[str] = frozenset()
-        self.remembered: SightingMemory | None = None
+        self.remembered: list[SightingMemory | SleepMemory] = []
         self._sightings: list[SightingTable] = []  # not collected yet
         self._ahead: Look | None = None
 
@@ -348,8 +349,8 @@ class Cameras(Watcher):
         self.next_step = end
         if len(seen):
             self._sightings.append(seen)
-            if self.remembered is not None:
-                self.remembered.take(seen.step, seen.index, seen.distinct)
+            for memory in self.remembered:
+                memory.take(seen.step, seen.index, seen.distinct)
             places = seen.distinct[:, SightingColumn.X : SightingColumn.Y + 1]
             for identity, number in enumerate(result.newest):
                 if number >= 0:

@@ -20,7 +20,7 @@ from fleet2d.entities.behavior import Situation
 from fleet2d.entities.body import Bodies, poses_of
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
-from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after_step, plan_around
+from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after, plan_around
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import I64, U8, Bool, Poses, line_of_sight, locate
 from fleet2d.runtime.events import EventKind
@@ -71,7 +71,9 @@ class BlockedWays(Watcher):
         self._radii = np.array([actor.entity.radius for actor in self._actors])
         self._waits = [Wait()] * len(self._actors)
         self._passes = [Pass()] * len(self._actors)
-        self.steered = range(0 if patience is None else len(self._actors))
+        # Robots yield anyway, unless bodies are ghosts to each other.
+        steered = len(self._actors) if basis.scenario.simulation.ghosts else self._users
+        self.steered = range(0 if patience is None else steered)
 
     @property
     def is_needed(self) -> bool:
@@ -131,7 +133,7 @@ class BlockedWays(Watcher):
             notes = []
             if since == step:
                 notes = [Note(step * step_us, EventKind.GIVES_WAY, self._actors[other].name)]
-            plan: Plan | None = plan_after_step(now, actor.plan, notes)
+            plan: Plan | None = plan_after(now, actor.plan, step + 1, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:
             plan = plan_around(now, actor.plan, clear)

@@ -38,7 +38,8 @@ PERSON_EVENTS = frozenset(
 # Events of every robot: interventions cause them.
 ROBOT_EVENTS = frozenset(
     {
-        EventKind.ALLOWED, EventKind.BANNED, EventKind.CALLED, EventKind.LOCALIZATION_LOST,
+        EventKind.ALLOWED, EventKind.BANNED, EventKind.CALLED, EventKind.DEADLOCK,
+        EventKind.GIVES_UP, EventKind.GIVES_WAY, EventKind.LOCALIZATION_LOST, EventKind.OVERLAPS,
         EventKind.POWER_OFF, EventKind.POWER_ON, EventKind.RELOCALIZED, EventKind.WITHDRAWS,
     }
 )  # fmt: skip
@@ -291,8 +292,6 @@ def _kinds_of(
         kinds |= set(actor.entity.sight_events)
     if getattr(actor.entity, "battery", None) is not None:
         kinds.add(EventKind.BATTERY)
-    if getattr(actor.entity, "gives_way", None) is not None:
-        kinds |= {EventKind.GIVES_WAY, EventKind.GIVES_UP}
     if may_block:
         kinds.add(EventKind.WAY_BLOCKED)
     if actor.requests is not None:

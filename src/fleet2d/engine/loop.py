@@ -93,29 +93,52 @@ def change_home(state: State, span: Span) -> None:
 def decide(state: State, span: Span) -> None:
     """Ask bodies that have no plan left, and those about to hit another one, for a decision."""
     step = span.first
+    yielding = state.yielding
+    rows = () if yielding is None else yielding.rows
+    begun = set[int]()  # robots whose plans may still be replaced, as others are in their way
     for row in _asked(state, step):
-        actor = state.actors[row]
-        if any(watcher.looks(row, step) for watcher in state.steering):
-            state.bodies.ask_at[row] = step
-        begins = bool(state.bodies.ask_at[row] <= step)
-        if begins:
-            situation = state.situation(row, step)
-            state.pending.pop(row, None)
-            begins = not actor.keeps_plan(situation)
-            for watcher in state.watchers:
-                watcher.listen(row)  # for other events, if other behaviors listen now
-        if begins:
-            state.end_plan(row, step)
-            actor.decide(situation)
-            _follow_plan(state, row)
-        if actor.charge is not None:
-            follow_charge(state.interventions, actor, step)
-        for watcher in state.steering:
-            if row in watcher.steered:
-                begins |= _evade(state, watcher, row, step, begins=begins)
-        if begins:
-            state.changes.expect(row, actor)
-            state.begin_plan(row, step)
+        begins = _decide(state, row, step)
+        if begins and row in rows:
+            begun.add(row)
+        elif begins:
+            _begin_plan(state, row, step)
+    if yielding is not None:
+        yielding.answer(step, state.learners.readable_outputs, begun, state.end_plan)
+    for row in sorted(begun):
+        _begin_plan(state, row, step)
+
+
+def _decide(state: State, row: int, step: int) -> bool:
+    """Ask a body for a decision, if it has no plan left or is about to hit another one.
+
+    Returns:
+        Whether it begins a plan.
+    """
+    actor = state.actors[row]
+    if any(watcher.looks(row, step) for watcher in state.steering):
+        state.bodies.ask_at[row] = step
+    begins = bool(state.bodies.ask_at[row] <= step)
+    if begins:
+        situation = state.situation(row, step)
+        state.pending.pop(row, None)
+        begins = not actor.keeps_plan(situation)
+        for watcher in state.watchers:
+            watcher.listen(row)  # for other events, if other behaviors listen now
+    if begins:
+        state.end_plan(row, step)
+        actor.decide(situation)
+        _follow_plan(state, row)
+    if actor.charge is not None:
+        follow_charge(state.interventions, actor, step)
+    for watcher in state.steering:
+        if row in watcher.steered:
+            begins |= _evade(state, watcher, row, step, begins=begins)
+    return begins
+
+
+def _begin_plan(state: State, row: int, step: int) -> None:
+    state.changes.expect(row, state.actors[row])
+    state.begin_plan(row, step)
 
 
 def _asked(state: State, step: int) -> Sequence[int]:

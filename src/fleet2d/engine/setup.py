@@ -23,6 +23,7 @@ from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import EventStream, InView, Recall, State
 from fleet2d.engine.world import schedule_script
+from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.home_object import Door
@@ -63,6 +64,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     watchers = [
         Clearance(basis.users, basis.robots),
         BlockedWays(basis),
+        Yielding(basis),
         *user_cameras,
         *cameras,
         Encounters(basis.users, basis.robots),
@@ -212,15 +214,22 @@ def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
 def _remember(state: State, basis: Basis) -> None:
     """Give robots a memory of their sightings if one of their behaviors needs it."""
     for actor in basis.robots:
+        cameras = next((group for group in state.cameras if group.owner is actor), None)
+        if actor.rules is not None and actor.rules.minds_sleep:
+            from fleet2d.entities.keep_out import SleepMemory
+
+            beliefs = SleepMemory(basis.home.plan)
+            actor.sleepers = Recall(state, cameras, beliefs)
+            if cameras is not None:
+                cameras.remembered.append(beliefs)
         if not any(behavior.remembers for behavior in actor.behaviors):
             continue
         from fleet2d.entities.robots.policy import SightingMemory  # few robots need it
 
-        cameras = next((group for group in state.cameras if group.owner is actor), None)
         memory = SightingMemory(basis.home.plan, len(basis.users), basis.clock)
         actor.recall = Recall(state, cameras, memory)
         if cameras is not None:
-            cameras.remembered = memory
+            cameras.remembered.append(memory)
 
 
 def _log(

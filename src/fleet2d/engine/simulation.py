@@ -884,6 +884,8 @@ class Simulation:
         results: dict[str, Any] = {}
         state = self._state
         manifest = self._store.manifest
+        if state.yielding is not None:
+            manifest.notes += state.yielding.notes
         if state.log:
             state.count_looks()
             try:

@@ -5,7 +5,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import chain, islice, takewhile
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
+from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
@@ -30,6 +31,7 @@ from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from fleet2d.engine.expectations import RunExpectations
+    from fleet2d.entities.keep_out import SleepMemory
     from fleet2d.entities.robots.policy import SightingMemory
     from fleet2d.expectations.expectation import Expectation
 
@@ -183,6 +185,7 @@ class State:
         changes: The changes of the home.
         watchers: All followers of the bodies that the run needs, in their order.
         steering: Those of them that may replace plans at any step.
+        yielding: The one by which robots keep clear of others; None if none does.
         user_cameras: The cameras of users.
         cameras: The cameras of robots.
         layers: What robots have seen of the home, and when layers are stored.
@@ -228,6 +231,7 @@ class State:
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
     steering: list[Watcher] = field(init=False)
+    yielding: Yielding | None = field(init=False)
     _situation: Situation | None = None  # the newest one
 
     def __getstate__(self) -> dict[str, object]:
@@ -239,6 +243,7 @@ class State:
         self.notes_emitted = [0] * len(self.actors)
         self.capacity = capacity_of(len(self.actors))
         self.steering = [watcher for watcher in self.watchers if watcher.steered]
+        self.yielding = self.find(Yielding)
 
     def find(self, kind: type[W]) -> W | None:
         """Return the watcher of a kind; None if the run needs none."""
@@ -400,9 +405,11 @@ class State:
         """Let a robot forget its sightings, if it has a memory of them."""
         if isinstance(actor.recall, Recall):
             old = actor.recall
-            actor.recall = Recall(self, old.cameras, old.memory.emptied())
+            emptied = cast("SightingMemory", old.memory).emptied()
+            actor.recall = Recall(self, old.cameras, emptied)
             if old.cameras is not None:
-                old.cameras.remembered = actor.recall.memory
+                kept = old.cameras.remembered
+                old.cameras.remembered = [emptied if m is old.memory else m for m in kept]
 
     def _observations(self) -> SightingTable:
         """Return the sightings of all robots, in order of step and robot."""
@@ -435,9 +442,9 @@ class Recall:
 
     state: State
     cameras: Cameras | None
-    memory: "SightingMemory"
+    memory: "SightingMemory | SleepMemory"
 
-    def __call__(self) -> "SightingMemory":
+    def __call__(self) -> Any:
         """Return the memory."""
         if self.cameras is not None:
             self.state.take(self.cameras, self.state.bodies.step)

@@ -15,7 +15,7 @@ from fleet2d.entities.body import NEVER, Body, Motion, Pose
 from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import ANY, Point, RoomChoice, is_kind, is_point
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import blame
+from fleet2d.errors import FloorPlanError, blame
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import Room
@@ -350,6 +350,8 @@ class Behavior(Component):
     listens: ClassVar[frozenset[str]] = frozenset()
     # Whether it does nothing in a scenario in which its robot wants nothing of people.
     serves_requests: ClassVar[bool] = False
+    # Whether it is where a log or a real body is, which nothing in the run may change.
+    is_recorded: ClassVar[bool] = False
     # Whether it reads what its robot remembers of its sightings, by `actor.recall`.
     remembers: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
@@ -453,14 +455,18 @@ class Actor(Body):
         self.requests: RequestQueue | None = None  # set if the scenario has interactions
         self.behaviors = [behavior.model_copy(deep=True) for behavior in self._declared]
         self.displacements: list[Displacement] = []
+        self.sleepers: Callable[[], Any] | None = None  # set if it keeps out of bedrooms
+        self.ruled = self.kept_out - self.forbidden  # the zones of its rules that hold at present
         with blame(self.path, None):
             self._state = self._first_pose()
+            self.kept_out = self.forbidden  # behaviors prepare for the hours without
             self._note_lost_rooms()
             battery = getattr(self.entity, "battery", None)
             self.charge = None if battery is None else Charge(battery, self)
             for behavior in self.behaviors:
                 behavior.start(self)
             self._find_attention()
+        self.kept_out = self.forbidden | self.ruled
         self.command: Command | None = None
         self.off_for: str | None = None
         self.bans: dict[int, int] = {}
@@ -490,8 +496,16 @@ class Actor(Body):
         return self.off_for is not None
 
     def banned(self, step: int) -> frozenset[int]:
-        """Return the indices of the rooms that it is told to keep out of at a step."""
-        return self.forbidden.union(room for room, until in self.bans.items() if until > step)
+        """Return the rooms, by index, and areas that it has to keep out of at a step."""
+        bans = (room for room, until in self.bans.items() if until > step)
+        return self.forbidden.union(self.ruled, bans)
+
+    def rules_at(self, time: datetime) -> frozenset[int]:
+        """Return the zones that its rules keep it out of at a local time, as it believes."""
+        if self.rules is None:
+            return frozenset()
+        rooms = frozenset[int]() if self.sleepers is None else self.sleepers().rooms
+        return self.rules.active(time, rooms)
 
     def ask(self, step: int | None) -> None:
         """Set the step at which it decides next; None: never."""
@@ -527,14 +541,27 @@ class Actor(Body):
 
     def _note_lost_rooms(self) -> None:
         """Note the rooms that it can't get to, as every way there leads through forbidden ones."""
-        if not self.forbidden or self._state.away:
+        if self.rules is None or self._state.away:
             return
         whole = self.whole_space
-        within_reach = whole.rooms_of(whole.part_at(self._state.x, self._state.y))
-        lost = within_reach - self.space.rooms_of(self.part) - self.forbidden
-        if lost:
-            names = ", ".join(self.home.rooms[index].name for index in sorted(lost))
-            self.notes.append(f"keep_out: no way is left to {names}")
+        x, y = self._state.position
+        within_reach = whole.rooms_of(whole.part_at(x, y))
+        zones = [(self.forbidden, "")]
+        zones += [(self.forbidden | timed.zones, timed.about) for timed in self.rules.timed]
+        told: set[int] = set()
+        for kept_out, when in zones:
+            try:
+                space = self.space_without(kept_out)
+            except FloorPlanError:
+                continue
+            # Where it stands in one of them, it is what remains of the largest part that counts.
+            part = max(space.part_at(x, y), 0)
+            lost = within_reach - space.rooms_of(part) - kept_out - told
+            told |= lost
+            if kept_out and lost:
+                names = ", ".join(self.home.rooms[index].name for index in sorted(lost))
+                hint = "; passing: true of a room lets it through"
+                self.notes.append(f"keep_out: no way is left to {names}{when}{hint}")
 
     def _first_pose(self) -> Pose:
         """Return the pose at step 0."""

@@ -4,7 +4,7 @@ import copy
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -19,7 +19,6 @@ from fleet2d.entities.place import (
     Place,
     Point,
     RoomChoice,
-    forbidden_rooms,
     furniture_of,
     is_point,
     lies_in,
@@ -33,10 +32,24 @@ from fleet2d.floorplan.placed_objects import PlacedObject, Posture
 from fleet2d.floorplan.plan import Room
 from fleet2d.floorplan.slow_area import SlowRegion
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I8, I64, TURN, Breakpoints, PoseBlock, Poses, Timelines, Window
+from fleet2d.kernels import (
+    F64,
+    I8,
+    I64,
+    TURN,
+    Breakpoints,
+    Distances,
+    PoseBlock,
+    Poses,
+    Timelines,
+    Window,
+)
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
+
+if TYPE_CHECKING:
+    from fleet2d.entities.keep_out import KeepOutRules
 
 
 class Pose(NamedTuple):
@@ -233,6 +246,18 @@ class Bodies:
             window = self._window = self._timelines.window(first, end)
         return window
 
+    def meetings(
+        self, rows: I64, distances: Distances, first: int, end: int
+    ) -> list[tuple[int, int, int, int]]:
+        """Return to whom bodies have to react in some steps: see `Timelines.meetings`."""
+        return self._timelines.meetings(rows, distances, first, end)
+
+    def meeting_on(
+        self, row: int, track: Breakpoints, distances: Distances, first: int, end: int
+    ) -> tuple[int, int]:
+        """Return whom a body would meet on a track: see `Timelines.meeting_on`."""
+        return self._timelines.meeting_on(row, track, distances, first, end)
+
     def runs(self, row: int, first: int, end: int) -> Window:
         """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
         return self._timelines.runs(row, first, end)
@@ -300,8 +325,9 @@ class Body:
         people: All users of the scenario by name; None for one that isn't built yet.
         notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
         part: The connected part of its space that it is in.
-        forbidden: Indices of the rooms that its configuration keeps it out of.
-        kept_out: Indices of the rooms that its ways avoid now: these, and those of bans.
+        rules: Where its configuration keeps it out; None: nowhere.
+        forbidden: The rooms, by index, and areas that it never enters: see `Home.area`.
+        kept_out: Those that its ways avoid now: these, those of its rules, and those of bans.
         row: Its row among the bodies of the run.
         interrupts: The events that have ended, or may end, its plans so far: they are checked.
         drive: How it moves along routes; None: as `Differential`, which the core computes.
@@ -318,8 +344,11 @@ class Body:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self.forbidden = forbidden_rooms(self, getattr(self.entity, "keep_out", ()))
+        self.rules: KeepOutRules | None = self._rules()
+        self.forbidden = frozenset[int]() if self.rules is None else self.rules.always
         self.kept_out = self.forbidden
+        if self.rules is not None:
+            self.kept_out |= self.rules.active(self.clock.start, frozenset())
         try:
             space = self.space_without()
         except FloorPlanError as error:
@@ -340,6 +369,15 @@ class Body:
         self._state_step = 0
         self.row = 0
         self.interrupts: frozenset[str] = frozenset()
+
+    def _rules(self) -> "KeepOutRules | None":
+        """Return the rules of where it keeps out; None without any."""
+        entries = getattr(self.entity, "keep_out", ())
+        if not entries:
+            return None
+        from fleet2d.entities.keep_out import KeepOutRules  # it reads hours, as behaviors do
+
+        return KeepOutRules(self, entries)
 
     def join(self, bodies: Bodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""
@@ -382,7 +420,8 @@ class Body:
     @property
     def may_block_routes(self) -> bool:
         """Whether routes may be closed to it that were open before, or will be."""
-        return self.home.may_block_routes or self.kept_out != self.forbidden
+        has_hours = self.rules is not None and bool(self.rules.timed)
+        return self.home.may_block_routes or has_hours or self.kept_out != self.forbidden
 
     @property
     def whole_space(self) -> Space:
@@ -605,7 +644,7 @@ class Body:
             return x, y
         why = ""
         if lies_in(self, (x, y), self.kept_out):
-            why = "is in a room that it keeps out of (keep_out)"
+            why = "is where it keeps out (keep_out)"
         elif part >= 0:
             why = "can't be reached from where it starts"
         elif self.home.space(self.entity.radius).part_at(x, y) >= 0:

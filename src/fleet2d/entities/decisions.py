@@ -31,7 +31,7 @@ from fleet2d.entities.behavior import (
 )
 from fleet2d.entities.body import Pose
 from fleet2d.entities.giving_way import GivesWay, Surroundings, WaitForPeople
-from fleet2d.entities.place import Point, RoomChoice
+from fleet2d.entities.place import Point, RoomChoice, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.power import EMPTY
 from fleet2d.errors import ComponentError, InputError, NoWayError, PlacementError, blame
@@ -139,6 +139,12 @@ class Arbiter:
         clock = now.actor.clock
         steps = [clock.step_at_or_after(clock.elapsed(time)) for time in times if time is not None]
         self.wake_step = max(min(steps), now.step + 1) if steps else None
+
+    def hear(self, plan: Plan, event: str) -> None:
+        """Let an event end a plan, at which only behaviors before the active one are asked."""
+        if event not in self.own:
+            self._preempting_events |= {event}
+            plan.interrupts |= {event}
 
     def _may_decide(self, number: int, now: Situation) -> bool:
         """Return whether a behavior may be asked: it is on, in its hours, and past its cooldown."""
@@ -287,12 +293,17 @@ class LeaveRoom:
     def decide(self, now: Situation) -> Plan | None:
         """Go to the nearest room that it may be in and isn't shut in by bans; once."""
         actor = now.actor
-        room = now.room
         banned = actor.banned(now.step)
-        if self._has_tried or room is None or room.index not in banned:
+        if self._has_tried or not lies_in(actor, actor.state.position, banned):
             return None
         self._has_tried = True
         plan = now.plan().note(EventKind.WITHDRAWS, self.about)
+        room = now.room
+        if room is None or room.index not in banned:  # it is in a drawn area
+            outside = actor.space_without(banned).nearest(*plan.position)
+            if outside is not None and plan.reaches(*outside):
+                plan.go_to_point(*outside)
+            return plan.stay(timedelta(seconds=1))
         allowed = actor.space_without(banned).rooms_of(0)
         others = [r for r in actor.reachable_rooms() if r.index in allowed - banned]
         if others:
@@ -397,9 +408,8 @@ class DecidingActor(Actor):
         self._chosen = None
         self.waiting = None
         self.is_displaced = True
-        room = self._room_index()
         banned = self.banned(step)
-        if not self.state.away and room in banned:
+        if not self.state.away and self._is_in(banned):
             self.kept_out = frozenset()  # its way out may lead through others of them, too
             self.order = LeaveRoom("keep_out")
         self.part = self._present_part()
@@ -420,12 +430,27 @@ class DecidingActor(Actor):
             about: What it was told, for the events table.
         """
         self.bans = {**self.bans, room: max(until, self.bans.get(room, 0))}
-        is_here = not self.state.away and self._room_index() == room
+        is_here = not self.state.away and self._is_in(frozenset({room}))
         self.follow_order(LeaveRoom(about) if is_here else self.order, step)
 
-    def _room_index(self) -> int | None:
-        room = self.home.plan.room_of_point(self.state.x, self.state.y)
-        return None if room is None else room.index
+    def _is_in(self, zones: frozenset[int]) -> bool:
+        """Return whether it is in one of some rooms, by index, or areas."""
+        return lies_in(self, self.state.position, zones)
+
+    def _heeds_rules(self, now: Situation) -> bool:
+        """Take in which of its rules of keeping out hold; return whether that has changed."""
+        ruled = self.rules_at(now.time)
+        if ruled == self.ruled:
+            return False
+        self.ruled = ruled
+        banned = self.banned(now.step)
+        if not self.state.away and self._is_in(banned):
+            self.order = LeaveRoom("keep_out")
+        else:
+            self.kept_out = banned
+        self._chosen = None
+        self.waiting = None
+        return True
 
     def _runs_down(self, now: Situation) -> bool:
         """Update the charge of its battery, if it has one; return whether it is empty."""
@@ -485,10 +510,12 @@ class DecidingActor(Actor):
         """
         if self._runs_down(now):
             return False
+        if self.rules is not None and self._heeds_rules(now):
+            return False
         # Bans hold for its ways once it is outside of those rooms.
-        if self.bans or self.kept_out != self.forbidden:
+        if self.bans or self.ruled or self.kept_out != self.forbidden:
             banned = self.banned(now.step)
-            if banned != self.kept_out and self._room_index() not in banned:
+            if banned != self.kept_out and not self._is_in(banned):
                 self.kept_out = banned
         if self._chosen is not None or self.order is not None or self.is_stuck:
             return False
@@ -631,6 +658,12 @@ class DecidingActor(Actor):
         if self.order is None and not self.is_stuck:
             self.arbiter.watch(now, self.plan, fresh=fresh)
         steps = [s for s in (self.plan.over_at, self.arbiter.wake_step) if s is not None]
+        if self.rules is not None:
+            clock = self.clock
+            times = self.rules.changes_at(now.time)
+            steps += [clock.step_at_or_after(clock.elapsed(time)) for time in times]
+            if self.rules.minds_sleep and self.entity.eyes:
+                self.arbiter.hear(self.plan, EventKind.USER_SEEN)
         if self.charge is not None:
             empty_us = self.charge.falls_to(0.0, self.motion)
             if empty_us is not None:

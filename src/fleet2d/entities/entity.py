@@ -15,6 +15,7 @@ from fleet2d.entities.body import BodySettings
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
+from fleet2d.entities.keep_out import KeptOutField
 from fleet2d.entities.power import Power
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
@@ -164,8 +165,9 @@ class Robot(Entity):
         localization: The error of its estimate of its own pose; null: there is none.
         power: When it crashes or updates, and what it forgets while it is off; null: never, and
             nothing that it has learned.
-        keep_out: Rooms, or kinds of rooms if the home has them, that it never enters: it starts,
-            stops, passes and follows nowhere there. Put there by a person, it leaves.
+        keep_out: Rooms, kinds of rooms if the home has them, and areas out of which it keeps, at
+            all times, at hours or while somebody sleeps: it starts, stops, passes and follows
+            nowhere there. Put there by a person, it leaves.
         climbs: Whether it climbs stairs and takes lifts, as people do.
     """
 
@@ -185,7 +187,7 @@ class Robot(Entity):
     gives_way: GivesWay | None = None
     localization: Localization | None = None
     power: Power | None = None
-    keep_out: tuple[str, ...] = ()
+    keep_out: tuple[KeptOutField, ...] = ()
     climbs: bool = False
     sight_events = (EventKind.USER_LOST, EventKind.USER_SEEN)
     request_events = REQUEST_EVENTS

@@ -285,26 +285,31 @@ class RoutesAround:
         xs, ys = body.home.plan.lattice.centre_axes()
         self.cost = np.zeros(body.space.part_of_cell.shape, np.int32)
         for x, y, reach in people.tolist():
-            self.cost[(xs - x) ** 2 + (ys[:, None] - y) ** 2 <= reach * reach] = CLOSED
+            rows, columns = (
+                slice(*np.searchsorted(axis, [middle - reach, middle + reach + 1]).tolist())
+                for axis, middle in ((ys, y), (xs, x))
+            )
+            away = (xs[columns] - x) ** 2 + (ys[rows, None] - y) ** 2
+            self.cost[rows, columns][away <= reach * reach] = CLOSED
 
     def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
         return route_by_cost(self._space, self.cost, start, goal)
 
 
-def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = ()) -> Plan:
-    """Return a plan that stands for a step, and then continues the present one.
+def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Note] = ()) -> Plan:
+    """Return a plan that stands until a step, and then continues the present one.
 
     A random walk isn't continued: the behavior is asked again.
 
     Args:
         now: The situation.
         interrupted: The present plan.
+        step: The step until which it stands.
         notes: Rows for the events table at the stop.
     """
     begin_us = now.step * interrupted.step_us
-    step_us = interrupted.step_us
-    plan = now.plan().stay_until(begin_us + step_us)
+    plan = now.plan().stay_until(step * interrupted.step_us)
     motion = interrupted.finish()
     plan.notes += notes
     if isinstance(motion, Track):
@@ -313,16 +318,59 @@ def plan_after_step(now: Situation, interrupted: Plan, notes: Sequence[Note] = (
     return plan
 
 
-def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
+def plan_aside(
+    now: Situation, interrupted: Plan, place: LatticePoint, step: int, met_at: int
+) -> Plan | None:
+    """Return a plan that steps aside to a place until a step, and then continues the present one.
+
+    After a random walk, the behavior is asked again.
+
+    Args:
+        now: The situation.
+        interrupted: The present plan.
+        place: Where it steps.
+        step: The step until which it stays there.
+        met_at: The step in which somebody is in the way: it goes on with the stop after that.
+
+    Returns:
+        The plan; None if no way leads there, or on from there.
+    """
+    motion = interrupted.finish()
+    begin_us = now.step * interrupted.step_us
+    try:
+        plan = now.plan().go_to_point(*place).stay_until(step * interrupted.step_us)
+        if not isinstance(motion, Track):
+            return plan
+        rows = _rows(motion.breakpoints)
+        stop = next_stop(now.actor, motion.breakpoints, (met_at + 1) * interrupted.step_us)
+        stop = len(rows) - 1 if stop is None else stop
+        plan.go_to_point(int(rows[stop, 1]), int(rows[stop, 2]))
+    except NoWayError:
+        return None
+    since_us = max(int(rows[stop, 0]), begin_us)
+    if stop < len(rows) - 1:
+        plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
+    return _continue(plan, interrupted, begin_us, since_us, rows[stop + 1 :])
+
+
+def plan_around(
+    now: Situation,
+    interrupted: Plan,
+    bodies: I64,
+    met_at: int | None = None,
+    waits_for: LatticePoint | None = None,
+) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
-    If a body stands at that stop, and it is the last one, it stops beside it in the room. A body on
-    a random walk turns round, and its behavior is asked again.
+    If a body stands at that stop, it stops beside it in the room. A body on a random walk turns
+    round, and its behavior is asked again.
 
     Args:
         now: The situation.
         interrupted: The present plan.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
+        met_at: The step in which they are in the way; left out: now.
+        waits_for: A place beside which it doesn't stop: its charger.
 
     Returns:
         The plan; None if there is no way round.
@@ -332,21 +380,19 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
     begin_us = now.step * interrupted.step_us
     if not isinstance(motion, Track):
         return now.plan().turn_by(0.5)
-    stop = next_stop(actor, motion.breakpoints, begin_us)
+    met_us = begin_us if met_at is None else (met_at + 1) * interrupted.step_us
+    stop = next_stop(actor, motion.breakpoints, met_us)
     if stop is None:
         return None
     rows = _rows(motion.breakpoints)
     detour = RoutesAround(actor, bodies)
     goal = (int(rows[stop, 1]), int(rows[stop, 2]))
-    rest = rows[stop + 1 :]
-    if detour.cost[goal[1] // SUB, goal[0] // SUB] < 0:
-        if (rest[:, 1:3] != rows[stop, 1:3]).any() or rest[:, 4].any() or interrupted.postures:
+    is_taken = detour.cost[goal[1] // SUB, goal[0] // SUB] < 0
+    if is_taken:
+        free = None if goal == waits_for or interrupted.postures else beside(actor, goal, detour)
+        if free is None:
             return None
-        beside = _beside(actor, goal, detour)
-        if beside is None:
-            return None
-        goal = beside
-        rest[:, 1:3] = goal
+        goal = free
     plan = now.plan()
     route = detour(plan.position, goal)
     if route is None:
@@ -354,7 +400,53 @@ def plan_around(now: Situation, interrupted: Plan, bodies: I64) -> Plan | None:
     since_us = max(int(rows[stop, 0]), begin_us)
     plan.go_to_point(*goal, route=route)
     plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
-    return _continue(plan, interrupted, begin_us, since_us, rest)
+    rest = rows[stop + 1 :]
+    if not is_taken:
+        return _continue(plan, interrupted, begin_us, since_us, rest)
+    return _continue_beside(plan, interrupted, begin_us, since_us, stop, rows)
+
+
+def _continue_beside(
+    plan: Plan, interrupted: Plan, begin_us: int, since_us: int, stop: int, rows: I64
+) -> Plan | None:
+    """Continue a plan that stops beside a stop of another one, which is taken.
+
+    Args:
+        plan: The plan, up to that stop.
+        interrupted: The other plan.
+        begin_us: The moment up to which the other plan was followed.
+        since_us: The moment at which it would have stopped, or the present one.
+        stop: The row at which the other plan stops.
+        rows: All rows of the other plan, int64 (n, 5).
+
+    Returns:
+        The plan; None if no way leads on to the stop after that one.
+    """
+    leaves = np.flatnonzero((rows[stop:, 1:3] != rows[stop, 1:3]).any(axis=1))
+    here = rows[stop + 1 :] if not len(leaves) else rows[stop + 1 : stop + leaves[0]]
+    here[:, 1:3] = plan.position
+    if not len(leaves):
+        return _continue(plan, interrupted, begin_us, since_us, here)
+    left_us = int(rows[stop + leaves[0] - 1, 0])
+    motion = interrupted.finish()
+    assert isinstance(motion, Track)
+    after = next_stop(plan.body, motion.breakpoints, int(rows[stop + leaves[0], 0]) - 1)
+    if after is None or rows[stop:, 4].any():
+        return None
+    later = plan.time_us - since_us
+    plan.notes += [
+        Note(max(at, since_us) + later, event, detail)
+        for at, event, detail in interrupted.notes
+        if begin_us < at <= left_us
+    ]
+    here[:, 0] = np.maximum(here[:, 0], since_us) + later
+    try:
+        plan.follow(here).go_to_point(int(rows[after, 1]), int(rows[after, 2]))
+    except NoWayError:
+        return None
+    arrives_us = int(rows[after, 0])
+    plan.turn_to(heading_at(motion.breakpoints, after, arrives_us)).stay_until(arrives_us)
+    return _continue(plan, interrupted, left_us, arrives_us, rows[after + 1 :])
 
 
 def _continue(
@@ -402,13 +494,16 @@ def _rows(track: Breakpoints) -> I64:
     return np.stack([column.astype(np.int64) for column in track], axis=-1)
 
 
-def _beside(actor: Actor, goal: LatticePoint, detour: RoutesAround) -> LatticePoint | None:
+def beside(
+    actor: Actor, goal: LatticePoint, detour: RoutesAround, *, in_room: bool = True
+) -> LatticePoint | None:
     """Return the free place nearest to an occupied one, in its room; None if there is none."""
     plan = actor.home.plan
     space = actor.space
-    room = plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
     free = (space.part_of_cell == actor.part) & (detour.cost != CLOSED)
-    cells = np.argwhere(free & (plan.room_of_cell == room))
+    if in_room:
+        free &= plan.room_of_cell == plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
+    cells = np.argwhere(free)
     if not len(cells):
         return None
     xs, ys = plan.lattice.centre_axes()

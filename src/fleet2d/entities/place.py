@@ -292,37 +292,17 @@ def avoided_rooms(body: "Body", key: str, names: tuple[str, ...]) -> frozenset[i
     Raises:
         PlacementError: There is no such room.
     """
-    return frozenset(room.index for room in available_rooms(body, key, names, needed=False))
-
-
-def forbidden_rooms(body: "Body", names: tuple[str, ...]) -> frozenset[int]:
-    """Return the indices of the rooms, or kinds of rooms, that a robot never enters.
-
-    Args:
-        body: The robot; its notes name the kinds of rooms that the home lacks.
-        names: The rooms and kinds of rooms.
-
-    Raises:
-        PlacementError: There is no such room.
-    """
-    rooms = body.home.rooms
-    forbidden: set[int] = set()
-    for name in names:
-        try:
-            _, matches = matching_rooms((name,), rooms, rooms)
-        except PlacementError as error:
-            if not is_kind(body, (name,)):
-                raise PlacementError(f"{body.path}.keep_out: {error}") from None
-            body.notes.append(f"keep_out: this home has no {name}")
-            continue
-        forbidden |= {room.index for room in matches}
-    return frozenset(forbidden)
+    passed = frozenset[int]() if body.rules is None else body.rules.no_stops
+    avoided = (room.index for room in available_rooms(body, key, names, needed=False))
+    return passed.union(avoided)
 
 
 def lies_in(body: "Body", point: LatticePoint, rooms: frozenset[int]) -> bool:
-    """Return whether a lattice point lies in one of some rooms, by their indices."""
+    """Return whether a lattice point lies in one of some rooms or areas: see `Home.area`."""
     room = body.home.plan.room_of_point(*point) if rooms else None
-    return room is not None and room.index in rooms
+    if room is not None and room.index in rooms:
+        return True
+    return any(zone < 0 and body.home.is_in_area(point, zone) for zone in rooms)
 
 
 def is_kind(body: "Body", place: RoomChoice | Point) -> bool:

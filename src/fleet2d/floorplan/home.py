@@ -128,11 +128,19 @@ class Home:
             radius: The radius of the body [m].
             opens_doors: Whether the body passes shut doors that aren't locked.
             uses_portals: Whether the body climbs stairs and takes lifts.
-            without: Indices of the rooms that the body keeps out of.
+            without: Indices of the rooms that the body keeps out of, and numbers of areas.
         """
         shut = self.shut & self.locked if opens_doors else self.shut
         space = self._shapes.space_of(radius, shut, _solid(self.objects), without)
         return self._shapes.linked(space) if uses_portals and self.plan.portals else space
+
+    def area(self, corners: Sequence[tuple[float, float]]) -> int:
+        """Return the number of an area with some corners [m], for `without`: below 0."""
+        return self._shapes.area(tuple(corners))
+
+    def is_in_area(self, point: LatticePoint, area: int) -> bool:
+        """Return whether a lattice point lies in an area, by its number, or on its border."""
+        return bool(shapely.intersects_xy(self._shapes.areas[-1 - area], *point))
 
     @property
     def costs_version(self) -> int:
@@ -265,6 +273,7 @@ class _Shapes:
         self.plan = plan
         self.values = Cache(CACHED_VALUES)
         self.door_lines = door_lines
+        self.areas: list[shapely.Polygon] = []  # out of which bodies keep [lattice]
         self._room_of: dict[str, tuple[PlacedObject, Room | None]] = {}
         self.walls = lru_cache(CACHED_ARRANGEMENTS)(self._make_walls)
         self._gates = lru_cache(CACHED_ARRANGEMENTS)(
@@ -276,6 +285,12 @@ class _Shapes:
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return itself, as branches of a run share it, too."""
         return self
+
+    def area(self, corners: tuple[tuple[float, float], ...]) -> int:
+        shape = shapely.Polygon(self.plan.lattice.to_lattice(np.array(corners)))
+        if shape not in self.areas:
+            self.areas.append(shape)
+        return -1 - self.areas.index(shape)
 
     def room_of(self, thing: PlacedObject) -> Room | None:
         entry = self._room_of.get(thing.name)
@@ -313,7 +328,7 @@ class _Shapes:
         solid: tuple[PlacedObject, ...],
         without: frozenset[int],
     ) -> Space:
-        rooms = [self.plan.room_of_cell == room for room in sorted(without)]
+        rooms = [self.plan.room_of_cell == room for room in sorted(without) if room >= 0]
         space = Space(
             self.plan,
             radius,
@@ -321,6 +336,7 @@ class _Shapes:
             obstacles=[
                 *(lattice_footprint(self.plan, thing) for thing in solid),
                 *(shape for room in rooms for shape in cell_polygons(room)),
+                *(self.areas[-1 - area] for area in without if area < 0),
             ],
             shut=[self.door_lines[door] for door in sorted(shut)],
         )

@@ -41,6 +41,7 @@ from fleet2d.configuration.units import (
 from fleet2d.entities.behavior import DARK
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
+from fleet2d.entities.right_of_way import Listed, RightOfWay
 from fleet2d.errors import errors_as
 from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.load import advise_type
@@ -154,8 +155,10 @@ class SimulationSettings(Settings):
         step: The length of a step.
         seed: The seed of all random draws; null: one is drawn and stored.
         max_span: The maximum number of steps computed at once. It doesn't change results.
-        people_block: How long a person or robot waits for another body in its way before going
-            round it; null: bodies don't block each other.
+        ghosts: Bodies pass through each other; if false, robots yield to people and to each other.
+        right_of_way: Which of two robots yields.
+        people_block: How long a person waits for another body in the way before going round it;
+            null: people walk on, and robots keep out of their way.
         speedup: Run at this many times real time; null: as fast as possible.
         daylight: Where the home is, if nights are to be longer in winter; null: lights and
             detection go by the time of day alone.
@@ -167,6 +170,8 @@ class SimulationSettings(Settings):
     step: PositiveDuration = timedelta(seconds=1)
     seed: int | None = Field(default=None, ge=0, lt=2**63)
     max_span: int | None = Field(default=None, ge=1)
+    ghosts: bool = True
+    right_of_way: OneOf[RightOfWay] = Listed()
     people_block: PositiveDuration | None = Field(default=None, examples=["3 s"])
     speedup: float | None = Field(default=None, ge=0.001)
     daylight: Daylight | None = None

@@ -105,7 +105,7 @@ def product() -> dict[str, Any]:
             {"type": "explore", "when": "07:00-09:00"},
             {"type": "patrol", "dwell": "1 min", "when": "07:30-08:30"},
             {"type": "dock", "threshold": "90 %", "when": "09:00-09:30"},
-            {"type": "hangout", "source": "ltp", "period": "5 min", "avoid": ["bedroom"]},
+            {"type": "hangout", "source": "ltp", "period": "5 min", "no_stops_in": ["bedroom"]},
         ],
         "3 h",
         {"type": "routine", "persona": "works_from_home"},

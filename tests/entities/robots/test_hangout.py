@@ -51,12 +51,12 @@ def test_nearness_by_path_falls_with_the_time_on_foot() -> None:
 
 
 def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
-    content = home_with([hangout(avoid=["bathroom"])], "40 min", **belief(bathroom_0=1))
+    content = home_with([hangout(no_stops_in=["bathroom"])], "40 min", **belief(bathroom_0=1))
     assert "kitchen_0" == rooms(run(content))[-1]
 
 
 def test_a_kind_of_room_that_the_home_lacks_is_avoided_all_the_same() -> None:
-    content = home_with([hangout(avoid=["garage"])], "10 min", **belief(bathroom_0=1))
+    content = home_with([hangout(no_stops_in=["garage"])], "10 min", **belief(bathroom_0=1))
     plain = home_with([hangout()], "10 min", **belief(bathroom_0=1))
     assert rooms(run(plain)) == rooms(run(content))
 
@@ -118,7 +118,7 @@ def test_it_stands_still_in_quiet_hours() -> None:
 
 def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
     content = home_with(
-        [hangout(avoid=["bedroom"], quiet="06:00-09:00")], "1 h", **belief(bathroom_0=1)
+        [hangout(no_stops_in=["bedroom"], quiet="06:00-09:00")], "1 h", **belief(bathroom_0=1)
     )
     content["robots"]["astro"]["start"] = [1.0, 6.0]
     stored = assert_same_for_every_max_span(content, 61)
@@ -168,8 +168,8 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"avoid": ["bathrom"]}, "no room 'bathrom'"),
-        ({"avoid": ["any"]}, "no place to hang out"),
+        ({"no_stops_in": ["bathrom"]}, "no room 'bathrom'"),
+        ({"no_stops_in": ["any"]}, "no place to hang out"),
         ({"quiet": "22:00"}, "expected hours"),
         ({"quiet": "workdays 22:00-23:00"}, "unknown day 'workdays'"),
         ({"near": "far"}, "near"),

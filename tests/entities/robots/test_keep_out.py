@@ -2,12 +2,13 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, names, rooms_of
-from tests.scenes import run, scenario
+from tests.scenes import path, run, scenario
 
 import fleet2d
-from fleet2d.errors import PlacementError
+from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.runs.run import Run
 
 ROUNDS = {"type": "patrol", "dwell": "5 s"}
@@ -101,7 +102,9 @@ def test_a_kind_of_room_that_the_home_lacks_is_noted() -> None:
 
 def test_rooms_that_are_cut_off_are_noted_by_name() -> None:
     said = notes(flat(keep_out=["kitchen"]))
-    assert ["robots.astro.keep_out: no way is left to bathroom_0"] == said
+    assert [
+        "robots.astro.keep_out: no way is left to bathroom_0; passing: true of a room lets it through"
+    ] == said
     assert [] == notes(flat(keep_out=["bedroom"]))
 
 
@@ -118,7 +121,9 @@ def test_a_robot_put_where_it_must_not_be_leaves(place: list[float]) -> None:
 
 
 def test_a_robot_cannot_start_where_it_must_not_be() -> None:
-    with pytest.raises(PlacementError, match=r"\[1.0, 3.0\] is in a room .*keep_out") as caught:
+    with pytest.raises(
+        PlacementError, match=r"\[1.0, 3.0\] is where it keeps out .*keep_out"
+    ) as caught:
         run(flat(keep_out=["living_room"]))
     assert "\n" not in str(caught.value)
 
@@ -170,3 +175,104 @@ def test_a_room_stays_forbidden_after_a_ban_of_it_ends() -> None:
     assert "bedroom_0" not in rooms[660:1200]
     assert "bedroom_0" in rooms[1200:]
     assert {"banned", "allowed"} <= set(names(stored))
+
+
+# --- At hours, in areas, while somebody sleeps -------------------------------------------------
+
+
+def test_at_hours_it_leaves_the_room_in_which_it_is_and_comes_back_later() -> None:
+    """The hours begin while it is inside: it withdraws, and enters again when they end."""
+    content = flat(keep_out=[{"room": "bedroom", "during": "07:20-07:40"}])
+    stored = assert_same_for_every_max_span(content, 61, 1)
+    rooms = rooms_of(stored)
+    assert "bedroom_0" in rooms[:1200]
+    assert "bedroom_0" not in rooms[1230:2400]
+    assert "bedroom_0" in rooms[2400:]
+    still = {"type": "patrol", "waypoints": [[2.5, 5.5]], "dwell": "1 d"}
+    inside = flat(still, keep_out=[{"room": "bedroom", "during": "07:10-07:20"}], astro={"start": [2.5, 5.5]}, duration="25 min")  # fmt: skip
+    stored = assert_same_for_every_max_span(inside, 61, 1)
+    rooms = rooms_of(stored)
+    assert {"bedroom_0"} == set(rooms[:600])
+    assert "bedroom_0" not in rooms[630:1200]
+    assert "withdraws" in names(stored)
+
+
+def test_a_run_that_begins_within_the_hours_begins_outside() -> None:
+    for seed in range(6):
+        content = flat(keep_out=[{"room": "living_room", "during": "06:00-07:05"}], astro={"start": None}, duration="5 min")  # fmt: skip
+        content["simulation"]["seed"] = seed
+        assert "living_room_0" not in rooms_of(run(content))
+
+
+def test_it_never_enters_a_drawn_area() -> None:
+    area = [[2.0, 2.8], [3.0, 2.8], [3.0, 3.9], [2.0, 3.9]]
+    stored = assert_same_for_every_max_span(flat(keep_out=[{"area": area}]), 61)
+    way = path(stored, "astro")
+    inside = (way.x > 1.86) & (way.x < 3.14) & (way.y > 2.66) & (way.y < 4)
+    assert not inside.any()
+    free = path(run(flat()), "astro")
+    assert ((free.x > 2) & (free.x < 3) & (free.y > 2.8) & (free.y < 3.9)).any()
+
+
+def test_put_into_an_area_it_leaves() -> None:
+    area = [[2.0, 2.8], [3.0, 2.8], [3.0, 3.9], [2.0, 3.9]]
+    script = [{"at": "07:10", "put": "astro", "to": [2.5, 3.4]}]
+    way = path(run(flat(keep_out=[{"area": area}], script=script)), "astro")
+    inside = (way.x > 2) & (way.x < 3) & (way.y > 2.8) & (way.y < 3.9)
+    assert inside[600]
+    assert not inside[615:].any()
+
+
+def test_it_may_pass_a_room_without_stops() -> None:
+    """The bathroom is behind the kitchen."""
+    assert [] == notes(flat(keep_out=[{"room": "kitchen", "passing": True}]))
+    stored = run(flat(keep_out=[{"room": "kitchen", "passing": True}]))
+    rooms = rooms_of(stored)
+    way = path(stored, "astro")
+    rests = (way.x[1:] == way.x[:-1]) & (way.y[1:] == way.y[:-1]) & (way.heading[1:] == way.heading[:-1])  # fmt: skip
+    assert "bathroom_0" in rooms
+    assert "kitchen_0" in rooms
+    assert "kitchen_0" not in set(np.array(rooms)[1:][rests])
+
+
+def test_it_keeps_out_while_it_believes_that_somebody_sleeps_there() -> None:
+    """Once it has seen Ana in bed it leaves her alone; when it sees her up, it comes again."""
+    day = [{"at": "00:00", "place": "bed", "activity": "sleep"}, {"at": "07:50", "place": "kitchen", "activity": "breakfast"}]  # fmt: skip
+    content = {
+        "simulation": {"start": "2026-01-05T07:00", "duration": "2 h", "seed": 4},
+        "floorplan": {"type": "bundled", "furnish": True},
+        "users": {"ana": {"type": "schedule", "days": [{"on": "daily", "items": day}]}},
+        "robots": {
+            "astro": {
+                "start": "hallway",
+                "camera": CAMERA,
+                "behaviors": [ROUNDS],
+                "keep_out": [{"while": "asleep"}],
+            }
+        },
+    }
+    stored = assert_same_for_every_max_span(content, 61)
+    bedroom = rooms_of(stored, "ana")[0]
+    rooms = np.array(rooms_of(stored))
+    events = stored.pandas("events")
+    seen = events[events["event"] == "user_seen"]["step"].min()
+    assert seen < 40 * 60
+    asleep = slice(seen + 40, 50 * 60)
+    assert not (rooms[asleep] == bedroom).any()
+    assert (rooms[60 * 60 :] == bedroom).any()
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"during": "22:00-07:00"}, "it says nowhere"),
+        ({"room": "bedroom", "area": [[0, 0], [1, 0], [1, 1]]}, "not both"),
+        ({"area": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "sides cross"),
+        ({"room": "kitchen", "passing": True, "during": "22:00-07:00"}, "without hours"),
+        ({"room": "kitchen", "while": "awake"}, "asleep"),
+        ({"rom": "kitchen"}, "room"),
+    ],
+)
+def test_wrong_entries_are_refused(entry: dict[str, Any], words: str) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        run(flat(keep_out=[entry]))

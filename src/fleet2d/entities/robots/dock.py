@@ -27,8 +27,8 @@ class Dock(Behavior):
         threshold: Charge at which it goes to the charger.
         until: Charge with which it leaves the charger.
         rest: Wait at the charger when there is nothing else to do.
-        avoid: Rooms, or kinds of rooms if the home has them, that it goes round on its way, as long
-            as there is another way.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it goes round on its way,
+            as long as there is another way.
     """
 
     records = frozenset({EventKind.CHARGED, EventKind.DOCKS})
@@ -37,7 +37,7 @@ class Dock(Behavior):
     threshold: Share = 0.2
     until: Share = 1.0
     rest: bool = False
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def model_post_init(self, _: object, /) -> None:
         """Refuse a robot that would leave the charger and return at once."""
@@ -59,11 +59,11 @@ class Dock(Behavior):
                 " 2 h, standing: 10 h, charging: 3 h, charger: hallway}"
             )
         self.charging = False
-        self.avoided = avoided_rooms(actor, "dock.avoid", self.avoid)
+        self.avoided = avoided_rooms(actor, "dock.no_stops_in", self.no_stops_in)
         if lies_in(actor, actor.charge.charger, self.avoided):
             raise ScenarioError(
-                f"{actor.path}: dock.avoid has the room of the charger: leave it out, or move the"
-                " charger by battery.charger"
+                f"{actor.path}: dock.no_stops_in has the room of the charger: leave it out, or move"
+                " the charger by battery.charger"
             )
 
     def busy(self) -> bool:

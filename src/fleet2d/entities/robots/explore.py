@@ -36,8 +36,8 @@ class Explore(Behavior):
     Attributes:
         enough: Share of the floor to be seen.
         reach: How near it goes to a frontier [m].
-        avoid: Rooms, or kinds of rooms if the home has them, that it doesn't explore: it looks
-            round in none of them, and their floor needn't be seen.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't explore: it
+            looks round in none of them, and their floor needn't be seen.
     """
 
     records = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})
@@ -45,13 +45,13 @@ class Explore(Behavior):
 
     enough: Share = 0.98
     reach: Length = Field(default=1.0, ge=0.1, le=5)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def start(self, actor: Actor) -> None:
         """Determine the floor to be seen, and the places from which it may be seen."""
         check_has_camera(actor, "explore")
         plan = actor.home.plan
-        avoided = avoided_rooms(actor, "explore.avoid", self.avoid)
+        avoided = avoided_rooms(actor, "explore.no_stops_in", self.no_stops_in)
         rooms = [r.index for r in actor.reachable_rooms() if r.index not in avoided]
         self.floor: Bool = np.isin(plan.room_of_cell, rooms) & plan.free
         cells = actor.space.cells(None, actor.part)

@@ -167,7 +167,8 @@ class Find(BeliefBehavior):
         views: The maximum number of places in a room from which it looks around.
         distance: How far it stays from the person it found [m].
         stay: How long it stays with the person it found.
-        avoid: Rooms, or kinds of rooms if the home has them, that it looks into from outside only.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it looks into from
+            outside only.
     """
 
     records = frozenset(
@@ -186,7 +187,7 @@ class Find(BeliefBehavior):
     views: int = Field(default=2, ge=1, le=8)
     distance: Length = Field(default=1.5, ge=0.3, le=10)
     stay: Duration = timedelta(minutes=1)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def model_post_init(self, _: object, /) -> None:
         """Refuse two ways to begin."""
@@ -200,7 +201,7 @@ class Find(BeliefBehavior):
     def start(self, actor: Actor) -> None:
         """Choose the viewpoints of each room."""
         check_has_camera(actor, "find")
-        self.avoided = avoided_rooms(actor, "find.avoid", self.avoid)
+        self.avoided = avoided_rooms(actor, "find.no_stops_in", self.no_stops_in)
         self.sites = Sites(actor, self.views, self.avoided)
         if self.policy == "exact" and len(self.sites) > MAX_EXACT_SITES:
             raise PlacementError(

@@ -37,7 +37,7 @@ class Follow(Behavior):
         distance: How far behind it stays [m].
         update: How often it looks where the person is.
         longest: For how long it follows at most; 0: without end.
-        avoid: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
     """
 
     records = frozenset({EventKind.FOLLOWS, EventKind.LOST})
@@ -47,7 +47,7 @@ class Follow(Behavior):
     distance: Length = Field(default=1.5, ge=0.3, le=10)
     update: PositiveDuration = timedelta(seconds=2)
     longest: Duration = timedelta(0)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def about(self) -> tuple[str, ...]:
         """Return the user that it follows, if it is one by name."""
@@ -56,7 +56,7 @@ class Follow(Behavior):
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "follow")
-        self.avoided = avoided_rooms(actor, "follow.avoid", self.avoid)
+        self.avoided = avoided_rooms(actor, "follow.no_stops_in", self.no_stops_in)
         self.person: str | None = None  # the one that it follows now
         self.last = (0.0, 0.0)  # where the person was perceived last [m]
         self.pause = self.update
@@ -123,8 +123,8 @@ class Come(Behavior):
 
     Attributes:
         stay: How long it waits there.
-        avoid: Rooms, or kinds of rooms if the home has them, that it doesn't enter: called into one
-            of them, it waits outside, near the door.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't enter: called
+            into one of them, it waits outside, near the door.
     """
 
     records = frozenset({EventKind.VISITS})
@@ -132,11 +132,11 @@ class Come(Behavior):
     resumes = True
 
     stay: Duration = timedelta(minutes=10)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def start(self, actor: Actor) -> None:
         """Start without a command."""
-        self.avoided = avoided_rooms(actor, "come.avoid", self.avoid)
+        self.avoided = avoided_rooms(actor, "come.no_stops_in", self.no_stops_in)
         self.command: Command | None = None
 
     def busy(self) -> bool:

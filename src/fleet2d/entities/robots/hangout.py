@@ -234,7 +234,7 @@ class Hangout(BeliefBehavior):
         moving: Weight of the travel time to a place.
         hysteresis: By how much another place must be better for it to move.
         explore: Share of decisions in which it explores any room instead.
-        avoid: Rooms, or kinds of rooms if the home has them, that it stays out of.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it stays out of.
         quiet: Hours in which it doesn't move.
     """
 
@@ -246,17 +246,17 @@ class Hangout(BeliefBehavior):
     moving: float = Field(default=0.05, ge=0)
     hysteresis: float = Field(default=0.1, ge=0)
     explore: Share = 0.1
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
     quiet: Hours = ()
 
     def start(self, actor: Actor) -> None:
         """Lay out the places, and rate them by what doesn't depend on where people are."""
-        self.avoided = avoided_rooms(actor, "hangout.avoid", self.avoid)
+        self.avoided = avoided_rooms(actor, "hangout.no_stops_in", self.no_stops_in)
         self.places = HangoutPlaces(actor, self.avoided)
         if not len(self.places.points):
             raise PlacementError(
                 f"{actor.path}: there is no place to hang out at, off doorways by"
-                f" {OFF_DOORS_M:g} m and out of: {', '.join(self.avoid) or 'no room'}"
+                f" {OFF_DOORS_M:g} m and out of: {', '.join(self.no_stops_in) or 'no room'}"
             )
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.places.block + SEAT_WEIGHT * self.places.prox

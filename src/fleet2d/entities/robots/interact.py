@@ -437,7 +437,7 @@ class Opportunistic(Behavior):
         interaction: How long it interacts.
         chance: Probability that it takes an opportunity.
         again: Minimum time between two approaches to the same person.
-        avoid: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
     """
 
     records = frozenset(
@@ -453,7 +453,7 @@ class Opportunistic(Behavior):
     interaction: Duration = timedelta(minutes=1)
     chance: Share = 1.0
     again: Duration = timedelta(minutes=15)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def about(self) -> tuple[str, ...]:
         """Return the users that it approaches, if only some."""
@@ -462,7 +462,7 @@ class Opportunistic(Behavior):
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
-        self.avoided = avoided_rooms(actor, "opportunistic.avoid", self.avoid)
+        self.avoided = avoided_rooms(actor, "opportunistic.no_stops_in", self.no_stops_in)
         self.asked: tuple[Request, str] | None = None  # the request, as events named it
         self.left_alone: dict[str, datetime] = {}  # until when each person isn't approached
 

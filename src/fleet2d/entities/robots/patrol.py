@@ -50,7 +50,7 @@ class Patrol(Behavior):
         dwell: How long it stays at each stop.
         order: Stops in the order given, or reshuffled for each round.
         look_around: Turn once on the spot on arriving at a stop.
-        avoid: Rooms, or kinds of rooms if the home has them, without stops.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, without stops.
         stop_at: Where it stops in a room that a round names: in its middle, or at up to four points
             from which it sees all places at the room's furniture (without any, 95 % of the floor).
     """
@@ -62,7 +62,7 @@ class Patrol(Behavior):
     dwell: Duration = timedelta(minutes=5)
     order: Literal["fixed", "random"] = "fixed"
     look_around: bool = True
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
     stop_at: Literal["middle", "view"] = "middle"
 
     def model_post_init(self, _: object, /) -> None:
@@ -81,8 +81,8 @@ class Patrol(Behavior):
         else:
             places = available_places(actor, "patrol.rooms", self.rooms)
             stops = [stop for place in places for stop in self._stops_at(actor, place)]
-        if self.avoid:
-            avoided = avoided_rooms(actor, "patrol.avoid", self.avoid)
+        if self.no_stops_in or (actor.rules is not None and actor.rules.no_stops):
+            avoided = avoided_rooms(actor, "patrol.no_stops_in", self.no_stops_in)
             stops = [stop for stop in stops if not lies_in(actor, stop, avoided)]
         self.stops = stops if self.waypoints else list(dict.fromkeys(stops))
         only_patrols = all(isinstance(each, Patrol) for each in actor.behaviors)
@@ -153,24 +153,26 @@ class Scheduled(Behavior):
     Attributes:
         visits: The visits.
         late: A visit that can't begin within this time is left out.
-        avoid: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits there
-            are left out, with a note.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits
+            there are left out, with a note.
     """
 
     records = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
 
     visits: tuple[ScheduledVisit, ...] = Field(min_length=1)
     late: Duration = timedelta(minutes=30)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def start(self, actor: Actor) -> None:
         """Find the stops."""
         self.stops = [stop_at(actor, visit.place) for visit in self.visits]
-        avoided = avoided_rooms(actor, "scheduled.avoid", self.avoid)
+        avoided = avoided_rooms(actor, "scheduled.no_stops_in", self.no_stops_in)
         self.left_out = {i for i, xy in enumerate(self.stops) if lies_in(actor, xy, avoided)}
         if self.left_out:
             rooms = ", ".join(sorted({self._room_name(actor, i) for i in self.left_out}))
-            actor.notes.append(f"scheduled.visits: left out, because of `avoid`: those of {rooms}")
+            actor.notes.append(
+                f"scheduled.visits: left out, because of `no_stops_in`: those of {rooms}"
+            )
         self.last_decision = actor.clock.start - timedelta(microseconds=1)
         self.pending: list[tuple[datetime, int]] = []  # due time and number of visits to make
 
@@ -232,7 +234,8 @@ class Retrace(Behavior):
     Attributes:
         path: The map's JSON file.
         reach: A point farther than this from free space is left out [m].
-        avoid: Rooms, or kinds of rooms if the home has them, whose part of the path is left out.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, whose part of the path is
+            left out.
     """
 
     records = frozenset({EventKind.RETRACED, EventKind.RETRACES})
@@ -240,7 +243,7 @@ class Retrace(Behavior):
 
     path: InputPath
     reach: Length = Field(default=1.0, ge=0)
-    avoid: tuple[str, ...] = ()
+    no_stops_in: tuple[str, ...] = ()
 
     def files(self) -> tuple[Path, ...]:
         """Return the files that it reads."""
@@ -266,7 +269,7 @@ class Retrace(Behavior):
         near: I64 = Nearest(actor).of(points)
         squared_moves = ((near - points) ** 2).sum(axis=1)
         reachable = near[squared_moves <= (self.reach * lattice.units_per_m) ** 2]
-        avoided = avoided_rooms(actor, "retrace.avoid", self.avoid)
+        avoided = avoided_rooms(actor, "retrace.no_stops_in", self.no_stops_in)
         points_left = _thin_out(reachable, SPACING_M * lattice.units_per_m)
         self.points = [p for p in points_left if not lies_in(actor, p, avoided)]
         if len(self.points) < 2:

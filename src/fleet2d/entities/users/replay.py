@@ -472,6 +472,7 @@ class Replay(Behavior, LogKeys):
     """
 
     records = frozenset({EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN})
+    is_recorded = True
 
     path: InputFileOrFolder
     format: Layout = "auto"

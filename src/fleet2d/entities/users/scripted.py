@@ -63,6 +63,8 @@ class Live(Behavior):
             `fleet2d live` opens; left out: any of `--with`.
     """
 
+    is_recorded = True
+
     source: PeerAddress | None = None
 
     def decide(self, now: Situation) -> Plan:

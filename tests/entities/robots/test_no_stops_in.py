@@ -1,4 +1,4 @@
-"""Rooms that behaviors stay out of: `avoid` of all behaviors of robots but hangout."""
+"""Rooms that behaviors stay out of: `no_stops_in` of all behaviors of robots but hangout."""
 
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ def inside(behavior: str, avoid: list[str]) -> int:
     content = scenario(
         "12 min",
         users={"ana": {"type": "schedule", "rest": "kitchen", "days": [{"on": "daily", "items": [{"at": "00:00", "place": [6.5, 3.1], "activity": "read"}]}]}},
-        robots={"astro": {"start": [1.0, 3.0], "camera": CAMERA, "behaviors": [{**BEHAVIORS[behavior], "avoid": avoid}, rest]}},
+        robots={"astro": {"start": [1.0, 3.0], "camera": CAMERA, "behaviors": [{**BEHAVIORS[behavior], "no_stops_in": avoid}, rest]}},
         script=[{"at": "07:01", "call": "astro", "to": "kitchen"}] if behavior == "come" else [],
         artifacts={"trajectories": "every step"},
     )  # fmt: skip
@@ -44,7 +44,7 @@ def test_the_robot_stays_out_of_the_rooms_that_it_avoids(behavior: str) -> None:
 
 
 def test_an_unknown_room_is_refused_and_a_kind_that_the_home_lacks_is_noted() -> None:
-    with pytest.raises(PlacementError, match=r"patrol\.avoid: .*did you mean 'kitchen'"):
+    with pytest.raises(PlacementError, match=r"patrol\.no_stops_in: .*did you mean 'kitchen'"):
         inside("patrol", ["kitchn"])
     assert inside("patrol", ["office"]) > 0
 
@@ -52,7 +52,7 @@ def test_an_unknown_room_is_refused_and_a_kind_that_the_home_lacks_is_noted() ->
 def test_a_robot_called_into_a_room_that_it_avoids_waits_near_the_door() -> None:
     """The door from the living room to the kitchen is at x = 5 m, y = 2.6 to 3.6 m."""
     simulation = fleet2d.Simulation(
-        scenario(robots={"astro": {"start": [1.0, 1.0], "behaviors": [{"type": "come", "avoid": ["kitchen"]}]}})
+        scenario(robots={"astro": {"start": [1.0, 1.0], "behaviors": [{"type": "come", "no_stops_in": ["kitchen"]}]}})
     )  # fmt: skip
     simulation.do(Call("astro", to="kitchen"))
     simulation.run_until("07:01")
@@ -87,20 +87,20 @@ def docking(plan: Path, **dock: Any) -> set[str]:
 
 def test_the_way_to_the_charger_leads_round_rooms_to_avoid_if_there_is_another(loop: Path) -> None:
     assert {"bedroom_0"} == docking(loop)
-    assert {"kitchen_0"} == docking(loop, avoid=["bedroom"])
-    assert {"bedroom_0"} == docking(loop, avoid=["kitchen", "bedroom"])
+    assert {"kitchen_0"} == docking(loop, no_stops_in=["bedroom"])
+    assert {"bedroom_0"} == docking(loop, no_stops_in=["kitchen", "bedroom"])
 
 
 def test_a_charger_in_a_room_to_avoid_is_refused(loop: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"dock\.avoid has the room of the charger"):
-        docking(loop, avoid=["living_room"])
+    with pytest.raises(ScenarioError, match=r"dock\.no_stops_in has the room of the charger"):
+        docking(loop, no_stops_in=["living_room"])
 
 
 def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note() -> None:
     visits = [{"at": "07:01", "place": "kitchen"}, {"at": "07:02", "place": "bedroom"}]
-    robot = {"behaviors": [{"type": "scheduled", "visits": visits, "avoid": ["kitchen"]}]}
+    robot = {"behaviors": [{"type": "scheduled", "visits": visits, "no_stops_in": ["kitchen"]}]}
     simulation = fleet2d.Simulation(scenario(robots={"astro": robot}))
-    note = "scheduled.visits: left out, because of `avoid`: those of kitchen_0"
+    note = "scheduled.visits: left out, because of `no_stops_in`: those of kitchen_0"
     assert [note] == simulation.actors["astro"].notes
     assert ["bedroom_0"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
 
@@ -109,7 +109,7 @@ def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data: Path
     file = shared_data / "valetudo" / "dreame_z10_named_rooms_and_paths.json"
 
     def points(avoid: list[str]) -> int:
-        robot = {"behaviors": [{"type": "retrace", "path": str(file), "avoid": avoid}]}
+        robot = {"behaviors": [{"type": "retrace", "path": str(file), "no_stops_in": avoid}]}
         content = scenario(robots={"astro": robot})
         content["floorplan"] = {"type": "valetudo", "path": str(file)}
         return int(table(fleet2d.run(content), "events", event="retraces")["detail"][0].split()[0])

@@ -1,0 +1,217 @@
+#include "meetings.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace fleet2d {
+namespace {
+
+constexpr i64 ENDLESS = std::numeric_limits<i64>::max();
+constexpr i64 ROUNDED = 8;  // more than all coordinates that a distance depends on are rounded by [lattice units]
+
+std::size_t number_of(i64 i) { return static_cast<std::size_t>(i); }
+
+// A straight stretch of a way, from one moment to another.
+struct Straight {
+    i64 begin, end;  // us; the part of it that counts
+    i64 from, whole; // us; when it began, and how long it takes in all; 0 at rest
+    Point at;        // where it began
+    i64 dx, dy;
+    bool away;
+
+    Point where(i64 moment) const {
+        if (whole == 0) return at;
+        const i64 elapsed = moment - from;
+        return {at.x + floor_div(2 * dx * elapsed + whole, 2 * whole),
+                at.y + floor_div(2 * dy * elapsed + whole, 2 * whole)};
+    }
+};
+
+// The way of a body, and the smallest box around it.
+struct Way {
+    std::vector<Straight> straights;
+    i64 x0 = ENDLESS, y0 = ENDLESS, x1 = -ENDLESS, y1 = -ENDLESS;
+
+    void add(const Straight& straight) {
+        if (straight.begin >= straight.end) return;
+        straights.push_back(straight);
+        if (straight.away) return;
+        x0 = std::min({x0, straight.at.x, straight.at.x + straight.dx});
+        y0 = std::min({y0, straight.at.y, straight.at.y + straight.dy});
+        x1 = std::max({x1, straight.at.x, straight.at.x + straight.dx});
+        y1 = std::max({y1, straight.at.y, straight.at.y + straight.dy});
+    }
+    bool is_near(const Way& other, i64 distance) const {
+        return x0 <= x1 && other.x0 <= other.x1 && x0 - distance <= other.x1 && other.x0 - distance <= x1 &&
+               y0 - distance <= other.y1 && other.y0 - distance <= y1;
+    }
+};
+
+void add_track(const TrackPiece& track, i64 begin, i64 end, Way& way) {
+    const auto after = std::upper_bound(track.time.begin(), track.time.end(), begin);
+    std::size_t i = number_of(std::max<i64>(0, after - track.time.begin() - 1));
+    while (begin < end) {
+        const Point at{track.x[i], track.y[i]};
+        const bool is_last = i + 1 == track.time.size();
+        const bool waits = track.time[i] > begin;  // before the first breakpoint it rests
+        const i64 until = std::min(end, is_last ? end : waits ? track.time[i] : track.time[i + 1]);
+        if (is_last || waits) {
+            way.add({begin, until, 0, 0, at, 0, 0, track.away[i] != 0});
+        } else {
+            const i64 dx = track.x[i + 1] - at.x, dy = track.y[i + 1] - at.y;
+            const i64 whole = dx == 0 && dy == 0 ? 0 : track.time[i + 1] - track.time[i];
+            way.add({begin, until, track.time[i], whole, at, dx, dy, track.away[i] != 0});
+        }
+        begin = until;
+        while (i + 1 < track.time.size() && track.time[i + 1] <= begin) ++i;
+    }
+}
+
+void add_walk(Timelines& timelines, i64 body, i64 first, i64 end, Way& way) {
+    const i64 step_us = timelines.step_us();
+    BodyPose at = timelines.pose(body, first);
+    for (i64 step = first; step < end; ++step) {
+        const BodyPose next = timelines.pose(body, step + 1);
+        const i64 dx = next.x - at.x, dy = next.y - at.y;
+        const i64 begin = step * step_us;
+        const i64 whole = dx == 0 && dy == 0 ? 0 : step_us;
+        way.add({begin, begin + step_us, begin, whole, {at.x, at.y}, dx, dy, at.away != 0});
+        at = next;
+    }
+}
+
+Way way_of(Timelines& timelines, i64 body, i64 first, i64 end) {
+    Way way;
+    const auto& pieces = timelines.pieces(body);
+    const auto after = std::upper_bound(pieces.begin(), pieces.end(), first,
+                                        [](i64 step, const Piece& piece) { return step < piece.first; });
+    for (std::size_t k = after == pieces.begin() ? 0 : number_of(after - pieces.begin() - 1); k < pieces.size(); ++k) {
+        const i64 from = std::max(first, pieces[k].first);
+        const i64 until = k + 1 < pieces.size() ? std::min(end, pieces[k + 1].first) : end;
+        if (from >= until) continue;
+        if (pieces[k].walk) {
+            add_walk(timelines, body, from, until, way);
+        } else {
+            add_track(*pieces[k].track, from * timelines.step_us(), until * timelines.step_us(), way);
+        }
+    }
+    return way;
+}
+
+struct MeetingLimits {
+    i64 near, hard;
+    MotionCounts counts;
+};
+
+// Whether two bodies meet between two moments within one stretch of each.
+bool do_meet(const Straight& body, const Straight& other, i64 begin, i64 end, const MeetingLimits& limits) {
+    const Point a0 = body.where(begin), a1 = body.where(end), b0 = other.where(begin), b1 = other.where(end);
+    const i64 px = b0.x - a0.x, py = b0.y - a0.y;
+    const i64 own_x = a1.x - a0.x, own_y = a1.y - a0.y;
+    const i64 dx = b1.x - b0.x - own_x, dy = b1.y - b0.y - own_y;
+    const i64 parting = px * dx + py * dy;
+    if (limits.counts != OWN_MOTION && px * px + py * py < limits.hard * limits.hard && parting <= 0) return true;
+    if (parting >= 0) return false;
+    if (limits.counts != ALL_MOTION) {
+        const bool mine = limits.counts == OWN_MOTION;
+        const i64 vx = mine ? own_x : -dx - own_x, vy = mine ? own_y : -dy - own_y;  // towards the other one
+        const i64 towards = px * vx + py * vy, then = (px + dx) * vx + (py + dy) * vy;
+        if (towards <= 0 && then <= 0) return false;
+    }
+    const i64 way = dx * dx + dy * dy;
+    const f64 near = static_cast<f64>(limits.near) * static_cast<f64>(limits.near);
+    if (-parting >= way) {
+        const f64 last_x = static_cast<f64>(px + dx), last_y = static_cast<f64>(py + dy);
+        return last_x * last_x + last_y * last_y < near;
+    }
+    const f64 beside = static_cast<f64>(px * dy - py * dx);
+    return beside * beside < near * static_cast<f64>(way);
+}
+
+// Whether two bodies are surely farther apart between two moments than their limits, whatever is rounded.
+bool is_far(const Straight& body, const Straight& other, i64 begin, i64 end, i64 limit) {
+    const Point a0 = body.where(begin), a1 = body.where(end), b0 = other.where(begin), b1 = other.where(end);
+    const i64 px = b0.x - a0.x, py = b0.y - a0.y, qx = b1.x - a1.x, qy = b1.y - a1.y;
+    const i64 reach = limit + ROUNDED;
+    return (px > reach && qx > reach) || (px < -reach && qx < -reach) || (py > reach && qy > reach) ||
+           (py < -reach && qy < -reach);
+}
+
+// The first step in which two bodies meet, -1 for none. Each step is looked at by itself, as what is rounded must not
+// depend on where the ways begin.
+i64 first_meeting_step(const Way& body, const Way& other, const MeetingLimits& limits, i64 step_us) {
+    const i64 limit = std::max(limits.near, limits.hard);
+    if (!body.is_near(other, limit)) return -1;
+    auto a = body.straights.begin();
+    auto b = other.straights.begin();
+    while (a != body.straights.end() && b != other.straights.end()) {
+        const i64 begin = std::max(a->begin, b->begin), end = std::min(a->end, b->end);
+        const bool counts = begin < end && !a->away && !b->away && !is_far(*a, *b, begin, end, limit);
+        const bool rest = a->whole == 0 && b->whole == 0;
+        for (i64 from = begin; counts && from < end;) {
+            const i64 until = rest ? end : std::min(end, (floor_div(from, step_us) + 1) * step_us);
+            if (do_meet(*a, *b, from, until, limits)) return floor_div(from, step_us);
+            from = until;
+        }
+        if (a->end == end) ++a;
+        if (b->end == end) ++b;
+    }
+    return -1;
+}
+
+std::optional<Meeting> first_meeting(const std::vector<Way>& ways, const Way& way, i64 row, i64 number,
+                                     const Distances& distances, i64 first, i64 end, i64 step_us) {
+    std::optional<Meeting> best;
+    for (i64 other = 0; other < static_cast<i64>(ways.size()); ++other) {
+        const i64 lead = distances.lead(number, other);
+        if (other == row || lead < 0) continue;
+        const MeetingLimits limits{distances.near(number, other), distances.hard(number, other),
+                            static_cast<MotionCounts>(distances.counts(number, other))};
+        const i64 step = first_meeting_step(way, ways[number_of(other)], limits, step_us);
+        if (step < 0) continue;
+        const i64 due = std::max(first, step - lead);
+        if (due >= end) continue;
+        if (!best || due < best->due || (due == best->due && step < best->step)) best = Meeting{row, due, step, other};
+    }
+    return best;
+}
+
+i64 longest_lead(const Distances& distances) {
+    i64 longest = 0;
+    for (i64 i = 0; i < distances.lead.shape[0]; ++i) {
+        for (i64 j = 0; j < distances.lead.shape[1]; ++j) longest = std::max(longest, distances.lead(i, j));
+    }
+    return longest;
+}
+
+std::vector<Way> ways_of(Timelines& timelines, i64 first, i64 end) {
+    std::vector<Way> ways;
+    for (i64 body = 0; body < timelines.bodies(); ++body) ways.push_back(way_of(timelines, body, first, end));
+    return ways;
+}
+
+}  // namespace
+
+std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
+                              i64 end) {
+    const std::vector<Way> ways = ways_of(timelines, first, end + longest_lead(distances));
+    std::vector<Meeting> result;
+    for (i64 number = 0; number < rows.size(); ++number) {
+        const i64 row = rows[number];
+        const auto found =
+            first_meeting(ways, ways[number_of(row)], row, number, distances, first, end, timelines.step_us());
+        if (found) result.push_back(*found);
+    }
+    return result;
+}
+
+std::optional<Meeting> meeting_on(Timelines& timelines, i64 row, const TrackPiece& track, const Distances& distances,
+                                  i64 first, i64 end) {
+    const i64 until = end + longest_lead(distances);
+    const std::vector<Way> ways = ways_of(timelines, first, until);
+    Way way;
+    add_track(track, first * timelines.step_us(), until * timelines.step_us(), way);
+    return first_meeting(ways, way, row, 0, distances, first, end, timelines.step_us());
+}
+
+}  // namespace fleet2d

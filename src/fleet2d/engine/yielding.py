@@ -1,0 +1,693 @@
+"""Yielding: robots keep clear of people and of each other, wherever they stop, turn or pass.
+
+The ways of all bodies are known until their next decisions. At each step at which somebody will
+come too near to a robot within the next seconds, the robot gets another plan: it waits, goes round,
+stops beside, or steps aside and comes back. A plan is taken only if it meets nobody on the ways
+that are known. Of two robots the right of way says which one yields; the other one drives on, and
+stops at the last step if its way isn't free. So robots never overlap: whoever stops where it is
+has kept its distance, and nobody else drives into it.
+
+People, logs and real bodies never change their ways. Where one of them walks into a robot that
+can't get out of the way, the two overlap, with an event.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from itertools import chain
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fleet2d.configuration.units import micros
+from fleet2d.engine.basis import Basis, Watcher
+from fleet2d.entities import giving_way
+from fleet2d.entities.behavior import Situation
+from fleet2d.entities.body import Bodies, Pose, Track
+from fleet2d.entities.decisions import DecidingActor
+from fleet2d.entities.giving_way import plan_after, plan_around, plan_aside
+from fleet2d.entities.place import is_point, points_at_distance
+from fleet2d.entities.plan import Note, Plan
+from fleet2d.errors import NoWayError
+from fleet2d.floorplan.lattice import LatticePoint
+from fleet2d.kernels import I64, SUB, Bool, Breakpoints, Distances, walking_distance
+from fleet2d.runtime.events import EventKind
+
+EndPlan = Callable[[int, int], None]
+
+# How far ahead a robot reacts to somebody to whom it yields.
+AHEAD = timedelta(seconds=5)
+# How far ahead the plan that it takes has to be free.
+FREE_FOR = timedelta(seconds=15)
+# The waits that it tries, in order.
+WAITS = tuple(timedelta(seconds=seconds) for seconds in (1, 2, 4, 8))
+WAITS_ASIDE = timedelta(seconds=2), timedelta(seconds=8)
+# How long a plan that isn't free for long is kept before the next try.
+PAUSE = timedelta(seconds=2)
+# Waiting for another robot for this long is a deadlock: the other one yields, for a while.
+DEADLOCK = timedelta(seconds=10)
+SWAPPED_FOR = timedelta(seconds=30)
+# A wait that begins this soon after another one, and this near, continues it.
+SAME_WAIT = timedelta(seconds=15)
+SAME_PLACE_M = 1.5
+# How long it waits in vain before it skips its stop.
+GIVES_UP = timedelta(minutes=2)
+# Gap at which bodies pass, and gap at which a robot with the right of way stops [m].
+PASSING_GAP_M = 0.02
+LEAST_GAP_M = 0.01
+# Places to step aside to: how far away they may be [m], the distance between them [cells], and how
+# many are tried; and the number of directions in which it passes somebody who stands.
+NEAR_M = 1.2
+FAR_M = 5.0
+ASIDE_CELLS = 4
+ASIDE_TRIES = 12
+VIAS = 8
+
+
+# Whose motion counts.
+OWN = 1
+OTHERS = 2
+
+
+class Wait(NamedTuple):
+    """The wait of a robot for others.
+
+    Attributes:
+        since: The step at which it began.
+        last: The last step at which it had to wait.
+        place: Where it began [lattice].
+        swaps: How often it has ended a deadlock meanwhile.
+    """
+
+    since: int
+    last: int
+    place: LatticePoint
+    swaps: int = 0
+
+
+@dataclass
+class Patience:
+    """A time in which a robot doesn't react to a body, as it can do nothing better.
+
+    Attributes:
+        until: The step before which it lasts.
+        planned_at: The step at which the other one began its plan; another plan ends it.
+        ignores: Whether it ignores the other one, with whom it overlaps; else it only stops.
+    """
+
+    until: int
+    planned_at: int
+    ignores: bool = False
+
+
+class Yielding(Watcher):
+    """The robots of a run that keep clear of all bodies."""
+
+    def __init__(self, basis: Basis) -> None:
+        """Prepare for the robots, unless the scenario says that bodies are ghosts."""
+        settings = basis.scenario.simulation
+        self._actors = basis.actors
+        self._bodies = basis.bodies
+        self._rule = settings.right_of_way
+        self._users = basis.bodies.users
+        robots = () if settings.ghosts or len(self._actors) < 2 else basis.robots
+        self.rows = [r.row for r in robots if not any(b.is_recorded for b in r.behaviors)]
+        self._number = {row: number for number, row in enumerate(self.rows)}
+        self._rows = np.array(self.rows, np.int64)
+        self._step_us = basis.clock.step_us
+        self._ahead = self._steps(AHEAD)
+        self._waits: dict[int, Wait] = {}
+        self._looked_round: dict[int, int] = {}  # when it last found no way round
+        self._told: dict[tuple[int, int], int] = {}
+        self._patience: dict[tuple[int, int], Patience] = {}
+        self._swapped: dict[tuple[int, int], int] = {}
+        self._stuck: tuple[bool, ...] = ()
+        self._distances: Distances | None = None
+        self.overlaps: dict[tuple[str, str], int] = {}
+        if self.rows:
+            self._set_up()
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether any robot yields."""
+        return bool(self.rows)
+
+    @property
+    def waits(self) -> bool:
+        """Whether any robot yields."""
+        return self.is_needed
+
+    @property
+    def notes(self) -> list[str]:
+        """How often somebody who doesn't yield walked into a robot."""
+        return [
+            f"robots.{robot}: {other} walked into it {count} time{'s' if count > 1 else ''}"
+            for (robot, other), count in self.overlaps.items()
+        ]
+
+    def limit(self, bodies: Bodies, end: int) -> int:
+        """Return the step at which a robot has to react: not the first of the span."""
+        first = self.next_step + 1
+        for patience in self._patience.values():
+            if first <= patience.until < end:
+                end = patience.until
+        for until in self._swapped.values():
+            if first <= until < end:
+                end = until
+        if first >= end:
+            return end
+        found = bodies.meetings(self._rows, self._present(self.next_step), first, end)
+        return min((due for _, due, _, _ in found), default=end)
+
+    def answer(
+        self, step: int, outputs: Mapping[str, Any], begun: set[int], end_plan: EndPlan
+    ) -> None:
+        """Give robots that would come too near to somebody other plans.
+
+        Args:
+            step: The present step, at which all bodies have decided.
+            outputs: The outputs of algorithms, for behaviors.
+            begun: The rows of these robots whose plans begin now; those of others are added.
+            end_plan: Called with a row and the step before its plan is replaced.
+        """
+        self._refresh(step)
+        found = self._bodies.meetings(self._rows, self._present(step), step, step + 1)
+        for row, _, at, other in found:
+            now = Situation(self._actors[row], step, (), outputs)
+            for each, plan in self._plans(now, at, other):
+                self._follow(each, plan, begun, end_plan)
+        # Who would still drive into somebody within this step stops, then who drives into those.
+        while found:
+            found = self._bodies.meetings(self._rows, self._strict(step), step, step + 1)
+            for row, *_ in found:
+                now = Situation(self._actors[row], step, (), outputs)
+                self._follow(now, self._stop(now), begun, end_plan)
+
+    def _follow(self, now: Situation, plan: Plan, begun: set[int], end_plan: EndPlan) -> None:
+        """Let a robot follow another plan from now on."""
+        row = now.actor.row
+        actor = self._actors[row]
+        if row not in begun:
+            end_plan(row, now.step)
+        begun.add(row)
+        plan.interrupts = actor.arbiter.own
+        actor.follow_instead(plan, now)
+        self._bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
+
+    # Whom each robot minds
+
+    def _set_up(self) -> None:
+        """Compute the distances between bodies, and move robots that begin in others."""
+        actors = self._actors
+        units = actors[0].home.plan.lattice.units_per_m
+        radii = np.array([actor.entity.radius for actor in actors])
+        touch = radii[self._rows, None] + radii
+
+        def lattice(gap: float) -> I64:
+            return np.ceil((touch + gap) * units).astype(np.int64)
+
+        self._hard = lattice(0.0)
+        self._near = lattice(PASSING_GAP_M)
+        self._least = lattice(LEAST_GAP_M)
+        self._nothing = np.zeros_like(self._near)
+        self._alone = np.full(touch.shape, OWN, np.uint8)
+        both = np.zeros_like(self._alone)
+        self._counts = both.copy()
+        polite = self._near.copy()
+        for number, row in enumerate(self.rows):
+            gives_way = getattr(actors[row].entity, "gives_way", None)
+            if gives_way is not None:  # `Clearance` lets it mind people that stand
+                self._counts[number, : self._users] = OTHERS
+                polite[number, : self._users] = lattice(gives_way.distance)[number, : self._users]
+        self._passing = Distances(self._nothing, self._near, self._nothing, both)
+        self._politely = Distances(self._nothing, polite, self._nothing, both)
+        self._everybody = Distances(self._nothing, self._near, self._hard, both)
+        self._same_place = SAME_PLACE_M * units
+        self._order()
+        for row in self.rows:
+            self._begin_apart(actors[row])
+
+    def _order(self) -> None:
+        """Ask the rule which robots go first; bool (robots, bodies)."""
+        self._first = np.zeros(self._near.shape, np.bool_)
+        for i, one in enumerate(self.rows):
+            for other in self.rows[i + 1 :]:
+                goes = self._rule.goes_first(self._actors[one], self._actors[other])
+                self._first[i, other] = goes
+                self._first[self._number[other], one] = not goes
+
+    def _refresh(self, step: int) -> None:
+        """Take in that bodies have begun plans."""
+        if not self._rule.is_fixed:
+            self._order()
+            self._distances = None
+        stuck = tuple([_is_stuck(self._actors[row]) for row in self.rows])
+        if stuck != self._stuck:
+            self._stuck = stuck
+            self._distances = None
+
+    def _present(self, step: int) -> Distances:
+        """Return what the robots keep from all bodies at a step."""
+        for pair, patience in list(self._patience.items()):
+            if patience.until <= step or self._actors[pair[1]].planned_at > patience.planned_at:
+                del self._patience[pair]
+                self._distances = None
+        for pair, until in list(self._swapped.items()):
+            if until <= step:
+                del self._swapped[pair]
+                self._distances = None
+        if self._distances is None:
+            self._distances = self._now_kept()
+        return self._distances
+
+    def _now_kept(self) -> Distances:
+        first = self._first.copy()
+        for one, other in self._swapped:
+            i, j = self._number[one], self._number[other]
+            first[i, other] = not first[i, other]
+            first[j, one] = not first[j, one]
+        for number, is_stuck in enumerate(self._stuck):
+            if is_stuck:
+                first[:, self.rows[number]] = False
+        lead = np.where(first, 0, self._ahead)
+        near = np.where(first, self._least, self._near)
+        hard = np.where(first, 0, self._hard)
+        counts = np.where(first, OWN, self._counts).astype(np.uint8)
+        for (row, other), patience in self._patience.items():
+            i = self._number[row]
+            lead[i, other] = -1 if patience.ignores else 0
+            near[i, other] = self._least[i, other]
+            hard[i, other] = 0
+            counts[i, other] = OWN if other in self._number else self._counts[i, other]
+        for number, is_stuck in enumerate(self._stuck):
+            if is_stuck:
+                lead[number] = -1
+        return Distances(lead, near, hard, counts)
+
+    def _strict(self, step: int) -> Distances:
+        """Return the distances at which robots stop at the last moment."""
+        lead = np.minimum(self._present(step).lead, 0)
+        return Distances(lead, self._least, self._nothing, self._alone)
+
+    def _goes_first(self, row: int, other: int, step: int) -> bool:
+        """Return whether a robot only has to stop before another one, and needn't yield."""
+        counts = self._present(step).counts
+        return other in self._number and bool(counts[self._number[row], other] == OWN)
+
+    def _have_patience(
+        self, now: Situation, other: int, steps: int, *, ignores: bool = False
+    ) -> None:
+        """Let a robot not react to another body for some steps."""
+        planned_at = self._actors[other].planned_at
+        patience = Patience(now.step + steps, planned_at, ignores)
+        self._patience[now.actor.row, other] = patience
+        self._distances = None
+
+    def _swap(self, row: int, other: int, step: int) -> None:
+        """Let the other one of two robots yield for a while."""
+        pair = min(row, other), max(row, other)
+        if pair in self._swapped:
+            del self._swapped[pair]
+        else:
+            self._swapped[pair] = step + self._steps(SWAPPED_FOR)
+        for key in ((row, other), (other, row)):
+            self._patience.pop(key, None)
+        self._distances = None
+
+    # Plans
+
+    def _plans(self, now: Situation, at: int, other: int) -> list[tuple[Situation, Plan]]:
+        """Return other plans for a robot, or for the one that it meets at a step; none to go on."""
+        row = now.actor.row
+        if self._goes_first(row, other, now.step):
+            return [(now, self._blocked(now, at, other, self._stop(now)))]
+        stays = self._met(now, now.plan().stay(), self._everybody)
+        if stays is None:
+            plan = self._by_waiting(now, at, other)
+        elif self._keeps_its_place(now, at, other):
+            return []
+        elif (passing := self._passed(now, at, other)) is not None:
+            return [passing]
+        else:
+            plan = next(self._asides(now, at, politely=True), None)
+            if plan is None and self._is_polite(row):
+                plan = next(self._asides(now, at, politely=False), None)
+        if plan is None:
+            plan = self._in_vain(now, at, other, stays)
+        else:
+            plan = self._noted(now, other, plan)
+        return [] if plan is None else [(now, plan)]
+
+    def _in_vain(
+        self, now: Situation, at: int, other: int, stays: tuple[int, int] | None
+    ) -> Plan | None:
+        """Return what a robot does that found nothing better than to stop; None to go on."""
+        pause = self._pause(now)
+        self._have_patience(now, other, pause)
+        is_hit = stays is not None and stays[0] <= at and other not in self._number
+        if is_hit and at > now.step:
+            return None  # it is hit as early if it stops
+        if is_hit:
+            return self._overlapping(now, pause)
+        return self._blocked(now, at, other, self._stop(now, pause))
+
+    def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
+        """Return a plan that goes on later, or round bodies that stand; None if none is free."""
+        actor = self._actors[now.actor.row]
+        for wait in () if self._rests(other, now.step) else WAITS:
+            until = now.step + self._steps(wait)
+            if self._is_free_after(now, until):
+                return plan_after(now, actor.plan, until)
+        plan = self._by_via(now, at, other)
+        if plan is not None:
+            return plan
+        last = self._looked_round.get(actor.row)
+        if last is not None and now.step - last < self._ahead:
+            return None
+        charger = None if actor.charge is None else actor.charge.charger
+        around = plan_around(now, actor.plan, self._standing(now), at, charger)
+        if around is not None and self._is_free(now, around):
+            return around
+        self._looked_round[actor.row] = now.step
+        return None
+
+    def _by_via(self, now: Situation, at: int, other: int) -> Plan | None:
+        """Return a plan to pass a body that stands, by a point beside it; None without one."""
+        actor = self._actors[now.actor.row]
+        if self._is_taken(actor, other, now.step, at):
+            return None
+        for via in self._beside(actor, other):
+            plan = plan_aside(now, actor.plan, via, now.step, at)
+            if plan is not None and self._is_free(now, plan):
+                return plan
+        return None
+
+    def _passed(self, now: Situation, at: int, other: int) -> tuple[Situation, Plan] | None:
+        """Return how a robot with the right of way passes one that stands; None if it can't."""
+        row = now.actor.row
+        if other not in self._number or not self._rests(row, now.step):
+            return None
+        theirs = Situation(self._actors[other], now.step, (), now.outputs)
+        plan = self._by_via(theirs, at, row)
+        return None if plan is None else (theirs, self._noted(theirs, row, plan))
+
+    def _is_polite(self, row: int) -> bool:
+        """Return whether a robot keeps clear of people that stand by its own `gives_way`."""
+        return getattr(self._actors[row].entity, "gives_way", None) is not None
+
+    def _beside(self, actor: DecidingActor, other: int) -> list[LatticePoint]:
+        """Return points by which a robot may pass a body that stands, the nearest two."""
+        near = 3 * int(self._politely.near[self._number[actor.row], other]) // 2
+        middle = self._actors[other].state.position
+        points = points_at_distance(actor, middle, near, VIAS)
+        return sorted(points, key=lambda at: math.dist(at, actor.state.position))[1:4]
+
+    def _asides(self, now: Situation, at: int, *, politely: bool) -> Iterator[Plan]:
+        """Yield plans to step aside and come back, the nearest place first."""
+        actor = self._actors[now.actor.row]
+        places = chain.from_iterable(
+            self._places_aside(actor, now.step, metres) for metres in (NEAR_M, FAR_M)
+        )
+        for place in places:
+            try:
+                plan = now.plan().go_to_point(*place)
+            except NoWayError:
+                continue
+            if not self._is_free(now, plan, politely=politely):
+                continue
+            arrives = actor.clock.step_at_or_after(plan.time_us)
+            for wait in WAITS_ASIDE:
+                back = plan_aside(now, actor.plan, place, arrives + self._steps(wait), at)
+                if back is not None and self._is_free(now, back, politely=politely):
+                    yield back
+            # It waits aside for as long as is known, and then looks again.
+            later = plan_aside(now, actor.plan, place, arrives + self._steps(FREE_FOR), at)
+            if later is not None:
+                yield later
+
+    def _stop(self, now: Situation, steps: int = 0) -> Plan:
+        """Return a plan to stop for a moment, and then to go on."""
+        until = now.step + max(steps, self._steps(PAUSE))
+        return plan_after(now, self._actors[now.actor.row].plan, until)
+
+    def _pause(self, now: Situation) -> int:
+        """Return for how many steps a robot waits before it looks again: longer and longer."""
+        wait = self._waits.get(now.actor.row)
+        waited = 0 if wait is None or not self._goes_on(wait, now) else now.step - wait.since
+        return min(max(self._steps(PAUSE), waited // 2), self._steps(DEADLOCK))
+
+    def _overlapping(self, now: Situation, pause: int) -> Plan | None:
+        """Write once who walks into a robot now; it goes on as before, and minds them no more."""
+        row = now.actor.row
+        robot = self._actors[row]
+        notes = []
+        for other in self._hits(now):
+            self._have_patience(now, other, pause, ignores=True)
+            told = self._told.get((row, other))
+            self._told[row, other] = now.step
+            if told is not None and now.step - told <= self._steps(SAME_WAIT):
+                continue
+            name = self._actors[other].name
+            self.overlaps[robot.name, name] = self.overlaps.get((robot.name, name), 0) + 1
+            notes.append(Note(now.step * self._step_us, EventKind.OVERLAPS, name))
+        if not notes:
+            return None
+        plan = plan_after(now, robot.plan, now.step)
+        plan.notes[:0] = notes
+        return plan
+
+    def _hits(self, now: Situation) -> list[int]:
+        """Return the rows of those who don't yield and walk into a robot at this step."""
+        lead, near, hard, counts = self._everybody
+        hits = []
+        for other in range(len(self._actors)):
+            only = np.full_like(lead, -1)
+            only[:, other] = 0
+            met = self._met(now, now.plan().stay(), Distances(only, near, hard, counts))
+            if other not in self._number and met is not None and met[0] == now.step:
+                hits.append(other)
+        return hits
+
+    def _noted(self, now: Situation, other: int, plan: Plan) -> Plan:
+        """Add to a plan that the robot gives way, at the beginning of a wait."""
+        row = now.actor.row
+        wait = self._waits.get(row)
+        if wait is not None and self._goes_on(wait, now):
+            self._waits[row] = wait._replace(last=now.step)
+        else:
+            self._waits[row] = Wait(now.step, now.step, now.actor.state.position)
+            note = Note(now.step * self._step_us, EventKind.GIVES_WAY, self._actors[other].name)
+            plan.notes.insert(0, note)
+        return plan
+
+    def _goes_on(self, wait: Wait, now: Situation) -> bool:
+        """Return whether a robot that has to wait now does so still."""
+        is_soon = now.step - wait.last <= self._steps(SAME_WAIT)
+        return is_soon and math.dist(wait.place, now.actor.state.position) <= self._same_place
+
+    def _blocked(self, now: Situation, at: int, other: int, plan: Plan) -> Plan:
+        """Return what a robot does for which nothing is free: it waits, or skips its stop."""
+        row = now.actor.row
+        actor = self._actors[row]
+        self._noted(now, other, plan)
+        wait = self._waits[row]
+        waited = now.step - wait.since
+        name = self._actors[other].name
+        taken = self._is_taken(actor, other, now.step, at)
+        charger = None if actor.charge is None else actor.charge.charger
+        if taken and self._stop_of(actor, at) == charger:
+            return plan  # it queues
+        patience = DEADLOCK if taken else GIVES_UP
+        if waited >= self._steps(patience) and _goes_somewhere(actor):
+            self._waits.pop(row)
+            return self._without_stop(now, name)
+        if other in self._number and waited >= (wait.swaps + 1) * self._steps(DEADLOCK):
+            self._waits[row] = wait._replace(swaps=wait.swaps + 1)
+            self._swap(row, other, now.step)
+            plan.notes.insert(0, Note(now.step * self._step_us, EventKind.DEADLOCK, name))
+        return plan
+
+    def _without_stop(self, now: Situation, name: str) -> Plan:
+        """Return the plan without the stop that it can't get to; else a step of standing."""
+        actor = self._actors[now.actor.row]
+        stands = timedelta(microseconds=self._step_us)
+        plan = now.plan().stay(stands).note(EventKind.GIVES_UP, name)
+        rest = giving_way.without_next_stop(plan, actor.plan, now.step)
+        if rest is not None:
+            return rest
+        if actor.order is None and actor.arbiter.active is not None:
+            actor.behaviors[actor.arbiter.active].give_up(now)
+        return now.plan().stay(stands).note(EventKind.GIVES_UP, name)
+
+    # What is free
+
+    def _met(self, now: Situation, plan: Plan, distances: Distances) -> tuple[int, int] | None:
+        """Return the step at which a plan would meet somebody first, and whom."""
+        motion = plan.finish()
+        if not isinstance(motion, Track):
+            return None
+        return self._meets(now, motion.breakpoints, distances)
+
+    def _meets(
+        self, now: Situation, track: Breakpoints, distances: Distances
+    ) -> tuple[int, int] | None:
+        row = now.actor.row
+        number = self._number[row]
+        lead, near, hard, counts = distances
+        mine = slice(number, number + 1)
+        kept = Distances(lead[mine], near[mine], hard[mine], counts[mine])
+        end = now.step + self._steps(FREE_FOR)
+        step, other = self._bodies.meeting_on(row, track, kept, now.step, end)
+        return None if step < 0 else (step, other)
+
+    def _is_free_after(self, now: Situation, step: int) -> bool:
+        """Return whether a robot may stand until a step, and then go on as it planned."""
+        motion = self._actors[now.actor.row].plan.finish()
+        if not isinstance(motion, Track):
+            return True
+        track = motion.breakpoints
+        now_us = now.step * self._step_us
+        first = int(np.searchsorted(track.time, now_us, side="right"))
+        begins = np.array([now_us, step * self._step_us], np.int64)
+        pose = now.actor.state
+        columns: Sequence[NDArray[Any]] = track[1:]
+        later = np.concatenate([begins, track.time[first:] + (begins[1] - begins[0])])
+        delayed = [
+            np.concatenate([np.full(2, value, column.dtype), column[first:]])
+            for value, column in zip(pose, columns, strict=True)
+        ]
+        return self._meets(now, Breakpoints(later, *delayed), self._politely) is None
+
+    def _is_free(self, now: Situation, plan: Plan, *, politely: bool = True) -> bool:
+        """Return whether a plan brings a robot too near to nobody, as far as is known."""
+        return self._met(now, plan, self._politely if politely else self._passing) is None
+
+    def _rests(self, row: int, step: int) -> bool:
+        """Return whether a body stays where it is for a while, as far as is known."""
+        runs = self._bodies.runs(row, step, step + self._steps(FREE_FOR))
+        return bool((runs.x == runs.x[0]).all() and (runs.y == runs.y[0]).all())
+
+    def _standing(self, now: Situation) -> I64:
+        """Return where others stand, or will have stopped; and the distances to keep, (n, 3)."""
+        number = self._number[now.actor.row]
+        lattice = now.actor.home.plan.lattice
+        cell = int(lattice.units_per_m * lattice.cell)
+        end = now.step + self._steps(FREE_FOR)
+        rows = []
+        for other in self._actors:
+            at = now.step if self._rests(other.row, now.step) else end
+            x, y, _, away = self._bodies.pose_at(other.row, at)
+            if other.row == now.actor.row or away or not self._rests(other.row, at):
+                continue
+            rows.append((x, y, int(self._near[number, other.row]) + cell))
+        return np.array(rows, np.int64).reshape(-1, 3)
+
+    def _stop_of(self, actor: DecidingActor, step: int) -> LatticePoint | None:
+        """Return where a body stops after a step, or is; None if it walks at random."""
+        motion = actor.plan.finish()
+        if not isinstance(motion, Track):
+            return None
+        track = motion.breakpoints
+        stop = giving_way.next_stop(actor, track, (step + 1) * self._step_us)
+        stop = len(track.time) - 1 if stop is None else stop
+        return int(track.x[stop]), int(track.y[stop])
+
+    def _is_taken(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
+        """Return whether another body stays where a robot wants to stop next."""
+        stop = self._stop_of(actor, at)
+        if stop is None or not self._rests(other, step):
+            return False
+        near = int(self._near[self._number[actor.row], other])
+        return math.dist(stop, self._actors[other].state.position) < near
+
+    def _keeps_its_place(self, now: Situation, at: int, other: int) -> bool:
+        """Let a robot that wants to stop where this one stands yield; return whether it does."""
+        row = now.actor.row
+        if other not in self._number or (min(row, other), max(row, other)) in self._swapped:
+            return False
+        if not self._is_taken(self._actors[other], row, now.step, at):
+            return False
+        self._swap(row, other, now.step)
+        return True
+
+    def _places_aside(
+        self, actor: DecidingActor, step: int, within_m: float
+    ) -> Iterator[LatticePoint]:
+        """Return places that nobody else comes near to on the ways known, by their distance."""
+        lattice = actor.home.plan.lattice
+        x, y = self._inside(actor)
+        reach = int(within_m / lattice.cell)
+        row0, column0 = max(y // SUB - reach, 0), max(x // SUB - reach, 0)
+        window = (slice(row0, y // SUB + reach + 1), slice(column0, x // SUB + reach + 1))
+        mask = actor.space.part_of_cell[window] == actor.part
+        here = np.array([[y // SUB - row0, x // SUB - column0]], np.int64)
+        steps = walking_distance(mask, here)
+        cells = np.argwhere(steps[::ASIDE_CELLS, ::ASIDE_CELLS] > 0) * ASIDE_CELLS
+        steps = steps[cells[:, 0], cells[:, 1]]
+        xs, ys = lattice.centre_axes()
+        places = np.stack([xs[cells[:, 1] + column0], ys[cells[:, 0] + row0]], axis=-1)
+        free = self._clear_of_ways(actor, step, places)
+        order = np.argsort(steps[free], kind="stable")[:ASIDE_TRIES]
+        yield from map(tuple, places[free][order].tolist())
+
+    def _clear_of_ways(self, actor: DecidingActor, step: int, places: I64) -> Bool:
+        """Return near which of some places, int64 (n, 2), nobody else comes on the ways known."""
+        lattice = actor.home.plan.lattice
+        reach = self._near[self._number[actor.row]] + int(lattice.units_per_m * lattice.cell)
+        poses = self._bodies.poses(np.arange(step, step + self._steps(FREE_FOR) + 1))
+        free = np.ones(len(places), np.bool_)
+        if not len(places):
+            return free
+        low, high = places.min(axis=0), places.max(axis=0)
+        for other in range(len(self._actors)):
+            ways = poses[:, other]
+            ways = ways[ways[:, 3] == 0][:, :2]
+            near = ((ways > low - reach[other]) & (ways < high + reach[other])).all(axis=1)
+            if other == actor.row or not near.any():
+                continue
+            ways = ways[near]
+            dx = places[:, 0, None] - ways[:, 0]
+            dy = places[:, 1, None] - ways[:, 1]
+            free &= (dx * dx + dy * dy > reach[other] ** 2).all(axis=1)
+        return free
+
+    def _inside(self, actor: DecidingActor) -> LatticePoint:
+        """Return where a robot is, or the nearest place in its space."""
+        x, y = actor.state.position
+        if actor.space.part_of_cell[y // SUB, x // SUB] == actor.part:
+            return x, y
+        return actor.space.nearest(x, y, actor.part) or (x, y)
+
+    def _begin_apart(self, actor: DecidingActor) -> None:
+        """Move a robot that was drawn into somebody to the nearest free place."""
+        start = actor.entity.start
+        if actor.state.away or (start is not None and is_point(start)):
+            return
+        others = [a for a in self._actors[: actor.row] if not a.state.away]
+        positions = np.array([a.state.position for a in others], np.int64).reshape(-1, 2)
+        reach = self._near[self._number[actor.row]][[a.row for a in others]]
+        x, y = actor.state.position
+        if (((positions - [x, y]) ** 2).sum(axis=1) >= reach * reach).all():
+            return
+        detour = giving_way.RoutesAround(actor, np.column_stack([positions, reach]))
+        beside = giving_way.beside(actor, (x, y), detour)
+        beside = beside or giving_way.beside(actor, (x, y), detour, in_room=False)
+        if beside is not None:
+            actor.state = Pose(*beside, actor.state.heading, 0)
+
+    def _steps(self, duration: timedelta) -> int:
+        return max(-(-micros(duration) // self._step_us), 1)
+
+
+def _is_stuck(actor: DecidingActor) -> bool:
+    return actor.is_stuck or (actor.charge is not None and actor.charge.is_empty)
+
+
+def _goes_somewhere(actor: DecidingActor) -> bool:
+    motion = actor.plan.finish()
+    if not isinstance(motion, Track):
+        return True
+    track = motion.breakpoints
+    return bool((track.x != track.x[0]).any() or (track.y != track.y[0]).any())

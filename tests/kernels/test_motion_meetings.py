@@ -1,0 +1,79 @@
+"""When bodies come too near to each other, against looking at many moments of each step."""
+
+import numpy as np
+from tests.reference.meetings import Way, first_meeting
+
+from fleet2d.kernels import Breakpoints, Distances, Timelines
+
+SECOND = 10**6
+STEPS = 30
+NEAR = 400
+
+
+def random_track(random: np.random.Generator, size: int) -> tuple[Breakpoints, Way]:
+    """A track of a few legs and rests between whole steps, and where it is at a moment."""
+    times = np.sort(random.choice(STEPS, 6, replace=False)).astype(np.int64)
+    points = random.integers(0, size, (6, 2))
+    points[2] = points[1]
+    zeros = np.zeros(6, np.int64)
+    track = Breakpoints(times * SECOND, points[:, 0], points[:, 1], zeros, zeros.astype(np.uint8))
+    return track, lambda t: tuple(float(np.interp(t, times, points[:, k])) for k in (0, 1))  # type: ignore[return-value]
+
+
+def distances(rows: int, lead: int = 0, counts: int = 0) -> Distances:
+    whole = np.ones((rows, 2), np.int64)
+    return Distances(whole * lead, whole * NEAR, whole * 0, np.full((rows, 2), counts, np.uint8))
+
+
+def follow(tracks: list[Breakpoints]) -> Timelines:
+    timelines = Timelines(len(tracks), SECOND)
+    for row, track in enumerate(tracks):
+        timelines.follow(row, 0, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    return timelines
+
+
+def test_meetings_are_those_seen_at_many_moments() -> None:
+    random = np.random.default_rng(7)
+    met = 0
+    for case in range(150):
+        (one, way), (other, others_way) = (random_track(random, 3000) for _ in range(2))
+        timelines = follow([one, other])
+        first = case % 5
+        expected = first_meeting(way, others_way, NEAR, first, STEPS)
+        found = timelines.meetings(np.array([0, 1]), distances(2), first, STEPS)
+        alone = timelines.meeting_on(0, one, distances(1), first, STEPS)
+        met += expected is not None
+        if expected is None:
+            assert [] == found, case
+            assert (-1, -1) == alone
+        else:
+            # What lasts shorter than a hundredth of a step may be found a moment earlier.
+            assert [(0, 1), (1, 0)] == [(row, met_row) for row, _, _, met_row in found]
+            assert {alone[0]} == {step for _, _, step, _ in found}, case
+            assert expected - 1 <= alone[0] <= expected, case
+    assert 30 < met < 140
+
+
+def test_a_lead_lets_a_body_react_before_and_not_before_the_first_step() -> None:
+    still = Breakpoints(np.array([0]), *(np.array([v]) for v in (5000, 0, 0)), np.array([0], np.uint8))  # fmt: skip
+    comes = Breakpoints(np.array([0, 10 * SECOND]), np.array([0, 10_000]), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(2, np.uint8))  # fmt: skip
+    timelines = follow([still, comes])
+    for lead, due in [(0, 4), (3, 1), (9, 0)]:
+        found = timelines.meetings(np.array([0, 1]), distances(2, lead), 0, 30)
+        assert [(0, due, 4, 1), (1, due, 4, 0)] == found
+    assert [(1, 4, 4, 0)] == timelines.meetings(np.array([0, 1]), distances(2, counts=1), 0, 30)
+    assert [(0, 4, 4, 1)] == timelines.meetings(np.array([0, 1]), distances(2, counts=2), 0, 30)
+    assert [] == timelines.meetings(np.array([0, 1]), distances(2, lead=-1), 0, 30)
+
+
+def test_a_meeting_is_the_same_from_wherever_it_is_looked_for() -> None:
+    """Else a run would depend on its spans."""
+    random = np.random.default_rng(3)
+    for _ in range(60):
+        one, other = (random_track(random, 2000)[0] for _ in range(2))
+        timelines = follow([one, other])
+        steps = [timelines.meeting_on(0, one, distances(1), first, STEPS)[0] for first in range(STEPS)]  # fmt: skip
+        for first, step in enumerate(steps):
+            assert step == -1 or step >= first
+            if first and steps[first - 1] >= first:
+                assert steps[first - 1] == step

@@ -1,0 +1,19 @@
+"""Meetings of bodies, by looking at a hundred moments of each step: slow and obvious."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+MOMENTS = 100
+Way = Callable[[float], tuple[float, float]]
+"""Where a body is at a moment [steps]: x and y."""
+
+
+def first_meeting(body: Way, other: Way, near: float, first: int, end: int) -> int | None:
+    """Return the first step in which two bodies approach each other below a distance, or None."""
+    for step in range(first, end):
+        moments = step + np.arange(MOMENTS + 1) / MOMENTS
+        apart = np.array([np.hypot(*np.subtract(body(t), other(t))) for t in moments.tolist()])
+        if ((apart[1:] < near) & (apart[1:] < apart[:-1])).any():
+            return step
+    return None
