@@ -115,7 +115,7 @@ def everything(duration: str = "2 h", **changes: Any) -> dict[str, Any]:
     return (
         scenario(
             duration,
-            simulation={"ghosts": True},
+            simulation={"ghosts": False},
             users={
                 "ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"},
                 "ben": {"type": "meander", "speed": 0.7},
