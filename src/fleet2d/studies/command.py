@@ -27,14 +27,8 @@ studying = typer.Typer(
     no_args_is_help=True,
 )
 ExecutorName = Annotated[
-    Literal["local", "ray", "slurm", "serial"],
+    Literal["local", "serial"],
     typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
-]
-SlurmParameters = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--slurm", metavar="KEY=VALUE", help="A parameter of jobs of Slurm, as submitit names it."
-    ),
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
@@ -57,7 +51,6 @@ def run(  # noqa: PLR0913 - options of the command line
     ] = None,
     workers: Workers = None,
     executor: ExecutorName = "local",
-    slurm: SlurmParameters = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check all, and print the variants.")
     ] = False,
@@ -90,7 +83,7 @@ def run(  # noqa: PLR0913 - options of the command line
     with (
         _interruptible(location),
         observing(quiet=quiet) as observer,
-        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+        open_crew(executor, workers) as crew,
     ):
         counts = run_study(
             checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
@@ -103,25 +96,6 @@ def run(  # noqa: PLR0913 - options of the command line
         _print_failures(location)
     if counts.failed or counts.missing:
         raise typer.Exit(1)
-
-
-def slurm_parameters(texts: list[str] | None) -> dict[str, Any]:
-    """Return parameters of jobs from texts like `slurm_partition=long`.
-
-    Raises:
-        InputError: A text has no name or no value.
-
-    Example:
-        >>> slurm_parameters(["slurm_partition=long", "timeout_min=240"])
-        {'slurm_partition': 'long', 'timeout_min': 240}
-    """
-    parameters: dict[str, Any] = {}
-    for text in texts or ():
-        name, _, value = text.partition("=")
-        if not name or not value:
-            raise InputError(f"--slurm {text}: write KEY=VALUE, as in timeout_min=240")
-        parameters[name] = int(value) if value.isdigit() else value
-    return parameters
 
 
 @studying.command()
@@ -361,7 +335,6 @@ def tune(
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
     executor: ExecutorName = "local",
-    slurm: SlurmParameters = None,
     changed: Annotated[
         Literal["redo"] | None,
         typer.Option(help="redo: start over if the folder holds another search."),
@@ -386,7 +359,7 @@ def tune(
     with (
         _interruptible(folder),
         observing_trials(show=not quiet) as bar,
-        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+        open_crew(executor, workers) as crew,
     ):
         result = search(specification, folder, crew, bar, changed=changed, storage=storage)
     if quiet:
