@@ -57,7 +57,7 @@ STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def write_report(study: "Study", folder: Path) -> Path:
-    """Write `report.html`, `figures/NAME.svg`, `tables/NAME.csv` and `.tex`; return the page.
+    """Write `report.html`, `figures/NAME.svg` and `tables/NAME.csv`; return the page.
 
     Raises:
         ArtifactError: No variant is complete.
@@ -346,17 +346,14 @@ class _Page:
         return f'<img alt="{html.escape(name)}" src="data:image/svg+xml;base64,{data}">'
 
     def _frame(self, frame: "pl.DataFrame", name: str, text: Sequence[str] = ()) -> str:
-        """Write a data frame as CSV and LaTeX; return it as HTML. `text`: its columns of text."""
+        """Write a data frame as CSV; return it as HTML. `text`: its columns of text."""
         frame.write_csv(self.folder / "tables" / f"{name}.csv")
         columns = [c for c in frame.columns if c not in NOT_SHOWN]
         head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
         rows = [[_cell(c, row) for c in columns] for row in frame.to_dicts()]
         texts = tuple(i for i, c in enumerate(columns) if c in text)
-        latex = latex_table(head, rows, texts)
-        (self.folder / "tables" / f"{name}.tex").write_text(latex, encoding="utf-8")
-        files = f'<p class="files"><a href="tables/{name}.csv">CSV</a>, '
-        files += f'<a href="tables/{name}.tex">LaTeX</a></p>'
-        return _table(head, rows, texts) + files
+        file = f'<p class="files"><a href="tables/{name}.csv">CSV</a></p>'
+        return _table(head, rows, texts) + file
 
 
 def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
@@ -377,35 +374,6 @@ def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
     unique = (next(n for n in names if len(set(n)) == len(set(texts))) for names in (starts, ends))
     shortest = min(unique, key=lambda names: max(map(len, names)))
     return dict(zip(labels, shortest, strict=True))
-
-
-def latex_table(
-    head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()
-) -> str:
-    r"""Return a table of LaTeX, for the package booktabs; `text`: its columns of text.
-
-    >>> print(latex_table(["speed", "95 % interval"], [["0.3", "1 to 2"]], (0,)))
-    \begin{tabular}{lr}
-    \toprule
-    speed & 95 \% interval \\
-    \midrule
-    0.3 & 1 to 2 \\
-    \bottomrule
-    \end{tabular}
-    <BLANKLINE>
-    """
-    kinds = "".join("l" if i in text else "r" for i in range(len(head)))
-    lines = [" & ".join(map(_latex, cells)) + r" \\" for cells in (head, *rows)]
-    lines.insert(1, r"\midrule")
-    body = "\n".join(lines)
-    return f"\\begin{{tabular}}{{{kinds}}}\n\\toprule\n{body}\n\\bottomrule\n\\end{{tabular}}\n"
-
-
-def _latex(text: str) -> str:
-    special = {**{c: f"\\{c}" for c in "&%$#_{}"}, "~": r"\textasciitilde{}"}
-    special |= {"^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}
-    special |= {"×": r"$\times$", "–": "--", "−": "$-$", "<": "$<$"}
-    return "".join(special.get(c, c) for c in text)
 
 
 def _file_name(metric: str) -> str:
