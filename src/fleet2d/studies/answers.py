@@ -46,8 +46,8 @@ class StudyAnswers:
     columns: tuple[str, ...]
     populations: tuple[str, ...]
 
-    def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
-        """Return the variants that are complete and have a metric, or some of them by number.
+    def with_metric(self, metric: str) -> "pl.DataFrame":
+        """Return the variants that are complete and have a metric.
 
         Raises:
             InputError: There is no such metric.
@@ -68,8 +68,6 @@ class StudyAnswers:
         against: Mapping[str, Any],
         by: Sequence[str] | None = None,
         within: Sequence[str] = (),
-        *,
-        variants: Sequence[int] | None = None,
     ) -> "pl.DataFrame":
         """Compare the values of an axis with one of them, pair by pair.
 
@@ -82,7 +80,6 @@ class StudyAnswers:
             by: Columns of the units over which intervals hold; None: homes, people and seeds.
             within: Axes with a comparison for each of their values; over other axes the differences
                 are averaged.
-            variants: Numbers of the variants to compare; None: all.
 
         Returns:
             A row for each other value: mean, reference, difference, low and high (95 %), doubt (why
@@ -97,7 +94,7 @@ class StudyAnswers:
         """
         import polars as pl
 
-        frame = self.with_metric(metric, variants)
+        frame = self.with_metric(metric)
         units = self._units(by, against)
         limits = difference_limits(self.limits(metric))
         better = self.better(metric)

@@ -129,7 +129,7 @@ class KnownNames:
                 raise specification.error(("keep", "tables", i), message)
         for location, metric in file.named_metrics():
             problem = self._problem(metric)
-            must_be_kept = location[0] in ("compare", "adapt")
+            must_be_kept = location[0] == "compare"
             if not problem and must_be_kept and not is_kept(metric, file.keep.metrics):
                 problem = f"the metric {metric!r} isn't kept: add it to keep.metrics"
             if problem:
@@ -334,8 +334,6 @@ def reconcile(
     finished: "pl.Series",
     changed: Changed | None,
     on_note: Callable[[str], None],
-    *,
-    notes_new: bool,
 ) -> StudyPlan:
     """Number the variants of a plan as in the stored study; new variants get new numbers.
 
@@ -344,8 +342,7 @@ def reconcile(
         directory: The study.
         finished: The numbers of variants that have results.
         changed: What to do with results of other code, inputs or scenarios.
-        on_note: Receives a remark about results that are set aside: they no longer belong to it.
-        notes_new: Whether it receives one about new variants, too.
+        on_note: Receives remarks about new variants, and about results that are set aside.
 
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
@@ -383,7 +380,7 @@ def reconcile(
     first = int(stored[VARIANT].max() or 0) + 1
     number = pl.when(is_new).then(first - 1 + is_new.cum_sum()).otherwise("stored")
     new = len(variants.filter(is_new))
-    if 0 < new < len(variants) and notes_new:
+    if 0 < new < len(variants):
         on_note(f"{new} variants are new in {directory.location}")
     if len(stale) > reused:
         on_note(f"{len(stale) - reused} results no longer belong to the study: set aside")

@@ -222,8 +222,8 @@ class Study(StudyAnswers):
         """The variants that are complete."""
         return self.variants.filter(status=COMPLETE)
 
-    def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
-        """Return the variants that are complete and have a metric, or some of them by number.
+    def with_metric(self, metric: str) -> "pl.DataFrame":
+        """Return the variants that are complete and have a metric.
 
         Raises:
             InputError: There is no such metric.
@@ -238,8 +238,7 @@ class Study(StudyAnswers):
             )
         import polars as pl
 
-        frame = self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
-        return frame if variants is None else frame.filter(pl.col(VARIANT).is_in(list(variants)))
+        return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
 
     def limits(self, metric: str) -> Limits:
         """Return the least and the largest value that a metric can have."""

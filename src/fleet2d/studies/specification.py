@@ -93,29 +93,6 @@ class Keep(Settings):
     tables: tuple[str, ...] = ()
 
 
-class AdaptSettings(Settings):
-    """How many seeds the values of an axis get, decided while the study runs.
-
-    Attributes:
-        metric: The number that decides, such as ltp_error.ana.tv.
-        against: The axis and its reference value.
-        seeds: The number of seeds of each round; after a round it is decided who gets the next.
-        width: No more seeds once the interval of every difference is at most this wide.
-        goal: `minimize` or `maximize`: no more seeds for values clearly worse than the reference.
-    """
-
-    metric: str
-    against: dict[str, Any] = Field(min_length=1, max_length=1)
-    seeds: int = Field(default=5, ge=2)
-    width: float | None = Field(default=None, gt=0)
-    goal: Literal["minimize", "maximize"] | None = None
-
-    def model_post_init(self, _: object, /) -> None:
-        """Require a criterion by which values are decided."""
-        if self.width is None and self.goal is None:
-            raise problem("give width, or goal, or both: else every value gets all seeds")
-
-
 class PairedComparison(Settings):
     """A paired comparison that the report shows.
 
@@ -163,7 +140,6 @@ class StudyFile(Settings):
         exclude: Combinations to leave out: {axis: value, …}.
         keep: The metrics and tables to keep of each run.
         compare: The comparisons that the report shows.
-        adapt: When values of an axis get no more seeds.
         tune: The search of `fleet2d study tune`.
     """
 
@@ -180,7 +156,6 @@ class StudyFile(Settings):
     exclude: tuple[dict[str, Any], ...] = ()
     keep: Keep = Keep()
     compare: tuple[PairedComparison, ...] = ()
-    adapt: AdaptSettings | None = None
     tune: TuneSettings | None = None
 
     @model_validator(mode="before")
@@ -216,8 +191,7 @@ class StudyFile(Settings):
             _check_columns(axis.when, known, ("axes", name, "when"), "axes before it")
             known += axis.columns(name)
         for location, condition in self.conditions():
-            seed = () if location[0] == "adapt" else (SEED,)
-            _check_columns(condition, [*known, *seed], location, "axes")
+            _check_columns(condition, [*known, SEED], location, "axes")
         for i, comparison in enumerate(self.compare):
             for key in ("by", "within"):
                 columns = getattr(comparison, key) or ()
@@ -229,8 +203,6 @@ class StudyFile(Settings):
         yield from ((("rules", i, "when"), rule.when) for i, rule in enumerate(self.rules))
         yield from ((("exclude", i), condition) for i, condition in enumerate(self.exclude))
         yield from ((("compare", i, "against"), c.against) for i, c in enumerate(self.compare))
-        if self.adapt is not None:
-            yield ("adapt", "against"), self.adapt.against
         if self.tune is not None:
             yield ("tune", "held_out"), self.tune.held_out
 
@@ -238,8 +210,6 @@ class StudyFile(Settings):
         """Yield the metrics that the file names, or patterns of some, and where they stand."""
         yield from ((("compare", i, "metric"), each.metric) for i, each in enumerate(self.compare))
         yield from ((("keep", "metrics", i), each) for i, each in enumerate(self.keep.metrics))
-        if self.adapt is not None:
-            yield ("adapt", "metric"), self.adapt.metric
         if self.tune is not None:
             yield from ((("tune", "objectives", name), name) for name in self.tune.objectives)
 
