@@ -24,7 +24,7 @@ from fleet2d.engine import checkpoint
 from fleet2d.engine.simulation import PURPOSE
 from fleet2d.engine.snapshot import MAGIC, open_snapshot
 from fleet2d.errors import ArtifactError, ComponentError, InputError
-from fleet2d.interventions import ChangeHome, Put, Replan
+from fleet2d.interventions import OpenDoor, Put, Replan
 from fleet2d.runtime.events import Event
 from fleet2d.storage.secret_files import signature
 
@@ -39,7 +39,7 @@ HOUSE = {
 def house(duration: str = "10 min") -> dict[str, Any]:
     """Doors, sensors, layers, people who react, robots that give way and don't know their place."""
     content = everything(duration, objects=HOUSE)
-    content["changes"] = [
+    content["script"] = [
         {"at": "4 min", "shut": "bath"},
         {"at": "6 min", "lock": "hall"},
         {"at": "8 min", "unlock": "hall"},
@@ -158,7 +158,7 @@ def test_copies_can_be_changed_without_the_other_noticing() -> None:
     twins = [way(simulation) for way in some([*WAYS.values()], 2)]
     for twin in twins:
         twin.do(Put("ana", "kitchen"))
-        twin.do(ChangeHome({"open": "bath"}))
+        twin.do(OpenDoor("bath"))
         twin.advance(150)
         assert simulation.state != twin.state
     assert undisturbed("doors, sensors, layers") == result(simulation)

@@ -644,7 +644,7 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         "simulation.duration=1 h",
         seed=4,
         floorplan={"slows": [{"area": area, "speed": 0.5}]},
-        changes=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
+        script=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
     )
     view = "#select=living_room_0&panel=inspect"
     with served(PageData(run)) as address, page_at(browser, address + view) as page:

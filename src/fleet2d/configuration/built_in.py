@@ -119,7 +119,6 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "battery": "fleet2d.interventions.robots:SetBattery",
         "call": "fleet2d.interventions.robots:Call",
         "call_home": "fleet2d.interventions.bodies:CallHome",
-        "change": "fleet2d.interventions.home:ChangeHome",
         "configure": "fleet2d.interventions.bodies:Configure",
         "decide": "fleet2d.interventions.bodies:Decide",
         "dismiss": "fleet2d.interventions.robots:Dismiss",

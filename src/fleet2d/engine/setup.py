@@ -47,9 +47,6 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
             group.expect_disturbances()
     changes = ChangeQueue(basis)
-    for index, change in enumerate(scenario.changes):
-        with _locate_errors(scenario, f"changes.{index}"):
-            changes.declare(index, change)
     with _locate_errors(scenario, "objects"):
         sensors = Sensors(basis, changes.names)
     recorder = Recorder(basis, cameras, sensors)

@@ -40,7 +40,6 @@ from fleet2d.configuration.units import (
 from fleet2d.entities.behavior import DARK
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
-from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
@@ -170,7 +169,6 @@ class Scenario(Settings):
         robots: The robots, by name.
         objects: Doors and sensors, by name.
         interactions: What robots want of people, by name.
-        changes: Changes of the home during the run, and when they happen.
         script: Interventions on people, robots and the home, and when they happen.
         sight: The method that computes what is in view.
         algorithms: The algorithms that run during the simulation, by name.
@@ -186,7 +184,6 @@ class Scenario(Settings):
     robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], CheckNames] = Field(default={})
     objects: Annotated[dict[str, OneOf[HomeObject]], CheckNames] = Field(default={})
     interactions: Annotated[dict[str, Interaction], CheckNames] = Field(default={})
-    changes: tuple[HomeChange, ...] = ()
     script: tuple[Entry, ...] = ()
     sight: SightSettings = SightSettings()
     algorithms: Annotated[dict[str, OneOf[Algorithm]], CheckNames, NameAsType()] = Field(default={})

@@ -171,11 +171,8 @@ class Shrinker:
         return is_missing and bool(case.failure.names & names)
 
     def _fewer(self, case: FailingCase) -> FailingCase:
-        """Leave out the people, robots, objects and changes not needed to fail."""
-        case = self._left_out(case, ("robots", "users", "objects"))
-        if case.variant.scenario.changes:
-            case = self._try(case, _edited(case.variant, changes=[])) or case
-        return case
+        """Leave out the people, robots and objects not needed to fail."""
+        return self._left_out(case, ("robots", "users", "objects"))
 
     def _left_out(self, case: FailingCase, sections: tuple[str, ...]) -> FailingCase:
         """Leave out the entries of some sections one by one."""
