@@ -20,7 +20,7 @@ from fleet2d.entities.robots.policy import COLUMNS
 from fleet2d.learning.gym import RobotEnv, load_task, perceived_s
 from fleet2d.learning.gym.task import Variants
 
-LTP = {"ltp": {"type": "ltp", "estimator": "likelihood"}}
+LTP = {"ltp": {"type": "long_term_presence", "estimator": "likelihood"}}
 BUNDLED: dict[str, dict[str, Any]] = {
     "hangout": {
         "hangout": {"type": "hangout"},

@@ -50,7 +50,11 @@ def house(duration: str = "10 min") -> dict[str, Any]:
     content["robots"]["astro"] |= {"gives_way": {}, "localization": {}}
     content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "3 min", "source": "rtp"}
     on = {"type": "tests.engine.test_events:Heard", "on": ["sensor", "user_lost"]}
-    content["algorithms"] |= {"rtp": {"type": "rtp"}, "ltp": {"type": "ltp"}, "heard": on}
+    content["algorithms"] |= {
+        "rtp": {"type": "real_time_presence"},
+        "ltp": {"type": "long_term_presence"},
+        "heard": on,
+    }
     content["metrics"] |= {"rtp_score": {"of": "rtp"}, "detections": {}, "coverage": {}}
     return content
 
@@ -64,7 +68,7 @@ def routine() -> dict[str, Any]:
         "users": {"ana": member},
         "robots": {"astro": {"type": "patrol", "dwell": "1 min"}},
         "sight": {"method": {"type": "flashlight"}},
-        "algorithms": {"rtp": {"type": "rtp", "model": "routine"}},
+        "algorithms": {"rtp": {"type": "real_time_presence", "model": "routine"}},
     }
 
 
@@ -74,7 +78,9 @@ def markov() -> dict[str, Any]:
         "floorplan": {"type": "bundled"},
         "users": {"ana": {"type": "room_sampling", "shares": {"kitchen": 0.4, "bedroom": 0.6}}},
         "robots": {"astro": {"behaviors": [{"type": "hangout", "source": "rtp"}]}},
-        "algorithms": {"rtp": {"type": "rtp", "model": "semi_markov", "period": "5 min"}},
+        "algorithms": {
+            "rtp": {"type": "real_time_presence", "model": "semi_markov", "period": "5 min"}
+        },
     }
 
 

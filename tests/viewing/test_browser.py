@@ -200,8 +200,8 @@ def with_away(rows: list[dict[str, Any]]) -> dict[str, float]:
 
 
 BELIEFS = {
-    "ltp": {"type": "ltp", "period": "6 h"},
-    "rtp": {"type": "rtp", "period": "30 min"},
+    "ltp": {"type": "long_term_presence", "period": "6 h"},
+    "rtp": {"type": "real_time_presence", "period": "30 min"},
     "later": {"type": "belief_table", "period": "2 h", "every": "30 min"},
 }
 
