@@ -102,14 +102,14 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "home_occupied": "fleet2d.engine.interrupt:HomeOccupied",
     },
     "sight": {
-        "flashlight": "fleet2d.sight.fov:Flashlight",
+        "flashlight": "fleet2d.sight.cached_fov:Flashlight",
         "line_of_sight": "fleet2d.sight.fov:LineOfSight",
-        "visibility_polygon": "fleet2d.sight.fov:VisibilityPolygon",
+        "visibility_polygon": "fleet2d.sight.cached_fov:VisibilityPolygon",
     },
     "perception_error": {
-        "miscalibration": "fleet2d.sight.perception_error:Miscalibration",
-        "outliers": "fleet2d.sight.perception_error:Outliers",
-        "taken_for": "fleet2d.sight.perception:TakenFor",
+        "miscalibration": "fleet2d.sight.built_in_errors:Miscalibration",
+        "outliers": "fleet2d.sight.built_in_errors:Outliers",
+        "taken_for": "fleet2d.sight.built_in_errors:TakenFor",
     },
     "intervention": {
         "activity": "fleet2d.interventions.bodies:StartActivity",

@@ -38,7 +38,6 @@ from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
 from fleet2d.inputs import open_input
 from fleet2d.kernels import Mesh, Timelines
-from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
 from fleet2d.storage.files import partial_file
 from fleet2d.storage.secret_files import SIGNATURE_CHARACTERS, signature
@@ -51,7 +50,7 @@ _DTYPES = {type(np.dtype(scalar)) for scalar in _SCALARS}
 _SHARED = frozenset(
     {
         *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, KeySegment, Mesh, Note),
-        *(Persona, PlacedObject, Polygon, RandomWalk, Room, SightingTable, Space, TableSpec, Track),
+        *(PlacedObject, Polygon, RandomWalk, Room, SightingTable, Space, TableSpec, Track),
         UsePlace,
         *(datetime, timedelta, *_DTYPES),
     }
@@ -65,6 +64,7 @@ _SHARED_NAMES = frozenset(
         "fleet2d.routines.activity.Activity",
         "fleet2d.routines.activity.DurationDistribution",
         "fleet2d.routines.distributions.Distribution",
+        "fleet2d.routines.persona.Persona",
     }
 )
 

@@ -40,7 +40,6 @@ from fleet2d.configuration.units import (
 from fleet2d.entities.behavior import DARK
 from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
-from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
@@ -85,7 +84,11 @@ def _parse_local_time(value: Any) -> Any:
 def _refuse_file_as_type(value: Any) -> Any:
     """Refuse the name of a file in place of a floor plan's type, with advice on how to read it."""
     name = value.get("type") if isinstance(value, Mapping) else value
-    if isinstance(name, str) and (advice := advise_type(name)):
+    if not isinstance(name, str) or Path(name).suffix == "" or ":" in name:  # a type
+        return value
+    from fleet2d.floorplan.load import advise_type  # few scenarios need it
+
+    if advice := advise_type(name):
         raise problem_at(("type",), f"there is no floorplan {name!r}: {advice}", name)
     return value
 
