@@ -64,7 +64,7 @@ FILES: dict[str, Any] = {
         "axes": {"home": {"synthetic": 2}},
         "tune": {
             "search": {"speed": {"key": "robots.astro.speed", "low": 0.2, "high": 0.8}},
-            "objectives": {"distance.astro.metres": "maximize"},
+            "objective": {"distance.astro.metres": "maximize"},
             "held_out": {"home": [1]},
         },
     },

@@ -47,20 +47,6 @@ def test_a_value_can_be_set_for_several_keys() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        ({"range": [0.1, 0.5], "step": 0.2}, [0.1, 0.3, 0.5]),
-        ({"range": [1, 3], "step": 1}, [1, 2, 3]),
-        ({"range": [0, 1], "count": 3}, [0.0, 0.5, 1.0]),
-        ({"range": [1, 100], "count": 3, "log": True}, [1, 10, 100]),
-        ({"range": [7, 28], "count": 2, "unit": "d"}, ["7 d", "28 d"]),
-    ],
-)
-def test_range(keys: dict[str, Any], expected: list[Any]) -> None:
-    assert expected == values(axis(key="a.b", **keys))
-
-
 def test_two_values_of_one_label_are_refused() -> None:
     with pytest.raises(ValidationError, match="two values have the label 'slow'"):
         axis(key=SPEED, values=[0.2, 0.3, 0.4], labels=["fast", "slow", "slow"])
@@ -165,36 +151,14 @@ def test_whole_numbers_reach_both_ends() -> None:
     assert [1, 2, 3, 3] == [parameter.at(share) for share in (0.0, 0.5, 0.9, 1.0)]
 
 
-def test_a_zip_pairs_values() -> None:
-    x_axis = axis(zip={"speed": {"key": SPEED, "values": [0.3, 0.6]}, "home": {"synthetic": 2}})
-    assert [(0.3, 0), (0.6, 1)] == labels(x_axis)
-    assert ("home",) == x_axis.populations("x")
-
-
-def test_a_zip_of_unequal_lengths_is_refused() -> None:
-    x_axis = axis(zip={"speed": {"key": SPEED, "values": [0.3]}, "home": {"synthetic": 2}})
-    with pytest.raises(ScenarioError, match="speed has 1, home has 2"):
-        x_axis.choices("x")
-
-
-def test_a_grid_within_an_axis_combines_all() -> None:
-    x_axis = axis(
-        grid={"a": {"key": "a.b", "values": [1, 2]}, "c": {"key": "c.d", "values": [3, 4]}}
-    )
-    assert [(1, 3), (1, 4), (2, 3), (2, 4)] == labels(x_axis)
-
-
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
         ({"key": SPEED}, "exactly one of values"),
         ({"key": SPEED, "vals": [1]}, "did you mean 'values'"),
-        ({"key": SPEED, "values": [1], "range": [0, 1]}, "got values and range"),
+        ({"key": SPEED, "values": [1], "synthetic": 2}, "got values and synthetic"),
         ({"key": SPEED, "values": []}, "at least 1"),
         ({"key": SPEED, "values": [1], "labels": ["a", "b"]}, "2 labels for 1 values"),
-        ({"key": SPEED, "range": [0, 1]}, "give step, or count"),
-        ({"key": SPEED, "range": [1, 0], "count": 3}, "below the last"),
-        ({"key": SPEED, "range": [0, 1], "count": 3, "log": True}, "above 0"),
         ({"sample": {"a": {"key": SPEED, "low": 2, "high": 1}}, "count": 3}, "low below high"),
         ({"sample": {"a": {"key": SPEED, "low": 2, "choices": [3]}}, "count": 3}, "not both"),
         ({"sample": {"a": {"key": SPEED, "high": 2, "choices": [3]}}, "count": 3}, "not both"),

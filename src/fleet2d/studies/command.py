@@ -339,9 +339,6 @@ def tune(
         Literal["redo"] | None,
         typer.Option(help="redo: start over if the folder holds another search."),
     ] = None,
-    storage: Annotated[
-        str | None, typer.Option(help="A database for the trials: sqlite:///trials.db.")
-    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Search parameters, and judge the best on other homes.
@@ -361,22 +358,20 @@ def tune(
         observing_trials(show=not quiet) as bar,
         open_crew(executor, workers) as crew,
     ):
-        result = search(specification, folder, crew, bar, changed=changed, storage=storage)
+        result = search(specification, folder, crew, bar, changed=changed)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())
     _print(f"trials: {counts}; in {folder}")
-    for name, settings in result.settings.items():
-        values = ", ".join(f"{value:.4g}" for value in result.values[name])
-        _print(f"{name}: {values} on the training homes")
-        for key, value in settings.items():
-            _print(f"  {key}={value}")
-    assert specification.file.tune is not None
-    for metric in specification.file.tune.objectives:
-        _print(f"{metric} on the homes held out:")
-        for row in result.held_out.paired(metric, {"setting": "base"}).to_dicts():
-            interval = "" if row["doubt"] else f" ({row['low']:.4g} to {row['high']:.4g})"
-            _print(
-                f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
-                f" difference {row['difference']:.4g}{interval}: {row['verdict']}"
-            )
+    tune = specification.file.tune
+    assert tune is not None
+    _print(f"the best setting: {result.value:.4g} on the training homes")
+    for key, value in result.settings.items():
+        _print(f"  {key}={value}")
+    _print(f"{tune.metric} on the homes held out:")
+    for row in result.held_out.paired(tune.metric, {"setting": "base"}).to_dicts():
+        interval = "" if row["doubt"] else f" ({row['low']:.4g} to {row['high']:.4g})"
+        _print(
+            f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
+            f" difference {row['difference']:.4g}{interval}: {row['verdict']}"
+        )

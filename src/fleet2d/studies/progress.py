@@ -111,8 +111,7 @@ def observing_trials(*, show: bool) -> "Iterator[TuneObserver]":
     with progress_bar(show=show) as progress:
         task = progress.add_task("trials", total=None)
 
-        def update(done: int, trials: int, best: list[float] | None) -> None:
-            values = ", ".join(f"{value:.4g}" for value in best or ())
-            progress.update(task, completed=done, total=trials, description=f"best {values}")
+        def update(done: int, trials: int, best: float) -> None:
+            progress.update(task, completed=done, total=trials, description=f"best {best:.4g}")
 
         yield update

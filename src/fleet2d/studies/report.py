@@ -50,7 +50,6 @@ GLOSSARY = {
     "pairs": "pairs of runs; then the number of units of each kind",
     "deviation": "standard deviation of single runs",
     "variants": "number of runs",
-    "effect": "mean of the value less the mean of all values of its axis, within units",
     "share": f"share of the variance of runs; {RESIDUAL}: what axes and their pairs don't explain",
 }
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
@@ -212,7 +211,7 @@ class _Page:
         return [name for name in ordered if name in self.study.metrics][:MAX_METRICS]
 
     def _metric(self, metric: str) -> Iterator[str]:
-        from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
+        from fleet2d.studies.figures import draw_course, draw_means
 
         study = self.study
         name = _file_name(metric)
@@ -231,16 +230,10 @@ class _Page:
             yield f"<h3>by {html.escape(axis)}</h3>"
             yield self._frame(table, f"{name}-by-{_file_name(axis)}", (axis,))
         main = axes[0] if axes else None
-        yield "<h3>distribution over variants</h3>"
-        yield self._figure(draw_distribution(frame, metric, label, main), f"{name}-distribution")
         course = over_time(study, metric)
         if course is not None and course["day"].n_unique() > 1:
             yield "<h3>over time</h3>"
             yield self._figure(draw_course(course, label, main, self.units), f"{name}-time")
-        effects = study.effects(metric, self.units)
-        if len(effects):
-            yield "<h3>main effects</h3>"
-            yield self._frame(effects, f"{name}-effects", ("axis", "value"))
         yield from self._interactions(metric, label)
         shares = study.shares(metric)
         if len(shares):

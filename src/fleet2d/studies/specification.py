@@ -12,7 +12,7 @@ from fleet2d.bounds import one_line
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import Location, problem, problem_at, suggest
-from fleet2d.configuration.units import PositiveDuration, folder_of
+from fleet2d.configuration.units import folder_of
 from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.load import explain
@@ -31,37 +31,32 @@ def _with_type(value: Any) -> Any:
 
 
 class TuneSettings(Settings):
-    """The searched parameters, the objectives, and the homes on which the results are judged.
+    """The searched parameters, the objective, and the homes on which the results are judged.
 
     Attributes:
         search: The parameters, by name.
-        objectives: Metrics such as ltp_error.ana.tv, each with the better direction.
+        objective: A metric such as ltp_error.ana.tv, with the better direction.
         trials: The number of settings to try.
         held_out: {axis: [values]}: unknown to the search, used only by the report.
-        prune_at: Simulated times at which poor trials end early; with one objective only.
         seed: The seed of the search.
         batch: The number of settings that are suggested together, before any of them is judged.
         sampler: A class of optuna.samplers or mine:Sampler, by its name, or {type: NAME, …} with
-            its arguments; left out: TPESampler, or NSGAIISampler for several objectives.
+            its arguments; left out: TPESampler.
     """
 
     search: dict[str, Parameter] = Field(min_length=1)
-    objectives: dict[str, Literal["minimize", "maximize"]] = Field(min_length=1)
+    objective: dict[str, Literal["minimize", "maximize"]] = Field(min_length=1, max_length=1)
     trials: int = Field(default=40, ge=1)
     held_out: dict[str, tuple[Any, ...]] = Field(min_length=1, max_length=1)
-    prune_at: tuple[PositiveDuration, ...] = ()
     seed: int = Field(default=0, ge=0)
     batch: int = Field(default=4, ge=1)
     sampler: Annotated[dict[str, Any], BeforeValidator(_with_type)] = Field(default={})
 
-    def model_post_init(self, _: object, /) -> None:
-        """Refuse pruning by several objectives, and times that are not in order."""
-        if self.prune_at and len(self.objectives) > 1:
-            raise problem(
-                "prune_at needs one objective: with several objectives no trial can end early"
-            )
-        if list(self.prune_at) != sorted(set(self.prune_at)):
-            raise problem("prune_at needs times in ascending order")
+    @property
+    def metric(self) -> str:
+        """The name of the objective."""
+        (metric,) = self.objective
+        return metric
 
 
 SEED = "seed"
@@ -211,7 +206,7 @@ class StudyFile(Settings):
         yield from ((("compare", i, "metric"), each.metric) for i, each in enumerate(self.compare))
         yield from ((("keep", "metrics", i), each) for i, each in enumerate(self.keep.metrics))
         if self.tune is not None:
-            yield from ((("tune", "objectives", name), name) for name in self.tune.objectives)
+            yield ("tune", "objective", self.tune.metric), self.tune.metric
 
     @property
     def populations(self) -> tuple[str, ...]:
