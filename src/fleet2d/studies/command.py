@@ -70,10 +70,12 @@ def run(  # noqa: PLR0913 - options of the command line
       fleet2d study run speeds.yaml --dry-run
       fleet2d study run speeds.yaml --workers 8 --out speeds
     """
+    from fleet2d.runtime.memory import free_memory_of_polars
     from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
 
+    free_memory_of_polars()
     checked = check_study(source, _print_size)
     if dry_run:
         _print_plan(checked, workers)

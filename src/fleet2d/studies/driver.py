@@ -13,10 +13,10 @@ from fleet2d.studies.design import (
     Design,
     build_design,
     code_version,
-    content_hash,
     identity,
     input_hash,
     scenario_content,
+    template_hash,
 )
 from fleet2d.studies.directory import (
     COMPLETE,
@@ -92,8 +92,9 @@ class StudyJob:
             Fleet2DError: It is wrong, or not as it was planned, since a file changed.
         """
         scenario = self.design.scenario(task.index)
-        inputs = input_hash(scenario)
-        if identity(content_hash(scenario_content(scenario)), inputs) != task.identity:
+        content = scenario_content(scenario)
+        seed = content["simulation"]["seed"]
+        if identity(template_hash(content), seed, input_hash(scenario)) != task.identity:
             raise ComponentError(CHANGED_MESSAGE)
         return scenario
 

@@ -201,8 +201,8 @@ def search_identity(plan: StudyPlan, settings: TuneSettings) -> dict[str, str]:
         plan: The variants.
         settings: The `tune` section of the study file.
     """
-    scenarios: dict[bool, list[str]] = {False: [], True: []}
-    for index, scenario in plan.variants.select("index", "scenario").iter_rows():
+    scenarios: dict[bool, list[Any]] = {False: [], True: []}
+    for index, *scenario in plan.variants.select("index", "template", "seed").iter_rows():
         is_held_out = matches(settings.held_out, plan.design.parameters(index))
         scenarios[is_held_out].append(scenario)
     content = {key: content_hash(value) for key, value in settings.model_dump(mode="json").items()}
