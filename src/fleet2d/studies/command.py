@@ -306,9 +306,9 @@ def _row_of(study: "Study", variant: str) -> dict[str, Any]:
         found = [row for row in rows if (row["identity"] or "").startswith(variant)]
     if len(found) != 1:
         raise InputError(
-            f"{study.location} has {len(found) or 'no'} variant{'s' * (len(found) > 1)}"
-            f" {variant!r}: give a number from 0 to {len(rows) - 1}, or the first"
-            f" {IDENTITY_START} characters or more of an identity"
+            f"{study.location} has {counted(len(found), 'variant')} {variant!r}: give a number from"
+            f" 0 to {len(rows) - 1}, or the first {IDENTITY_START} characters or more of an"
+            " identity"
         )
     return found[0]
 

@@ -326,12 +326,12 @@ def _check_size(name: str, design: Design) -> None:
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:
     axis = specification.file.axes[name]
     place = specification.places.place(("axes", name))
-    with errors_as(ScenarioError, f"{place}{': ' * bool(place)}axes.{name}"):
+    with errors_as(ScenarioError, specification.places.named(("axes", name))):
         choices = tuple(axis.choices(name))
         changes = tuple(
             _change(
                 ((".".join(keys), value) for keys, value in choice.changes),
-                f"axis {name!r}, {choice.words}{', ' * bool(place)}{place}",
+                ", ".join(filter(None, (f"axis {name!r}", choice.words, place))),
             )
             for choice in choices
         )

@@ -12,6 +12,7 @@ from pathlib import Path
 from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import ArtifactError, InputError, os_errors_as
 from fleet2d.studies.answers import NOISE, RESIDUAL, judged
 from fleet2d.studies.figures import over_time
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 
 MAX_METRICS = 12
+MAX_VALUES = 12  # of an axis that are listed
 MAX_SHARES = 8
 MAX_INTERACTIONS = 3  # pairs of axes with a table of cell means, for each metric
 MAX_CELLS = 60  # of such a table
@@ -133,8 +135,10 @@ class _Page:
         for column in self.study.columns:
             labels = self.study.variants[column].unique(maintain_order=True).to_list()
             kind = "units of intervals" if column in meta.populations else "compared"
-            values = ", ".join(_text(self._name(column, label)) for label in labels[:12])
-            rows.append([column, kind, str(len(labels)), values + ", …" * (len(labels) > 12)])
+            values = [_text(self._name(column, label)) for label in labels[:MAX_VALUES]]
+            if len(labels) > MAX_VALUES:
+                values.append("…")
+            rows.append([column, kind, str(len(labels)), ", ".join(values)])
         yield _table(["axis", "its values are", "number", "which"], rows, text=(0, 1, 3))
         yield from self._warnings(counts.total - counts.complete)
         yield '<p><a href="#methods">How answers were computed, and what columns mean</a></p>'
@@ -262,11 +266,15 @@ class _Page:
         units = " and ".join(f"{self.counts[c]} values of {c}" for c in self.units)
         sizes = ", ".join(f"{self.counts[axis]} values of {axis}" for axis in self.axes)
         number = sum(len(t) for t in self._comparisons if not isinstance(t, InputError))
+        settings = f"{counted(combinations, 'combination')} of settings"
+        if sizes:
+            settings += f" ({sizes})"
+        code = self.meta.code.partition(",")[0].capitalize()
+        simulated = f"{'were' if combinations > 1 else 'was'} simulated by {code}"
+        if units:
+            simulated += f" over {units}"
         text = (
-            f"{combinations} combination{'s' * (combinations > 1)} of settings"
-            f"{f' ({sizes})' * bool(sizes)} {'were' if combinations > 1 else 'was'} simulated by"
-            f" {self.meta.code.partition(',')[0].capitalize()}"
-            f"{f' over {units}' * bool(units)}: {len(times)} runs of"
+            f"{settings} {simulated}: {len(times)} runs of"
             f" {timedelta(seconds=times.median())} (h:mm:ss) each in the median."
             " Runs with the same home, people and seed share the people's lives to the second, so"
             " settings were compared in pairs."
@@ -380,15 +388,13 @@ def _warning(text: str) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()) -> str:
     """Return an HTML table; `text` holds the indices of its columns of text."""
 
-    def hint(value: str) -> str:
-        return f' title="{GLOSSARY[value]}"' if value in GLOSSARY else ""
-
     def cells(tag: str, values: Sequence[str]) -> str:
-        return "".join(
-            f"<{tag}{' class=text' * (i in text)}{hint(value) * (tag == 'th')}>"
-            f"{html.escape(value)}</{tag}>"
-            for i, value in enumerate(values)
-        )
+        found = []
+        for i, value in enumerate(values):
+            kind = " class=text" if i in text else ""
+            hint = f' title="{GLOSSARY[value]}"' if tag == "th" and value in GLOSSARY else ""
+            found.append(f"<{tag}{kind}{hint}>{html.escape(value)}</{tag}>")
+        return "".join(found)
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     return f"<table><tr>{cells('th', head)}</tr>{body}</table>"

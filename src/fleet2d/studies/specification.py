@@ -299,8 +299,7 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
 
 def _base(base: Any, document: Document) -> Document:
     """Compose the base scenario; messages name the lines of the study file."""
-    place = document.place(("base",))
-    with errors_as(ScenarioError, f"{place}{': ' * bool(place)}base", of=ScenarioError):
+    with errors_as(ScenarioError, document.named(("base",)), of=ScenarioError):
         if isinstance(base, Scenario):
             return compose(base.resolved())
         if isinstance(base, Mapping):

@@ -296,7 +296,9 @@ def _by_expectation(result: ClaimResult) -> Iterable[str]:
         if len(result.trials) == 1:
             continue
         seeds = [trial.variant.text for trial, _ in cases]
-        shown = "; ".join(seeds[:MAX_SEEDS_SHOWN]) + "; …" * (len(seeds) > MAX_SEEDS_SHOWN)
+        if len(seeds) > MAX_SEEDS_SHOWN:
+            seeds[MAX_SEEDS_SHOWN:] = ["…"]
+        shown = "; ".join(seeds)
         worst, failure = min(cases, key=lambda case: case[1].margin)
         yield f"  {name}: failed in {len(cases)} of {len(result.trials)} ({shown})"
         if len(cases) > 1 and name != ASSERT:
