@@ -128,7 +128,7 @@ Count = Annotated[int, AfterValidator(check_count)]
 """A number of values that fits into one study."""
 
 
-Method = Literal["random", "latin_hypercube", "orthogonal", "sobol"]
+Method = Literal["latin_hypercube", "sobol"]
 DIGITS = 6  # significant digits of a sampled number, so that tables print the very value
 
 
@@ -202,29 +202,20 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
     """Return points of the unit cube: float64 (count, dimensions), the same at each call.
 
     Raises:
-        InputError: scipy is missing, which all methods but `random` need.
-        ScenarioError: The method has no such number of points, or of dimensions.
+        InputError: scipy is missing.
+        ScenarioError: The method has no such number of points.
     """
     generator = np.random.Generator(np.random.Philox(seed))
-    if method == "random":
-        return generator.random((count, dimensions))
     with extra("study", f"{method} samples need scipy"):
         from scipy.stats import qmc
-    if method == "sobol":
-        power = round(math.log2(count))
-        if count != 2**power:
-            raise ScenarioError(
-                f"sobol points are balanced in powers of two only: count {2**power}, not {count}"
-            )
-        return qmc.Sobol(dimensions, rng=generator).random_base2(power)
-    try:
-        strength = 2 if method == "orthogonal" else 1
-        return qmc.LatinHypercube(dimensions, strength=strength, rng=generator).random(count)
-    except ValueError:
+    if method == "latin_hypercube":
+        return qmc.LatinHypercube(dimensions, rng=generator).random(count)
+    power = round(math.log2(count))
+    if count != 2**power:
         raise ScenarioError(
-            "orthogonal samples come in squares of primes (4, 9, 25, 49, 121, …), of at most one"
-            f" parameter more than the prime: not {count} of {dimensions}"
-        ) from None
+            f"sobol points are balanced in powers of two only: count {2**power}, not {count}"
+        )
+    return qmc.Sobol(dimensions, rng=generator).random_base2(power)
 
 
 def _texts(value: Any) -> tuple[Any, ...]:
@@ -402,13 +393,12 @@ class OptionsAxis(Axis):
 
 
 class SampleAxis(Axis):
-    """Samples of several parameters at once: random, or evenly spread.
+    """Samples of several parameters at once, evenly spread.
 
     Attributes:
         sample: The parameters, by column.
         count: The number of samples.
-        method: `latin_hypercube`: each parameter is spread evenly; `orthogonal`: each pair of
-            parameters, too; `sobol`: all together; or `random`.
+        method: `latin_hypercube`: each parameter is spread evenly; `sobol`: all together.
         seed: The seed of the samples.
     """
 

@@ -1,6 +1,5 @@
 """The progress of a study while it runs: a bar with the time left."""
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -64,14 +63,6 @@ def _rate(per_second: float) -> str:
     if per_second >= 1:
         return f"{per_second:.1f} variants/s"
     return f"{60 * per_second:.1f} variants/min"
-
-
-class NoteObserver(Observer):
-    """Prints remarks on stderr."""
-
-    def on_note(self, text: str) -> None:
-        """Print a remark."""
-        sys.stderr.write(f"note: {text}\n")
 
 
 @contextmanager
