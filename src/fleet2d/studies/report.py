@@ -123,10 +123,8 @@ class _Page:
         counts = self.study.counts
         meta = self.meta
         yield f"<h1>{html.escape(meta.name)}</h1>"
-        for text in filter(None, (meta.description, meta.notes)):
-            yield f"<p>{html.escape(text)}</p>"
-        if meta.tags:
-            yield f"<p>Tags: {html.escape(', '.join(meta.tags))}.</p>"
+        if meta.description:
+            yield f"<p>{html.escape(meta.description)}</p>"
         yield (
             f"<p>{counts.complete} of {counts.total} variants complete, {counts.failed} failed."
             f" {html.escape(meta.code)}.</p>"
