@@ -36,6 +36,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
             {"metric": "distance.astro", "against": {SPEED: 0.3}, "within": ["dwell"]},
         ],
         "description": "Does a fast robot see more?",
+        "tags": ["speed", "pilot"],
+        "notes": "The camera has no noise.",
     }
     return run(small(**keys), folder / "speeds")[1]
 
@@ -70,6 +72,8 @@ def test_a_report_says_what_is_measured_in_which_unit_and_how(page: Path) -> Non
     assert "2 values of home and 3 values of seed: 24 runs of 0:02:00" in text
     assert "Those of the 3 comparisons of this report" in text
     assert "Hall&#x27;s (1992)" in text
+    assert "speed, pilot" in text
+    assert "The camera has no noise." in text
 
 
 def test_homes_have_a_picture_within_each_value_of_another_axis(page: Path) -> None:

@@ -99,6 +99,8 @@ class Meta(BaseModel):
         compare: The comparisons that the report shows, as `PairedComparison` takes them.
         source: The study file's text, for readers.
         metrics: The metrics of the scenarios, by name.
+        tags: Words to find the study by.
+        notes: Remarks of its author.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -112,6 +114,8 @@ class Meta(BaseModel):
     compare: tuple[dict[str, Any], ...] = ()
     source: str = ""
     metrics: dict[str, MetricFacts] = {}
+    tags: tuple[str, ...] = ()
+    notes: str = ""
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric such as `ltp_error.ana.tv`; empty if unknown."""

@@ -331,5 +331,7 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         compare=tuple(comparison.model_dump() for comparison in file.compare),
         source=source.read_text(encoding="utf-8") if source else "",
         metrics=dict(checked.metrics),
+        tags=file.tags,
+        notes=file.notes,
     )
     directory.write_meta(meta)

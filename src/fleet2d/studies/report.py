@@ -123,8 +123,10 @@ class _Page:
         counts = self.study.counts
         meta = self.meta
         yield f"<h1>{html.escape(meta.name)}</h1>"
-        if meta.description:
-            yield f"<p>{html.escape(meta.description)}</p>"
+        for text in filter(None, (meta.description, meta.notes)):
+            yield f"<p>{html.escape(text)}</p>"
+        if meta.tags:
+            yield f"<p>Tags: {html.escape(', '.join(meta.tags))}.</p>"
         yield (
             f"<p>{counts.complete} of {counts.total} variants complete, {counts.failed} failed."
             f" {html.escape(meta.code)}.</p>"

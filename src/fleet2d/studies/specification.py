@@ -126,6 +126,8 @@ class StudyFile(Settings):
     Attributes:
         name: The name of the study in reports.
         description: The question it answers, for the report.
+        tags: Words to find the study by.
+        notes: Remarks for the report.
         base: The scenario: a file, bundled:NAME, or a mapping; left out: bundled:family.
         axes: The axes along which scenarios vary, by name.
         replicates: The number of seeds, from 0 on, or a list; left out: the seed of the base.
@@ -138,6 +140,8 @@ class StudyFile(Settings):
 
     name: str | None = None
     description: str = ""
+    tags: tuple[str, ...] = ()
+    notes: str = ""
     base: Any = None
     axes: dict[str, AnyAxis] = Field(default={})
     replicates: Annotated[
