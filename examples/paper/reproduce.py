@@ -205,8 +205,8 @@ def ltp_gap(options: PaperOptions) -> Result:
     start_s = time.perf_counter()
     months = run_months(LTP_GAP, options)
     duration_s = time.perf_counter() - start_s
-    of_user = months.polars("gap").filter(user=USER)
-    rows = of_user.sort("variant", "step", maintain_order=True).collect()
+    stored = pl.DataFrame(months.arrow("gap").to_table())  # rooms in the order of the plan
+    rows = stored.filter(user=USER).sort("variant", "step", maintain_order=True)
     rooms = rows["room"].unique(maintain_order=True).to_list()
     gaps = rows["gap"].to_numpy().reshape(robots, days, len(rooms))
     gaps = np.ascontiguousarray(np.moveaxis(gaps, 2, 0))  # shape: (rooms, robots, days)
