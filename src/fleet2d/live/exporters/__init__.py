@@ -178,6 +178,11 @@ _FORMATS = {
         "The readings of a run's sensors as a text file in the layout of the CASAS smart homes.",
     ),
     "csv": ("texts", "Poses of all users and robots as CSV: a row for each body and time."),
+    "geojson": (
+        "texts",
+        "GeoJSON in metres: rooms, doorways and furniture, a line for each way, a point for each"
+        " event.",
+    ),
     "jsonl": (
         "texts",
         "JSON Lines: an object for each pose, event, observation and row of a table, in order of"
@@ -187,6 +192,7 @@ _FORMATS = {
         "bags",
         "ROS 2 messages in an MCAP file, for Foxglove, PlotJuggler and ROS: needs the extra `ros`.",
     ),
+    "rerun": ("rerun", "A recording for the viewer of Rerun: needs the extra `rerun`."),
     "rosbag2": (
         "bags",
         "ROS 2 messages as a bag in SQLite, which any ROS 2 can play: needs the extra `ros`.",
@@ -195,7 +201,7 @@ _FORMATS = {
 """The module of each format, and what it is."""
 
 # Formats whose files have another suffix than the name of the format.
-_SUFFIXES = {".txt": "casas", "": "rosbag2"}
+_SUFFIXES = {".txt": "casas", ".rrd": "rerun", "": "rosbag2"}
 
 
 def export(

@@ -1,0 +1,741 @@
+"""Converting configurations of the published Fleet2D: every key, every remark, every refusal."""
+
+import errno
+import math
+import os
+import sys
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tools.convert_published import convert_file, main
+
+import fleet2d
+from fleet2d.cli.__main__ import app
+from fleet2d.configuration.documents import read_document
+from fleet2d.entities.entity import Robot, User
+from fleet2d.entities.meander import Meander
+from fleet2d.errors import ArtifactError, FloorPlanError, InputError, ScenarioError
+from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
+
+PLAN = "658e5214673c7a4e25b458e56bdb6144.json"
+OLD = """\
+simulation:
+  start_ts: !!timestamp '2010-11-17 13:12:11'
+  duration:
+    hours: 2
+    days: 0
+  delta:
+    seconds: 1
+    minutes: 0
+  speedup: null
+  seed: 4
+  visualization:
+    visualize: False
+    every_n_steps: 100
+  show_progress: True
+  outputs:
+    save: True
+    every_n_steps: 600
+    output_dir: 'somewhere'
+    prefix: null
+
+floorplan:
+  type: he
+  he:
+    json_fpath: "plan.json"
+    ppm: 20
+    border_pad: 1
+
+users:
+  names: "user0,user1"
+  user0:
+    type: base
+    base:
+      radius: 0.2
+      pose_config:
+        init_pose:
+          x: 8.0
+          y: 3.0
+          theta: 45
+        meander_strategy:
+          lin_speed: 0.1
+          ang_speed: 15
+      color: blue
+  user1:
+    type: base
+    base:
+      radius: 0.25
+      pose_config:
+        init_pose:
+          x: 7.0
+          y: 4.0
+          theta: 150
+        meander_strategy:
+          lin_speed: 0.1
+          ang_speed: 15
+      color: green
+
+robot:
+  type: base
+  base:
+    radius: 0.1
+    fov_config:
+      distance: 3.0
+      angle: 108
+      load_fov_file: 'views.pickle'
+      lazy_compute: True
+    pose_config:
+      init_pose:
+        x: 4.0
+        y: 2.0
+        theta: 45
+      meander_strategy:
+        lin_speed: 0.1
+        ang_speed: 15
+    color: red
+"""
+USER1 = OLD[OLD.index("  user1:") : OLD.index("robot:")]
+WALKS = ("users.user0.base", "users.user1.base", "robot.base")
+USUAL = [
+    "floorplan.he.ppm: the grid's cells are 0.05 m; walls and poses are not rounded to them",
+    "floorplan.he.border_pad: left out: the grid has a margin of its own",
+    f"{', '.join(f'{walk}.pose_config.meander_strategy.lin_speed' for walk in WALKS)}: metres per"
+    " step there, a speed here, and the same rule of walking at this step, with at_walls: stay; a"
+    " move across a wall is never made, where the published Fleet2D looked at the end of the move"
+    " only",
+    f"{', '.join(f'{walk}.pose_config.meander_strategy.ang_speed' for walk in WALKS)}: degrees"
+    " per step there, per square root of a second here, and the same law at this step; turns"
+    " are cut at 4.88 standard deviations, and turn_rate_deg, at 5, cuts none",
+    "simulation.seed: the same seed draws other numbers here: the walks are of the same kind, not"
+    " the same",
+    "simulation.outputs.output_dir: left out: `fleet2d run --out DIR` says where a run is stored",
+    "simulation.outputs.save, simulation.outputs.every_n_steps: poses are stored every 10 min,"
+    " observations and events in full; the published Fleet2D wrote nothing",
+    "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute: not needed:"
+    " fields of view are computed exactly, when needed",
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the plan that the published Fleet2D ships with."""
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "plan.json").write_bytes((shared_data / "houseexpo" / PLAN).read_bytes())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "home"
+
+
+def written(folder: Path, *changes: tuple[str, str], text: str = OLD) -> Path:
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after, 1)
+    (folder / "old.yaml").write_text(text)
+    return folder / "old.yaml"
+
+
+def converted(folder: Path, *changes: tuple[str, str]) -> tuple[list[str], Scenario]:
+    remarks = convert_file(written(folder, *changes), folder / "new.yaml")
+    return remarks, load_scenario(folder / "new.yaml")
+
+
+def extra(folder: Path, *changes: tuple[str, str]) -> list[str]:
+    """Return the remarks that the unchanged configuration doesn't get."""
+    return [remark for remark in converted(folder, *changes)[0] if remark not in USUAL]
+
+
+def refused(folder: Path, *changes: tuple[str, str], text: str = OLD) -> str:
+    with pytest.raises(InputError) as caught:
+        convert_file(written(folder, *changes, text=text), folder / "new.yaml")
+    assert ["old.yaml", "plan.json"] == sorted(path.name for path in folder.iterdir())
+    return str(caught.value).replace(str(folder) + os.sep, "")
+
+
+def walk(entity: User | Robot) -> Meander:
+    (behavior,) = entity.behaviors
+    assert isinstance(behavior, Meander)
+    return behavior
+
+
+def plan_of(scenario: Scenario) -> tuple[str, Path, float]:
+    plan: Any = scenario.floorplan
+    return plan.type_name, plan.path, plan.cell
+
+
+# Every key
+
+
+def test_whole_configuration_becomes_the_scenario_it_means(folder: Path) -> None:
+    remarks, scenario = converted(folder)
+    assert remarks == USUAL
+    simulation = scenario.simulation
+    assert datetime(2010, 11, 17, 13, 12, 11) == simulation.start
+    assert timedelta(hours=2) == simulation.duration
+    assert timedelta(seconds=1) == simulation.step
+    assert (4, None) == (simulation.seed, simulation.speedup)
+    assert ("houseexpo", folder / "plan.json", 0.05) == plan_of(scenario)
+    assert timedelta(minutes=10) == scenario.artifacts.trajectories
+    assert ["user0", "user1"] == list(scenario.users)
+    assert ["robot"] == list(scenario.robots)
+    user0, user1 = scenario.users.values()
+    assert (0.2, (8.0, 3.0), 45.0, "blue") == (
+        user0.radius,
+        user0.start,
+        user0.start_heading_deg,
+        user0.color,
+    )
+    assert (0.25, (7.0, 4.0), 150.0, "green") == (
+        user1.radius,
+        user1.start,
+        user1.start_heading_deg,
+        user1.color,
+    )
+    assert (0.1, 15.0, 75.0) == (user0.speed, walk(user0).turn_std_deg, user0.turn_rate_deg)
+    robot = scenario.robots["robot"]
+    assert (0.1, (4.0, 2.0), 45.0, "red") == (
+        robot.radius,
+        robot.start,
+        robot.start_heading_deg,
+        robot.color,
+    )
+    assert robot.camera is not None
+    assert ((0.0, 3.0), 108.0, 1.0) == (
+        robot.camera.range,
+        robot.camera.angle_deg,
+        robot.camera.detection,
+    )
+
+
+def test_converted_scenario_runs_for_two_hours(folder: Path) -> None:
+    _, scenario = converted(folder)
+    run = fleet2d.run(scenario)
+    assert 7200 == run.manifest["steps"]
+    rows = run.tables["trajectories"].to_pylist()
+    assert 3 * 12 == len(rows)
+    first = {row["entity"]: (row["x"], row["y"]) for row in rows if row["step"] == 0}
+    assert {"user0": (8.0, 3.0), "user1": (7.0, 4.0), "robot": (4.0, 2.0)} == {
+        name: (pytest.approx(x, abs=1e-3), pytest.approx(y, abs=1e-3))
+        for name, (x, y) in first.items()
+    }
+    for name in first:
+        assert len({(row["x"], row["y"]) for row in rows if row["entity"] == name}) > 5
+
+
+def test_remarks_are_in_the_new_file_as_comments(folder: Path) -> None:
+    remarks, _ = converted(folder, ("ppm: 20", 'ppm: 20\n    "odd\\nkey": 1'))
+    lines = (folder / "new.yaml").read_text().splitlines()
+    comment = " ".join(" ".join(line[2:] for line in lines if line.startswith("#")).split())
+    assert comment.startswith(
+        "Converted by `tools/convert_published.py` from old.yaml, a configuration of"
+    )
+    assert any("odd\nkey" in remark for remark in remarks)
+    for remark in remarks:
+        assert remark.replace("\n", "?") in comment
+
+
+def test_steps_of_other_length_keep_the_walk_per_step(folder: Path) -> None:
+    _, scenario = converted(folder, ("seconds: 1\n    minutes: 0", "milliseconds: 250"))
+    user = scenario.users["user0"]
+    assert (0.4, 30.0, 300.0) == (user.speed, walk(user).turn_std_deg, user.turn_rate_deg)
+    assert timedelta(milliseconds=250) == scenario.simulation.step
+    assert timedelta(seconds=150) == scenario.artifacts.trajectories
+
+
+def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder: Path) -> None:
+    _, scenario = converted(folder)
+    simulation = fleet2d.Simulation(scenario)
+    moves, turns = [], []
+    for _ in range(400):
+        before = simulation.state["user0"]
+        simulation.advance()
+        after = simulation.state["user0"]
+        moves.append(math.hypot(after["x"] - before["x"], after["y"] - before["y"]))
+        if moves[-1]:  # no wall was in the way
+            turns.append(math.remainder(after["heading"] - before["heading"], math.tau))
+    assert 0.1 == pytest.approx(max(moves), abs=2e-3)
+    std = math.degrees(math.sqrt(sum(turn**2 for turn in turns) / len(turns)))
+    assert 15 == pytest.approx(std, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("days: 30\n    hours: 2", timedelta(days=30, hours=2)),
+        ("weeks: 1\n    minutes: 1.5\n    seconds: 1", timedelta(weeks=1, seconds=91)),
+        ("days: 1\n    hours: -1", timedelta(hours=23)),
+    ],
+)
+def test_duration_adds_up_its_units(folder: Path, old: str, new: timedelta) -> None:
+    _, scenario = converted(folder, ("hours: 2\n    days: 0", old))
+    assert new == scenario.simulation.duration
+
+
+def test_duration_no_multiple_of_the_step_is_remarked(folder: Path) -> None:
+    assert [
+        "simulation.duration: 2 h is not a multiple of delta, 7 s: there, a run went one step beyond"
+        " it; here it ends with the last full step within it"
+    ] == [r for r in extra(folder, ("seconds: 1", "seconds: 7")) if "duration" in r]
+
+
+def test_start_with_a_time_zone_keeps_the_clock_and_is_remarked(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("'2010-11-17 13:12:11'", "'2010-11-17 13:12:11+02:00'"))
+    assert datetime(2010, 11, 17, 13, 12, 11) == scenario.simulation.start
+    assert (
+        "simulation.start_ts: its time zone is left out: time is that of the clock on the"
+        " home's wall" in remarks
+    )
+
+
+@pytest.mark.parametrize("stamp", ["2010-11-17", "!!timestamp 2010-11-17", "'2010-11-17'"])
+def test_start_without_a_time_is_midnight(folder: Path, stamp: str) -> None:
+    _, scenario = converted(folder, ("!!timestamp '2010-11-17 13:12:11'", stamp))
+    assert datetime(2010, 11, 17) == scenario.simulation.start
+
+
+def test_seed_null_stays_null_without_remark(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("seed: 4", "seed: null"))
+    assert scenario.simulation.seed is None
+    assert not [remark for remark in remarks if "seed" in remark]
+
+
+def test_speedup_is_kept_and_remarked(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("speedup: null", "speedup: 10"))
+    assert 10 == scenario.simulation.speedup
+    assert (
+        "simulation.speedup: kept to in full here; there, each step slept for its share of it on"
+        " top of computing"
+    ) in remarks
+
+
+@pytest.mark.parametrize("true", ["True", "true", "yes", "on"])
+def test_visualization_is_left_out(folder: Path, true: str) -> None:
+    assert [
+        "simulation.visualization.visualize, simulation.visualization.every_n_steps: left out: no"
+        " window opens during a run; `fleet2d show RUN_DIR` draws a stored one"
+    ] == extra(folder, ("visualize: False", f"visualize: {true}"))
+
+
+def test_flashlight_is_kept_as_the_method_of_sight(folder: Path) -> None:
+    change = ("show_progress: True", "show_progress: True\n  fov_provider: Flashlight")
+    _, scenario = converted(folder, change)
+    assert "flashlight" == scenario.sight.model_dump()["method"]["type"]
+
+
+def test_walks_stay_at_walls_as_there(folder: Path) -> None:
+    _, scenario = converted(folder)
+    bodies = [*scenario.users.values(), *scenario.robots.values()]
+    walks = [behavior for body in bodies for behavior in body.behaviors]
+    assert {"stay"} == {walk.at_walls for walk in walks}
+
+
+def test_progress_and_provider_and_prefix_are_left_out(folder: Path) -> None:
+    assert [
+        "simulation.show_progress: left out: `fleet2d run --quiet` shows none",
+        "simulation.fov_provider: left out: lines of sight are computed exactly here",
+        "simulation.outputs.output_dir, simulation.outputs.prefix: left out: `fleet2d run --out"
+        " DIR` says where a run is stored",
+    ] == extra(
+        folder,
+        ("show_progress: True", "show_progress: False\n  fov_provider: Rays"),
+        ("prefix: null", "prefix: mine"),
+    )
+
+
+def test_save_false_stores_nothing(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("save: True", "save: False"))
+    assert "off" == scenario.artifacts.trajectories
+    stored = scenario.artifacts
+    assert not any((stored.key_frames, stored.observations, stored.events, stored.outputs))
+    assert (
+        "simulation.outputs.save: every table is off; a run still makes a directory with its"
+        " manifest"
+    ) in remarks
+    assert [] == list(fleet2d.run(scenario, "simulation.duration=1 min").tables)
+
+
+def test_save_every_step(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("every_n_steps: 600", "every_n_steps: 1"))
+    assert "every step" == scenario.artifacts.trajectories
+    assert any("poses are stored every step, observations" in remark for remark in remarks)
+
+
+def test_path_counts_from_the_top_of_a_repository_above_the_file(folder: Path) -> None:
+    deep = folder / "src" / "configs"
+    deep.mkdir(parents=True)
+    (deep / "old.yaml").write_text(OLD)
+    convert_file(deep / "old.yaml", deep / "new.yaml")
+    assert "../../plan.json" == read_document(deep / "new.yaml").data["floorplan"]["path"]
+    assert folder / "plan.json" == plan_of(load_scenario(deep / "new.yaml"))[1]
+
+
+def test_path_counts_from_the_current_folder(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(folder)
+    old = written(tmp_path / "other")
+    convert_file(old, Path("new.yaml"))
+    assert "plan.json" == read_document(Path("new.yaml")).data["floorplan"]["path"]
+
+
+def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
+    old = written(folder, ('"plan.json"', '"f2d/he/gone.json"'))
+    remarks = convert_file(old, folder / "new.yaml")
+    assert [
+        "floorplan.he.json_fpath: there is no file f2d/he/gone.json beside old.yaml, in the"
+        " folders above it or in the current one; kept as written, it counts from the folder of"
+        " new.yaml: put the plan there, or run with floorplan.path=PLAN.json. The starts of"
+        " users and robot were not checked"
+    ] == [remark for remark in remarks if remark not in USUAL]
+    with pytest.raises(ScenarioError, match=r"floorplan\.path: no such file: .*gone\.json"):
+        load_scenario(folder / "new.yaml")
+    (folder / "f2d" / "he").mkdir(parents=True)
+    (folder / "plan.json").rename(folder / "f2d" / "he" / "gone.json")
+    assert 7200 == load_scenario(folder / "new.yaml").simulation.steps
+
+
+@pytest.mark.parametrize(("ppm", "cell"), [("50", 0.02), ("30", 0.0333333333333), ("1000", 0.01)])
+def test_ppm_becomes_the_cell_within_its_limits(folder: Path, ppm: str, cell: float) -> None:
+    remarks, scenario = converted(folder, ("ppm: 20", f"ppm: {ppm}"))
+    assert cell == plan_of(scenario)[2]
+    assert (
+        f"floorplan.he.ppm: the grid's cells are {cell:.4g} m; walls and poses are not"
+        " rounded to them" in remarks
+    )
+
+
+def test_names_as_a_list_or_with_blanks(folder: Path) -> None:
+    for names in ("[user0, user1]", "' user0 , user1,'"):
+        (folder / "new.yaml").unlink(missing_ok=True)
+        _, scenario = converted(folder, ('"user0,user1"', names))
+        assert ["user0", "user1"] == list(scenario.users)
+
+
+def test_section_that_nobody_names_is_left_out(folder: Path) -> None:
+    remarks, scenario = converted(folder, ('"user0,user1"', '"user0"'))
+    assert ["user0"] == list(scenario.users)
+    assert "users.user1: left out: users.names doesn't have it, so it was not used" in remarks
+    assert not [remark for remark in remarks if "user1.base" in remark]
+
+
+def test_no_users(folder: Path) -> None:
+    remarks, scenario = converted(folder, ('"user0,user1"', '""'))
+    assert {} == scenario.users
+    assert "users.names: no names; the scenario has no users" in remarks
+
+
+def test_names_that_are_none_here_are_changed_and_remarked(folder: Path) -> None:
+    remarks, scenario = converted(
+        folder,
+        ('"user0,user1"', '"Ana Maria,robot"'),
+        ("  user0:", "  Ana Maria:"),
+        ("  user1:", "  robot:"),
+    )
+    assert ["Ana_Maria", "robot"] == list(scenario.users)
+    assert ["robot_2"] == list(scenario.robots)
+    assert "users.Ana Maria: called Ana_Maria: names are letters, digits, _ and -" in remarks
+    assert "robot: called robot_2: there is a user robot" in remarks
+
+
+def test_start_in_a_wall_moves_to_the_nearest_free_point(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("x: 8.0", "x: -3.0"))
+    (moved,) = [remark for remark in remarks if remark not in USUAL]
+    start = scenario.users["user0"].start
+    assert start is not None
+    assert (
+        "users.user0.base.pose_config.init_pose: [-3.0, 3.0] is in a wall or nearer to one than"
+        f" its radius, 0.2 m: it starts at {list(start)}, the nearest free point"
+    ) == moved
+    fleet2d.Simulation(scenario)  # would refuse a start in a wall
+
+
+def test_start_is_moved_for_a_body_too_wide_for_it(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("radius: 0.2", "radius: 2"))
+    fleet2d.Simulation(scenario)
+    assert ["users.user0.base.pose_config.init_pose"] == [
+        remark.split(":")[0] for remark in remarks if "init_pose" in remark
+    ]
+
+
+def test_ranges_that_were_ignored_take_effect_and_are_remarked(folder: Path) -> None:
+    remarks, scenario = converted(
+        folder, ("distance: 3.0", "distance: 3.0\n      min_distance: 1.0\n      max_distance: 4.5")
+    )
+    camera = scenario.robots["robot"].camera
+    assert camera is not None
+    assert (1.0, 4.5) == camera.range
+    assert [
+        "robot.base.fov_config.min_distance, robot.base.fov_config.max_distance: accepted and"
+        " ignored there, where it saw from 0 to distance, 3 m; here they hold, and camera.range"
+        " is [1, 4.5]"
+    ] == [remark for remark in remarks if remark not in USUAL]
+
+
+def test_a_flashlight_sees_as_far_as_there(folder: Path) -> None:
+    remarks, scenario = converted(
+        folder,
+        ("distance: 3.0", "distance: 3.0\n      min_distance: 1.0\n      max_distance: 4.5"),
+        ("show_progress: True", "show_progress: True\n  fov_provider: Flashlight"),
+    )
+    camera = scenario.robots["robot"].camera
+    assert camera is not None
+    assert (0.0, 3.0) == camera.range
+    (remark,) = (remark for remark in remarks if "min_distance" in remark)
+    assert "left out, as they were ignored there: it sees from 0 to distance, 3 m" in remark
+    assert "camera.range: [1, 4.5]" in remark
+
+
+def test_angle_beyond_a_turn_sees_all_round(folder: Path) -> None:
+    camera = converted(folder, ("angle: 108", "angle: 400"))[1].robots["robot"].camera
+    assert camera is not None
+    assert 360 == camera.angle_deg
+
+
+def test_no_stride_stands_still(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("lin_speed: 0.1", "lin_speed: 0"))
+    assert (
+        "users.user0.base.pose_config.meander_strategy.lin_speed: missing, 0 or below 0.01 m/s;"
+        " it stands still"
+    ) in remarks
+    simulation = fleet2d.Simulation(scenario)
+    before = simulation.state["user0"]
+    simulation.advance(1000)
+    assert before == simulation.state["user0"]
+
+
+def test_no_turns_walks_straight(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("ang_speed: 15", "ang_speed: 0"))
+    assert 0 == walk(scenario.users["user0"]).turn_std_deg
+    assert not any("user0" in remark for remark in remarks if "ang_speed" in remark)
+
+
+def test_turns_beyond_the_fastest_are_remarked(folder: Path) -> None:
+    remarks, scenario = converted(
+        folder,
+        ("seconds: 1\n    minutes: 0", "milliseconds: 10"),
+        ("ang_speed: 15", "ang_speed: 90"),
+    )
+    assert 36000 == scenario.users["user0"].turn_rate_deg
+    assert (
+        "users.user0.base.pose_config.meander_strategy.ang_speed: turns are cut at 36000 deg/s,"
+        " the fastest there is"
+    ) in remarks
+
+
+def test_missing_parts_get_what_the_remarks_say(folder: Path) -> None:
+    text = """\
+simulation: {duration: {hours: 2}}
+floorplan: {type: he, he: {json_fpath: plan.json}}
+users: {names: ana, ana: {base: {radius: 0, seed: 7}}}
+robot: {base: {radius: 0.1, fov_config: {}}}
+"""
+    (folder / "old.yaml").write_text(text)
+    remarks = convert_file(folder / "old.yaml", folder / "new.yaml")
+    assert [
+        "simulation.delta: missing; the step is 1 s",
+        "floorplan.he.ppm: missing; the grid's cells are 0.05 m; walls and poses are not rounded"
+        " to them",
+        "users.ana.base.radius: missing or 0; a body has a radius, and this one has 0.01 m",
+        "users.ana.base.pose_config.init_pose, robot.base.pose_config.init_pose: has no x and y;"
+        " where it starts is drawn",
+        "users.ana.base.seed: left out: each entity has its own random numbers, from"
+        " simulation.seed",
+        "users.ana.base.pose_config.meander_strategy, robot.base.pose_config.meander_strategy:"
+        " missing; it stands still",
+        "simulation.start_ts: missing; the run starts on 2026-01-05, a Monday, at 00:00",
+        "robot.base.fov_config.distance: missing; 4.5 m is used",
+        "robot.base.fov_config.angle: missing; the camera gets the angle that cameras have here",
+    ] == remarks
+    scenario = load_scenario(folder / "new.yaml")
+    assert datetime(2026, 1, 5) == scenario.simulation.start
+    assert 0.01 == scenario.users["ana"].radius
+    assert 2 == len(fleet2d.Simulation(scenario).state)
+
+
+def test_remarks_on_a_robot_come_before_those_on_its_camera(folder: Path) -> None:
+    remarks, _ = converted(folder, ("radius: 0.1\n", "radius: 0\n"))
+    keys = [remark.partition(":")[0] for remark in remarks]
+
+    assert keys.index("robot.base.radius") < keys.index(
+        "robot.base.fov_config.load_fov_file, robot.base.fov_config.lazy_compute"
+    )
+
+
+def test_no_robot(folder: Path) -> None:
+    text = OLD[: OLD.index("robot:")]
+    (folder / "old.yaml").write_text(text)
+    remarks = convert_file(folder / "old.yaml", folder / "new.yaml")
+    assert "robot: missing; the scenario has no robot" in remarks
+    assert {} == load_scenario(folder / "new.yaml").robots
+
+
+def test_type_of_ones_own_is_read_as_base(folder: Path) -> None:
+    remarks, scenario = converted(folder, ("type: base\n    base:", "type: cat\n    cat:"))
+    assert 0.2 == scenario.users["user0"].radius
+    assert "users.user0.type: cat is not a type of the published Fleet2D: read as base" in remarks
+
+
+def test_unknown_keys_are_left_out_with_their_lines(folder: Path) -> None:
+    assert [
+        f"simulation.speed_up: not known, left out ({folder / 'old.yaml'}:10)",
+        f"users.user0.base.mood: not known, left out ({folder / 'old.yaml'}:34)",
+        f"weather: not known, left out ({folder / 'old.yaml'}:77)",
+    ] == extra(
+        folder,
+        ("  seed: 4", "  speed_up: 3\n  seed: 4"),
+        ("      radius: 0.2", "      mood: {is: good, was: bad}\n      radius: 0.2"),
+        ("    color: red\n", "    color: red\nweather: rain\n"),
+    )
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("hours: 2", "month: 2", "old.yaml:3: simulation.duration: expected a mapping of days, ho"),
+        ("hours: 2", "hours: -2", "old.yaml:3: simulation.duration: expected a duration of 0 o"),
+        ("hours: 2", "hours: two", "old.yaml:3: simulation.duration: expected a duration, got {'h"),
+        ("hours: 2", "seconds: 0.5", "simulation.duration: 0.5 s is shorter than one step, delta:"),
+        ("seconds: 1", "seconds: 0", "old.yaml:6: simulation.delta: expected a step longer than"),
+        ("'2010-11-17 13:12:11'", "2010-02-31", "simulation.start_ts: expected a date and time l"),
+        ("!!timestamp '2010-11-17 13:12:11'", "7", "simulation.start_ts: expected a date and time"),
+        ("speedup: null", "speedup: 0", "simulation.speedup: expected a number above 0, got 0"),
+        ("seed: 4", "seed: 0.5", "simulation.seed: expected a whole number of 0 or more, got 0"),
+        ("save: True", "save: 3", "simulation.outputs.save: expected true or false, got 3"),
+        ("every_n_steps: 600", "every_n_steps: 0", "every_n_steps: expected a whole number of 1"),
+        ("every_n_steps: 600", f"every_n_steps: {10**15}", "that many steps are over 1000 years"),
+        ("type: he", "type: svg", "floorplan.type: expected he (HouseExpo), the only type"),
+        ('"plan.json"', "null", "floorplan.he.json_fpath: missing: give the path of a HouseExpo J"),
+        ('"plan.json"', "5", "floorplan.he.json_fpath: expected text, got 5"),
+        ("ppm: 20", "ppm: -1", "floorplan.he.ppm: expected a number above 0, got -1"),
+        ('"user0,user1"', "7", "users.names: expected names separated by commas, got 7"),
+        ("user0,user1", "user0,bob", "users.names: 'bob' has no section users.bob: add it, or remove"),
+        ("type: base", "type: cat", "users.user0: its type is 'cat', and it has no section of tha"),
+        ("radius: 0.2", "radius: wide", "radius: expected a number of 0 or more, 2 at most"),
+        ("radius: 0.2", "radius: .nan", "radius: expected a number of 0 or more, 2 at most, got n"),
+        ("radius: 0.2", f"radius: 1{'0' * 400}", "a number of 0 or more, 2 at most, got"),
+        ("x: 8.0", "x: [1]", "users.user0.base.pose_config.init_pose.x: expected a number, got [1"),
+        ("x: 8.0", "x: 8.0e+9", "can't be converted to a valid scenario: users.user0.start: expected"),
+        ("lin_speed: 0.1", "lin_speed: 30", "lin_speed: 30 m in a step of 1 s is 30 m/s, more th"),
+        ("lin_speed: 0.1", "lin_speed: -1", "lin_speed: expected a number of 0 or more, got -1"),
+        ("ang_speed: 15", "ang_speed: 1.0e+9", "ang_speed: expected a number of -3600"),
+        ("angle: 108", "angle: 0", "robot.base.fov_config.angle: expected a number above 0, got"),
+        (
+            "distance: 3.0",
+            "distance: 3.0\n      min_distance: 3",
+            "robot.base.fov_config: the camera would see from 3 m to 3 m: the farthest distance"
+            " must",
+        ),
+        ("    base:\n      radius", "    base: 3\n    bass:\n      radius", "users.user0.base: ex"),
+        ("!!timestamp", "!!python/name:os.sep", "a !!python tag runs code, so none is read"),
+        ("seed: 4", "seed: [", "old.yaml:12: not valid YAML: "),
+    ],
+)  # fmt: skip
+def test_wrong_value_is_refused(folder: Path, before: str, after: str, message: str) -> None:
+    assert message in refused(folder, (before, after))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "old.yaml is empty"),
+        ("[1, 2]", "old.yaml: a scenario is a mapping"),
+        ("floorplan: {type: he}", "and robot: there is no section simulation"),
+        ("simulation: {duration: 1}", "old.yaml is not a configuration of the published Fleet2D"),
+        (
+            "simulation: {start: 2026-01-05}\nfloorplan: {}",
+            "old.yaml is a scenario already: run it",
+        ),
+        ("simulation: {}\nfloorplan: {type: he, he: {json_fpath: plan.json}}", "duration: missing"),
+    ],
+)
+def test_other_files_are_refused(folder: Path, text: str, message: str) -> None:
+    assert message in refused(folder, text=text)
+
+
+def test_no_file_is_refused(folder: Path) -> None:
+    with pytest.raises(InputError, match=r"there is no file .*none\.yaml"):
+        convert_file(folder / "none.yaml", folder / "new.yaml")
+
+
+def test_plan_that_is_no_plan_is_refused(folder: Path) -> None:
+    (folder / "plan.json").write_text("{}")
+    with pytest.raises(FloorPlanError, match="is not a floor plan that Fleet2D can read"):
+        convert_file(written(folder), folder / "new.yaml")
+    assert not (folder / "new.yaml").exists()
+
+
+def test_body_too_wide_for_the_plan_is_refused(folder: Path) -> None:
+    (folder / "plan.json").write_text('{"verts": [[0, 0], [3, 0], [3, 3], [0, 3]]}')
+    assert "robot.base.radius: a body of radius 2 m fits nowhere in plan" in refused(
+        folder, ("radius: 0.1", "radius: 2")
+    )
+
+
+def test_existing_file_is_not_overwritten(folder: Path) -> None:
+    (folder / "new.yaml").write_text("mine")
+    with pytest.raises(InputError, match="exists: choose another name, or remove it"):
+        convert_file(written(folder), folder / "new.yaml")
+    assert "mine" == (folder / "new.yaml").read_text()
+
+
+def test_file_in_no_folder_is_refused(folder: Path) -> None:
+    with pytest.raises(InputError, match=r"new\.yaml can't be written: there is no folder"):
+        convert_file(written(folder), folder / "none" / "new.yaml")
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "message"),
+    [
+        (errno.ENOSPC, ArtifactError, "the disk is full: "),
+        (errno.EROFS, InputError, "can't be written: Read-only file system; choose another place"),
+    ],
+)
+def test_file_that_cannot_be_written_leaves_nothing(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    code: int,
+    kind: type[Exception],
+    message: str,
+) -> None:
+    def fail(descriptor: int) -> None:
+        raise OSError(code, os.strerror(code))
+
+    old = written(folder)
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(kind, match=message):
+        convert_file(old, folder / "new.yaml")
+    assert ["old.yaml", "plan.json"] == sorted(path.name for path in folder.iterdir())
+
+
+# The command line
+
+
+def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["convert_published.py", *arguments])
+    return main()
+
+
+def test_script_converts_and_the_scenario_is_valid(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from typer.testing import CliRunner
+
+    written(folder)
+    assert 0 == call(monkeypatch, "home/old.yaml", "home/new.yaml")
+    output = capsys.readouterr().out.splitlines()
+    assert [*(f"note: {remark}" for remark in USUAL), "home/new.yaml"] == output
+    result = CliRunner().invoke(app, ["validate", "home/new.yaml"])
+    assert 0 == result.exit_code
+    assert result.output.startswith("ok: 2 users and 1 robot in ")
+
+
+def test_script_says_what_is_wrong_in_a_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert 2 == call(monkeypatch, "home/old.yaml", "home/new.yaml")
+    assert "error: there is no file home/old.yaml.\n" == capsys.readouterr().err
