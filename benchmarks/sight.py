@@ -162,7 +162,8 @@ def measure(name: str, plan: Any, peers: str | None) -> Row:
 def measure_points(row: Row, home: Any, pairs: tuple[Any, Any], region: tuple[Any, ...]) -> None:
     """Measure and compare what tells whether a point is visible."""
     from fleet2d.kernels import region_contains_points
-    from fleet2d.sight.fov import LineOfSight, VisibilityPolygon
+    from fleet2d.sight.cached_fov import VisibilityPolygon
+    from fleet2d.sight.fov import LineOfSight
 
     (eyes, points), lines, walls = pairs, compiled_lines(), walls_of(home.plan)
     row.query_ns = best(lambda: lines(home.walls, eyes, points)) / len(eyes) * 1e9
@@ -191,7 +192,8 @@ def measure_cells(row: Row, home: Any, poses: list[Any]) -> None:
     """Measure and compare what finds the cells in view of a pose."""
     from fleet2d.kernels import cells_in_view
     from fleet2d.sight import fov
-    from fleet2d.sight.fov import Flashlight, LineOfSight
+    from fleet2d.sight.cached_fov import Flashlight
+    from fleet2d.sight.fov import LineOfSight
 
     fov.MEMORY_BYTES = 500e6
     grid, reach = (home.plan.lattice.rows, home.plan.lattice.columns), reach_in(home)

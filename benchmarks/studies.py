@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from fleet2d.configuration.documents import read_document
+from fleet2d.runtime.memory import free_memory_of_polars
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor, WorkerTask
 from fleet2d.studies.reader import open_study
@@ -79,6 +80,7 @@ def speedup(folder: Path, days: int = 5, seeds: int = 40) -> None:
 
 def driver(folder: Path, variants: int = 100_000) -> None:
     """Print time and memory of a driver of many variants: its first run, and going on with it."""
+    free_memory_of_polars()  # as `fleet2d study run` does
     speeds = [round(0.1 + i / 1000, 3) for i in range(variants // 1000)]
     study = {"base": HOUR, "axes": {"robots.astro.speed": speeds}, "replicates": 1000}
     for name in (f"driver of {variants:,} variants", "  going on with nothing to do"):

@@ -233,7 +233,7 @@ def test_interventions_of_the_page_exist() -> None:
     listed = {name for cell in cells for name in re.findall(r"`([a-z_]+)(?::|`)", cell)}
     arguments = {"find", "dock", "behavior", "rooms", "values"}
     assert set() == listed - set(verbs()) - arguments
-    assert set(verbs()) - listed == {"change", "decide", "drive", "switch_on"}  # by Python alone
+    assert set(verbs()) - listed == {"decide", "drive", "switch_on"}  # by Python alone
 
 
 def test_rates_that_seeds_can_tell_apart_are_as_the_page_says() -> None:

@@ -249,8 +249,8 @@ USERS = [
     "{type: routine, persona: retired, household: ../secrets/s.yaml}",
 ]  # fmt: skip
 MODELS = [
-    "algorithms: {rtp: {type: rtp, model: {type: learned, weights: ../secrets/file.npz}}}",
-    "algorithms: {rtp: {type: rtp, model: {type: onnx, file: ../secrets/file.onnx}}}",
+    "algorithms: {rtp: {type: real_time_presence, model: {type: learned, weights: ../secrets/file.npz}}}",
+    "algorithms: {rtp: {type: real_time_presence, model: {type: onnx, file: ../secrets/file.onnx}}}",
     "robots: {astro: {type: policy, file: link/file.onnx}}",
     "algorithms: {x: {type: ../secrets/own_code.py:Class}}",
     "algorithms: {x: {type: process, command: ../secrets/s.yaml}}",

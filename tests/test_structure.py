@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -12,6 +14,12 @@ from tools import package_map
 ROOT = Path(package_map.ROOT)
 MODULES = dict(package_map.modules())
 LONGEST_CIRCLE = 2
+# What the bundled scenario of the paper doesn't name, and so doesn't import.
+SELDOM = (
+    "engine.conversations", "engine.encounters", "engine.sighting_errors", "engine.snapshot",
+    "engine.world", "floorplan.checkup", "floorplan.rooms.division",
+    "sight.built_in_errors", "sight.cached_fov", "storage.apart",
+)  # fmt: skip
 
 
 @pytest.mark.slow
@@ -19,6 +27,20 @@ def test_modules_form_no_circle_longer_than_two() -> None:
     graph = {name: set(imports(name, path)) for name, path in MODULES.items()}
 
     assert [] == [sorted(circle) for circle in circles(graph) if len(circle) > LONGEST_CIRCLE]
+
+
+def test_a_run_imports_what_its_scenario_names_alone() -> None:
+    code = (
+        "import sys, fleet2d\n"
+        "fleet2d.run('bundled:paper', 'simulation.duration=1 min', seed=4)\n"
+        "print(*sys.modules)"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    loaded = done.stdout.split()
+
+    assert "fleet2d.engine.loop" in loaded
+    assert [] == [name for name in SELDOM if f"fleet2d.{name}" in loaded]
 
 
 def test_circles_are_found() -> None:

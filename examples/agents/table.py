@@ -28,7 +28,7 @@ from fleet2d.learning.gym.task import METRIC, Variants
 FIRST_HOME = {"validation": 500, "test": 1000}
 VALIDATION_HOMES = 10
 ROOMS_TO_LEAVE = ["bedroom", "bathroom"]
-LTP = {"ltp": {"type": "ltp", "estimator": "likelihood"}}
+LTP = {"ltp": {"type": "long_term_presence", "estimator": "likelihood"}}
 Choice = Callable[[Any, Any, RobotEnv], int]
 Behaviors = list[dict[str, Any]]
 AT = {name: number for number, name in enumerate(COLUMNS)}

@@ -33,7 +33,10 @@ class LastWeek(fleet2d.Algorithm):
 def errors(home: int) -> dict[str, float]:
     """Return each algorithm's total variation distance to the truth, after a week in a home."""
     ours = {"naive": "sighting_share", "weighed": "exposure_ratio", "likely": "likelihood"}
-    algorithms = {name: {"type": "ltp", "estimator": estimator} for name, estimator in ours.items()}
+    algorithms = {
+        name: {"type": "long_term_presence", "estimator": estimator}
+        for name, estimator in ours.items()
+    }
     algorithms["mine"] = {"type": f"{__file__}:LastWeek"}
     metrics = {name: {"type": "ltp_error", "of": name} for name in algorithms}
     users = {"ana": {"type": "routine", "persona": "works_from_home"}}

@@ -205,9 +205,9 @@ def ltp_gap(options: PaperOptions) -> Result:
     start_s = time.perf_counter()
     months = run_months(LTP_GAP, options)
     duration_s = time.perf_counter() - start_s
-    rows = months.pandas("gap", columns=["variant", "step", "user", "room", "gap"])
-    rows = rows[rows["user"] == USER].sort_values(["variant", "step"], kind="stable")
-    rooms = rows["room"].unique().tolist()
+    stored = pl.DataFrame(months.arrow("gap").to_table())  # rooms in the order of the plan
+    rows = stored.filter(user=USER).sort("variant", "step", maintain_order=True)
+    rooms = rows["room"].unique(maintain_order=True).to_list()
     gaps = rows["gap"].to_numpy().reshape(robots, days, len(rooms))
     gaps = np.ascontiguousarray(np.moveaxis(gaps, 2, 0))  # shape: (rooms, robots, days)
     overall = gaps.mean(axis=0)

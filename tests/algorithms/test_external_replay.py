@@ -51,7 +51,7 @@ def test_the_newest_shares_are_put_out(tmp_path: Path) -> None:
 
 def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
     content = {"extends": "bundled:paper", "simulation": {"duration": "4 h", "seed": 4}}
-    content["algorithms"] = {"ltp": {"type": "ltp", "period": "1 h"}}
+    content["algorithms"] = {"ltp": {"type": "long_term_presence", "period": "1 h"}}
     first = fleet2d.run(content, out=tmp_path / "first")
 
     again = fleet2d.run(scenario(tmp_path / "first" / "ltp.parquet", user="ana"))

@@ -90,7 +90,7 @@ def test_a_summary_for_people_names_what_matters(fleet2d: Cli) -> None:
 
 
 def test_the_table_shows_what_matters_of_many_numbers_and_json_all(fleet2d: Cli) -> None:
-    content = small(algorithms={"rtp": {"type": "rtp"}})
+    content = small(algorithms={"rtp": {"type": "real_time_presence"}})
     content["metrics"] = {
         "rtp_score": {"of": "rtp", "period": "5 min"},
         "ltp_gap": {"of": "rtp", "period": "5 min"},
@@ -243,7 +243,14 @@ def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> No
         {"simulation": {"durations": "1 h"}},
         {"simulaton": {}},
         {"users": {"ana": {"type": "meander", "speed": [3]}}},
-        {"algorithms": {"x": {"type": "ltp", "estimator": {"type": "likelihood", "stagez": 2}}}},
+        {
+            "algorithms": {
+                "x": {
+                    "type": "long_term_presence",
+                    "estimator": {"type": "likelihood", "stagez": 2},
+                }
+            }
+        },
     ],
 )
 def test_what_is_wrong_does_not_fit_the_schema(

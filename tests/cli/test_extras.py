@@ -64,7 +64,7 @@ FILES: dict[str, Any] = {
         "axes": {"home": {"synthetic": 2}},
         "tune": {
             "search": {"speed": {"key": "robots.astro.speed", "low": 0.2, "high": 0.8}},
-            "objectives": {"distance.astro.metres": "maximize"},
+            "objective": {"distance.astro.metres": "maximize"},
             "held_out": {"home": [1]},
         },
     },
@@ -115,8 +115,6 @@ LACKING = [
     ("study status st", "", "study"),
     ("study report st", "matplotlib", "viz"),
     ("study report st", "polars", "polars|study"),
-    ("study run study.yaml --out ray --executor ray", "ray", "ray"),
-    ("study run study.yaml --out slurm --executor slurm", "submitit", "slurm"),
     ("study tune tune.yaml --out tuned", "optuna", "tune"),
     ("dataset score data --picture forecasts.png", "", "viz"),
     ("live home.yaml --with ws://127.0.0.1:0 --speed 0", "", "live"),

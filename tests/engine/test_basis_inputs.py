@@ -31,7 +31,9 @@ def content(folder: Path, **sections: Any) -> dict[str, Any]:
     (folder / "net.py").write_text(NET)
     np.save(folder / "weights.npy", np.ones(1))
     model = {"type": f"{folder.as_posix()}/net:Net", "weights": str(folder / "weights.npy")}
-    return scenario("10 min", algorithms={"rtp": {"type": "rtp", "model": model}}, **sections)
+    return scenario(
+        "10 min", algorithms={"rtp": {"type": "real_time_presence", "model": model}}, **sections
+    )
 
 
 def test_a_model_within_an_algorithm_is_noted_with_its_weights(tmp_path: Path) -> None:

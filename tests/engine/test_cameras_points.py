@@ -13,9 +13,10 @@ from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import U64, Bool, Lenses, PoseBlock, Poses, Reach
-from fleet2d.sight import fov
+from fleet2d.sight import cached_fov
+from fleet2d.sight.cached_fov import Flashlight, VisibilityPolygon
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
-from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
+from fleet2d.sight.fov import FieldOfView, LineOfSight
 
 HERE = f"{TESTS.as_posix()}/engine/test_cameras_points"
 SECOND = 1_000_000
@@ -91,15 +92,6 @@ def test_run_is_the_same_by_every_exact_method(method: dict[str, Any]) -> None:
     assert len(table(run(content), "observations")["step"]) > 50
 
 
-def test_run_by_a_shared_file_is_the_same(tmp_path: Any) -> None:
-    content = with_odd_cameras()
-    method = {"type": "visibility_polygon", "precompute": "file", "path": str(tmp_path)}
-    expected = stored_without_scenario(content)
-
-    assert expected == stored_without_scenario({**content, "sight": {"method": method}})
-    assert 1 == len(list(tmp_path.iterdir()))
-
-
 def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -113,7 +105,7 @@ def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(
 
     assert len(table(run(content), "observations")["step"]) > 50
     for memory_bytes in (64e6, 10e3):
-        monkeypatch.setattr(fov, "MEMORY_BYTES", memory_bytes)
+        monkeypatch.setattr(cached_fov, "MEMORY_BYTES", memory_bytes)
         method = {"type": "flashlight"}
         assert expected == stored_without_scenario({**content, "sight": {"method": method}})
 

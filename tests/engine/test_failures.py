@@ -131,7 +131,7 @@ def content(**more: Any) -> dict[str, Any]:
         "5 h",
         users={"ana": {"type": "meander"}},
         robots={"astro": {"type": "patrol", "dwell": "30 s"}},
-        algorithms={"ltp": {"type": "ltp"}, "rtp": {"type": f"{__name__}:Quiet"}},
+        algorithms={"ltp": {"type": "long_term_presence"}, "rtp": {"type": f"{__name__}:Quiet"}},
     )
     for section, entries in more.items():
         found[section] = {**found[section], **entries} if section in found else entries
@@ -164,10 +164,10 @@ ALGORITHMS = {
 CASES = [
     *(({"algorithms": {"mine": {"type": f"{MINE}Fails", "how": how, "reads": ["ltp"]}}}, "algorithms.mine", words)
       for how, words in ALGORITHMS.items()),
-    *(({"algorithms": {"mine": {"type": "ltp", "estimator": {"type": f"{MINE}FailsEstimator", "how": how}}}},
+    *(({"algorithms": {"mine": {"type": "long_term_presence", "estimator": {"type": f"{MINE}FailsEstimator", "how": how}}}},
        "algorithms.mine", words)
       for how, words in {"raises": ["KeyError"], "not a number": ["not a distribution", "nan"]}.items()),
-    *(({"algorithms": {"mine": {"type": "rtp", "period": "1 h", "model": {"type": f"{MINE}FailsModel", "how": how}}}},
+    *(({"algorithms": {"mine": {"type": "real_time_presence", "period": "1 h", "model": {"type": f"{MINE}FailsModel", "how": how}}}},
        "algorithms.mine", words)
       for how, words in {
           "raises": ["KeyError"],

@@ -18,7 +18,7 @@ from fleet2d.engine.intervention_queue import (
     read_record,
 )
 from fleet2d.errors import InputError, PlacementError, ScenarioError
-from fleet2d.interventions import ChangeHome, Put, Replan
+from fleet2d.interventions import Put, Replan, ShutDoor
 from fleet2d.interventions.intervention import Trigger, parse_intervention
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
@@ -200,9 +200,9 @@ def test_a_change_by_a_script_is_done_again() -> None:
     content = home("30 min", objects={"kitchen_door": door})
     run = fleet2d.Simulation(content)
     run.advance(300)
-    run.do(ChangeHome({"shut": "kitchen_door"}))
+    run.do(ShutDoor("kitchen_door"))
     with pytest.raises(ScenarioError, match="no door 'x'"):
-        run.do(ChangeHome({"shut": "x"}))
+        run.do(ShutDoor("x"))
     stored = run.run()
     interventions = stored.manifest["interventions"]
     assert stored.digest == fleet2d.Simulation(content, interventions=interventions).run().digest

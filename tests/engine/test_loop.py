@@ -12,7 +12,7 @@ from fleet2d import Algorithm, Behavior, Metric, Plan, Situation
 from fleet2d.engine import loop
 from fleet2d.engine.loop import PHASES, Span
 from fleet2d.entities.body import NEVER
-from fleet2d.interventions import ChangeHome, Replan
+from fleet2d.interventions import Replan, ShutDoor
 
 STORY: list[tuple[int, str]] = []
 """What happened, as it happened: the step, and to whom."""
@@ -55,7 +55,7 @@ def told(duration: str = "150 s", **more: Any) -> dict[str, Any]:
         users={"zoe": body("zoe"), "ana": body("ana")},
         robots={"bolt": body("bolt"), "astro": body("astro")},
         objects={"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}},
-        changes=[{"at": "1 min", "shut": "door"}],
+        script=[{"at": "1 min", "shut": "door"}],
         algorithms={"learn": {"type": f"{__name__}:Learn", "period": "1 min"}},
         metrics={"measure": {"type": f"{__name__}:Measure", "period": "1 min"}},
         **more,
@@ -95,7 +95,7 @@ def test_in_a_step_come_home_users_robots_algorithms_metrics(
 def test_what_a_script_does_at_a_step_comes_before_all_else(story: list[tuple[int, str]]) -> None:
     simulation = fleet2d.Simulation(told())
     simulation.advance(30)
-    simulation.do(ChangeHome({"shut": "door"}))
+    simulation.do(ShutDoor("door"))
     simulation.do(Replan("bolt"))
     simulation.advance(1)
     assert (30, "bolt, shut") == story[-1]
@@ -118,7 +118,7 @@ def spans_of(simulation: fleet2d.Simulation, end: int) -> Iterator[tuple[Span, i
 def test_a_span_ends_where_something_is_due_and_not_before(max_span: int | None) -> None:
     content = everything("30 min")
     content["objects"] = {"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
-    content["changes"] = [{"at": "10 min", "shut": "door"}]
+    content["script"] = [{"at": "10 min", "shut": "door"}]
     simulation = fleet2d.Simulation(content, max_span=max_span)
     begun = 0
     for span, moved, state in spans_of(simulation, 1800):

@@ -23,7 +23,7 @@ LEARNS = (
     "simulation.start=2026-01-05T06:00",
     "simulation.duration=10 h",
     "artifacts.trajectories=5 min",
-    "algorithms.rtp={type: rtp, model: hmm, period: 5 min}",
+    "algorithms.rtp={type: real_time_presence, model: hmm, period: 5 min}",
     "metrics.rtp_score={of: rtp}",
     "robots.astro.behaviors=[{type: find, user: ana, source: rtp, every: 5 h}, {type: hangout,"
     " source: ltp, near: view, explore: 20 %}]",
@@ -65,7 +65,10 @@ def test_every_table_is_the_same_step_by_step() -> None:
             ],
         }
     }
-    algorithms = {"ltp": {"type": "ltp", "period": "5 min"}, "rtp": {"type": "rtp"}}
+    algorithms = {
+        "ltp": {"type": "long_term_presence", "period": "5 min"},
+        "rtp": {"type": "real_time_presence"},
+    }
     metrics = {"ltp_error": {"of": "ltp", "period": "10 min"}, "rtp_score": {"of": "rtp"}}
     content = scenario("1 h", users=users, robots=robots, algorithms=algorithms, metrics=metrics)
     whole, *others = (fleet2d.run(content, max_span=span) for span in (None, 60, 1))

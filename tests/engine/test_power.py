@@ -27,8 +27,8 @@ BATTERY = {"driving": "20 min", "standing": "2 h", "charging": "1 h", "charger":
 PILL = {"do": "remind", "to": "ana", "at": ["07:10"], "within": "3 h", "worth": 4, "takes": "2 min"}
 READS = [{"on": "daily", "items": [{"at": "00:10", "place": "kitchen", "activity": "read"}]}]
 LEARNERS = {
-    "ltp": {"type": "ltp", "period": "5 min"},
-    "rtp": {"type": "rtp", "period": "5 min"},
+    "ltp": {"type": "long_term_presence", "period": "5 min"},
+    "rtp": {"type": "real_time_presence", "period": "5 min"},
 }
 
 
@@ -230,7 +230,7 @@ def test_real_time_presence_begins_anew_after_a_time_off(model: str) -> None:
             {"at": "07:13", "power": "astro", "state": state},
             {"at": "07:14", "put": "astro", "to": "bathroom"},
             {"at": "07:14", "hold": "astro"},
-            algorithms={"rtp": {"type": "rtp", "model": model}},
+            algorithms={"rtp": {"type": "real_time_presence", "model": model}},
             metrics={"rtp_score": {"of": "rtp", "period": "5 min"}},
             astro={"camera": {"range": [0.3, 5], "angle_deg": 360}, "behaviors": [STAYS]},
         )

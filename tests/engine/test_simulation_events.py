@@ -15,7 +15,7 @@ DAY = {
         "hall_motion": {"type": "motion_sensor", "at": [16.53, 7.73], "range": 4},
         "bath": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "10 s"},
     },
-    "changes": [{"at": "9 h", "open": "bath"}],
+    "script": [{"at": "9 h", "open": "bath"}],
 }
 PATROL = [{"type": "opportunistic"}, {"type": "patrol"}]
 WITHOUT_LEARNERS = {

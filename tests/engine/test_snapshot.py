@@ -24,7 +24,7 @@ from fleet2d.engine import checkpoint
 from fleet2d.engine.simulation import PURPOSE
 from fleet2d.engine.snapshot import MAGIC, open_snapshot
 from fleet2d.errors import ArtifactError, ComponentError, InputError
-from fleet2d.interventions import ChangeHome, Put, Replan
+from fleet2d.interventions import OpenDoor, Put, Replan
 from fleet2d.runtime.events import Event
 from fleet2d.storage.secret_files import signature
 
@@ -39,7 +39,7 @@ HOUSE = {
 def house(duration: str = "10 min") -> dict[str, Any]:
     """Doors, sensors, layers, people who react, robots that give way and don't know their place."""
     content = everything(duration, objects=HOUSE)
-    content["changes"] = [
+    content["script"] = [
         {"at": "4 min", "shut": "bath"},
         {"at": "6 min", "lock": "hall"},
         {"at": "8 min", "unlock": "hall"},
@@ -50,7 +50,11 @@ def house(duration: str = "10 min") -> dict[str, Any]:
     content["robots"]["astro"] |= {"gives_way": {}, "localization": {}}
     content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "3 min", "source": "rtp"}
     on = {"type": "tests.engine.test_events:Heard", "on": ["sensor", "user_lost"]}
-    content["algorithms"] |= {"rtp": {"type": "rtp"}, "ltp": {"type": "ltp"}, "heard": on}
+    content["algorithms"] |= {
+        "rtp": {"type": "real_time_presence"},
+        "ltp": {"type": "long_term_presence"},
+        "heard": on,
+    }
     content["metrics"] |= {"rtp_score": {"of": "rtp"}, "detections": {}, "coverage": {}}
     return content
 
@@ -64,7 +68,7 @@ def routine() -> dict[str, Any]:
         "users": {"ana": member},
         "robots": {"astro": {"type": "patrol", "dwell": "1 min"}},
         "sight": {"method": {"type": "flashlight"}},
-        "algorithms": {"rtp": {"type": "rtp", "model": "routine"}},
+        "algorithms": {"rtp": {"type": "real_time_presence", "model": "routine"}},
     }
 
 
@@ -74,7 +78,9 @@ def markov() -> dict[str, Any]:
         "floorplan": {"type": "bundled"},
         "users": {"ana": {"type": "room_sampling", "shares": {"kitchen": 0.4, "bedroom": 0.6}}},
         "robots": {"astro": {"behaviors": [{"type": "hangout", "source": "rtp"}]}},
-        "algorithms": {"rtp": {"type": "rtp", "model": "semi_markov", "period": "5 min"}},
+        "algorithms": {
+            "rtp": {"type": "real_time_presence", "model": "semi_markov", "period": "5 min"}
+        },
     }
 
 
@@ -158,7 +164,7 @@ def test_copies_can_be_changed_without_the_other_noticing() -> None:
     twins = [way(simulation) for way in some([*WAYS.values()], 2)]
     for twin in twins:
         twin.do(Put("ana", "kitchen"))
-        twin.do(ChangeHome({"open": "bath"}))
+        twin.do(OpenDoor("bath"))
         twin.advance(150)
         assert simulation.state != twin.state
     assert undisturbed("doors, sensors, layers") == result(simulation)

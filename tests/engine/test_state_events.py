@@ -169,7 +169,7 @@ def test_the_table_is_in_order_of_step_entity_and_rank() -> None:
     content = everything(
         "1 h", objects={"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
     )
-    content["changes"] = [{"at": "10 min", "shut": "door"}, {"at": "20 min", "open": "door"}]
+    content["script"] = [{"at": "10 min", "shut": "door"}, {"at": "20 min", "open": "door"}]
     stored = run(content)
     order = ["ana", "ben", "astro", "bolt", "curio", "drift", "ego", "door"]
     keys = [(step, order.index(who), event(0, kind).rank) for step, who, kind, _ in rows(stored)]

@@ -29,7 +29,7 @@ def test_household_lives_through_both_nights_the_same_for_every_span(start: str)
     """With all that a robot learns, and darkness."""
     overrides = [BERLIN, start, "simulation.duration=5 h", "simulation.step=5 s"]
     overrides += ["users.pat={type: population}", "simulation.daylight={latitude: 52.5}"]
-    overrides += ["algorithms.learned={type: rtp, model: learned, period: 10 min}"]
+    overrides += ["algorithms.learned={type: real_time_presence, model: learned, period: 10 min}"]
     digests = {
         span: fleet2d.run("bundled:family", *overrides, seed=4, max_span=span).digest
         for span in (None, 1, 77)

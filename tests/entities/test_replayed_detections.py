@@ -25,7 +25,10 @@ def scenario(path: Path, **robot: Any) -> dict[str, Any]:
         "simulation": {"duration": "1 h", "seed": 4},
         "users": {"ana": {"type": "unknown"}},
         "robots": {"astro": {"perceives": {"type": "replay", "path": str(path)} | robot}},
-        "algorithms": {"ltp": {"type": "ltp", "period": "10 min"}, "rtp": {"type": "rtp"}},
+        "algorithms": {
+            "ltp": {"type": "long_term_presence", "period": "10 min"},
+            "rtp": {"type": "real_time_presence"},
+        },
         "metrics": {
             "detections": {},
             "sightings": {},

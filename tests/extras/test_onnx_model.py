@@ -69,7 +69,7 @@ def beliefs(model: Any) -> Any:
         "bundled:paper",
         "simulation.duration=8 h",
         seed=3,
-        algorithms={"rtp": {"type": "rtp", "model": model}},
+        algorithms={"rtp": {"type": "real_time_presence", "model": model}},
     )
     return np.array(run.arrow("rtp")["share"].to_pylist())
 

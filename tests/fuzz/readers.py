@@ -98,7 +98,7 @@ def _scenario() -> dict[str, Any]:
         objects={"door": {"type": "motion_sensor", "at": [2, 1], "range": "4 m"}},
         algorithms={"ltp": {"type": "long_term_presence", "period": "30 min"}},
         metrics={"sightings": {}, "ltp_error": {"of": "ltp"}},
-        changes=[{"at": "30 min", "open": "door 1"}],
+        script=[{"at": "30 min", "open": "door 1"}],
     )
     content["floorplan"] = {"type": "bundled", "cell": "0.05 m", "furnish": True}
     return content

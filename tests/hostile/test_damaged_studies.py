@@ -265,7 +265,7 @@ def test_a_damaged_search_is_refused_in_one_line(
     pytest.importorskip("optuna")
     settings = {
         "search": {"speed": {"key": SPEED, "low": 0.2, "high": 1.0}},
-        "objectives": {"distance.astro": "maximize"},
+        "objective": {"distance.astro": "maximize"},
         "trials": 1,
         "held_out": {"radius": [0.15]},
     }

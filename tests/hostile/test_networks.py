@@ -25,7 +25,9 @@ def content(file: Path) -> dict[str, Any]:
 
 
 def model(file: Path) -> dict[str, Any]:
-    algorithms = {"rtp": {"type": "rtp", "model": {"type": "onnx", "file": str(file)}}}
+    algorithms = {
+        "rtp": {"type": "real_time_presence", "model": {"type": "onnx", "file": str(file)}}
+    }
     return {**content(file), "robots": {}, "algorithms": algorithms}
 
 

@@ -33,11 +33,11 @@ def content(duration: str = "3 h", **changes: Any) -> dict[str, Any]:
             "users": USERS,
             "robots": {"astro": {"type": "patrol", "dwell": "20 s"}},
             "algorithms": {
-                "ltp": {"type": "ltp", "estimator": "likelihood"},
-                "rtp": {"type": "rtp"},
-                "minutely": {"type": "rtp", "period": "1 min"},
-                "last": {"type": "rtp", "model": "last_seen"},
-                "share": {"type": "ltp", "estimator": "sighting_share"},
+                "ltp": {"type": "long_term_presence", "estimator": "likelihood"},
+                "rtp": {"type": "real_time_presence"},
+                "minutely": {"type": "real_time_presence", "period": "1 min"},
+                "last": {"type": "real_time_presence", "model": "last_seen"},
+                "share": {"type": "long_term_presence", "estimator": "sighting_share"},
             },
             "metrics": {
                 "error": {"type": "ltp_error", "of": "ltp", "period": "1 h"},
@@ -178,7 +178,7 @@ def test_naive_guess_of_somebody_who_was_never_seen_is_every_room_alike(
         content(
             "30 min",
             robots={"astro": blind},
-            algorithms={"rtp": {"type": "rtp"}},
+            algorithms={"rtp": {"type": "real_time_presence"}},
             metrics={
                 "score": {"type": "rtp_score", "of": "rtp"},
                 "at_home": {"type": "rtp_score", "of": "rtp", "given_home": True},
@@ -232,7 +232,10 @@ def test_bins_without_a_reference_forecast_are_skipped() -> None:
     stored = run(
         content(
             "1 h",
-            algorithms={"rtp": {"type": "rtp"}, "ltp": {"type": "ltp", "period": "5 min"}},
+            algorithms={
+                "rtp": {"type": "real_time_presence"},
+                "ltp": {"type": "long_term_presence", "period": "5 min"},
+            },
             metrics={"score": {"type": "rtp_score", "of": "rtp", "reference": "ltp"}},
         )
     )
@@ -259,7 +262,7 @@ def test_forecasts_are_used_if_an_algorithm_has_no_track() -> None:
     stored = run(
         content(
             metrics={"score": {"type": "rtp_score", "of": "ltp", "period": "30 min"}},
-            algorithms={"ltp": {"type": "ltp", "period": "30 min"}},
+            algorithms={"ltp": {"type": "long_term_presence", "period": "30 min"}},
         )
     )
     # Of the first period nothing was known.
@@ -318,7 +321,7 @@ def test_a_window_ignores_earlier_steps() -> None:
 
 
 def test_hours_of_the_week_are_compared_one_by_one() -> None:
-    week = {"type": "ltp", "estimator": "sighting_share", "by": "hour_of_week"}
+    week = {"type": "long_term_presence", "estimator": "sighting_share", "by": "hour_of_week"}
     stored = run(
         content(
             algorithms={"week": week},

@@ -79,7 +79,7 @@ STAND_INS: dict[str, dict[str, type[Component]]] = {
     "sight": {"line_of_sight": LineOfSight},  # defaults that every scenario has
     "drive": {"differential": Differential},
     "right_of_way": {"listed": Listed},
-    "floorplan": {"houseexpo": File, "he": File, "empty": Empty},
+    "floorplan": {"houseexpo": File, "empty": Empty},
     "behavior": {"drift": Drift, "tour": Tour},
     "algorithm": {"count": Count, "smooth": Smooth},
     "metric": {"tally": Tally},

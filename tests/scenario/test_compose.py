@@ -36,9 +36,6 @@ BASE: dict[str, Any] = {
          {"type": "empty", "cell": 0.1, "width": 3}),
         (["floorplan.type=empty", "floorplan.path=x"], "floorplan",
          {"type": "empty", "cell": 0.1, "path": "x"}),
-        (["floorplan.type=he"], "floorplan", {**BASE["floorplan"], "type": "he"}),
-        (["floorplan.path=x", "floorplan.type=he"], "floorplan",
-         {**BASE["floorplan"], "type": "he", "path": "x"}),
         (["users.ana=null"], "users", {"ben": "drift"}),
         (["users=null"], "users", None),
         (["users.ana.type=drift", "users.ben=tour"], "users",
@@ -117,7 +114,7 @@ def test_files_extend_files(tmp_path: Path) -> None:
 
 
 def test_extended_file_can_change_a_type(tmp_path: Path) -> None:
-    write(tmp_path, base="floorplan: {type: he, path: plan.json, cell: 0.1}")
+    write(tmp_path, base="floorplan: {type: houseexpo, path: plan.json, cell: 0.1}")
     write(tmp_path, home="extends: base.yaml\nfloorplan: {type: empty, width: 3}")
 
     assert {"type": "empty", "cell": 0.1, "width": 3} == compose(tmp_path / "home.yaml").data[
@@ -142,7 +139,7 @@ def test_class_that_stays_the_same_is_not_imported(
 def test_text_keeps_the_folder_of_the_file_it_came_from(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write(tmp_path / "a", base="floorplan: {type: he, path: plan.json}\nname: x")
+    write(tmp_path / "a", base="floorplan: {type: houseexpo, path: plan.json}\nname: x")
     write(tmp_path / "b", home="extends: ../a/base.yaml\nname: y")
     monkeypatch.chdir(tmp_path)
     data = compose("b/home.yaml", ["floorplan.note=z"]).data

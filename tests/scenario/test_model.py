@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("stand_ins")
 
 HOME = """\
 simulation: {start: 2026-01-05, duration: {days: 30}, step: 1 s, seed: 4}
-floorplan: {type: he, path: plan.json}
+floorplan: {type: houseexpo, path: plan.json}
 users:
   ana: {type: tour, radius: 30 cm, stops: [kitchen, hall]}
   ben: {behaviors: [drift, {type: tour, dwell: 1 h}]}

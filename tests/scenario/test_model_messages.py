@@ -116,7 +116,8 @@ def test_what_a_file_broke_in_the_one_that_it_extends_names_both(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("low.yaml").write_text(
-        "simulation: {duration: {days: 1}}\nfloorplan: bundled\nalgorithms:\n  ltp: {}\n"
+        "simulation: {duration: {days: 1}}\nfloorplan: bundled\nalgorithms:\n"
+        "  ltp: {type: long_term_presence}\n"
     )
     Path("high.yaml").write_text(
         "extends: low.yaml\nalgorithms:\n  ltp:\n    interval: 0.9\n    by: hour_of_week\n"

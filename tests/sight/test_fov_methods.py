@@ -2,7 +2,6 @@
 
 import gc
 import tracemalloc
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,9 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
 from fleet2d.kernels import SUB, Bool, Reach
-from fleet2d.sight import fov
-from fleet2d.sight.fov import FieldOfView, Flashlight, LineOfSight, VisibilityPolygon
+from fleet2d.sight import cached_fov
+from fleet2d.sight.cached_fov import Flashlight, VisibilityPolygon
+from fleet2d.sight.fov import FieldOfView, LineOfSight
 
 POINTS = 300
 
@@ -28,14 +28,13 @@ def home() -> Home:
     return Home(fleet2d.load_floorplan(flat_path()))
 
 
-def exact_methods(folder: Path) -> list[FieldOfView]:
+def exact_methods() -> list[FieldOfView]:
     """The methods that answer for any point."""
     return [
         LineOfSight(),
         VisibilityPolygon(),
         VisibilityPolygon(keep=1),
         VisibilityPolygon(precompute="all"),
-        VisibilityPolygon(precompute="file", path=folder),
     ]
 
 
@@ -55,10 +54,10 @@ def some_reaches() -> list[Reach]:
     return [Reach(0, 3000**2, 1229), Reach(200**2, 6000**2, 3000), Reach(0, 10**10, 4096)]
 
 
-def test_methods_agree_on_every_point(home: Home, tmp_path: Path) -> None:
+def test_methods_agree_on_every_point(home: Home) -> None:
     rng = np.random.default_rng(6)
     low, high = (0, 0), (SUB * home.plan.lattice.columns, SUB * home.plan.lattice.rows)
-    methods = exact_methods(tmp_path)
+    methods = exact_methods()
     for method in methods:
         method.start(home)
     seen = 0
@@ -75,14 +74,14 @@ def test_methods_agree_on_every_point(home: Home, tmp_path: Path) -> None:
     assert seen > 1000
 
 
-def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home, tmp_path: Path) -> None:
+def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home) -> None:
     flashlight = Flashlight()
     rows, columns = np.indices(home.plan.free.shape)
     centres = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.int64) * SUB + 33
     for pose in some_poses(home, 6):
         for reach in some_reaches():
             expected = LineOfSight().cells(home, *pose, reach)
-            for method in (*exact_methods(tmp_path), flashlight):
+            for method in (*exact_methods(), flashlight):
                 assert np.array_equal(expected, method.cells(home, *pose, reach)), method
             in_view = flashlight.sees(home, *pose, reach, centres)
             assert np.array_equal(expected.ravel(), in_view)
@@ -100,7 +99,7 @@ def test_flashlight_stays_within_its_memory_and_gives_the_same_results(
     for pose in (*poses, *poses[:5]):
         expected = large.cells(home, *pose, reach)
         with monkeypatch.context() as limited:
-            limited.setattr(fov, "MEMORY_BYTES", 10_000)
+            limited.setattr(cached_fov, "MEMORY_BYTES", 10_000)
             assert np.array_equal(expected, small.cells(home, *pose, reach))
         assert small.cache_size[1] <= 10_000
     assert 1 <= small.cache_size[0] < large.cache_size[0] <= len(set(poses))
@@ -122,49 +121,9 @@ def test_every_method_follows_a_door() -> None:
             assert [is_open] == method.visible(home, *eye.tolist(), point[None]).tolist(), method
 
 
-def test_file_is_written_once_and_read_by_others(home: Home, tmp_path: Path) -> None:
-    folder = tmp_path / "shared" / "regions"
-    first = VisibilityPolygon(precompute="file", path=folder)
-    first.start(home)
-    (file,) = folder.iterdir()
-    before = file.stat().st_mtime_ns, file.read_bytes()
-    second = VisibilityPolygon(precompute="file", path=folder)
-    second.start(home)
-
-    assert before == (file.stat().st_mtime_ns, file.read_bytes())
-    assert isinstance(second._regions.right, np.memmap)  # type: ignore[union-attr]
-    other = Home(fleet2d.load_floorplan())
-    second.start(other)
-    assert 2 == len(list(folder.iterdir()))
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda file: file.write_bytes(b""),
-        lambda file: file.write_bytes(b"nonsense" * 100),
-        lambda file: file.write_bytes(file.read_bytes()[:5000]),
-        lambda file: np.save(file, np.zeros(5000)),
-        lambda file: np.save(file, np.load(file)[:-2]),
-    ],
-    ids=["empty", "other", "cut off", "of floats", "too short"],
-)
-def test_damaged_file_is_an_error_that_tells_what_to_do(
-    home: Home, tmp_path: Path, damage: Any
-) -> None:
-    VisibilityPolygon(precompute="file", path=tmp_path).start(home)
-    (file,) = tmp_path.iterdir()
-    damage(file)
-
-    with pytest.raises(InputError, match="remove it"):
-        VisibilityPolygon(precompute="file", path=tmp_path).start(home)
-
-
 @pytest.mark.parametrize(
     ("settings", "why"),
     [
-        ({"type": "visibility_polygon", "precompute": "file"}, "give 'path'"),
-        ({"type": "visibility_polygon", "path": "here"}, "give 'path'"),
         ({"type": "visibility_polygon", "precompute": "al"}, "visited"),
         ({"type": "visibility_polygon", "keep": 0}, "keep"),
         ({"type": "flash_light"}, "did you mean 'flashlight'"),

@@ -11,7 +11,7 @@ from tests.scenes import OWN, scenario
 import fleet2d
 from fleet2d.configuration import components
 from fleet2d.scenario.schema import schema
-from fleet2d.sight.perception_error import Outliers
+from fleet2d.sight.built_in_errors import Outliers
 
 ERRORS = OWN.replace("own_components", "own_errors")
 

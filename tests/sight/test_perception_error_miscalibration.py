@@ -4,7 +4,7 @@ import numpy as np
 from tests.sight.sightings import sightings
 
 from fleet2d.configuration.components import lookup
-from fleet2d.sight.perception_error import Miscalibration
+from fleet2d.sight.built_in_errors import Miscalibration
 
 
 def test_it_is_found_by_its_name() -> None:

@@ -10,7 +10,7 @@ from tests.sight.sightings import sightings
 import fleet2d
 from fleet2d.configuration.components import lookup
 from fleet2d.errors import Fleet2DError
-from fleet2d.sight.perception import TakenFor
+from fleet2d.sight.built_in_errors import TakenFor
 
 MANY = 20_000
 

@@ -55,7 +55,7 @@ SCENARIO = {
     "simulation": {"duration": "2 h", "start": "2026-01-05T17:00", "seed": 4},
     "users": {"ana": None, "müller": {"type": "routine"}, "مريم": {"type": "routine"}},
     "robots": {"astro": None, "ロボ": {"type": "patrol", "camera": {"range": [0, 4.5]}}},
-    "algorithms": {"ltp": None, "присутствие": {"type": "ltp"}},
+    "algorithms": {"ltp": None, "присутствие": {"type": "long_term_presence"}},
     "metrics": {"ltp_error": {"of": "присутствие"}, "sightings": {}},
     "floorplan": {"layers": {"explored": {}, "स्थान": {"fill": 1}}, "type": "bundled"},
     "artifacts": {"learned": True},

@@ -15,7 +15,7 @@ from tests.studies.scenes import SPEED, CountingExecutor, base, digests, run, sm
 from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
-from fleet2d.studies import design, directory, driver, results, storage
+from fleet2d.studies import design, driver, plan, results, storage
 from fleet2d.studies.executors import LocalExecutor, SerialExecutor
 from fleet2d.studies.plan import Changed
 from fleet2d.studies.reader import open_study
@@ -163,7 +163,7 @@ def test_a_part_that_grows_large_is_followed_by_another(
 def test_a_data_set_of_many_slices_is_the_same(
     copied: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(directory, "SLICE_ROWS", 4)
+    monkeypatch.setattr(plan, "SLICE_ROWS", 4)
     more = small(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=4, **ROWS)
     _, study = run(more, copied)
     stored = pq.ParquetFile(copied / "variants.parquet")

@@ -70,17 +70,8 @@ def pa_rows(study: Study, variant: int):  # type: ignore[no-untyped-def]
     return study.arrow("room_share").to_table(filter=pc.field("variant") == variant)
 
 
-def test_pandas_reads_some_variants_and_columns(study: Study) -> None:
-    frame = study.pandas("room_share", variants=[1, 4], columns=["variant", "room"])
-    assert ({1, 4}, ["variant", "room"]) == (set(frame["variant"]), list(frame.columns))
+def test_variants_are_a_pandas_frame_too(study: Study) -> None:
     assert 6 == len(study.pandas())
-
-
-def test_duckdb_joins_tables_and_variants(study: Study) -> None:
-    rows = study.duckdb().sql(
-        f'select "{SPEED}", count(*) from room_share join variants using (variant) group by 1'
-    )
-    assert {0.3, 0.6} == {speed for speed, _ in rows.fetchall()}
 
 
 def test_any_parquet_reader_reads_it(study: Study) -> None:
@@ -185,12 +176,6 @@ def test_a_summary_has_a_row_for_each_value(study: Study) -> None:
     table = study.summary(SIGHTINGS, [SPEED])
     assert [0.3, 0.6] == table[SPEED].to_list()
     assert (table["low"] <= table["mean"]).all()
-
-
-def test_effects_of_an_axis_add_up_to_nothing(study: Study) -> None:
-    table = study.effects(SIGHTINGS)
-    assert 0 == pytest.approx(table["effect"].sum())
-    assert ["0.3", "0.6"] == table["value"].to_list()
 
 
 def test_shares_of_the_variance_are_shares(study: Study) -> None:

@@ -56,7 +56,7 @@ def test_a_report_is_one_page_with_its_figures(study: Study, page: Path, tmp_pat
     assert "http" not in text.replace("http://www.w3.org", "")
     figures = {path.stem for path in (page.parent / "figures").iterdir()}
     assert {"compare-1", "compare-1-home", "sightings_ana-means"} <= figures
-    assert {"sightings_ana-distribution", "room_share_ana_kitchen_0-time"} <= figures
+    assert "room_share_ana_kitchen_0-time" in figures
     assert "sightings_ana-robots_astro_speed-dwell" in figures
     assert text == write_report(study, tmp_path / "again").read_text()
     for path in page.parent.rglob("*.*"):
@@ -93,15 +93,10 @@ def test_homes_of_long_names_have_short_ones_that_are_listed(page: Path) -> None
     assert f"<td class=text>…long_a</td><td class=text>{LONG}a</td>" in text
 
 
-def test_tables_are_files_of_csv_and_latex(page: Path) -> None:
+def test_tables_are_files_of_csv(page: Path) -> None:
     table = pl.read_csv(page.parent / "tables/compare-2.csv")
     assert [SPEED, "dwell", "mean", "reference", "difference"] == table.columns[:5]
     assert {"p", "p_holm", "effect_size", "verdict", "n_home"} <= set(table.columns)
-    latex = (page.parent / "tables/compare-2.tex").read_text()
-    assert r"\begin{tabular}{ll" in latex
-    assert r"95\% interval" in latex
-    assert re.search(r"[^\\]&", latex)
-    assert not re.search(r"(?<!\\)_", latex)
 
 
 def test_p_values_are_corrected_over_all_comparisons(study: Study, page: Path) -> None:

@@ -8,13 +8,10 @@ from tests.studies.scenes import SPEED, CountingExecutor, base, small
 from tests.thorough import THOROUGH, some
 
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
-from fleet2d.studies.axes import Parameter
 from fleet2d.studies.driver import check_study
 from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor
-from fleet2d.studies.simulator import StagedRun
 from fleet2d.studies.tuning import (
     TRIALS,
-    TrialJob,
     TrialTask,
     TuneResult,
     tune,
@@ -39,7 +36,7 @@ PATROL = {"astro": {"type": "patrol", "dwell": 0, "speed": 0.2}}
 def search(**keys: Any) -> dict[str, Any]:
     settings = {
         "search": {"speed": {"key": SPEED, "low": 0.2, "high": 1.0}},
-        "objectives": {"distance.astro": "maximize"},
+        "objective": {"distance.astro": "maximize"},
         "trials": 6,
         "held_out": {"radius": [0.15]},
         **keys,
@@ -54,7 +51,7 @@ def search(**keys: Any) -> dict[str, Any]:
 
 
 def tuned(tmp_path: Path, executor: Any = None, **keys: Any) -> TuneResult:
-    options = {name: keys.pop(name) for name in ("changed", "storage") if name in keys}
+    options = {name: keys.pop(name) for name in ("changed",) if name in keys}
     workers = keys.pop("workers", 1)
     return tuned_study(search(**keys), tmp_path / "tune", executor, workers, **options)
 
@@ -69,7 +66,7 @@ def tuned_study(
 
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
     result = tuned(tmp_path)
-    assert 0.2 <= result.settings["tuned"][SPEED] <= 1.0
+    assert 0.2 <= result.settings[SPEED] <= 1.0
     (row,) = result.held_out.paired("distance.astro", {"setting": "base"}).to_dicts()
     assert row["difference"] > 0
     assert {0.15} == set(result.held_out.variants["radius"])
@@ -94,51 +91,6 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     assert [] == again.trials
 
 
-def test_what_does_badly_is_given_up_at_simulated_times(tmp_path: Path) -> None:
-    spy = Spy()
-    result = tuned(tmp_path, spy, trials=12, prune_at=["1 min", "2 min"])
-    assert result.trials["pruned"] > 0
-    assert 12 == result.trials["pruned"] + result.trials["complete"]
-    assert {60.0, 120.0, None} == {task.until_s for task in spy.trials}
-
-
-def test_what_goes_on_is_not_begun_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    starts = []
-
-    class Counted(StagedRun):
-        def __init__(self, scenario: Any) -> None:
-            starts.append(scenario)
-            super().__init__(scenario)
-
-    monkeypatch.setattr("fleet2d.studies.tuning.StagedRun", Counted)
-    spy = Spy()
-    tuned(tmp_path, spy, trials=8, prune_at=["1 min", "2 min"])
-    runs = {(task.trial, task.index) for task in spy.trials}
-    assert len(runs) == len(starts) < len(spy.trials)
-
-
-def test_a_run_that_goes_on_comes_to_what_one_from_the_start_does() -> None:
-    checked = check_study(search())
-    parameters = {"speed": Parameter(key=SPEED, low=0.2, high=1.0)}
-    objectives = ("distance.astro", "sightings.ana")
-
-    def answers(*stages: float | None) -> list[Any]:
-        job = TrialJob(checked.plan.design, parameters, objectives)
-        return [job(TrialTask(0, 0, "", "", 0, {"speed": 0.5}, stage)) for stage in stages]
-
-    minute_1, minute_2, end = answers(60.0, 120.0, None)
-    assert [minute_2] == answers(120.0)
-    assert [end] == answers(None)
-    assert minute_1 != minute_2
-
-
-def test_several_objectives_end_in_several_settings(tmp_path: Path) -> None:
-    objectives = {"distance.astro": "maximize", "sightings.ana": "maximize"}
-    result = tuned(tmp_path, objectives=objectives)
-    assert all(name.startswith("trial ") for name in result.settings)
-    assert all(len(values) == 2 for values in result.values.values())
-
-
 @pytest.mark.slow
 def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
     assert 3 == tuned(tmp_path, LocalExecutor(1), trials=3).trials["complete"]
@@ -158,7 +110,7 @@ def parameters(tmp_path: Path) -> list[tuple[Any, ...]]:
 @pytest.mark.slow
 def test_trials_are_the_same_with_any_number_of_workers(tmp_path: Path) -> None:
     """Each worker that became free asked for a trial, so that their number decided on it."""
-    keys = {"trials": 6, "batch": 3, "prune_at": ["1 min", "2 min"]}
+    keys = {"trials": 6, "batch": 3}
     tuned(tmp_path / "one", SerialExecutor(), **keys)
     workers = 3 if THOROUGH else 2
     tuned(tmp_path / "several", LocalExecutor(workers), workers=workers, **keys)
@@ -171,9 +123,8 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "base": ({}, {"base": base("3 min", robots=PATROL)}, "base scenario"),
     "replicates": ({}, {"replicates": 1}, "seeds"),
     "search": ({"search": {"speed": {"key": SPEED, "low": 0.2, "high": 0.9}}}, {}, "parameters"),
-    "objectives": ({"objectives": {"distance.ana": "maximize"}}, {}, "the objectives changed"),
-    "direction": ({"objectives": {"distance.astro": "minimize"}}, {}, "the objectives changed"),
-    "prune_at": ({"prune_at": ["1 min"]}, {}, "prune_at changed"),
+    "objective": ({"objective": {"distance.ana": "maximize"}}, {}, "the objective changed"),
+    "direction": ({"objective": {"distance.astro": "minimize"}}, {}, "the objective changed"),
     "seed": ({"seed": 1}, {}, "the seed of the search changed"),
     "batch": ({"batch": 2}, {}, "the batch changed"),
     "sampler": ({"sampler": "RandomSampler"}, {}, "the sampler changed"),
@@ -195,7 +146,7 @@ def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change
         tuned_study(other, tmp_path / "tune")
     spy = Spy()
     result = tuned_study(other, tmp_path / "tune", spy, changed="redo")
-    assert 2 == result.trials["complete"] + result.trials["pruned"]
+    assert 2 == result.trials["complete"]
     assert 2 == len({task.trial for task in spy.trials})
     design = check_study(other).plan.design
     trained = {design.parameters(task.index)["radius"] for task in spy.trials}
@@ -233,25 +184,6 @@ def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Pa
         tuned_study(study, tmp_path / "tune")
 
 
-@pytest.mark.slow
-def test_trials_can_be_stored_in_a_database(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path / 'trials.db'}"
-    first = tuned(tmp_path, trials=3, storage=url)
-    spy = Spy()
-    assert first.settings == tuned(tmp_path, spy, trials=3, storage=url).settings
-    assert [] == spy.trials
-    assert not (tmp_path / "tune" / TRIALS).exists()
-    with pytest.raises(RunDirectoryError, match="the storage changed"):
-        tuned(tmp_path, trials=3)
-
-
-@pytest.mark.parametrize("url", ["nowhere", "nowhere://db", "sqlite:////nowhere/at/all.db"])
-def test_a_database_that_cannot_be_used_is_refused(tmp_path: Path, url: str) -> None:
-    with pytest.raises(InputError, match="give the URL of a database"):
-        tuned(tmp_path, storage=url)
-    assert not (tmp_path / "tune").exists()
-
-
 def test_the_sampler_can_be_chosen(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "import optuna\n"
@@ -262,7 +194,7 @@ def test_the_sampler_can_be_chosen(tmp_path: Path) -> None:
         "        return (distribution.low + distribution.high) / 2\n"
     )
     own = tuned(tmp_path / "own", trials=2, sampler=f"{tmp_path}/mine:Middle")
-    assert {SPEED: 0.6} == own.settings["tuned"]
+    assert {SPEED: 0.6} == own.settings
     sampler = {"type": "QMCSampler", "qmc_type": "halton"}
     assert 5 == tuned(tmp_path / "halton", trials=5, sampler=sampler).trials["complete"]
 
@@ -277,11 +209,7 @@ def test_the_sampler_can_be_chosen(tmp_path: Path) -> None:
         ({"sampler": "TPSampler"}, "did you mean 'TPESampler'"),
         ({"sampler": {"seed": 1}}, "name the type of the sampler"),
         ({"sampler": {"type": "TPESampler", "speed": 1}}, "can't be used.*speed"),
-        ({"prune_at": ["2 min", "1 min"]}, "ascending"),
-        (
-            {"prune_at": ["1 min"], "objectives": {"a": "minimize", "b": "minimize"}},
-            "one objective",
-        ),
+        ({"objective": {"a": "minimize", "b": "minimize"}}, "length 1 or less"),
     ],
 )
 def test_wrong_searches_are_refused(tmp_path: Path, keys: dict[str, Any], message: str) -> None:
@@ -297,15 +225,15 @@ def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
 def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> None:
     """It showed only when all trials had failed."""
     with pytest.raises(
-        ScenarioError, match=r"tune\.objectives\.happiness: no variant has .*'happiness'"
+        ScenarioError, match=r"tune\.objective\.happiness: no variant has .*'happiness'"
     ):
-        tuned(tmp_path, objectives={"happiness": "maximize"}, trials=1)
+        tuned(tmp_path, objective={"happiness": "maximize"}, trials=1)
     assert not (tmp_path / "tune").exists()
 
 
 def test_an_objective_that_no_run_has_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no trial succeeded.*no metric 'distance.happiness'"):
-        tuned(tmp_path, objectives={"distance.happiness": "maximize"}, trials=1)
+        tuned(tmp_path, objective={"distance.happiness": "maximize"}, trials=1)
 
 
 def test_a_copy_of_a_home_is_not_held_out_of_a_search_on_the_home(tmp_path: Path) -> None:

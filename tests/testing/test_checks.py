@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fleet2d import Algorithm, CameraSightings, PerceptionError, RoomDistribution
-from fleet2d.sight.perception_error import Miscalibration, Outliers
+from fleet2d.sight.built_in_errors import Miscalibration, Outliers
 from fleet2d.testing import check_algorithm, check_perception_error
 
 SHARED = [0]

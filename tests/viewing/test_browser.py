@@ -213,8 +213,8 @@ def with_away(rows: list[dict[str, Any]]) -> dict[str, float]:
 
 
 BELIEFS = {
-    "ltp": {"type": "ltp", "period": "6 h"},
-    "rtp": {"type": "rtp", "period": "30 min"},
+    "ltp": {"type": "long_term_presence", "period": "6 h"},
+    "rtp": {"type": "real_time_presence", "period": "30 min"},
     "later": {"type": "belief_table", "period": "2 h", "every": "30 min"},
 }
 
@@ -657,7 +657,7 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         "simulation.duration=1 h",
         seed=4,
         floorplan={"slows": [{"area": area, "speed": 0.5}]},
-        changes=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
+        script=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
     )
     view = "#select=living_room_0&panel=inspect"
     with served(PageData(run)) as address, page_at(browser, address + view) as page:

@@ -8,12 +8,11 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fleet2d.algorithms.evidence import Evidence, Patches, gather
 from fleet2d.algorithms.observations import (
     NOWHERE,
     Activities,
@@ -27,7 +26,6 @@ from fleet2d.algorithms.observations import (
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
-from fleet2d.interactions.answers import AnswerRecord, Answers, Wanted
 from fleet2d.kernels import (
     F64,
     I16,
@@ -43,6 +41,10 @@ from fleet2d.kernels import (
 )
 from fleet2d.runtime.clock import DAY_S, Clock
 from fleet2d.runtime.events import HOME, Event, EventKind
+
+if TYPE_CHECKING:
+    from fleet2d.algorithms.evidence import Evidence, Patches
+    from fleet2d.interactions.answers import AnswerRecord, Answers, Wanted
 
 
 class Blocks:
@@ -341,7 +343,7 @@ class Log:
         self._next_bin = begin + len(bins)
         self._bins.append(begin, self._next_bin, bins)
 
-    def evidence(self, first: int, end: int, known_from: int = 0) -> Evidence:
+    def evidence(self, first: int, end: int, known_from: int = 0) -> "Evidence":
         """Return the evidence of the steps from `first` to `end` - 1.
 
         Bins that begin before `known_from` are as if nobody had looked.
@@ -371,6 +373,8 @@ class Log:
         patch = seen.room_in(self._nearest_patches).astype(np.int64)
         observed = (seen.step, seen.user.astype(np.int64), patch)
         users = self.activities.users
+        from fleet2d.algorithms.evidence import gather  # few algorithms need it
+
         return gather(self.clock, first, self.bin_steps, self.patches, bins, observed, users)
 
     def exposure(self, first: int, end: int) -> I64:
@@ -498,7 +502,7 @@ class History:
         return frozen(Truth.behind(self.observations))
 
     @cached_property
-    def answers(self) -> list[AnswerRecord]:
+    def answers(self) -> "list[AnswerRecord]":
         """The answers of people to robots, and the attitudes after them; for metrics only.
 
         Raises:
@@ -508,7 +512,7 @@ class History:
         return [record for record in self.log.answers if self.first <= record.step < self.end]
 
     @cached_property
-    def answer_models(self) -> Mapping[str, Answers]:
+    def answer_models(self) -> "Mapping[str, Answers]":
         """How each user answers, if any robot wants something of people; for metrics only.
 
         Raises:
@@ -518,7 +522,7 @@ class History:
         return self.log.answer_models
 
     @cached_property
-    def wanted(self) -> list[Wanted]:
+    def wanted(self) -> "list[Wanted]":
         """The requests of robots to people."""
         return [record for record in self.log.wanted if self.first <= record.step < self.end]
 
@@ -546,7 +550,7 @@ class History:
         return frozen(self.log.exposure(self.first, self.end))
 
     @cached_property
-    def evidence(self) -> Evidence:
+    def evidence(self) -> "Evidence":
         """The views of robots, and the users they perceived there, minute by minute.
 
         Raises:

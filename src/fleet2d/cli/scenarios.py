@@ -137,8 +137,7 @@ def components(
         typer.echo(json.dumps([asdict(component) for component in descriptions], indent=2))
         return
     for component in descriptions:
-        names = " or ".join((component.type, *component.aliases))
-        typer.echo(f"{component.kind}: {names}\n    {component.summary}")
+        typer.echo(f"{component.kind}: {component.type}\n    {component.summary}")
         for field in component.fields:
             default = "required" if field.default is None else f"= {field.default or repr('')}"
             typer.echo(f"    {field.name}: {field.type} {default}")

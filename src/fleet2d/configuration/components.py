@@ -438,7 +438,7 @@ def lookup(kind: str, name: str) -> type[Component]:
             cls.type_name = name
             return cls
     known = components(kind)
-    near = did_you_mean(name, [*known, *COMPONENTS.get(kind, ())])
+    near = did_you_mean(name, known)
     raise ScenarioError(
         f"there is no {kind.replace('_', ' ')} {name!r}{near} There are:"
         f" {', '.join(known) or 'none'}; your own is written 'package.module:Class'"
@@ -481,12 +481,6 @@ def _is_there(entry: "EntryPoint") -> bool:
         return importlib.util.find_spec(entry.module) is not None
     except ModuleNotFoundError:
         return False
-
-
-def aliases(kind: str, name: str) -> tuple[str, ...]:
-    """Return the other names of a built-in component."""
-    types = COMPONENTS.get(kind, {})
-    return tuple(word for word in types if word != name and types[word] == types.get(name))
 
 
 def base_of(cls: type[Component]) -> type[Component]:

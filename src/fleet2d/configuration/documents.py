@@ -270,6 +270,17 @@ class Document:
     data: dict[str, Any] = field(default_factory=dict)
     places: dict[Keys, str] = field(default_factory=dict)
 
+    def named(self, location: Location) -> str:
+        """Return the path of a key after its place, if that is known, as errors begin.
+
+        Example:
+            >>> Document(places={("users",): "home.yaml:4"}).named(("users", "bo"))
+            'home.yaml:4: users.bo'
+        """
+        path = ".".join(map(str, location))
+        place = self.place(location)
+        return f"{place}: {path}" if place else path
+
     def place(self, location: Location) -> str:
         """Return where a key is written, or the nearest key around it.
 

@@ -180,10 +180,10 @@ class Basis:
     def may_change(self) -> bool:
         """Whether the home may change during the run."""
         scenario = self.scenario
-        changes = bool(scenario.objects or scenario.changes)
-        changes |= any(user.lights for user in scenario.users.values())
-        if changes or not scenario.script:
-            return changes
+        if scenario.objects or any(user.lights for user in scenario.users.values()):
+            return True
+        if not scenario.script:
+            return False
         from fleet2d.interventions.home import HomeIntervention  # only scripts need it
 
         return any(isinstance(entry.act, HomeIntervention) for entry in scenario.script)

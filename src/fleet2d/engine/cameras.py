@@ -14,7 +14,6 @@ import numpy as np
 
 from fleet2d.algorithms.observations import OBSERVATION, ActivitySense, SightingTable
 from fleet2d.engine.basis import Watcher
-from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.behavior import Actor, SightEvent
 from fleet2d.entities.body import Bodies, poses_of
 from fleet2d.entities.equipment import Drift, Localization
@@ -435,7 +434,9 @@ class Cameras(Watcher):
             newest = newest_of(rows, len(newest))
             if differs:
                 patience = self.rule.patience
-                events = sight_events(rows, self.memory, patience, self.next_step, looked)
+                events = self.sighting_errors.events(
+                    rows, self.memory, patience, self.next_step, looked
+                )
                 end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
         return Look(looked, end, sightings, newest, events, old_memory)
 

@@ -1,6 +1,6 @@
 """Changes of the home during a run: their times and order, and the bodies that they stop.
 
-Known changes wait in a queue by step: those of the scenario, doors by their schedule, doors on the
+Known changes wait in a queue by step: those of scripts, doors by their schedule, doors on the
 way of a body, and doors that close by themselves; so do the steps at which people may switch
 lights. Changes are made before decisions in a step, so they hold for all bodies in it.
 """
@@ -219,20 +219,6 @@ class ChangeQueue:
         """Return the step of the next change; None if there is none."""
         return self._queue[0][0] if self._queue else None
 
-    def declare(self, index: int, change: HomeChange) -> None:
-        """Schedule a change of the scenario.
-
-        Raises:
-            ScenarioError: It has no time, or names something unknown.
-        """
-        if change.at is None:
-            raise ScenarioError(
-                f"changes.{index}: the key 'at' is missing: give the time of the change"
-            )
-        with errors_as(ScenarioError, f"changes.{index}", of=ScenarioError):
-            self.check_names(change)
-        self._put(DueChange(self._step_of(change.at), change, "scenario"))
-
     def ask(self, change: HomeChange, step: int, by: str) -> None:
         """Schedule a change that an algorithm or a script requests.
 
@@ -241,8 +227,6 @@ class ChangeQueue:
         """
         with errors_as(ComponentError, f"{by} requests an impossible change", of=ScenarioError):
             self.check_names(change)
-        if change.at is not None:
-            step = max(step, self._step_of(change.at))
         self._put(DueChange(step, change, by))
 
     def expect(self, row: int, actor: Actor) -> None:

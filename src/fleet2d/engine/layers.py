@@ -2,13 +2,12 @@
 
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.algorithms.evidence import Patches, patches_of, steps_of_bin, whole_rooms
 from fleet2d.algorithms.history import Log
 from fleet2d.artifacts.table import DTYPES, KINDS, Column, time_column
 from fleet2d.configuration.problems import suggest
@@ -39,6 +38,9 @@ from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.camera import TableContext, stack_lenses
 
+if TYPE_CHECKING:
+    from fleet2d.algorithms.evidence import Patches
+
 # Slots of the cache of poses, which holds half as many. A round through a large home has a few
 # thousand poses, a month of going to people ten thousand.
 SLOTS = 1 << 15
@@ -61,7 +63,7 @@ class SeenArea(Watcher):
     def __init__(
         self,
         robot: DecidingActor,
-        patches: Patches,
+        patches: "Patches",
         bodies: Bodies,
         layers: Set[str],
         every: int,
@@ -268,17 +270,16 @@ class LayerBook:
         needs |= {need for behavior in behaviors for need in behavior.needs}
         names = {*needs, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
         self._exposes = "exposure" in needs
-        self._bin_steps = steps_of_bin(self._clock.step_us) if "evidence" in needs else 0
+        self._bin_steps = 0
         self._logged_bins = 0
-        cut, key = (patches_of, "patches") if self._bin_steps else (whole_rooms, "rooms")
-        self._patches: Patches = basis.home.cached((key,), lambda: cut(basis.home.plan))
+        self._patches: Patches | None = None
         self.areas = self._open_areas(basis, names) if names else []
         self._add_seen_layers(scenario, needs)
         self.next_due(0)
 
     def expose(self, step: int, log: Log) -> None:
         """Add the parts of rooms that each robot has had in view before `step` to the log."""
-        if self._bin_steps:
+        if self._patches is not None and self._bin_steps:
             log.bin_steps = self._bin_steps
             log.patches = self._patches
             bins_of_areas = [area.take_bins(step) for area in self.areas]
@@ -318,6 +319,12 @@ class LayerBook:
 
     def _open_areas(self, basis: Basis, names: Set[str]) -> list[SeenArea]:
         """Return the area that each robot with a camera has seen, before the first step."""
+        from fleet2d.algorithms.evidence import patches_of, steps_of_bin, whole_rooms
+
+        if "evidence" in names:
+            self._bin_steps = steps_of_bin(self._clock.step_us)
+        cut, key = (patches_of, "patches") if self._bin_steps else (whole_rooms, "rooms")
+        self._patches = basis.home.cached((key,), lambda: cut(basis.home.plan))
         every = basis.scenario.sight.seen_every
         step_us = self._clock.step_us
         steps = 1 if every is None else whole_steps(every, step_us, "sight.seen_every")

@@ -14,20 +14,21 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fleet2d.algorithms.history import Log
 from fleet2d.configuration.trust import may_run_code, running_code
 from fleet2d.engine.basis import Watcher
-from fleet2d.engine.checkpoint import CheckpointWriter
 from fleet2d.engine.power import follow_charge
 from fleet2d.engine.state import State
-from fleet2d.engine.world import EngineWorld
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame
 from fleet2d.floorplan.home import HomeChanges
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.memory import rare_collections
+
+if TYPE_CHECKING:
+    from fleet2d.engine.checkpoint import CheckpointWriter
 
 # Fewer steps are simulated without a handler for Ctrl-C: they end before a user could press it.
 SHORT = 100
@@ -64,6 +65,8 @@ def intervene(state: State, span: Span) -> None:
     due = state.interventions.next_due()
     if due is None or due > span.first:
         return
+    from fleet2d.engine.world import EngineWorld  # few runs need it
+
     world = EngineWorld(state, span.first)
     for item in state.interventions.take(span.first):
         try:
@@ -271,7 +274,7 @@ class Loop:
     """
 
     def __init__(
-        self, clock: Clock, speedup: float | None, keeper: CheckpointWriter | None
+        self, clock: Clock, speedup: float | None, keeper: "CheckpointWriter | None"
     ) -> None:
         self.pace = Pace(speedup) if speedup else None
         self.has_failed = self._is_stopping = False

@@ -49,7 +49,7 @@ MAX_ROWS = 1 << 16
 REPEATS_PER_ROW = 8
 UNSTORED = (
     "changes of the home are not in the table of events, as the scenario has none: announce them,"
-    " like changes: [{at: 0 s, lights: all, turn: on}]"
+    " like script: [{at: 0 s, lights: all, turn: on}]"
 )
 ROWS_PER_BODY = 128
 

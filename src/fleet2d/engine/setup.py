@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,6 @@ from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras, SightSetup
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.collisions import BlockedWays, Clearance
-from fleet2d.engine.conversations import Conversations
-from fleet2d.engine.encounters import Encounters
 from fleet2d.engine.interrupt import WATCHED_EVENTS, Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
@@ -22,8 +21,6 @@ from fleet2d.engine.power import schedule_failures
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import EventStream, InView, Recall, State
-from fleet2d.engine.world import schedule_script
-from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.home_object import Door
@@ -34,6 +31,11 @@ from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
 from fleet2d.sight.fov import LineOfSight
+
+if TYPE_CHECKING:
+    from fleet2d.engine.conversations import Conversations
+    from fleet2d.engine.encounters import Encounters
+    from fleet2d.engine.yielding import Yielding
 
 
 def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> State:
@@ -49,26 +51,24 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         if any(causes_errors(entry.act, group.owner.name) for entry in scenario.script):
             group.expect_disturbances()
     changes = ChangeQueue(basis)
-    for index, change in enumerate(scenario.changes):
-        with _locate_errors(scenario, f"changes.{index}"):
-            changes.declare(index, change)
     with _locate_errors(scenario, "objects"):
         sensors = Sensors(basis, changes.names)
     recorder = Recorder(basis, cameras, sensors)
     layers = LayerBook(basis)
     learners = Learners(basis)
     interventions = InterventionQueue(clock)
-    conversations = Conversations(basis, interventions)
+    conversations = _conversations(basis, interventions)
     log = _log(basis, cameras, recorder, conversations) if learners.all else None
     names = [*(actor.name for actor in basis.actors), *scenario.objects]
+    yielding = _yielding(basis)
     watchers = [
         Clearance(basis.users, basis.robots),
         BlockedWays(basis),
-        Yielding(basis),
+        *yielding,
         *user_cameras,
         *cameras,
-        Encounters(basis.users, basis.robots),
-        conversations,
+        *_encounters(basis),
+        *conversations,
         Interruptions(basis),
         sensors,
         *layers.areas,
@@ -90,21 +90,57 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         interventions=interventions,
         max_span=scenario.simulation.max_span,
     )
+    state.yielding = next((watcher for watcher in yielding if watcher.is_needed), None)
     for group in [*user_cameras, *cameras]:
         group.owner.in_view = InView(state, group)
     _remember(state, basis)
     state.wait_for(state.requested)
     schedule_failures(state, scenario, clock, seed)
+    if scenario.script:
+        _schedule_script(state, scenario)
+    for name, expectation in scenario.expect.items():
+        with _locate_errors(scenario, f"expect.{name}"):
+            state.expect(scenario, name, expectation, 0)
+    return state
+
+
+def _yielding(basis: Basis) -> "list[Yielding]":
+    """Return what lets robots yield; nothing if bodies are ghosts to each other."""
+    if basis.scenario.simulation.ghosts:
+        return []
+    from fleet2d.engine.yielding import Yielding  # few runs need it
+
+    return [Yielding(basis)]
+
+
+def _encounters(basis: Basis) -> "list[Encounters]":
+    """Return the encounters of people who react to robots; none if nobody does."""
+    if all(user.attention is None for user in basis.users):
+        return []
+    from fleet2d.engine.encounters import Encounters  # few runs need them
+
+    return [Encounters(basis.users, basis.robots)]
+
+
+def _conversations(basis: Basis, interventions: InterventionQueue) -> "list[Conversations]":
+    """Return the conversations; none if neither robots nor people want anything."""
+    scenario = basis.scenario
+    if not scenario.interactions and all(user.answers is None for user in scenario.users.values()):
+        return []
+    from fleet2d.engine.conversations import Conversations  # few runs need them
+
+    return [Conversations(basis, interventions)]
+
+
+def _schedule_script(state: State, scenario: Scenario) -> None:
+    from fleet2d.engine.world import schedule_script  # few runs need it
+
     # Entries that wait for an event come last: another entry may cause the event.
     for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
         path = f"script.{index}"
         errors = PlacementError, ScenarioError
         with _locate_errors(scenario, path), errors_as(None, path, of=errors):
             schedule_script(state, entry, index)
-    for name, expectation in scenario.expect.items():
-        with _locate_errors(scenario, f"expect.{name}"):
-            state.expect(scenario, name, expectation, 0)
-    return state
 
 
 def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
@@ -233,14 +269,16 @@ def _remember(state: State, basis: Basis) -> None:
 
 
 def _log(
-    basis: Basis, cameras: list[Cameras], recorder: Recorder, conversations: Conversations
+    basis: Basis, cameras: list[Cameras], recorder: Recorder, conversations: "list[Conversations]"
 ) -> Log:
     names = [actor.name for actor in basis.actors]
     log = Log(basis.home, basis.clock, names, basis.bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]
     behaviors = [(user.name, behavior) for user in basis.users for behavior in user.behaviors]
     log.untracked = frozenset(name for name, b in behaviors if EventKind.UNKNOWN in b.records)
-    log.answers, log.wanted = conversations.log, conversations.wanted
-    log.answer_models = {basis.users[u].name: each for u, each in conversations.answers.items()}
+    for each in conversations:
+        log.answers = each.log
+        log.wanted = each.wanted
+        log.answer_models = {basis.users[u].name: a for u, a in each.answers.items()}
     log.beliefs = {c.owner.name: c.drift for c in cameras if c.drift is not None}
     return log

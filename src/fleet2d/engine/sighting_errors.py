@@ -119,6 +119,9 @@ class SightingErrors:
     """Changes the sightings of a body in the span of their look, delayed ones included.
 
     Errors of perception come first, then the error of the belief about the body's own pose.
+
+    Attributes:
+        events: Returns the events of changed sightings; see `sight_events`.
     """
 
     def __init__(self, cameras: "Cameras", perceptions: Sequence[Perception | None]) -> None:
@@ -131,6 +134,7 @@ class SightingErrors:
         common = getattr(owner.entity, "perception", None)
         only = "camera" in cameras.names
         self._cameras = []
+        self.events = sight_events
         for name, perception in zip(cameras.names, perceptions, strict=True):
             part = "" if perception is common else ".camera" if only else f".cameras.{name}"
             path = f"{owner.path}{part}.perception.errors"

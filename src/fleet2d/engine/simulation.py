@@ -32,28 +32,16 @@ from fleet2d.artifacts.unfinished import UnfinishedRun
 from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.basis import input_files
-from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.setup import set_up
-from fleet2d.engine.snapshot import (
-    Constants,
-    copy_state,
-    open_snapshot,
-    read_state,
-    save_snapshot,
-    write_state,
-)
 from fleet2d.engine.state import Listener, State
-from fleet2d.engine.world import repeat, request
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Plan, data_of
 from fleet2d.errors import ArtifactError, InputError, ScenarioError, errors_as
-from fleet2d.floorplan.checkup import errors_in
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.native import native_document
 from fleet2d.interventions.intervention import ClockTime, Intervention, parse_when
 from fleet2d.kernels import in_radians
 from fleet2d.runs.run import Run, open_store
@@ -64,6 +52,8 @@ from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
+    from fleet2d.engine.checkpoint import Checkpoint, CheckpointWriter
+    from fleet2d.engine.snapshot import Constants
     from fleet2d.expectations.expectation import Expectation
     from fleet2d.expectations.verdict import Verdict, VerdictEvidence
 
@@ -130,15 +120,28 @@ class Simulation:
         self._state = set_up(self.scenario, self.clock, self.seed, self._store)
         # The scenario's own script repeats its interventions itself.
         outside = [dict(record) for record in interventions if is_from_outside(record)]
-        repeat(self._state, outside)
+        self._repeat(outside)
         self._run: Run | None = None  # set when it is finished
-        self._keeper: CheckpointWriter | None = None
-        if store.directory is not None:
-            settings = scenario.artifacts
-            self._keeper = CheckpointWriter(store, settings, self.clock, self._checkpoint_header)
+        self._keeper = self._open_keeper()
         self._loop = Loop(self.clock, simulation.speedup, self._keeper)
         self._setup_s = 0.0
         self._describe_start(outside)
+
+    def _open_keeper(self) -> "CheckpointWriter | None":
+        """Return what commits rows and writes checkpoints; None: the run is in memory."""
+        if self._store.directory is None:
+            return None
+        from fleet2d.engine.checkpoint import CheckpointWriter
+
+        settings = self.scenario.artifacts
+        return CheckpointWriter(self._store, settings, self.clock, self._checkpoint_header)
+
+    def _repeat(self, records: Sequence[Mapping[str, Any]]) -> None:
+        """Apply interventions from outside that were recorded."""
+        if records:
+            from fleet2d.engine.world import repeat  # few runs need it
+
+            repeat(self._state, records)
 
     def _open_store(self) -> None:
         """Create the run directory, and store the floor plan in it.
@@ -161,6 +164,8 @@ class Simulation:
             raise
 
     def _store_plan(self) -> None:
+        from fleet2d.floorplan.native import native_document  # runs in memory don't need it
+
         plan = self.home.plan
         document = self.home.cached("document", lambda: json.dumps(native_document(plan)))
         self._store.keep(FLOORPLAN_NAME, document)
@@ -564,6 +569,8 @@ class Simulation:
         """
         if self._run is not None:
             raise InputError("the run is finished: nothing can be done to it any more")
+        from fleet2d.engine.world import request  # few runs need it
+
         if request(self._state, act, self.step) and self._keeper is not None:
             self._keeper.update_manifest(self._state)
 
@@ -701,6 +708,8 @@ class Simulation:
                 f"a simulation that stores in {self._store.directory} can't be copied, because both"
                 " would write there: copy a simulation that stores in memory"
             )
+        from fleet2d.engine.snapshot import copy_state  # few runs are copied
+
         twin = self.__class__.__new__(self.__class__)
         twin.__dict__.update(self.__dict__)
         memo[id(self)] = twin
@@ -710,6 +719,8 @@ class Simulation:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the simulation for `pickle`, as another process of this user reads it."""
+        from fleet2d.engine.snapshot import write_state  # few runs are copied
+
         self._check_savable()
         file = io.BytesIO()
         write_state(file, self._state, self._constants)
@@ -740,6 +751,8 @@ class Simulation:
             >>> Simulation.load(file).run().digest == simulation.run().digest
             True
         """
+        from fleet2d.engine.snapshot import save_snapshot  # few runs are saved
+
         self._check_savable()
         save_snapshot(path, self._state, self._constants, self._header(), PURPOSE)
 
@@ -760,10 +773,14 @@ class Simulation:
             ArtifactError: Another user saved the file, it is damaged, or of another version of
                 Fleet2D.
         """
+        from fleet2d.engine.snapshot import open_snapshot  # few runs are saved
+
         return cls._restored(*open_snapshot(path, PURPOSE))
 
     @classmethod
     def _restored(cls, header: Mapping[str, Any], body: BinaryIO) -> Self:
+        from fleet2d.engine.snapshot import read_state  # few runs are saved
+
         simulation = cls(header["scenario"], seed=header["seed"])
         simulation._take(read_state(body, simulation._constants))
         loop = simulation._loop
@@ -788,7 +805,7 @@ class Simulation:
         loop = self._loop
         return {"setup": self._setup_s, "simulate": loop.simulate_s, "save": loop.save_s}
 
-    def _checkpoint_header(self) -> tuple[Constants, dict[str, Any]]:
+    def _checkpoint_header(self) -> "tuple[Constants, dict[str, Any]]":
         return self._constants, {**self._header(), "manifest": self._store.manifest.content()}
 
     @property
@@ -943,7 +960,7 @@ def reopened(
     scenario: Scenario,
     store: RunStore,
     unfinished: UnfinishedRun,
-    checkpoint: Checkpoint | None,
+    checkpoint: "Checkpoint | None",
 ) -> Simulation:
     """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
 
@@ -979,13 +996,15 @@ def reopened(
 def catch_up(simulation: Simulation, interventions: Sequence[Mapping[str, Any]]) -> None:
     """Repeat the interventions that were requested after the checkpoint of the run."""
     outside = [record for record in interventions if is_from_outside(record)]
-    repeat(simulation._state, outside[len(simulation._state.interventions.requests) :])
+    simulation._repeat(outside[len(simulation._state.interventions.requests) :])
 
 
 def flaws_of(simulation: Simulation) -> Sequence[str]:
     """Return the flaws of a home from a file; other homes have been checked."""
     if not simulation.scenario.floorplan.files():
         return ()
+    from fleet2d.floorplan.checkup import errors_in  # runs don't need it
+
     home = simulation.home
     radii = tuple(robot.radius for robot in simulation.scenario.robots.values())
     return home.cached(("errors", radii), lambda: errors_in(home, radii))

@@ -38,7 +38,6 @@ from fleet2d.floorplan.plan import FloorPlan, Room
 from fleet2d.floorplan.space import Space
 from fleet2d.inputs import open_input
 from fleet2d.kernels import Mesh, Timelines
-from fleet2d.routines.persona import Persona
 from fleet2d.runtime.events import Event
 from fleet2d.runtime.local_time import LocalTime, Zone
 from fleet2d.storage.files import partial_file
@@ -52,7 +51,7 @@ _DTYPES = {type(np.dtype(scalar)) for scalar in _SCALARS}
 _SHARED = frozenset(
     {
         *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, KeySegment, Mesh, Note),
-        *(Persona, PlacedObject, Polygon, RandomWalk, Room, SightingTable, Space, TableSpec, Track),
+        *(PlacedObject, Polygon, RandomWalk, Room, SightingTable, Space, TableSpec, Track),
         UsePlace,
         *(datetime, timedelta, LocalTime, Zone, *_DTYPES),
     }
@@ -66,6 +65,7 @@ _SHARED_NAMES = frozenset(
         "fleet2d.routines.activity.Activity",
         "fleet2d.routines.activity.DurationDistribution",
         "fleet2d.routines.distributions.Distribution",
+        "fleet2d.routines.persona.Persona",
     }
 )
 

@@ -20,7 +20,6 @@ from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
-from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
@@ -31,6 +30,7 @@ from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from fleet2d.engine.expectations import RunExpectations
+    from fleet2d.engine.yielding import Yielding
     from fleet2d.entities.keep_out import SleepMemory
     from fleet2d.entities.robots.policy import SightingMemory
     from fleet2d.expectations.expectation import Expectation
@@ -231,7 +231,7 @@ class State:
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
     steering: list[Watcher] = field(init=False)
-    yielding: Yielding | None = field(init=False)
+    yielding: "Yielding | None" = None
     _situation: Situation | None = None  # the newest one
 
     def __getstate__(self) -> dict[str, object]:
@@ -243,7 +243,6 @@ class State:
         self.notes_emitted = [0] * len(self.actors)
         self.capacity = capacity_of(len(self.actors))
         self.steering = [watcher for watcher in self.watchers if watcher.steered]
-        self.yielding = self.find(Yielding)
 
     def find(self, kind: type[W]) -> W | None:
         """Return the watcher of a kind; None if the run needs none."""

@@ -208,8 +208,11 @@ def _parts(plan: FloorPlan) -> Iterator[Finding]:
             yield _found("parts", "wrong", text, part.representative_point(), part, rest)
     small = [part for part in parts if part.area < PART_M2]
     if small:
-        parts_text = f"{counted(len(small), 'part')} smaller than {PART_M2:g} m2"
-        text = f"nothing joins {parts_text} to the rest,{' the largest' * (len(small) > 1)}"
+        text = (
+            f"nothing joins {counted(len(small), 'part')} smaller than {PART_M2:g} m2 to the rest,"
+        )
+        if len(small) > 1:
+            text += " the largest"
         shape = shapely.MultiPolygon(small)
         yield _found("parts", "odd", text, small[0].representative_point(), shape)
 

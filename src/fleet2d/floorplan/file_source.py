@@ -9,7 +9,6 @@ from fleet2d.bounds import FILE_BYTES, Bound
 from fleet2d.floorplan.files import read_file
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.storage.apart import apart
 
 
 class FileSource(FloorPlanSource):
@@ -42,6 +41,8 @@ class FileSource(FloorPlanSource):
         contents = self.contents()
         if sum(map(len, contents.values())) < self.small_bytes:
             return self.read(contents)
+        from fleet2d.storage.apart import apart  # most homes are small
+
         return apart(self.path, self.read, contents)
 
     def contents(self) -> dict[Path, bytes]:

@@ -4,11 +4,11 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
 from functools import lru_cache, partial
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 import shapely
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic import Field
 from shapely import Polygon
 
 from fleet2d.configuration.components import Settings
@@ -385,26 +385,10 @@ def format_moment(moment: datetime | timedelta) -> str:
     return moment.isoformat() if isinstance(moment, datetime) else format_duration(moment)
 
 
-Moment = Annotated[
-    datetime | timedelta,
-    BeforeValidator(parse_moment),
-    PlainSerializer(format_moment),
-    WithJsonSchema(
-        {
-            "description": "a local time like 2026-01-07T14:00, or the time since the start like"
-            " '2 d 14 h'",
-            "type": ["string", "number", "object"],
-            "examples": ["2026-01-07T14:00", "2 d"],
-        }
-    ),
-]
-
-
 class HomeChange(Settings):
     """One change of the home: exactly one of open, shut, lock, unlock, move, room, lights.
 
     Attributes:
-        at: Time of the change; left out by an algorithm or a script: now.
         open: The door that is opened.
         shut: The door that is shut.
         lock: The door that is locked.
@@ -420,11 +404,10 @@ class HomeChange(Settings):
     Example:
         >>> HomeChange(shut="bath_door").verb
         'shut'
-        >>> HomeChange(at="2 d", room="office_0", type="bedroom").at
-        datetime.timedelta(days=2)
+        >>> HomeChange(room="office_0", type="bedroom").target
+        'office_0'
     """
 
-    at: Moment | None = None
     open: str | None = None
     shut: str | None = None
     lock: str | None = None

@@ -186,8 +186,7 @@ def advise_type(name: str) -> str:
     'to read a file write {type: image, path: sketch.png}'
     """
     path = named_path(name)
-    is_type = path.suffix == "" or ":" in name  # then the formats needn't be imported
-    if is_type or path.suffix.lower() not in (*plan_suffixes(), *IMAGES):
+    if path.suffix.lower() not in (*plan_suffixes(), *IMAGES):
         return ""
     kinds = _types_by_suffix(path)
     if path.is_file() and len(kinds) > 1:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 import shapely
@@ -34,13 +34,6 @@ from fleet2d.floorplan.placed_objects import (
     find_named,
     number_objects,
 )
-from fleet2d.floorplan.rooms.division import (
-    Passages,
-    RegionKind,
-    divide,
-    search_passages,
-    select_doorways,
-)
 from fleet2d.floorplan.rooms.doorways import (
     DoorLine,
     Doorway,
@@ -49,7 +42,7 @@ from fleet2d.floorplan.rooms.doorways import (
     name_doorways,
     room_links,
 )
-from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, room_type
+from fleet2d.floorplan.rooms.room import NO_ROOM, LabelledRegion, Room, assign_rooms, room_type
 from fleet2d.kernels import (
     I16,
     I64,
@@ -61,6 +54,9 @@ from fleet2d.kernels import (
     strictly_inside,
 )
 from fleet2d.runtime.determinism import sum_in_order
+
+if TYPE_CHECKING:
+    from fleet2d.floorplan.rooms.division import Passages, RegionKind
 
 T = TypeVar("T")
 
@@ -227,7 +223,7 @@ class FloorPlan:
         source: str = "",
         entrance: tuple[float, float] | None = None,
         doorways: Sequence[DoorLine] | None = (),
-        regions_are: RegionKind = "exact",
+        regions_are: "RegionKind" = "exact",
         objects: Sequence[PlacedObject] = (),
         no_go: Sequence[Polygon] = (),
         glass: Sequence[Polygon] = (),
@@ -277,7 +273,9 @@ class FloorPlan:
         polygons, segments, door_notes = fit_lines(lattice, polygons, lines)
         passages: Passages | None = None
         if doorways is None or regions_are != "exact":
-            polygons, passages = search_passages(lattice, polygons, regions_are)
+            from fleet2d.floorplan.rooms import division  # files that say where rooms are don't
+
+            polygons, passages = division.search_passages(lattice, polygons, regions_are)
         polygons = canonical_order(polygons)
         mesh = build_mesh(polygons, lattice.columns, lattice.rows)
         cells: Bool = rasterize_cells(mesh, lattice.rows, lattice.columns) >= 0
@@ -286,13 +284,16 @@ class FloorPlan:
                 f"the free space of {name} holds no cell of {cell:g} m: choose a smaller"
                 f" floorplan.cell, and check that the file is in metres{unit_hint(lattice.size)}"
             )
-        room_of_cell, rooms, room_notes = divide(
-            lattice, polygons, mesh, cells, regions, regions_are, passages
-        )
+        if passages is None:
+            room_of_cell, rooms, room_notes = assign_rooms(lattice, cells, regions)
+        else:
+            room_of_cell, rooms, room_notes = division.divide(
+                lattice, polygons, mesh, cells, regions, regions_are, passages
+            )
         found = list(zip(lines, segments, strict=True))
         fitted = [(line, at) for line, at in found if at is not None]
         if doorways is None and passages is not None:
-            fitted, polygons = select_doorways(
+            fitted, polygons = division.select_doorways(
                 lattice, polygons, room_of_cell, passages, regions_are
             )
             polygons = canonical_order(polygons)

@@ -5,7 +5,6 @@ from typing import Any, Literal
 
 from fleet2d.entities.power import PowerState
 from fleet2d.entities.sensor import SensorFault
-from fleet2d.floorplan.home import HomeChange
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions import algorithms, bodies, home, robots, steering
 from fleet2d.sight.perception import Perception
@@ -175,9 +174,6 @@ class Inject(robots.Inject):
         camera: str | None = ...,
         heading_deg: Angle | None = ...,
     ) -> None: ...
-
-class ChangeHome(home.ChangeHome):
-    def __init__(self, change: HomeChange | Mapping[str, Any]) -> None: ...
 
 class OpenDoor(home.OpenDoor):
     def __init__(self, door: str) -> None: ...

@@ -31,26 +31,6 @@ class HomeIntervention(Intervention):
         world.change(self.home_change)
 
 
-class ChangeHome(HomeIntervention):
-    """Change the home like an entry of `changes`.
-
-    Attributes:
-        change: The change, as in `changes` of a scenario.
-
-    Example:
-        >>> ChangeHome({"shut": "bath_door"}).change.shut
-        'bath_door'
-    """
-
-    subject = "change"
-    change: HomeChange
-
-    @property
-    def home_change(self) -> HomeChange:
-        """The change."""
-        return self.change
-
-
 class DoorIntervention(HomeIntervention):
     """Base of interventions on a door.
 

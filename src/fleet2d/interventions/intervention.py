@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import partial
-from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, Self
 
@@ -168,29 +167,6 @@ class Intervention(Component):
 
     # Pydantic passes no context through a constructor of its own that is not marked like this.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
-
-    @classmethod
-    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        """Show the arguments of the constructor to `help` and interactive sessions."""
-        super().__pydantic_init_subclass__(**kwargs)
-        cls._sign()
-
-    @classmethod
-    def model_rebuild(cls, **kwargs: Any) -> bool | None:
-        """Build the validators, after which Pydantic shows arguments of its own."""
-        result = super().model_rebuild(**kwargs)
-        cls._sign()
-        return result
-
-    @classmethod
-    def _sign(cls) -> None:
-        needed = [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in cls.needed()]
-        others = [
-            Parameter(name, Parameter.KEYWORD_ONLY, default=field.default)
-            for name, field in cls.model_fields.items()
-            if not field.is_required()
-        ]
-        cls.__signature__ = Signature([*needed, *others])
 
     @classmethod
     def needed(cls) -> list[str]:

@@ -278,7 +278,7 @@ class RtpScore(Metric):
     - with `reference`, over the bins for which that algorithm has an output: reference_log_loss,
       reference_brier, reference_top_1 of its belief, and reference_skill: 1 - log_loss /
       reference_log_loss. The usual reference is long-term presence of the hour of the week,
-      `{type: rtp, model: hour_of_week}`.
+      `{type: real_time_presence, model: hour_of_week}`.
 
     Its period must be that of the algorithm. Stored per period and user: bins and sums of scores
     by class of gaps. The result has the means over the run, per user. Minutes of a day depend on

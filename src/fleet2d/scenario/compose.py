@@ -115,8 +115,7 @@ def _load(
                 raise ScenarioError(f"expected the path of a YAML file, got {parent}")
             result = merge(result, _load(str(parent), folder, chain, sizes))
     except ScenarioError as error:
-        place = document.place(("extends",))
-        raise ScenarioError(f"{place}{': ' * bool(place)}extends: {error}") from error
+        raise ScenarioError(f"{document.named(('extends',))}: {error}") from error
     # A scenario doesn't inherit the name of the one that it extends: runs are stored under it.
     result.places.pop(("name",), None)
     result.data.pop("name", None)
@@ -266,9 +265,9 @@ def _refuse_unknown_deletions(base: Document, change: Document) -> None:
         names = base.data.get(section) or {}
         for name, value in entries.items() if isinstance(entries, Mapping) else ():
             if value is None and name not in names:
-                place = change.place((section, name))
+                key = change.named((section, name))
                 raise ScenarioError(
-                    f"{place}{': ' * bool(place)}{section}.{name}: null deletes an entry, and "
+                    f"{key}: null deletes an entry, and "
                     f"there is none of this name{suggest(name, names)}"
                 )
 

@@ -43,8 +43,6 @@ from fleet2d.entities.entity import Robot, User
 from fleet2d.entities.home_object import HomeObject
 from fleet2d.entities.right_of_way import Listed, RightOfWay
 from fleet2d.errors import errors_as
-from fleet2d.floorplan.home import HomeChange
-from fleet2d.floorplan.load import advise_type
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
@@ -85,7 +83,11 @@ def _parse_local_time(value: Any) -> Any:
 def _refuse_file_as_type(value: Any) -> Any:
     """Refuse the name of a file in place of a floor plan's type, with advice on how to read it."""
     name = value.get("type") if isinstance(value, Mapping) else value
-    if isinstance(name, str) and (advice := advise_type(name)):
+    if not isinstance(name, str) or Path(name).suffix == "" or ":" in name:  # a type
+        return value
+    from fleet2d.floorplan.load import advise_type  # few scenarios need it
+
+    if advice := advise_type(name):
         raise problem_at(("type",), f"there is no floorplan {name!r}: {advice}", name)
     return value
 
@@ -247,7 +249,6 @@ class Scenario(Settings):
         robots: The robots, by name.
         objects: Doors and sensors, by name.
         interactions: What robots want of people, by name.
-        changes: Changes of the home during the run, and when they happen.
         script: Interventions on people, robots and the home, and when they happen.
         sight: The method that computes what is in view.
         algorithms: The algorithms that run during the simulation, by name.
@@ -263,7 +264,6 @@ class Scenario(Settings):
     robots: Annotated[dict[str, Annotated[Robot, ShortForm()]], CheckNames] = Field(default={})
     objects: Annotated[dict[str, OneOf[HomeObject]], CheckNames] = Field(default={})
     interactions: Annotated[dict[str, Interaction], CheckNames] = Field(default={})
-    changes: tuple[HomeChange, ...] = ()
     script: tuple[Entry, ...] = ()
     sight: SightSettings = SightSettings()
     algorithms: Annotated[dict[str, OneOf[Algorithm]], CheckNames, NameAsType()] = Field(default={})

@@ -11,7 +11,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, models_jso
 from pydantic_core import PydanticSerializationError, SchemaError, SchemaSerializer, core_schema
 
 from fleet2d.configuration.built_in import COMPONENTS
-from fleet2d.configuration.components import Component, Settings, aliases, components
+from fleet2d.configuration.components import Component, Settings, components
 from fleet2d.interventions.intervention import verbs
 from fleet2d.scenario.compose import ENTRIES
 from fleet2d.scenario.model import Scenario
@@ -47,7 +47,6 @@ class ComponentDescription:
 
     kind: str
     type: str
-    aliases: tuple[str, ...]
     summary: str
     fields: tuple[FieldDescription, ...]
     shares: tuple[str, ...]
@@ -72,10 +71,8 @@ def schema() -> dict[str, Any]:
     definitions["Entry"] = {"properties": times, "anyOf": forms}
     for kind, types in kinds.items():
         for name, cls_name in types.items():
-            names = [name, *aliases(kind, name)]
-            type_schema = {"enum": names} if names[1:] else {"const": name}
             definition = definitions[cls_name]
-            properties = {"type": type_schema, **definition.get("properties", {})}
+            properties = {"type": {"const": name}, **definition.get("properties", {})}
             definition.update(title=name, properties=properties)
         forms = [{"$ref": f"#/$defs/{name}", "required": ["type"]} for name in types.values()]
         definitions[kind] = {"anyOf": [*forms, *_forms_without_fields(kind, types)]}
@@ -165,7 +162,7 @@ def _forms_without_fields(kind: str, names: Iterable[str]) -> list[dict[str, Any
     """Return the ways to write a component whose fields the schema doesn't describe."""
     own_class = {"type": "string", "pattern": ":", "description": f"your own {kind}: module:Class"}
     return [
-        {"type": "string", "enum": [n for name in names for n in (name, *aliases(kind, name))]},
+        {"type": "string", "enum": list(names)},
         {"type": "object", "properties": {"type": own_class}, "required": ["type"]},
         own_class,
     ]
@@ -256,7 +253,7 @@ def _describe(
         fields.append(FieldDescription(key, _type_of(value), default, text))
     summary = definition.get("description", "").partition("\n")[0]
     shared = tuple(dict.fromkeys(shares))
-    return ComponentDescription(kind, name, aliases(kind, name), summary, tuple(fields), shared)
+    return ComponentDescription(kind, name, summary, tuple(fields), shared)
 
 
 def _type_of(value: Mapping[str, Any]) -> str:

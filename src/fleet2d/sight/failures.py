@@ -5,15 +5,29 @@ from datetime import datetime, timedelta
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, micros
 from fleet2d.errors import ScenarioError
-from fleet2d.floorplan.home import Moment, format_moment
+from fleet2d.floorplan.home import format_moment, parse_moment
 from fleet2d.runtime.clock import DAY, Clock, midnights
 from fleet2d.runtime.determinism import Draws
+
+Moment = Annotated[
+    datetime | timedelta,
+    BeforeValidator(parse_moment),
+    PlainSerializer(format_moment),
+    WithJsonSchema(
+        {
+            "description": "a local time like 2026-01-07T14:00, or the time since the start like"
+            " '2 d 14 h'",
+            "type": ["string", "number", "object"],
+            "examples": ["2026-01-07T14:00", "2 d"],
+        }
+    ),
+]
 
 
 def _as_list(value: Any) -> Any:

@@ -8,20 +8,19 @@ from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from decimal import Decimal, localcontext
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, model_serializer, model_validator
 from pydantic_core import CoreSchema
 
 from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Settings
-from fleet2d.configuration.problems import check_known, problem, problem_at
-from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, micros
-from fleet2d.errors import ComponentError
+from fleet2d.configuration.problems import problem, problem_at
+from fleet2d.configuration.units import AngleDeg, Duration, Length, Share
 from fleet2d.floorplan.placed_objects import Posture
-from fleet2d.kernels import F64, I64, NOBODY, ONE
+from fleet2d.kernels import F64, I64, ONE
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.sight.perception_error import CameraSightings, PerceptionError
+from fleet2d.sight.perception_error import PerceptionError
 
 EXACT = 20  # digits: far more than a probability in units of 2**-31 needs
 LIMIT = 200  # beyond exp(-200) or exp(200) a probability is 0 or 1
@@ -33,8 +32,6 @@ TERMS = 15  # of the series of exp, up to half of LN_2: more than the precision 
 # Largest deviation from 1 of a sum of shares, such as of 1/3 written in decimals.
 SUM_ERROR = 1e-6
 UNKNOWN = "unknown"
-# How tall a user of a kind is [m].
-HEIGHTS = {"cat": 0.25, "dog": 0.5, "big_dog": 0.75}
 
 
 class Curve(Settings):
@@ -188,7 +185,7 @@ DARKEST = 0.2
 DARK_NIGHT = Curve(points=((6.0, DARKEST), (8.0, 1.0), (17.0, 1.0), (19.0, DARKEST)))
 
 
-def _check_shares(
+def check_shares(
     location: tuple[str, ...], shares: Mapping[Any, float], own: object = None, *, whole: bool
 ) -> None:
     """Refuse shares that have one of `own`, or exceed 1 together; if `whole`, they must be 1."""
@@ -267,7 +264,7 @@ class FalsePositives(Settings):
 
     def model_post_init(self, _: object, /) -> None:
         """Require shares of identities that add up to at most 1."""
-        _check_shares(("looks_like",), self.looks_like, whole=False)
+        check_shares(("looks_like",), self.looks_like, whole=False)
 
 
 class Identity(Settings):
@@ -291,7 +288,7 @@ class Identity(Settings):
     def model_post_init(self, _: object, /) -> None:
         """Require distributions over other users."""
         for user, others in self.confusion.items():
-            _check_shares(("confusion", user), others, user, whole=True)
+            check_shares(("confusion", user), others, user, whole=True)
 
 
 class Attributes(Settings):
@@ -324,7 +321,7 @@ class Attributes(Settings):
         }
         for key, confusion in confusions.items():
             for true, others in confusion.items():
-                _check_shares((key, true), others, true, whole=False)
+                check_shares((key, true), others, true, whole=False)
 
 
 class Perception(Settings):
@@ -348,102 +345,3 @@ class Perception(Settings):
         CheckNames,
         NameAsType(),
     ] = Field(default={})
-
-
-# How often somebody of a height [m] is taken for a person. Not measured: detectors differ widely.
-BY_HEIGHT = Curve(points=((0.2, 0.01), (0.5, 0.03), (0.8, 0.1), (1.1, 0.3)))
-
-
-class Confusable(Settings):
-    """How often a user is taken for others. Short form: a number is the rate.
-
-    Attributes:
-        rate: Share of sightings in which it is taken for somebody else; left out: by its height.
-        kind: What it is: its height is that of its kind.
-        height: How tall it is [m].
-        others: The shares of those that it is taken for, `unknown` among them; left out: all
-            users without an entry equally.
-    """
-
-    short_form = ("rate", (str, int, float))
-
-    rate: Share | None = None
-    kind: Literal["cat", "dog", "big_dog"] | None = None
-    height: Length | None = Field(default=None, gt=0, le=3)
-    others: dict[str, Share] = Field(default={})
-
-    @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Add the short form to the schema."""
-        short = [{"type": "number"}, {"type": "string"}]
-        return {"anyOf": [*short, super().__get_pydantic_json_schema__(schema, handler)]}
-
-    def model_post_init(self, _: object, /) -> None:
-        """Require one way to state the rate, and shares that add up to 1."""
-        if sum(value is not None for value in (self.rate, self.kind, self.height)) != 1:
-            raise problem("give one of rate, kind and height")
-        if self.others:
-            _check_shares(("others",), self.others, whole=True)
-
-    @property
-    def share(self) -> float:
-        """The share of sightings in which it is taken for somebody else."""
-        if self.rate is not None:
-            return self.rate
-        return BY_HEIGHT.at(HEIGHTS[self.kind] if self.kind is not None else self.height or 0.0)
-
-
-class TakenFor(PerceptionError):
-    """Some users, such as pets, are taken for others at times, each at a rate of its own.
-
-    Attributes:
-        users: The users that are taken for others, by name: a rate, or how tall each is.
-        lasts: How long somebody is taken for another, rounded to steps, in intervals from the start
-            of the run; 0: each look by itself.
-    """
-
-    users: dict[str, Confusable] = Field(min_length=1)
-    lasts: Duration = timedelta(seconds=5)
-
-    def model_post_init(self, _: object, /) -> None:
-        """Refuse users who are taken for nobody or for themselves."""
-        for name, confusable in self.users.items():
-            if name == UNKNOWN:
-                raise problem_at(("users", name), "unknown is nobody: false_positives are for that")
-            if name in confusable.others:
-                raise problem_at(("users", name, "others"), f"{name!r} is itself: leave it out")
-
-    def distort(self, sightings: CameraSightings) -> CameraSightings:
-        """Give sightings of these users the names of others."""
-        steps = max(1, round(micros(self.lasts) / 1e6 / sightings.step_s))
-        at = sightings.step // steps
-        draw = sightings.uniform("whether", at=at)
-        which = sightings.uniform("for whom", at=at)
-        user = sightings.user.copy()
-        for name, confusable in self.users.items():
-            number = self._number(sightings, name)
-            choices, limits = self._choices(sightings, confusable)
-            is_taken = (sightings.true_user == number) & (draw < confusable.share)
-            for_whom = np.searchsorted(limits, which[is_taken] * limits[-1], side="right")
-            user[is_taken] = np.array(choices)[for_whom]
-        return sightings.replace(user=user)
-
-    def _choices(
-        self, sightings: CameraSightings, confusable: Confusable
-    ) -> tuple[list[int], list[int]]:
-        """Return the numbers of those that somebody is taken for, and cumulative weights."""
-        others = confusable.others or {u: 1.0 for u in sightings.users if u not in self.users}
-        others = others or {UNKNOWN: 1.0}
-        names = [name for name, share in others.items() if share > 0]
-        numbers = [self._number(sightings, name) for name in names]
-        weights = {name: others[name] / sum_in_order(others.values()) for name in names}
-        return numbers, cumulative(weights, names)
-
-    @staticmethod
-    def _number(sightings: CameraSightings, name: str) -> int:
-        if name == UNKNOWN:
-            return NOBODY
-        check_known(name, "user", sightings.users, ComponentError, "taken_for: ")
-        return list(sightings.users).index(name)

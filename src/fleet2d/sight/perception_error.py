@@ -1,20 +1,17 @@
-"""Errors of perception: their base, the sightings that they change, and the built-in ones."""
+"""Errors of perception: their base, and the sightings that they change."""
 
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from math import radians
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
 
 from fleet2d import kernels
 from fleet2d.configuration.components import Component
-from fleet2d.configuration.units import AngleDeg, Duration, Length, Share, micros
 from fleet2d.errors import ComponentError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.placed_objects import POSTURES
@@ -323,46 +320,3 @@ class PerceptionError(Component):
             " looks may be computed twice; for errors that last use draws such as"
             " sightings.uniform('burst', at=sightings.step // 60)"
         )
-
-
-class Miscalibration(PerceptionError):
-    """A camera that isn't mounted or calibrated as the robot assumes: the same error in each look.
-
-    Attributes:
-        yaw_deg: Angle by which all that it perceives is turned round it, counter-clockwise, with
-            the headings of people; rounded to 1/8192 of a turn.
-        scale: Factor of all distances.
-        offset: What is added to all distances [m].
-    """
-
-    yaw_deg: AngleDeg = Field(default=0.0, ge=-180, le=180)
-    scale: float = Field(default=1.0, gt=0, le=10)
-    offset: Length = Field(default=0.0, ge=-10, le=10)
-
-    def distort(self, sightings: CameraSightings) -> CameraSightings:
-        """Turn and stretch all sightings."""
-        moved = sightings.moved(turn_deg=self.yaw_deg, scale=self.scale, offset=self.offset)
-        return moved.replace(heading=moved.heading + radians(self.yaw_deg))
-
-
-class Outliers(PerceptionError):
-    """A share of sightings is far off along the ray, as when the depth is that of the background.
-
-    Attributes:
-        share: Share of sightings that are outliers.
-        spread: Standard deviation of their error in distance, bell-shaped and independent in each
-            look [m].
-        lasts: How long a person stays an outlier, rounded to steps, in intervals from the start of
-            the run; 0: each look by itself.
-    """
-
-    share: Share = 0.02
-    spread: Length = Field(default=1.0, gt=0, le=100)
-    lasts: Duration = timedelta(0)
-
-    def distort(self, sightings: CameraSightings) -> CameraSightings:
-        """Move the outliers along their rays."""
-        steps = max(1, round(micros(self.lasts) / 1e6 / sightings.step_s))
-        is_far_off = sightings.uniform("which", at=sightings.step // steps) < self.share
-        error = np.where(is_far_off, self.spread * sightings.bell("how far"), 0.0)
-        return sightings.moved(offset=error)

@@ -46,8 +46,8 @@ class StudyAnswers:
     columns: tuple[str, ...]
     populations: tuple[str, ...]
 
-    def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
-        """Return the variants that are complete and have a metric, or some of them by number.
+    def with_metric(self, metric: str) -> "pl.DataFrame":
+        """Return the variants that are complete and have a metric.
 
         Raises:
             InputError: There is no such metric.
@@ -68,8 +68,6 @@ class StudyAnswers:
         against: Mapping[str, Any],
         by: Sequence[str] | None = None,
         within: Sequence[str] = (),
-        *,
-        variants: Sequence[int] | None = None,
     ) -> "pl.DataFrame":
         """Compare the values of an axis with one of them, pair by pair.
 
@@ -82,7 +80,6 @@ class StudyAnswers:
             by: Columns of the units over which intervals hold; None: homes, people and seeds.
             within: Axes with a comparison for each of their values; over other axes the differences
                 are averaged.
-            variants: Numbers of the variants to compare; None: all.
 
         Returns:
             A row for each other value: mean, reference, difference, low and high (95 %), doubt (why
@@ -97,7 +94,7 @@ class StudyAnswers:
         """
         import polars as pl
 
-        frame = self.with_metric(metric, variants)
+        frame = self.with_metric(metric)
         units = self._units(by, against)
         limits = difference_limits(self.limits(metric))
         better = self.better(metric)
@@ -237,37 +234,6 @@ class StudyAnswers:
         frame = self.with_metric(metric)
         check_axes(axes, frame.columns)
         return group_means(frame, metric, axes, self._units(by), self.limits(metric))
-
-    def effects(self, metric: str, by: Sequence[str] | None = None) -> "pl.DataFrame":
-        """Return the main effect of each value of each axis: its mean minus the mean of all.
-
-        Differences are taken within units, so that differences between homes and lives don't count.
-
-        Raises:
-            InputError: There is no such metric.
-        """
-        import polars as pl
-
-        frame = self.with_metric(metric)
-        units = self._units(by)
-        limits = difference_limits(self.limits(metric))
-        rows = []
-        for axis in (column for column in self.columns if column not in self.populations):
-            applicable = frame.filter(pl.col(axis).is_not_null())
-            labels = applicable.get_column(axis).unique(maintain_order=True).to_list()
-            if len(labels) < 2:
-                continue
-            cells = by_units(applicable, [*units, axis], metric)
-            value = pl.col(metric)
-            cells = cells.with_columns(value - value.mean().over(list(units) or [pl.lit(0)]))
-            for label in labels:
-                of_value = cells.filter(pl.col(axis) == label)
-                effect = estimate_units(of_value, units, metric, limits)
-                row = (axis, str(label), effect.mean, effect.low, effect.high, effect.doubt)
-                rows.append(row)
-        texts = dict.fromkeys(("axis", "value"), pl.String)
-        floats = dict.fromkeys(("effect", "low", "high"), pl.Float64)
-        return pl.DataFrame(rows, schema={**texts, **floats, "doubt": pl.String}, orient="row")
 
     def shares(self, metric: str) -> "pl.DataFrame":
         """Return the share of a metric's variance by axis, and by pairs of axes beyond both.

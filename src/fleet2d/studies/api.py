@@ -14,7 +14,6 @@ from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.cluster_executors import RayExecutor, SlurmExecutor
 from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import (
@@ -35,10 +34,7 @@ from fleet2d.studies.simulator import run_scenario
 from fleet2d.studies.specification import read_specification
 
 Result = TypeVar("Result")
-ExecutorName = Literal["local", "ray", "slurm", "serial"]
-SLURM_JOBS = 16
-SLURM_SHARE = 0.5  # of a job's time, in which it begins variants
-SUBMITIT_TIMEOUT_MIN = 5  # of a job without `timeout_min`
+ExecutorName = Literal["local", "serial"]
 
 
 def study(
@@ -57,8 +53,8 @@ def study(
         out: A folder, or a location like s3://bucket/study; None: studies/NAME.
         workers: The number of worker processes; None: one per core. Of an executor of your own:
             how many calls it gets at a time.
-        executor: Where they run: `local`, `ray`, `slurm`, `serial` (in this process), or an
-            executor of your own, as `concurrent.futures` defines them.
+        executor: Where they run: `local`, `serial` (in this process), or an executor of your own,
+            as `concurrent.futures` defines them.
         fail_fast: End with the first variant that fails.
         changed: What to do with results of other code or scenarios: `redo` or `keep`; None: refuse
             to continue.
@@ -139,20 +135,15 @@ def map_runs(
 
 
 @contextmanager
-def open_crew(
-    executor: ExecutorName | Executor,
-    workers: int | None = None,
-    slurm: Mapping[str, Any] | None = None,
-) -> Iterator[Crew]:
+def open_crew(executor: ExecutorName | Executor, workers: int | None = None) -> Iterator[Crew]:
     """Yield a crew of an executor by its name, which ends with the context; or of your own.
 
     Args:
         executor: The name; or an executor, which stays open.
-        workers: The number of workers; None: one per core, or 16 jobs of Slurm.
-        slurm: submitit's parameters of jobs of Slurm.
+        workers: The number of workers; None: one per core.
 
     Raises:
-        InputError: There is no executor of that name, or its package is missing.
+        InputError: There is no executor of that name.
     """
     count = workers or cores()
     match executor:
@@ -160,15 +151,8 @@ def open_crew(
             crew = Crew(LocalExecutor(count), count)
         case "serial":
             crew = Crew(SerialExecutor())
-        case "ray":
-            ray = RayExecutor()
-            crew = Crew(ray, workers or max(ray.cores, 1))
-        case "slurm":
-            jobs = workers or SLURM_JOBS
-            batch_s = SLURM_SHARE * 60 * (slurm or {}).get("timeout_min", SUBMITIT_TIMEOUT_MIN)
-            crew = Crew(SlurmExecutor(jobs, slurm), jobs, batch_s)
         case str():
-            raise InputError(f"there is no executor {executor!r}: give local, ray, slurm or serial")
+            raise InputError(f"there is no executor {executor!r}: give local or serial")
         case _:
             yield Crew(executor, count)
             return

@@ -1,8 +1,7 @@
-"""The axes of a study: lists, ranges, samples, homes, people, and combinations of them."""
+"""The axes of a study: lists, samples, options, homes and people."""
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
@@ -129,7 +128,7 @@ Count = Annotated[int, AfterValidator(check_count)]
 """A number of values that fits into one study."""
 
 
-Method = Literal["random", "latin_hypercube", "orthogonal", "sobol"]
+Method = Literal["latin_hypercube", "sobol"]
 DIGITS = 6  # significant digits of a sampled number, so that tables print the very value
 
 
@@ -203,29 +202,20 @@ def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:
     """Return points of the unit cube: float64 (count, dimensions), the same at each call.
 
     Raises:
-        InputError: scipy is missing, which all methods but `random` need.
-        ScenarioError: The method has no such number of points, or of dimensions.
+        InputError: scipy is missing.
+        ScenarioError: The method has no such number of points.
     """
     generator = np.random.Generator(np.random.Philox(seed))
-    if method == "random":
-        return generator.random((count, dimensions))
     with extra("study", f"{method} samples need scipy"):
         from scipy.stats import qmc
-    if method == "sobol":
-        power = round(math.log2(count))
-        if count != 2**power:
-            raise ScenarioError(
-                f"sobol points are balanced in powers of two only: count {2**power}, not {count}"
-            )
-        return qmc.Sobol(dimensions, rng=generator).random_base2(power)
-    try:
-        strength = 2 if method == "orthogonal" else 1
-        return qmc.LatinHypercube(dimensions, strength=strength, rng=generator).random(count)
-    except ValueError:
+    if method == "latin_hypercube":
+        return qmc.LatinHypercube(dimensions, rng=generator).random(count)
+    power = round(math.log2(count))
+    if count != 2**power:
         raise ScenarioError(
-            "orthogonal samples come in squares of primes (4, 9, 25, 49, 121, …), of at most one"
-            f" parameter more than the prime: not {count} of {dimensions}"
-        ) from None
+            f"sobol points are balanced in powers of two only: count {2**power}, not {count}"
+        )
+    return qmc.Sobol(dimensions, rng=generator).random_base2(power)
 
 
 def _texts(value: Any) -> tuple[Any, ...]:
@@ -379,65 +369,6 @@ class ValuesAxis(Axis):
         ]
 
 
-class RangeAxis(Axis):
-    """Evenly spaced numbers of a range, by their step or their count.
-
-    Attributes:
-        key: The key path.
-        range: First and last number.
-        step: Difference between consecutive numbers.
-        count: The number of values, instead of a step.
-        log: With `count`: whether consecutive numbers differ by a constant factor.
-        unit: The unit to write after the number: d, cm, %.
-    """
-
-    key: str
-    range: tuple[float, float]
-    step: float | None = Field(default=None, gt=0)
-    count: Count | None = Field(default=None, ge=2)
-    log: bool = False
-    unit: str = ""
-
-    def model_post_init(self, _: object, /) -> None:
-        """Require a step or a count, and a range that it fits."""
-        first, last = self.range
-        if (self.step is None) == (self.count is None):
-            raise problem("give step, or count")
-        if not first < last:
-            raise problem(f"the first number, {first:g}, must be below the last, {last:g}")
-        if self.step is not None:
-            check_count((last - first) / self.step)
-        if self.log and (first <= 0 or self.count is None):
-            raise problem("log needs a count, and numbers above 0")
-
-    def numbers(self) -> list[float]:
-        """Return the numbers, rounded so that 0.1 + 0.2 is 0.3.
-
-        >>> RangeAxis(key="a.b", range=(0.1, 0.5), step=0.2).numbers()
-        [0.1, 0.3, 0.5]
-        """
-        first, last = self.range
-        if self.step is not None:
-            steps = math.floor((last - first) / self.step + 1e-9)
-            return [rounded(first + i * self.step, 12) for i in range(steps + 1)]
-        assert self.count is not None
-        shares = [i / (self.count - 1) for i in range(self.count)]
-        if self.log:
-            return [rounded(first * (last / first) ** share) for share in shares]
-        return [rounded(first + share * (last - first), 12) for share in shares]
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each number; whole numbers stay whole."""
-        numbers = self.numbers()
-        are_whole = all(number.is_integer() for number in numbers)
-        values: list[Any] = [int(number) if are_whole else number for number in numbers]
-        path = key_path(self.key)
-        return [
-            Choice({name: value}, ((path, f"{value!r} {self.unit}" if self.unit else value),))
-            for value in values
-        ]
-
-
 class OptionsAxis(Axis):
     """Named options, each a set of changes.
 
@@ -462,13 +393,12 @@ class OptionsAxis(Axis):
 
 
 class SampleAxis(Axis):
-    """Samples of several parameters at once: random, or evenly spread.
+    """Samples of several parameters at once, evenly spread.
 
     Attributes:
         sample: The parameters, by column.
         count: The number of samples.
-        method: `latin_hypercube`: each parameter is spread evenly; `orthogonal`: each pair of
-            parameters, too; `sobol`: all together; or `random`.
+        method: `latin_hypercube`: each parameter is spread evenly; `sobol`: all together.
         seed: The seed of the samples.
     """
 
@@ -503,91 +433,13 @@ class SampleAxis(Axis):
         return choices
 
 
-class _GroupAxis(Axis):
-    """Base class of axes that consist of other axes."""
-
-    def axes(self) -> "dict[str, Axis]":
-        """Return the axes of the group."""
-        raise NotImplementedError
-
-    def columns(self, name: str) -> tuple[str, ...]:
-        """Return the columns of all of its axes."""
-        return tuple(c for axis_name, axis in self.axes().items() for c in axis.columns(axis_name))
-
-    def populations(self, name: str) -> tuple[str, ...]:
-        """Return the columns of its axes whose values are a sample of a population."""
-        return tuple(
-            c for axis_name, axis in self.axes().items() for c in axis.populations(axis_name)
-        )
-
-    def _join(self, rows: Iterator[tuple[Choice, ...]]) -> list[Choice]:
-        """Return a choice for each row: the labels and changes of all its parts."""
-        return [
-            Choice(
-                {column: label for part in row for column, label in part.labels.items()},
-                tuple(change for part in row for change in part.changes),
-            )
-            for row in rows
-        ]
-
-
-class ZipAxis(_GroupAxis):
-    """Axes of equal length in lockstep: the first choices together, the second ones, and so on.
-
-    Attributes:
-        zip: The axes, by name.
-    """
-
-    zip: "dict[str, AnyAxis]" = Field(min_length=1)
-
-    def axes(self) -> dict[str, Axis]:
-        """Return the axes of the group."""
-        return self.zip
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each position of the axes.
-
-        Raises:
-            ScenarioError: The axes differ in length.
-        """
-        lists = {axis_name: axis.choices(axis_name) for axis_name, axis in self.zip.items()}
-        if len({len(choices) for choices in lists.values()}) > 1:
-            lengths = ", ".join(
-                f"{axis_name} has {len(choices)}" for axis_name, choices in lists.items()
-            )
-            raise ScenarioError(f"the axes of a zip must have equally many values: {lengths}")
-        return self._join(zip(*lists.values(), strict=True))
-
-
-class GridAxis(_GroupAxis):
-    """All combinations of the values of axes, as of the axes of a study itself.
-
-    Attributes:
-        grid: The axes, by name.
-    """
-
-    grid: "dict[str, AnyAxis]" = Field(min_length=1)
-
-    def axes(self) -> dict[str, Axis]:
-        """Return the axes of the group."""
-        return self.grid
-
-    def choices(self, name: str) -> list[Choice]:
-        """Return a choice for each combination; the last axis changes fastest."""
-        lists = (axis.choices(axis_name) for axis_name, axis in self.grid.items())
-        return self._join(itertools.product(*lists))
-
-
 KINDS: dict[str, type[Axis]] = {
     "values": ValuesAxis,
-    "range": RangeAxis,
     "options": OptionsAxis,
     "floorplans": FloorplansAxis,
     "synthetic": SyntheticAxis,
     "personas": PersonasAxis,
     "sample": SampleAxis,
-    "zip": ZipAxis,
-    "grid": GridAxis,
 }
 """The kinds of axes by the key that only they have."""
 
@@ -609,6 +461,3 @@ def _axis_of(value: Any) -> Any:
 
 AnyAxis = Annotated[Axis, BeforeValidator(_axis_of)]
 """A field that takes an axis of any kind."""
-
-ZipAxis.model_rebuild()
-GridAxis.model_rebuild()

@@ -27,14 +27,8 @@ studying = typer.Typer(
     no_args_is_help=True,
 )
 ExecutorName = Annotated[
-    Literal["local", "ray", "slurm", "serial"],
+    Literal["local", "serial"],
     typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
-]
-SlurmParameters = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--slurm", metavar="KEY=VALUE", help="A parameter of jobs of Slurm, as submitit names it."
-    ),
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
 MAX_LINES = 10  # of a list that is printed
@@ -57,7 +51,6 @@ def run(  # noqa: PLR0913 - options of the command line
     ] = None,
     workers: Workers = None,
     executor: ExecutorName = "local",
-    slurm: SlurmParameters = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check all, and print the variants.")
     ] = False,
@@ -77,10 +70,12 @@ def run(  # noqa: PLR0913 - options of the command line
       fleet2d study run speeds.yaml --dry-run
       fleet2d study run speeds.yaml --workers 8 --out speeds
     """
+    from fleet2d.runtime.memory import free_memory_of_polars
     from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
 
+    free_memory_of_polars()
     checked = check_study(source, _print_size)
     if dry_run:
         _print_plan(checked, workers)
@@ -90,7 +85,7 @@ def run(  # noqa: PLR0913 - options of the command line
     with (
         _interruptible(location),
         observing(quiet=quiet) as observer,
-        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+        open_crew(executor, workers) as crew,
     ):
         counts = run_study(
             checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
@@ -103,25 +98,6 @@ def run(  # noqa: PLR0913 - options of the command line
         _print_failures(location)
     if counts.failed or counts.missing:
         raise typer.Exit(1)
-
-
-def slurm_parameters(texts: list[str] | None) -> dict[str, Any]:
-    """Return parameters of jobs from texts like `slurm_partition=long`.
-
-    Raises:
-        InputError: A text has no name or no value.
-
-    Example:
-        >>> slurm_parameters(["slurm_partition=long", "timeout_min=240"])
-        {'slurm_partition': 'long', 'timeout_min': 240}
-    """
-    parameters: dict[str, Any] = {}
-    for text in texts or ():
-        name, _, value = text.partition("=")
-        if not name or not value:
-            raise InputError(f"--slurm {text}: write KEY=VALUE, as in timeout_min=240")
-        parameters[name] = int(value) if value.isdigit() else value
-    return parameters
 
 
 @studying.command()
@@ -330,9 +306,9 @@ def _row_of(study: "Study", variant: str) -> dict[str, Any]:
         found = [row for row in rows if (row["identity"] or "").startswith(variant)]
     if len(found) != 1:
         raise InputError(
-            f"{study.location} has {len(found) or 'no'} variant{'s' * (len(found) > 1)}"
-            f" {variant!r}: give a number from 0 to {len(rows) - 1}, or the first"
-            f" {IDENTITY_START} characters or more of an identity"
+            f"{study.location} has {counted(len(found), 'variant')} {variant!r}: give a number from"
+            f" 0 to {len(rows) - 1}, or the first {IDENTITY_START} characters or more of an"
+            " identity"
         )
     return found[0]
 
@@ -361,13 +337,9 @@ def tune(
     out: Annotated[Path | None, typer.Option(help="A folder; left out: studies/NAME-tune.")] = None,
     workers: Workers = None,
     executor: ExecutorName = "local",
-    slurm: SlurmParameters = None,
     changed: Annotated[
         Literal["redo"] | None,
         typer.Option(help="redo: start over if the folder holds another search."),
-    ] = None,
-    storage: Annotated[
-        str | None, typer.Option(help="A database for the trials: sqlite:///trials.db.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -386,24 +358,22 @@ def tune(
     with (
         _interruptible(folder),
         observing_trials(show=not quiet) as bar,
-        open_crew(executor, workers, slurm_parameters(slurm)) as crew,
+        open_crew(executor, workers) as crew,
     ):
-        result = search(specification, folder, crew, bar, changed=changed, storage=storage)
+        result = search(specification, folder, crew, bar, changed=changed)
     if quiet:
         return
     counts = ", ".join(f"{n} {state}" for state, n in result.trials.items())
     _print(f"trials: {counts}; in {folder}")
-    for name, settings in result.settings.items():
-        values = ", ".join(f"{value:.4g}" for value in result.values[name])
-        _print(f"{name}: {values} on the training homes")
-        for key, value in settings.items():
-            _print(f"  {key}={value}")
-    assert specification.file.tune is not None
-    for metric in specification.file.tune.objectives:
-        _print(f"{metric} on the homes held out:")
-        for row in result.held_out.paired(metric, {"setting": "base"}).to_dicts():
-            interval = "" if row["doubt"] else f" ({row['low']:.4g} to {row['high']:.4g})"
-            _print(
-                f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
-                f" difference {row['difference']:.4g}{interval}: {row['verdict']}"
-            )
+    tune = specification.file.tune
+    assert tune is not None
+    _print(f"the best setting: {result.value:.4g} on the training homes")
+    for key, value in result.settings.items():
+        _print(f"  {key}={value}")
+    _print(f"{tune.metric} on the homes held out:")
+    for row in result.held_out.paired(tune.metric, {"setting": "base"}).to_dicts():
+        interval = "" if row["doubt"] else f" ({row['low']:.4g} to {row['high']:.4g})"
+        _print(
+            f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
+            f" difference {row['difference']:.4g}{interval}: {row['verdict']}"
+        )

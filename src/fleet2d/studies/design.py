@@ -93,32 +93,20 @@ def input_hash(scenario: Scenario) -> str:
     return content_hash({str(path): file_hash(path) for path in input_files(scenario)})
 
 
-def scenario_hashes(content: dict[str, Any], seeds: Sequence[int]) -> Iterator[str]:
-    """Yield for each seed the `content_hash` of a scenario with that seed.
-
-    Args:
-        content: Its `scenario_content`; the seed in it doesn't matter.
-        seeds: The seeds.
-    """
-    mark = "a seed stands here"
-    marked = {**content, "simulation": {**content["simulation"], SEED: mark}}
-    before, _, after = json.dumps(marked, separators=(",", ":")).partition(json.dumps(mark))
-    common = hashlib.sha256(before.encode())
-    rest = after.encode()
-    for seed in seeds:
-        digest = common.copy()
-        digest.update(str(seed).encode() + rest)
-        yield digest.hexdigest()[:DIGITS]
+def template_hash(content: dict[str, Any]) -> str:
+    """Return the hash of the `scenario_content` of variants that differ by their seed alone."""
+    return content_hash({**content, "simulation": {**content["simulation"], SEED: None}})
 
 
-def identity(scenario: str, inputs: str) -> str:
+def identity(template: str, seed: int, inputs: str) -> str:
     """Return the identity of a variant.
 
     Args:
-        scenario: The hash of its scenario, with its seed.
+        template: The `template_hash` of its scenario.
+        seed: The seed of its scenario.
         inputs: The `input_hash` of its scenario.
     """
-    return content_hash([code_version(), scenario, inputs])
+    return content_hash([code_version(), template, seed, inputs])
 
 
 def home_key(content: Mapping[str, Any]) -> str:
@@ -338,12 +326,12 @@ def _check_size(name: str, design: Design) -> None:
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:
     axis = specification.file.axes[name]
     place = specification.places.place(("axes", name))
-    with errors_as(ScenarioError, f"{place}{': ' * bool(place)}axes.{name}"):
+    with errors_as(ScenarioError, specification.places.named(("axes", name))):
         choices = tuple(axis.choices(name))
         changes = tuple(
             _change(
                 ((".".join(keys), value) for keys, value in choice.changes),
-                f"axis {name!r}, {choice.words}{', ' * bool(place)}{place}",
+                ", ".join(filter(None, (f"axis {name!r}", choice.words, place))),
             )
             for choice in choices
         )

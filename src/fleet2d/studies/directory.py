@@ -30,8 +30,7 @@ META = "study.json"
 PLAN = "plan.parquet"
 SCENARIOS = "scenarios.parquet"
 VARIANTS = "variants.parquet"
-SLICE_ROWS = 5_000  # variants whose results are in memory at a time
-PLAN_ONLY = ("identity", "scenario", "template", "home_key")
+PLAN_ONLY = ("identity", "template", "home_key")
 """Columns of the plan that variants don't have, or from their results."""
 
 
@@ -260,7 +259,7 @@ class StudyDirectory:
         Raises:
             RunDirectoryError: Files are missing or damaged.
         """
-        return self._with_results(self._parameters())
+        return self._with_results(self.plan(lambda column: column not in PLAN_ONLY))
 
     def slices(self) -> "Iterator[pl.DataFrame]":
         """Yield some `variants` at a time: all results may need more memory than there is.
@@ -268,11 +267,12 @@ class StudyDirectory:
         Raises:
             RunDirectoryError: Files are missing or damaged.
         """
-        for rows in self._parameters().iter_slices(SLICE_ROWS):
-            yield self._with_results(rows)
+        import polars as pl
 
-    def _parameters(self) -> "pl.DataFrame":
-        return self.plan(lambda column: column not in PLAN_ONLY)
+        with self.storage.parquet(PLAN) as file:
+            names = [name for name in file.schema_arrow.names if name not in PLAN_ONLY]
+            for number in range(file.num_row_groups):  # as `write_plan` made them
+                yield self._with_results(pl.from_arrow(file.read_row_group(number, names)))
 
     def _with_results(self, plan: "pl.DataFrame") -> "pl.DataFrame":
         import polars as pl

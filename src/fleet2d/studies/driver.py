@@ -1,12 +1,10 @@
 """Running a study: missing variants are run, and each result is stored at once."""
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import ComponentError, Fleet2DError, extra
@@ -15,10 +13,10 @@ from fleet2d.studies.design import (
     Design,
     build_design,
     code_version,
-    content_hash,
     identity,
     input_hash,
     scenario_content,
+    template_hash,
 )
 from fleet2d.studies.directory import (
     COMPLETE,
@@ -29,7 +27,6 @@ from fleet2d.studies.directory import (
     StudyDirectory,
 )
 from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
-from fleet2d.studies.intervals import LEVEL
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
@@ -40,7 +37,6 @@ from fleet2d.studies.plan import (
     reconcile,
     write_plan,
 )
-from fleet2d.studies.reader import Study
 from fleet2d.studies.results import (
     RESULT_COLUMNS,
     VARIANT,
@@ -52,87 +48,11 @@ from fleet2d.studies.results import (
     results_frame,
 )
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
-from fleet2d.studies.specification import AdaptSettings, Specification, read_specification
+from fleet2d.studies.specification import Specification, read_specification
 
 if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
-
-
-class AdaptiveRounds:
-    """The variants of a study in rounds of seeds; between rounds the results so far decide.
-
-    All values of the axis have the same seeds as long as they get any, so pairs stay fair. To give
-    up a value, its difference must be significant at 5 % over all rounds together (Bonferroni).
-    """
-
-    def __init__(
-        self,
-        settings: AdaptSettings,
-        plan: StudyPlan,
-        directory: StudyDirectory,
-        on_note: Callable[[str], None],
-    ) -> None:
-        """Prepare the rounds.
-
-        Args:
-            settings: The section `adapt` of the study file.
-            plan: All variants.
-            directory: The study, for results so far.
-            on_note: Receives a remark for each decision.
-        """
-        self._settings, self._plan = settings, plan
-        self._directory, self._on_note = directory, on_note
-        self._dropped = set[object]()
-        self._places = list[int]()
-
-    @property
-    def plan(self) -> StudyPlan:
-        """The variants of all rounds so far."""
-        return StudyPlan(self._plan.design, self._plan.variants[sorted(self._places)])
-
-    def __iter__(self) -> "Iterator[pl.DataFrame]":
-        """Yield the variants of each round, after those of the last have results."""
-        ((axis, _),) = self._settings.against.items()
-        design = self._plan.design
-        index = self._plan.variants["index"].to_numpy()
-        seeds = len(design.seeds)
-        round_of = index % seeds // self._settings.seeds
-        looks = int(round_of.max())
-        for number in range(looks + 1):
-            if self._places and not self._goes_on(looks):
-                return
-            places = np.flatnonzero(round_of == number).tolist()
-            labels = (design.parameters(int(index[place]))[axis] for place in places)
-            found = zip(places, labels, strict=True)
-            new = [place for place, label in found if label not in self._dropped]
-            self._places += new
-            yield self._plan.variants[new]
-
-    def _goes_on(self, looks: int) -> bool:
-        """Give up values that are clearly worse; return whether others need more seeds."""
-        settings = self._settings
-        study = Study(self._directory)
-        ((axis, _),) = settings.against.items()
-        # Not those of later rounds, which an interrupted or larger study may have.
-        so_far = self._plan.variants[self._places]
-        numbers = so_far[VARIANT].to_list()
-        seeds = (so_far["index"] % len(self._plan.design.seeds)).n_unique()
-        table = study.paired(settings.metric, settings.against, variants=numbers).to_dicts()
-        open_rows = [row for row in table if row[axis] not in self._dropped]
-        sign = -1 if settings.goal == "maximize" else 1
-        for row in open_rows if settings.goal else ():
-            if sign * row["difference"] > 0 and row["p"] < (1 - LEVEL) / looks:
-                self._dropped.add(row[axis])
-                self._on_note(f"{axis} = {row[axis]} is clearly worse after {seeds} seeds: dropped")
-        left = [row for row in open_rows if row[axis] not in self._dropped]
-        # NaN, that of an interval which can't be told, is the largest, and never narrow.
-        width = np.max([row["high"] - row["low"] for row in left], initial=0.0)
-        if left and (settings.width is None or not width <= settings.width):
-            return True
-        reason = f"intervals are {width:.3g} wide" if left else "all values are worse"
-        self._on_note(f"no more than {seeds} seeds: {reason}")
-        return False
 
 
 CHANGED_MESSAGE = (
@@ -172,8 +92,9 @@ class StudyJob:
             Fleet2DError: It is wrong, or not as it was planned, since a file changed.
         """
         scenario = self.design.scenario(task.index)
-        inputs = input_hash(scenario)
-        if identity(content_hash(scenario_content(scenario)), inputs) != task.identity:
+        content = scenario_content(scenario)
+        seed = content["simulation"]["seed"]
+        if identity(template_hash(content), seed, input_hash(scenario)) != task.identity:
             raise ComponentError(CHANGED_MESSAGE)
         return scenario
 
@@ -308,25 +229,12 @@ def run_study(
         for problem in drop_damaged(directory.storage):
             observer.on_note(problem)
         results = read_results(directory.storage, columns=(VARIANT, "status"))
-        adapt = checked.specification.file.adapt
-        # Of an adaptive study, new variants may be those of rounds that it doesn't need.
-        plan = reconcile(
-            checked.plan,
-            directory,
-            results[VARIANT],
-            changed,
-            observer.on_note,
-            notes_new=adapt is None,
-        )
+        finished = results[VARIANT]
+        plan = reconcile(checked.plan, directory, finished, changed, observer.on_note)
         _write_plan(directory, checked, plan)
         complete = results.filter(status=COMPLETE)[VARIANT]
         run = _StudyRun(checked, plan, directory, crew, observer, fail_fast)
-        if adapt is None:
-            run.run_missing([plan.variants], complete)
-        else:
-            rounds = AdaptiveRounds(adapt, plan, directory, observer.on_note)
-            if run.run_missing(rounds, complete):
-                write_plan(directory, rounds.plan)
+        run.run_missing(complete)
         variants = _write_variants(directory)
     checked.note_missing(variants, observer)
     return Counts.of(variants)
@@ -365,17 +273,16 @@ class _StudyRun:
     observer: Observer
     fail_fast: bool
 
-    def run_missing(self, rounds: "Iterable[pl.DataFrame]", complete: "pl.Series") -> bool:
-        """Run the variants of each round that are not complete; return whether all were run."""
+    def run_missing(self, complete: "pl.Series") -> None:
+        """Run the variants that are not complete."""
         import polars as pl
 
         total = len(self.plan.variants)
         is_complete = pl.col(VARIANT).is_in(complete.implode())
-        done = len(self.plan.variants.filter(is_complete))
-        self.observer.on_start(Counts(total, done, 0), self.crew.workers)
-        queues = (self.plan.queue(round_.filter(~is_complete)) for round_ in rounds)
+        missing = self.plan.variants.filter(~is_complete)
+        self.observer.on_start(Counts(total, total - len(missing), 0), self.crew.workers)
         is_checked = False
-        with closing(self._results(queues)) as found:
+        with closing(self._results(self.plan.queue(missing))) as found:
             for result in found:
                 self.observer.on_result(result)
                 if result.is_complete and not is_checked:
@@ -383,21 +290,18 @@ class _StudyRun:
                     self.checked.note_missing(frame, self.observer)
                     is_checked = True
                 if self.fail_fast and not result.is_complete:
-                    return False
-        return True
+                    return
 
-    def _results(self, queues: Iterable[TaskQueue]) -> Generator[VariantResult]:
-        """Run the tasks of one queue after the other; yield and store their results."""
+    def _results(self, queue: TaskQueue) -> Generator[VariantResult]:
+        """Run the tasks of a queue; yield and store their results."""
         writer = ResultWriter(self.directory.storage)
         try:
-            for queue in queues:
-                with closing(run_tasks(self.crew, self.checked.job, queue)) as steps:
-                    for ends in steps:
-                        for result in map(_result, ends):
-                            writer.add(result)
-                            yield result
-                        writer.flush()
-                writer.flush(now=True)  # the next queue may depend on it
+            with closing(run_tasks(self.crew, self.checked.job, queue)) as steps:
+                for ends in steps:
+                    for result in map(_result, ends):
+                        writer.add(result)
+                        yield result
+                    writer.flush()
         finally:
             writer.flush(now=True)
 

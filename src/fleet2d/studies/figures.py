@@ -170,27 +170,6 @@ def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
     return figure
 
 
-def draw_distribution(frame: "pl.DataFrame", metric: str, label: str, axis: str | None) -> Figure:
-    """Draw the metric of every variant with median and quartiles, by the values of an axis."""
-    import polars as pl
-
-    labels = [None] if axis is None else frame[axis].unique(maintain_order=True).to_list()
-    figure, axes = _figure(2.8)
-    generator = np.random.Generator(np.random.Philox(key=1))
-    for x, value in enumerate(labels):
-        group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(value))
-        values = group[metric].to_numpy()
-        shift = generator.uniform(-0.22, 0.22, len(values))
-        axes.plot(x + shift, values, ".", color=PALE, ms=4, zorder=1)
-        low, middle, high = np.quantile(values, [0.25, 0.5, 0.75])
-        axes.plot([x, x], [low, high], color=COLORS[0], lw=5, alpha=0.5, solid_capstyle="butt")
-        axes.plot([x - 0.16, x + 0.16], [middle, middle], color=DARK, lw=1.6)
-    _label(axes, ["all" if value is None else str(value) for value in labels])
-    axes.set_xlabel(axis or "")
-    _label_y(axes, label)
-    return figure
-
-
 def draw_course(
     frame: "pl.DataFrame", label: str, axis: str | None, units: Sequence[str]
 ) -> Figure:

@@ -20,18 +20,16 @@ from fleet2d.studies.axes import Label
 from fleet2d.studies.design import (
     SWITCHES,
     Design,
-    content_hash,
     home_key,
     identity,
     input_hash,
     scenario_content,
-    scenario_hashes,
+    template_hash,
 )
 from fleet2d.studies.directory import (
     PLAN,
     PLAN_ONLY,
     SCENARIOS,
-    SLICE_ROWS,
     MetricFacts,
     StudyDirectory,
 )
@@ -52,6 +50,7 @@ if TYPE_CHECKING:
 
 MAX_PROBLEMS = 10  # in one report
 LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of robots' maps
+SLICE_ROWS = 5_000  # variants whose results are in memory at a time
 FEW_SETUPS = 8  # up to here starting workers costs more than it saves
 
 
@@ -62,9 +61,9 @@ class StudyPlan(NamedTuple):
         design: The design.
         variants: A row for each variant, in the order of the design: `variant`, its number in
             results, which stays when the study is extended; `index` in the design; `identity`, the
-            hash of everything that its results depend on; `scenario`, that of its scenario alone;
-            `template`, that of its scenario without the seed; `home_key`, the same for variants
-            that can share a home; `simulated_s` [s].
+            hash of everything that its results depend on; `template`, that of its scenario without
+            the seed; `seed`; `home_key`, the same for variants that can share a home;
+            `simulated_s` [s].
     """
 
     design: Design
@@ -129,7 +128,7 @@ class KnownNames:
                 raise specification.error(("keep", "tables", i), message)
         for location, metric in file.named_metrics():
             problem = self._problem(metric)
-            must_be_kept = location[0] in ("compare", "adapt")
+            must_be_kept = location[0] == "compare"
             if not problem and must_be_kept and not is_kept(metric, file.keep.metrics):
                 problem = f"the metric {metric!r} isn't kept: add it to keep.metrics"
             if problem:
@@ -184,15 +183,14 @@ def make_plan(
                 break
             continue
         simulation = content["simulation"]
-        template = content_hash({**content, "simulation": {**simulation, "seed": None}})
+        template = template_hash(content)
         same = first_of.setdefault((template, inputs), first)
         if same != first and repeated is None:
             repeated = same, first
-        hashes = list(scenario_hashes(content, design.seeds))
         step, duration = (parse_duration(simulation[key]) for key in ("step", "duration"))
-        frame = pl.DataFrame(
-            {"scenario": hashes, "identity": [identity(each, inputs) for each in hashes]}
-        )
+        identities = [identity(template, seed, inputs) for seed in design.seeds]
+        seeds = pl.Series(SEED, design.seeds, pl.Int64)
+        frame = pl.DataFrame({"identity": identities, SEED: seeds})
         frames.append(
             frame.with_columns(
                 template=pl.lit(template),
@@ -334,8 +332,6 @@ def reconcile(
     finished: "pl.Series",
     changed: Changed | None,
     on_note: Callable[[str], None],
-    *,
-    notes_new: bool,
 ) -> StudyPlan:
     """Number the variants of a plan as in the stored study; new variants get new numbers.
 
@@ -344,8 +340,7 @@ def reconcile(
         directory: The study.
         finished: The numbers of variants that have results.
         changed: What to do with results of other code, inputs or scenarios.
-        on_note: Receives a remark about results that are set aside: they no longer belong to it.
-        notes_new: Whether it receives one about new variants, too.
+        on_note: Receives remarks about new variants, and about results that are set aside.
 
     Raises:
         RunDirectoryError: There are such results, and `changed` is None.
@@ -362,13 +357,14 @@ def reconcile(
     stored = directory.plan((VARIANT, "identity").__contains__)
     if stored["identity"].equals(plan.variants["identity"]):  # it takes less memory than joins
         return StudyPlan(plan.design, plan.variants.with_columns(stored[VARIANT]))
-    stored = directory.plan((VARIANT, "identity", "scenario").__contains__)
+    stored = directory.plan((VARIANT, "identity", "template", SEED).__contains__)
     numbers = stored.select("identity", stored=VARIANT).unique("identity", keep="last")
     stale = stored.filter(pl.col(VARIANT).is_in(finished.implode()))
     stale = stale.join(plan.variants, on="identity", how="anti")
-    others = stale.select("scenario", other=VARIANT, old="identity").unique("scenario", keep="last")
+    same = ["template", SEED]
+    others = stale.select(*same, other=VARIANT, old="identity").unique(same, keep="last")
     variants = plan.variants.join(numbers, on="identity", how="left", maintain_order="left")
-    variants = variants.join(others, on="scenario", how="left", maintain_order="left")
+    variants = variants.join(others, on=same, how="left", maintain_order="left")
     is_recomputed = pl.col("stored").is_null() & pl.col("other").is_not_null()
     recomputed = len(variants.filter(is_recomputed))
     if len(stale) and changed is None:
@@ -383,7 +379,7 @@ def reconcile(
     first = int(stored[VARIANT].max() or 0) + 1
     number = pl.when(is_new).then(first - 1 + is_new.cum_sum()).otherwise("stored")
     new = len(variants.filter(is_new))
-    if 0 < new < len(variants) and notes_new:
+    if 0 < new < len(variants):
         on_note(f"{new} variants are new in {directory.location}")
     if len(stale) > reused:
         on_note(f"{len(stale) - reused} results no longer belong to the study: set aside")
@@ -408,11 +404,9 @@ def _refusal(location: str, recomputed: int, stale: int) -> str:
 
 def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
     """Write the plan of a study: a row per variant with its parameters."""
-    import polars as pl
-
     design = plan.design
     index = plan.variants["index"].to_numpy()
-    combination, seed = np.divmod(index, len(design.seeds))
+    combination = index // len(design.seeds)
     columns = []
     for number, axis in enumerate(design.axes):
         choices = design.combinations[:, number]
@@ -424,9 +418,8 @@ def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
             ]
             places = choices[combination] % (len(labels) + 1)  # -1, of no choice, is the last
             columns.append(label_series([*labels, None]).gather(places).alias(column))
-    columns.append(pl.Series(SEED, np.array(design.seeds, np.int64)[seed]))
     names = (VARIANT, *PLAN_ONLY, "simulated_s")
-    frame = plan.variants.select(*names).with_columns(columns)
+    frame = plan.variants.select(*names, *columns, SEED)
     parts = (rows.to_arrow() for rows in frame.iter_slices(SLICE_ROWS))
     directory.storage.write_table(PLAN, parts)
 

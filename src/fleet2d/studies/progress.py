@@ -1,6 +1,5 @@
 """The progress of a study while it runs: a bar with the time left."""
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -66,14 +65,6 @@ def _rate(per_second: float) -> str:
     return f"{60 * per_second:.1f} variants/min"
 
 
-class NoteObserver(Observer):
-    """Prints remarks on stderr."""
-
-    def on_note(self, text: str) -> None:
-        """Print a remark."""
-        sys.stderr.write(f"note: {text}\n")
-
-
 @contextmanager
 def observing(*, quiet: bool = False) -> Iterator[Observer]:
     """Yield an observer of a study, which prints remarks and shows the progress.
@@ -111,8 +102,7 @@ def observing_trials(*, show: bool) -> "Iterator[TuneObserver]":
     with progress_bar(show=show) as progress:
         task = progress.add_task("trials", total=None)
 
-        def update(done: int, trials: int, best: list[float] | None) -> None:
-            values = ", ".join(f"{value:.4g}" for value in best or ())
-            progress.update(task, completed=done, total=trials, description=f"best {values}")
+        def update(done: int, trials: int, best: float) -> None:
+            progress.update(task, completed=done, total=trials, description=f"best {best:.4g}")
 
         yield update

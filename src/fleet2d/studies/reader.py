@@ -1,12 +1,11 @@
 """Reading a study: its variants and its tables as one data set that needn't fit into memory."""
 
-from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.configuration.problems import did_you_mean, suggest
-from fleet2d.errors import ArtifactError, InputError, extra
+from fleet2d.errors import ArtifactError, InputError
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import COMPLETE, FAILED, META, Counts, StudyDirectory
 from fleet2d.studies.intervals import Limits
@@ -14,10 +13,8 @@ from fleet2d.studies.results import RESULT_COLUMNS, TABLES, VARIANT, part_names,
 from fleet2d.studies.storage import damaged
 
 if TYPE_CHECKING:
-    import duckdb
     import pandas as pd
     import polars as pl
-    import pyarrow as pa
     import pyarrow.dataset as pads
 
     from fleet2d.runs.run import Run
@@ -132,55 +129,9 @@ class Study(StudyAnswers):
         parameters = self.variants.lazy().select(VARIANT, *self.columns)
         return rows.join(parameters, on=VARIANT, how="inner")
 
-    def pandas(
-        self,
-        table: str | None = None,
-        variants: Sequence[int] | None = None,
-        columns: Sequence[str] | None = None,
-    ) -> "pd.DataFrame":
-        """Return the variants, or a table of some or all of them, as a pandas data frame.
-
-        Args:
-            table: A table; None: the variants.
-            variants: Numbers of the variants; None: all.
-            columns: Columns of the table; None: all.
-
-        Raises:
-            ArtifactError: The study keeps no such table.
-        """
-        if table is None:
-            return self.variants.to_pandas()
-        frames = [batch.to_pandas() for batch in self.batches(table, variants, columns)]
-        import pandas as pd
-
-        return pd.concat(frames, ignore_index=True)
-
-    def batches(
-        self,
-        table: str,
-        variants: Sequence[int] | None = None,
-        columns: Sequence[str] | None = None,
-    ) -> "Iterator[pa.RecordBatch]":
-        """Yield the rows of a table in Arrow record batches, which fit into memory."""
-        import pyarrow.compute as pc
-
-        condition = None if variants is None else pc.field(VARIANT).isin(list(variants))
-        names = None if columns is None else list(columns)
-        yield from self.arrow(table).to_batches(columns=names, filter=condition)
-
-    def duckdb(self) -> "duckdb.DuckDBPyConnection":
-        """Return a DuckDB connection with a view `variants`, and one for each table.
-
-        Raises:
-            InputError: DuckDB is not installed.
-        """
-        with extra("study", "this needs DuckDB"):
-            import duckdb
-        connection = duckdb.connect()
-        connection.register("variants", self.variants.to_arrow())
-        for table in self.tables:
-            connection.register(table, self.arrow(table))
-        return connection
+    def pandas(self) -> "pd.DataFrame":
+        """Return the variants as a pandas data frame."""
+        return self.variants.to_pandas()
 
     def scenario(self, variant: int) -> dict[str, Any]:
         """Return the scenario of a variant, with its seed, as `fleet2d.run` takes it.
@@ -222,8 +173,8 @@ class Study(StudyAnswers):
         """The variants that are complete."""
         return self.variants.filter(status=COMPLETE)
 
-    def with_metric(self, metric: str, variants: Sequence[int] | None = None) -> "pl.DataFrame":
-        """Return the variants that are complete and have a metric, or some of them by number.
+    def with_metric(self, metric: str) -> "pl.DataFrame":
+        """Return the variants that are complete and have a metric.
 
         Raises:
             InputError: There is no such metric.
@@ -238,8 +189,7 @@ class Study(StudyAnswers):
             )
         import polars as pl
 
-        frame = self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
-        return frame if variants is None else frame.filter(pl.col(VARIANT).is_in(list(variants)))
+        return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
 
     def limits(self, metric: str) -> Limits:
         """Return the least and the largest value that a metric can have."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import ArtifactError, InputError, os_errors_as
 from fleet2d.studies.answers import NOISE, RESIDUAL, judged
 from fleet2d.studies.figures import over_time
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 
 MAX_METRICS = 12
+MAX_VALUES = 12  # of an axis that are listed
 MAX_SHARES = 8
 MAX_INTERACTIONS = 3  # pairs of axes with a table of cell means, for each metric
 MAX_CELLS = 60  # of such a table
@@ -50,14 +52,13 @@ GLOSSARY = {
     "pairs": "pairs of runs; then the number of units of each kind",
     "deviation": "standard deviation of single runs",
     "variants": "number of runs",
-    "effect": "mean of the value less the mean of all values of its axis, within units",
     "share": f"share of the variance of runs; {RESIDUAL}: what axes and their pairs don't explain",
 }
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def write_report(study: "Study", folder: Path) -> Path:
-    """Write `report.html`, `figures/NAME.svg`, `tables/NAME.csv` and `.tex`; return the page.
+    """Write `report.html`, `figures/NAME.svg` and `tables/NAME.csv`; return the page.
 
     Raises:
         ArtifactError: No variant is complete.
@@ -134,8 +135,10 @@ class _Page:
         for column in self.study.columns:
             labels = self.study.variants[column].unique(maintain_order=True).to_list()
             kind = "units of intervals" if column in meta.populations else "compared"
-            values = ", ".join(_text(self._name(column, label)) for label in labels[:12])
-            rows.append([column, kind, str(len(labels)), values + ", …" * (len(labels) > 12)])
+            values = [_text(self._name(column, label)) for label in labels[:MAX_VALUES]]
+            if len(labels) > MAX_VALUES:
+                values.append("…")
+            rows.append([column, kind, str(len(labels)), ", ".join(values)])
         yield _table(["axis", "its values are", "number", "which"], rows, text=(0, 1, 3))
         yield from self._warnings(counts.total - counts.complete)
         yield '<p><a href="#methods">How answers were computed, and what columns mean</a></p>'
@@ -212,7 +215,7 @@ class _Page:
         return [name for name in ordered if name in self.study.metrics][:MAX_METRICS]
 
     def _metric(self, metric: str) -> Iterator[str]:
-        from fleet2d.studies.figures import draw_course, draw_distribution, draw_means
+        from fleet2d.studies.figures import draw_course, draw_means
 
         study = self.study
         name = _file_name(metric)
@@ -231,16 +234,10 @@ class _Page:
             yield f"<h3>by {html.escape(axis)}</h3>"
             yield self._frame(table, f"{name}-by-{_file_name(axis)}", (axis,))
         main = axes[0] if axes else None
-        yield "<h3>distribution over variants</h3>"
-        yield self._figure(draw_distribution(frame, metric, label, main), f"{name}-distribution")
         course = over_time(study, metric)
         if course is not None and course["day"].n_unique() > 1:
             yield "<h3>over time</h3>"
             yield self._figure(draw_course(course, label, main, self.units), f"{name}-time")
-        effects = study.effects(metric, self.units)
-        if len(effects):
-            yield "<h3>main effects</h3>"
-            yield self._frame(effects, f"{name}-effects", ("axis", "value"))
         yield from self._interactions(metric, label)
         shares = study.shares(metric)
         if len(shares):
@@ -269,11 +266,15 @@ class _Page:
         units = " and ".join(f"{self.counts[c]} values of {c}" for c in self.units)
         sizes = ", ".join(f"{self.counts[axis]} values of {axis}" for axis in self.axes)
         number = sum(len(t) for t in self._comparisons if not isinstance(t, InputError))
+        settings = f"{counted(combinations, 'combination')} of settings"
+        if sizes:
+            settings += f" ({sizes})"
+        code = self.meta.code.partition(",")[0].capitalize()
+        simulated = f"{'were' if combinations > 1 else 'was'} simulated by {code}"
+        if units:
+            simulated += f" over {units}"
         text = (
-            f"{combinations} combination{'s' * (combinations > 1)} of settings"
-            f"{f' ({sizes})' * bool(sizes)} {'were' if combinations > 1 else 'was'} simulated by"
-            f" {self.meta.code.partition(',')[0].capitalize()}"
-            f"{f' over {units}' * bool(units)}: {len(times)} runs of"
+            f"{settings} {simulated}: {len(times)} runs of"
             f" {timedelta(seconds=times.median())} (h:mm:ss) each in the median."
             " Runs with the same home, people and seed share the people's lives to the second, so"
             " settings were compared in pairs."
@@ -346,17 +347,14 @@ class _Page:
         return f'<img alt="{html.escape(name)}" src="data:image/svg+xml;base64,{data}">'
 
     def _frame(self, frame: "pl.DataFrame", name: str, text: Sequence[str] = ()) -> str:
-        """Write a data frame as CSV and LaTeX; return it as HTML. `text`: its columns of text."""
+        """Write a data frame as CSV; return it as HTML. `text`: its columns of text."""
         frame.write_csv(self.folder / "tables" / f"{name}.csv")
         columns = [c for c in frame.columns if c not in NOT_SHOWN]
         head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
         rows = [[_cell(c, row) for c in columns] for row in frame.to_dicts()]
         texts = tuple(i for i, c in enumerate(columns) if c in text)
-        latex = latex_table(head, rows, texts)
-        (self.folder / "tables" / f"{name}.tex").write_text(latex, encoding="utf-8")
-        files = f'<p class="files"><a href="tables/{name}.csv">CSV</a>, '
-        files += f'<a href="tables/{name}.tex">LaTeX</a></p>'
-        return _table(head, rows, texts) + files
+        file = f'<p class="files"><a href="tables/{name}.csv">CSV</a></p>'
+        return _table(head, rows, texts) + file
 
 
 def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
@@ -379,35 +377,6 @@ def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
     return dict(zip(labels, shortest, strict=True))
 
 
-def latex_table(
-    head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()
-) -> str:
-    r"""Return a table of LaTeX, for the package booktabs; `text`: its columns of text.
-
-    >>> print(latex_table(["speed", "95 % interval"], [["0.3", "1 to 2"]], (0,)))
-    \begin{tabular}{lr}
-    \toprule
-    speed & 95 \% interval \\
-    \midrule
-    0.3 & 1 to 2 \\
-    \bottomrule
-    \end{tabular}
-    <BLANKLINE>
-    """
-    kinds = "".join("l" if i in text else "r" for i in range(len(head)))
-    lines = [" & ".join(map(_latex, cells)) + r" \\" for cells in (head, *rows)]
-    lines.insert(1, r"\midrule")
-    body = "\n".join(lines)
-    return f"\\begin{{tabular}}{{{kinds}}}\n\\toprule\n{body}\n\\bottomrule\n\\end{{tabular}}\n"
-
-
-def _latex(text: str) -> str:
-    special = {**{c: f"\\{c}" for c in "&%$#_{}"}, "~": r"\textasciitilde{}"}
-    special |= {"^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}
-    special |= {"×": r"$\times$", "–": "--", "−": "$-$", "<": "$<$"}
-    return "".join(special.get(c, c) for c in text)
-
-
 def _file_name(metric: str) -> str:
     return re.sub(r"[^\w-]+", "_", metric)
 
@@ -419,15 +388,13 @@ def _warning(text: str) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()) -> str:
     """Return an HTML table; `text` holds the indices of its columns of text."""
 
-    def hint(value: str) -> str:
-        return f' title="{GLOSSARY[value]}"' if value in GLOSSARY else ""
-
     def cells(tag: str, values: Sequence[str]) -> str:
-        return "".join(
-            f"<{tag}{' class=text' * (i in text)}{hint(value) * (tag == 'th')}>"
-            f"{html.escape(value)}</{tag}>"
-            for i, value in enumerate(values)
-        )
+        found = []
+        for i, value in enumerate(values):
+            kind = " class=text" if i in text else ""
+            hint = f' title="{GLOSSARY[value]}"' if tag == "th" and value in GLOSSARY else ""
+            found.append(f"<{tag}{kind}{hint}>{html.escape(value)}</{tag}>")
+        return "".join(found)
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     return f"<table><tr>{cells('th', head)}</tr>{body}</table>"

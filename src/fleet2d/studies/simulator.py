@@ -1,6 +1,5 @@
 """Running scenarios: the only module of `studies` that imports the engine."""
 
-import copy
 import time
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,7 +16,6 @@ from fleet2d.scenario.model import Scenario
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from fleet2d.runs.run import Run
 
 Status = Literal["complete", "failed"]
 SEPARATOR = "."
@@ -58,46 +56,6 @@ def check_setup(scenario: Scenario) -> None:
         ComponentError: A component can't start.
     """
     Simulation(scenario)
-
-
-class StagedRun:
-    """A run in stages: it stops at simulated times, and its results so far can be read there.
-
-    Example:
-        >>> from fleet2d.scenario.load import load_scenario
-        >>> stages = StagedRun(load_scenario("simulation.duration=2 h", seed=4))
-        >>> hour = stages.until(3600.0)
-        >>> whole = stages.until(None)
-        >>> hour.status, whole.status
-        ('interrupted', 'complete')
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        """Set the run up.
-
-        Raises:
-            Fleet2DError: The scenario is wrong, or a component can't start.
-        """
-        self._simulation = Simulation(scenario)
-
-    @property
-    def done(self) -> bool:
-        """Whether the run is over."""
-        return self._simulation.done
-
-    def until(self, seconds: float | None) -> "Run":
-        """Continue to a simulated time [s], None for the end; return the run so far.
-
-        Raises:
-            Fleet2DError: A component failed.
-        """
-        simulation = self._simulation
-        if seconds is None:
-            return simulation.run()
-        steps = int(seconds * 1e6) // simulation.clock.step_us - simulation.step
-        if steps > 0:
-            simulation.advance(min(steps, simulation.clock.steps - simulation.step))
-        return copy.deepcopy(simulation).finish()
 
 
 def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> VariantOutcome:

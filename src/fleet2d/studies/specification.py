@@ -12,7 +12,7 @@ from fleet2d.bounds import one_line
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import Location, problem, problem_at, suggest
-from fleet2d.configuration.units import PositiveDuration, folder_of
+from fleet2d.configuration.units import folder_of
 from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.load import explain
@@ -31,37 +31,32 @@ def _with_type(value: Any) -> Any:
 
 
 class TuneSettings(Settings):
-    """The searched parameters, the objectives, and the homes on which the results are judged.
+    """The searched parameters, the objective, and the homes on which the results are judged.
 
     Attributes:
         search: The parameters, by name.
-        objectives: Metrics such as ltp_error.ana.tv, each with the better direction.
+        objective: A metric such as ltp_error.ana.tv, with the better direction.
         trials: The number of settings to try.
         held_out: {axis: [values]}: unknown to the search, used only by the report.
-        prune_at: Simulated times at which poor trials end early; with one objective only.
         seed: The seed of the search.
         batch: The number of settings that are suggested together, before any of them is judged.
         sampler: A class of optuna.samplers or mine:Sampler, by its name, or {type: NAME, …} with
-            its arguments; left out: TPESampler, or NSGAIISampler for several objectives.
+            its arguments; left out: TPESampler.
     """
 
     search: dict[str, Parameter] = Field(min_length=1)
-    objectives: dict[str, Literal["minimize", "maximize"]] = Field(min_length=1)
+    objective: dict[str, Literal["minimize", "maximize"]] = Field(min_length=1, max_length=1)
     trials: int = Field(default=40, ge=1)
     held_out: dict[str, tuple[Any, ...]] = Field(min_length=1, max_length=1)
-    prune_at: tuple[PositiveDuration, ...] = ()
     seed: int = Field(default=0, ge=0)
     batch: int = Field(default=4, ge=1)
     sampler: Annotated[dict[str, Any], BeforeValidator(_with_type)] = Field(default={})
 
-    def model_post_init(self, _: object, /) -> None:
-        """Refuse pruning by several objectives, and times that are not in order."""
-        if self.prune_at and len(self.objectives) > 1:
-            raise problem(
-                "prune_at needs one objective: with several objectives no trial can end early"
-            )
-        if list(self.prune_at) != sorted(set(self.prune_at)):
-            raise problem("prune_at needs times in ascending order")
+    @property
+    def metric(self) -> str:
+        """The name of the objective."""
+        (metric,) = self.objective
+        return metric
 
 
 SEED = "seed"
@@ -91,29 +86,6 @@ class Keep(Settings):
 
     metrics: tuple[str, ...] = ("*",)
     tables: tuple[str, ...] = ()
-
-
-class AdaptSettings(Settings):
-    """How many seeds the values of an axis get, decided while the study runs.
-
-    Attributes:
-        metric: The number that decides, such as ltp_error.ana.tv.
-        against: The axis and its reference value.
-        seeds: The number of seeds of each round; after a round it is decided who gets the next.
-        width: No more seeds once the interval of every difference is at most this wide.
-        goal: `minimize` or `maximize`: no more seeds for values clearly worse than the reference.
-    """
-
-    metric: str
-    against: dict[str, Any] = Field(min_length=1, max_length=1)
-    seeds: int = Field(default=5, ge=2)
-    width: float | None = Field(default=None, gt=0)
-    goal: Literal["minimize", "maximize"] | None = None
-
-    def model_post_init(self, _: object, /) -> None:
-        """Require a criterion by which values are decided."""
-        if self.width is None and self.goal is None:
-            raise problem("give width, or goal, or both: else every value gets all seeds")
 
 
 class PairedComparison(Settings):
@@ -163,7 +135,6 @@ class StudyFile(Settings):
         exclude: Combinations to leave out: {axis: value, …}.
         keep: The metrics and tables to keep of each run.
         compare: The comparisons that the report shows.
-        adapt: When values of an axis get no more seeds.
         tune: The search of `fleet2d study tune`.
     """
 
@@ -180,7 +151,6 @@ class StudyFile(Settings):
     exclude: tuple[dict[str, Any], ...] = ()
     keep: Keep = Keep()
     compare: tuple[PairedComparison, ...] = ()
-    adapt: AdaptSettings | None = None
     tune: TuneSettings | None = None
 
     @model_validator(mode="before")
@@ -216,8 +186,7 @@ class StudyFile(Settings):
             _check_columns(axis.when, known, ("axes", name, "when"), "axes before it")
             known += axis.columns(name)
         for location, condition in self.conditions():
-            seed = () if location[0] == "adapt" else (SEED,)
-            _check_columns(condition, [*known, *seed], location, "axes")
+            _check_columns(condition, [*known, SEED], location, "axes")
         for i, comparison in enumerate(self.compare):
             for key in ("by", "within"):
                 columns = getattr(comparison, key) or ()
@@ -229,8 +198,6 @@ class StudyFile(Settings):
         yield from ((("rules", i, "when"), rule.when) for i, rule in enumerate(self.rules))
         yield from ((("exclude", i), condition) for i, condition in enumerate(self.exclude))
         yield from ((("compare", i, "against"), c.against) for i, c in enumerate(self.compare))
-        if self.adapt is not None:
-            yield ("adapt", "against"), self.adapt.against
         if self.tune is not None:
             yield ("tune", "held_out"), self.tune.held_out
 
@@ -238,10 +205,8 @@ class StudyFile(Settings):
         """Yield the metrics that the file names, or patterns of some, and where they stand."""
         yield from ((("compare", i, "metric"), each.metric) for i, each in enumerate(self.compare))
         yield from ((("keep", "metrics", i), each) for i, each in enumerate(self.keep.metrics))
-        if self.adapt is not None:
-            yield ("adapt", "metric"), self.adapt.metric
         if self.tune is not None:
-            yield from ((("tune", "objectives", name), name) for name in self.tune.objectives)
+            yield ("tune", "objective", self.tune.metric), self.tune.metric
 
     @property
     def populations(self) -> tuple[str, ...]:
@@ -334,8 +299,7 @@ def read_specification(source: str | Path | Mapping[str, Any] | Specification) -
 
 def _base(base: Any, document: Document) -> Document:
     """Compose the base scenario; messages name the lines of the study file."""
-    place = document.place(("base",))
-    with errors_as(ScenarioError, f"{place}{': ' * bool(place)}base", of=ScenarioError):
+    with errors_as(ScenarioError, document.named(("base",)), of=ScenarioError):
         if isinstance(base, Scenario):
             return compose(base.resolved())
         if isinstance(base, Mapping):

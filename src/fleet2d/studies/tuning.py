@@ -3,7 +3,8 @@
 import inspect
 import itertools
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,11 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import TypeAdapter
 
-from fleet2d.bounds import one_line
 from fleet2d.configuration.importing import import_class
 from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import (
-    ComponentError,
     Fleet2DError,
     InputError,
     RunDirectoryError,
@@ -23,7 +22,6 @@ from fleet2d.errors import (
     errors_as,
     extra,
 )
-from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.load import scenario_of
 from fleet2d.scenario.model import Scenario
@@ -41,7 +39,7 @@ from fleet2d.studies.driver import CheckedStudy, check_study, run_study
 from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, by_home, run_tasks
 from fleet2d.studies.plan import StudyPlan
 from fleet2d.studies.reader import Study, open_study
-from fleet2d.studies.simulator import StagedRun, describe_error, flat_numbers, input_files
+from fleet2d.studies.simulator import describe_error, execute, input_files
 from fleet2d.studies.specification import (
     PairedComparison,
     Specification,
@@ -61,40 +59,35 @@ INPUTS = "input files"
 SETTING = "setting"
 BEFORE = "base"
 TUNED = "tuned"
-MAX_JUDGED_SETTINGS = 5  # settings to judge after a search for several objectives
-MAX_RUNS = 40  # unfinished runs that a worker holds for the next stage of their trial
 FAILURE = "failure"  # the attribute of a failed trial that holds the error
 
 
 @dataclass(frozen=True)
 class TrialTask(WorkerTask):
-    """One variant with one setting, up to a simulated time.
+    """One variant with one setting.
 
     Attributes:
         trial: The number of the trial.
         settings: The values of the searched parameters.
-        until_s: The simulated time at which the stage ends [s]; None: the end of the scenario.
     """
 
     trial: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
-    until_s: float | None = None
 
 
 @dataclass
 class TrialJob:
-    """Runs a variant with a setting, and returns its objectives.
+    """Runs a variant with a setting, and returns its objective.
 
     Attributes:
         design: The variants.
         search: The searched parameters.
-        objectives: The names of the metrics.
+        objective: The name of the metric.
     """
 
     design: Design
     search: Mapping[str, Parameter]
-    objectives: tuple[str, ...]
-    _runs: dict[tuple[int, int], StagedRun] = field(default_factory=dict, repr=False)
+    objective: str
 
     def scenario(self, index: int, settings: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a variant with a setting.
@@ -114,28 +107,19 @@ class TrialJob:
         document = apply_changes(scenario._document, changes)
         return scenario_of(document, scenario.folder)
 
-    def __call__(self, task: TrialTask) -> tuple[list[float] | None, str | None]:
-        """Return the objectives and the error; one of them is None."""
+    def __call__(self, task: TrialTask) -> tuple[float, str | None]:
+        """Return the objective, NaN if there is none, and the error, if there is one."""
         try:
-            numbers = dict(flat_numbers(self._metrics(task)))
-            missing = [name for name in self.objectives if name not in numbers]
-            if missing:
-                hint = did_you_mean(missing[0], numbers)
-                raise ComponentError(f"the run has no metric {missing[0]!r}{hint}")
-            return [numbers[name] for name in self.objectives], None
-        except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
-            return None, describe_error(error)
-
-    def _metrics(self, task: TrialTask) -> Mapping[str, Any]:
-        """Return the metrics at the end of a stage; a run that this worker has goes on."""
-        key = task.trial, task.index
-        run = self._runs.pop(key, None) or StagedRun(self.scenario(task.index, task.settings))
-        metrics = run.until(task.until_s).metrics
-        if task.until_s is not None and not run.done:
-            self._runs[key] = run
-            while len(self._runs) > MAX_RUNS:  # workers don't hear of trials that ended early
-                del self._runs[next(iter(self._runs))]
-        return metrics
+            scenario = self.scenario(task.index, task.settings)
+        except Fleet2DError as error:
+            return math.nan, describe_error(error)
+        outcome = execute(scenario, ["*"], ())
+        if outcome.error is not None:
+            return math.nan, outcome.error
+        if self.objective not in outcome.metrics:
+            hint = did_you_mean(self.objective, outcome.metrics)
+            return math.nan, f"the run has no metric {self.objective!r}{hint}"
+        return outcome.metrics[self.objective], None
 
 
 def make_sampler(settings: TuneSettings, finished: int) -> "optuna.samplers.BaseSampler":
@@ -146,8 +130,7 @@ def make_sampler(settings: TuneSettings, finished: int) -> "optuna.samplers.Base
     """
     from optuna import samplers
 
-    usual = "TPESampler" if len(settings.objectives) == 1 else "NSGAIISampler"
-    options = {"type": usual, **settings.sampler}
+    options = {"type": "TPESampler", **settings.sampler}
     name = options.pop("type")
     known = [known for known in samplers.__all__ if known.endswith("Sampler")]
     if ":" not in name and name not in known:
@@ -187,8 +170,8 @@ def check_settings(job: TrialJob, index: int) -> None:
                 job.scenario(index, {name: value})
 
 
-TuneObserver = Callable[[int, int, list[float] | None], None]
-"""Receives the number of trials that are over, that of all, and the best objectives so far."""
+TuneObserver = Callable[[int, int, float], None]
+"""Receives the number of trials that are over, that of all, and the best value so far, or NaN."""
 
 
 @dataclass(frozen=True)
@@ -196,19 +179,19 @@ class TuneResult:
     """The result of a search.
 
     Attributes:
-        settings: The best settings by name, as overrides: key path to value.
-        values: Their objectives on the training homes, by name.
-        trials: The numbers of complete, pruned and failed trials.
+        settings: The best settings, as overrides: key path to value.
+        value: The objective with them on the training homes.
+        trials: The numbers of complete and failed trials.
         held_out: The study on the homes that the search doesn't use.
     """
 
-    settings: dict[str, dict[str, Any]]
-    values: dict[str, list[float]]
+    settings: dict[str, Any]
+    value: float
     trials: dict[str, int]
     held_out: Study
 
 
-def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> dict[str, str]:
+def search_identity(plan: StudyPlan, settings: TuneSettings) -> dict[str, str]:
     """Return what the trials of a search depend on, by its name in messages: as hashes or as text.
 
     Trials of another search may have seen the homes that are now held out, or have been judged by
@@ -217,10 +200,9 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
     Args:
         plan: The variants.
         settings: The `tune` section of the study file.
-        storage: Where the trials are stored, without secrets.
     """
-    scenarios: dict[bool, list[str]] = {False: [], True: []}
-    for index, scenario in plan.variants.select("index", "scenario").iter_rows():
+    scenarios: dict[bool, list[Any]] = {False: [], True: []}
+    for index, *scenario in plan.variants.select("index", "template", "seed").iter_rows():
         is_held_out = matches(settings.held_out, plan.design.parameters(index))
         scenarios[is_held_out].append(scenario)
     content = {key: content_hash(value) for key, value in settings.model_dump(mode="json").items()}
@@ -228,12 +210,10 @@ def search_identity(plan: StudyPlan, settings: TuneSettings, storage: str) -> di
         "the training (homes, base scenario or seeds)": content_hash(sorted(scenarios[False])),
         "the held-out part": content_hash(sorted(scenarios[True])),
         "the searched parameters": content["search"],
-        "the objectives": content["objectives"],
-        "prune_at": content["prune_at"],
+        "the objective": content["objective"],
         "the seed of the search": content["seed"],
         "the batch": content["batch"],
         "the sampler": content["sampler"],
-        "the storage": storage,
         "the version of Fleet2D": code_version(),
         INPUTS: content_hash(sorted(plan.variants["identity"])),
     }
@@ -246,9 +226,8 @@ def tune(
     observer: TuneObserver | None = None,
     *,
     changed: Literal["redo"] | None = None,
-    storage: str | None = None,
 ) -> TuneResult:
-    """Search the parameters that a study's `tune` section names, and judge the best settings.
+    """Search the parameters that a study's `tune` section names, and judge the best ones.
 
     A search that was interrupted continues.
 
@@ -257,10 +236,8 @@ def tune(
         folder: The folder of the search.
         crew: Where trials run.
         observer: Follows the progress.
-        changed: `redo` starts over if the folder holds another search, whose trials stay in the
-            storage under a name of their own; None: such a folder is refused.
-        storage: The URL of a database for the trials, such as sqlite:///trials.db; None: a file in
-            the folder.
+        changed: `redo` starts over if the folder holds another search, whose trials stay in their
+            file under a name of their own; None: such a folder is refused.
 
     Raises:
         InputError: The study has no such section, the section is wrong, the folder holds another
@@ -275,7 +252,7 @@ def tune(
     checked = check_study(specification)
     plan = checked.plan
     training = _training(plan, settings)
-    job = TrialJob(plan.design, settings.search, tuple(settings.objectives))
+    job = TrialJob(plan.design, settings.search, settings.metric)
     check_settings(job, training[0][0])
     directory = StudyDirectory(folder)
     if directory.storage.folder is None:
@@ -285,26 +262,26 @@ def tune(
         from optuna.storages import JournalStorage
         from optuna.storages.journal import JournalFileBackend
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    database, storage_name = _open_database(storage) if storage else (None, TRIALS)
-    identity = search_identity(plan, settings, storage_name)
+    identity = search_identity(plan, settings)
     make_sampler(settings, 0)  # its errors come before anything is written
     with directory.locked():
         _check_identity(directory.storage, identity, changed)
         name = f"{specification.name} {content_hash(identity)}"
         with directory.storage.reading(TRIALS):
             path = directory.storage.path(TRIALS)
-            trials = database or JournalStorage(JournalFileBackend(path))
+            trials = JournalStorage(JournalFileBackend(path))
             study = _open_trials(trials, name, settings)
         Search(study, job, training, settings, crew).run(observer)
-    best = _best(study, settings)
-    held_out = _check_held_out(specification, plan.design, best, settings)
+    best = _best(study)
+    overrides = _overrides(best, settings)
+    held_out = _check_held_out(specification, plan.design, overrides, settings)
     # After more trials, the best settings may be others.
     run_study(held_out, directory.storage.folder / HELD_OUT, crew, changed="redo")
     states = [trial.state.name.lower() for trial in study.trials]
     return TuneResult(
-        {name: _overrides(trial, settings) for name, trial in best.items()},
-        {name: list(trial.values) for name, trial in best.items()},
-        {state: states.count(state) for state in ("complete", "pruned", "fail")},
+        overrides,
+        best.value,
+        {state: states.count(state) for state in ("complete", "fail")},
         open_study(directory.storage.folder / HELD_OUT),
     )
 
@@ -386,9 +363,7 @@ def _check_identity(
 class Search:
     """A search in batches of trials that are suggested and judged together.
 
-    So neither the number of workers nor their speed has an effect on what Optuna suggests. All
-    trials of a batch run all variants up to one time of `prune_at` before the next; between them
-    Optuna decides which trials go on.
+    So neither the number of workers nor their speed has an effect on what Optuna suggests.
     """
 
     def __init__(
@@ -415,7 +390,7 @@ class Search:
         """Run trials up to the number of the settings; an interrupted batch is filled."""
         total = self._settings.trials
         trials = self._study.get_trials(deepcopy=False)
-        finished = sum(trial.state.name in ("COMPLETE", "PRUNED") for trial in trials)
+        finished = sum(trial.state.name == "COMPLETE" for trial in trials)
         while finished < total:
             rest = self._settings.batch - finished % self._settings.batch
             count = min(rest, total - finished)
@@ -425,85 +400,44 @@ class Search:
             finished += count
             if observer is not None:
                 best = self._study.best_trials
-                observer(finished, total, list(best[0].values) if best else None)
+                observer(finished, total, best[0].value if best else math.nan)
 
     def _run_batch(self, trials: "list[optuna.Trial]") -> None:
-        """Run trials stage by stage, and tell Optuna what came of each."""
-        settings = {trial.number: self._suggested(trial) for trial in trials}
-        for time in self._settings.prune_at:
-            until_s = time.total_seconds()
-            # Optuna decides only after all of the batch, in their order.
-            means = {trial.number: mean for trial, mean in self._means(trials, settings, until_s)}
-            trials = [trial for trial in trials if trial.number in means]
-            for trial in trials:
-                trial.report(means[trial.number][0], int(until_s))
-            pruned = [trial for trial in trials if trial.should_prune()]
-            for trial in pruned:
-                self._study.tell(trial, state=_state("PRUNED"))
-            trials = [trial for trial in trials if trial not in pruned]
-        for trial, mean in self._means(trials, settings, None):
-            self._study.tell(trial, mean)
-
-    def _suggested(self, trial: "optuna.Trial") -> dict[str, Any]:
+        """Run trials, and tell Optuna what came of each."""
+        keys = itertools.product(trials, self._variants)
         search = self._settings.search
-        return {name: suggested(trial, name, search[name]) for name in search}
-
-    def _means(
-        self,
-        trials: "list[optuna.Trial]",
-        settings: Mapping[int, Mapping[str, Any]],
-        until_s: float | None,
-    ) -> "Iterator[tuple[optuna.Trial, list[float]]]":
-        """Run trials up to a simulated time; yield those that don't fail, with their objectives."""
-        by_number = {trial.number: trial for trial in trials}
-        keys = itertools.product(by_number, self._variants)
+        settings = {
+            trial.number: {name: suggested(trial, name, search[name]) for name in search}
+            for trial in trials
+        }
         tasks = [
-            TrialTask(place, index, "", home, number, settings[number], until_s)
-            for place, (number, (index, home)) in enumerate(keys)
+            TrialTask(place, index, "", home, trial.number, settings[trial.number])
+            for place, (trial, (index, home)) in enumerate(keys)
         ]
-        results: dict[int, dict[int, Any]] = {number: {} for number in by_number}
+        by_number = {trial.number: trial for trial in trials}
+        values: dict[int, list[float]] = {trial.number: [] for trial in trials}
         with closing(run_tasks(self._crew, self._job, TaskQueue(by_home(tasks)))) as rounds:
             for end in itertools.chain.from_iterable(rounds):
                 number = end.task.trial
                 trial = by_number.get(number)
                 if trial is None:  # it has failed
                     continue
-                objectives, error = end.payload or (None, end.loss)
+                value, error = end.payload or (math.nan, end.loss)
                 if error is not None:
                     trial.set_user_attr(FAILURE, error)
                     self._study.tell(trial, state=_state("FAIL"))
                     del by_number[number]
                     continue
-                results[number][end.task.index] = objectives
-                if len(results[number]) == len(self._variants):
-                    of_all = [results[number][index] for index, _ in self._variants]
-                    columns = zip(*of_all, strict=True)
-                    yield trial, [sum_in_order(column) / len(column) for column in columns]
+                values[number].append(value)
+                if len(values[number]) == len(self._variants):
+                    # `fsum` is exact, whatever the order of the results.
+                    self._study.tell(trial, math.fsum(values[number]) / len(self._variants))
 
 
 def _state(name: str) -> "optuna.trial.TrialState":
     from optuna.trial import TrialState
 
     return TrialState[name]
-
-
-def _open_database(url: str) -> tuple["optuna.storages.BaseStorage", str]:
-    """Return the storage of the trials in a database, and its URL without secrets.
-
-    Raises:
-        InputError: The database can't be used.
-    """
-    from optuna.storages import RDBStorage
-    from sqlalchemy.engine import make_url
-    from sqlalchemy.exc import SQLAlchemyError
-
-    try:
-        return RDBStorage(url), make_url(url).render_as_string(hide_password=True)
-    except (SQLAlchemyError, ImportError, ValueError) as error:
-        raise InputError(
-            f"the storage can't be used ({one_line(error, 200)}): give the URL of a database, such"
-            " as sqlite:///trials.db"
-        ) from error
 
 
 def _open_trials(
@@ -513,8 +447,8 @@ def _open_trials(
     import optuna
 
     study = optuna.create_study(
-        study_name=name, storage=storage, directions=list(settings.objectives.values()),
-        load_if_exists=True, pruner=optuna.pruners.MedianPruner(n_startup_trials=5),
+        study_name=name, storage=storage, direction=settings.objective[settings.metric],
+        load_if_exists=True,
     )  # fmt: skip
     for trial in study.get_trials(states=(optuna.trial.TrialState.RUNNING,)):
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
@@ -523,20 +457,18 @@ def _open_trials(
     return study
 
 
-def _best(study: "optuna.Study", settings: TuneSettings) -> "dict[str, optuna.trial.FrozenTrial]":
-    """Return the best trials by their names in the report.
+def _best(study: "optuna.Study") -> "optuna.trial.FrozenTrial":
+    """Return the best trial.
 
     Raises:
         InputError: All trials failed.
     """
-    best = study.best_trials[:MAX_JUDGED_SETTINGS]
+    best = study.best_trials
     if not best:
         reasons = (trial.user_attrs.get(FAILURE) for trial in study.trials)
         reason = next(filter(None, reasons), "none is complete")
         raise InputError(f"no trial succeeded: {reason}")
-    if len(settings.objectives) == 1:
-        return {TUNED: best[0]}
-    return {f"trial {trial.number}": trial for trial in best}
+    return best[0]
 
 
 def _overrides(trial: "optuna.trial.FrozenTrial", settings: TuneSettings) -> dict[str, Any]:
@@ -554,20 +486,17 @@ def _overrides(trial: "optuna.trial.FrozenTrial", settings: TuneSettings) -> dic
 def _check_held_out(
     specification: Specification,
     design: Design,
-    best: "dict[str, optuna.trial.FrozenTrial]",
+    best: Mapping[str, Any],
     settings: TuneSettings,
 ) -> CheckedStudy:
-    """Return the study that compares the best settings on the homes held out of the search."""
+    """Return the study that compares the best setting with the base on the homes held out."""
     ((axis, values),) = settings.held_out.items()
     training = tuple(
         label for label in design.labels[axis] if not matches({axis: list(values)}, {axis: label})
     )
-    options = {BEFORE: dict[str, Any]()}
-    options |= {name: _overrides(trial, settings) for name, trial in best.items()}
+    options = {BEFORE: dict[str, Any](), TUNED: dict(best)}
     file = specification.file
-    compare = tuple(
-        PairedComparison(metric=metric, against={SETTING: BEFORE}) for metric in settings.objectives
-    )
+    compare = (PairedComparison(metric=settings.metric, against={SETTING: BEFORE}),)
     changes = {
         "name": f"{specification.name}, tuned",
         "axes": {**file.axes, SETTING: OptionsAxis(options=options)},

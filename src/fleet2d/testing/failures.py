@@ -170,11 +170,8 @@ class Shrinker:
         return is_missing and bool(case.failure.names & names)
 
     def _fewer(self, case: FailingCase) -> FailingCase:
-        """Leave out the people, robots, objects and changes not needed to fail."""
-        case = self._left_out(case, ("robots", "users", "objects"))
-        if case.variant.scenario.changes:
-            case = self._try(case, _edited(case.variant, changes=[])) or case
-        return case
+        """Leave out the people, robots and objects not needed to fail."""
+        return self._left_out(case, ("robots", "users", "objects"))
 
     def _left_out(self, case: FailingCase, sections: tuple[str, ...]) -> FailingCase:
         """Leave out the entries of some sections one by one."""
@@ -298,7 +295,9 @@ def _by_expectation(result: ClaimResult) -> Iterable[str]:
         if len(result.trials) == 1:
             continue
         seeds = [trial.variant.text for trial, _ in cases]
-        shown = "; ".join(seeds[:MAX_SEEDS_SHOWN]) + "; …" * (len(seeds) > MAX_SEEDS_SHOWN)
+        if len(seeds) > MAX_SEEDS_SHOWN:
+            seeds[MAX_SEEDS_SHOWN:] = ["…"]
+        shown = "; ".join(seeds)
         worst, failure = min(cases, key=lambda case: case[1].margin)
         yield f"  {name}: failed in {len(cases)} of {len(result.trials)} ({shown})"
         if len(cases) > 1 and name != ASSERT:

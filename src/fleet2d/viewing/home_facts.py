@@ -241,7 +241,7 @@ class WallsHistory:
             if not door.open:
                 self._home.set_door(number, is_open=False)
         self.changes = [WallsChange(step=0, walls=self._number())]
-        if doors or run.manifest["scenario"].get("changes"):
+        if doors or run.manifest["scenario"].get("script"):
             for step, entity, event, detail in _home_events(run):
                 self._replay(step, entity, event, detail)
 

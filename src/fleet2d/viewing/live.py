@@ -21,8 +21,7 @@ from fleet2d.engine.simulation import Simulation, interventions_of, may_run_code
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import Fleet2DError, InputError, PlacementError
-from fleet2d.floorplan.home import HomeChange
-from fleet2d.interventions import ChangeHome, Configure, HoldStill, Put, Replan, Send
+from fleet2d.interventions import Configure, HoldStill, OpenDoor, Put, Replan, Send, ShutDoor
 from fleet2d.kernels import TURN, Mesh
 from fleet2d.runs.run import Run
 from fleet2d.runtime.clock import DAY_S
@@ -150,8 +149,7 @@ class LiveEngine:
         name = order["target"]
         place = (order["x"], order["y"])
         if order["action"] == "door":
-            change = HomeChange(open=name) if order["value"] else HomeChange(shut=name)
-            self.simulation.do(ChangeHome(change))
+            self.simulation.do(OpenDoor(name) if order["value"] else ShutDoor(name))
         elif order["action"] == "place":
             self.simulation.do(Put(name, self._near(name, place)))
             if name in self._called:

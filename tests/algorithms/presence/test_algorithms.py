@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import digests, run, scenario, table
 
 import fleet2d
-from fleet2d.configuration.components import components, lookup
+from fleet2d.configuration.components import components
 from fleet2d.errors import Fleet2DError
 
 ESTIMATORS, MODELS = (
@@ -33,10 +33,15 @@ def content(duration: str = "3 h", **algorithms: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def stored():
     """Every estimator and every model, over a midnight."""
-    algorithms = {f"e_{name}": {"type": "ltp", "estimator": name} for name in ESTIMATORS}
-    algorithms |= {f"m_{name}": {"type": "rtp", "model": name, "period": "1 h"} for name in MODELS}
+    algorithms = {
+        f"e_{name}": {"type": "long_term_presence", "estimator": name} for name in ESTIMATORS
+    }
+    algorithms |= {
+        f"m_{name}": {"type": "real_time_presence", "model": name, "period": "1 h"}
+        for name in MODELS
+    }
     algorithms["week"] = {"type": "long_term_presence", "by": "hour_of_week"}
-    algorithms["sure"] = {"type": "ltp", "interval": 0.9}
+    algorithms["sure"] = {"type": "long_term_presence", "interval": 0.9}
     return run(content("19 h", **algorithms))
 
 
@@ -68,14 +73,23 @@ def test_intervals_are_columns_and_the_others_have_none(stored) -> None:
 
 
 def test_a_run_is_the_same_with_and_without_other_learners(stored) -> None:
-    alone = run(content("19 h", e_likelihood={"type": "ltp", "estimator": "likelihood"}))
+    alone = run(
+        content("19 h", e_likelihood={"type": "long_term_presence", "estimator": "likelihood"})
+    )
     assert digests(stored)["e_likelihood"] == digests(alone)["e_likelihood"]
     assert digests(stored)["trajectories"] == digests(alone)["trajectories"]
 
 
 def test_the_longest_span_changes_nothing() -> None:
     digests_by_span = [
-        digests(run(content("2 h", rtp={"type": "rtp"}, ltp={"type": "ltp"}), max_span=span))
+        digests(
+            run(
+                content(
+                    "2 h", rtp={"type": "real_time_presence"}, ltp={"type": "long_term_presence"}
+                ),
+                max_span=span,
+            )
+        )
         for span in (100, 100_000)
     ]
     assert digests_by_span[0] == digests_by_span[1]
@@ -84,14 +98,17 @@ def test_the_longest_span_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"type": "ltp", "estimator": "sighting"}, "sighting_share"),
-        ({"type": "ltp", "estimator": {"type": "likelihood", "detection": 1}}, "detection"),
-        ({"type": "ltp", "estimator": {"type": "likelihood", "looks": 1}}, "looks"),
-        ({"type": "ltp", "interval": 0.9, "by": "hour_of_week"}, "interval"),
-        ({"type": "ltp", "interval": 0.9, "estimator": "fremen"}, "fremen has none"),
-        ({"type": "ltp", "half_life": 0}, "half_life"),
-        ({"type": "rtp", "model": "psychic"}, "There are: .*hmm, .*hour_of_week"),
-        ({"type": "rtp", "model": {"detection": 0.5}}, "'type' is needed"),
+        ({"type": "long_term_presence", "estimator": "sighting"}, "sighting_share"),
+        (
+            {"type": "long_term_presence", "estimator": {"type": "likelihood", "detection": 1}},
+            "detection",
+        ),
+        ({"type": "long_term_presence", "estimator": {"type": "likelihood", "looks": 1}}, "looks"),
+        ({"type": "long_term_presence", "interval": 0.9, "by": "hour_of_week"}, "interval"),
+        ({"type": "long_term_presence", "interval": 0.9, "estimator": "fremen"}, "fremen has none"),
+        ({"type": "long_term_presence", "half_life": 0}, "half_life"),
+        ({"type": "real_time_presence", "model": "psychic"}, "There are: .*hmm, .*hour_of_week"),
+        ({"type": "real_time_presence", "model": {"detection": 0.5}}, "'type' is needed"),
     ],
 )
 def test_wrong_settings_are_refused_with_a_message(settings: dict[str, Any], words: str) -> None:
@@ -99,14 +116,12 @@ def test_wrong_settings_are_refused_with_a_message(settings: dict[str, Any], wor
         run(content(mine=settings))
 
 
-def test_they_are_found_by_their_short_names() -> None:
-    assert lookup("algorithm", "ltp") is lookup("algorithm", "long_term_presence")
-    assert lookup("algorithm", "rtp") is lookup("algorithm", "real_time_presence")
-
-
 def test_presence_is_defined_without_users_or_cameras() -> None:
     for robots in ({}, {"astro": {"type": "patrol", "camera": None}}):
-        algorithms = {"ltp": {"type": "ltp", "estimator": "likelihood"}, "rtp": {"type": "rtp"}}
+        algorithms = {
+            "ltp": {"type": "long_term_presence", "estimator": "likelihood"},
+            "rtp": {"type": "real_time_presence"},
+        }
         stored = run(scenario("2 h", robots=robots, algorithms=algorithms))
         rows = table(stored, "ltp")
         assert {"anyone"} == set(rows["user"])
@@ -129,7 +144,7 @@ class Sure(Model):
 """
     (tmp_path / "mine.py").write_text(code)
     model = {"type": f"{tmp_path.as_posix()}/mine:Sure", "room": 2}
-    stored = run(content("1 h", rtp={"type": "rtp", "model": model}))
+    stored = run(content("1 h", rtp={"type": "real_time_presence", "model": model}))
     rows = table(stored, "rtp", user="ana", share=1.0)
     assert 12 == len(rows["step"])
     assert {"bedroom_0"} == set(rows["room"])
@@ -137,14 +152,21 @@ class Sure(Model):
 
 @pytest.mark.slow
 def test_a_longer_step_than_a_minute_makes_bins_of_a_step() -> None:
-    slow = content("2 d", ltp={"type": "ltp", "estimator": "likelihood"}, rtp={"type": "rtp"})
+    slow = content(
+        "2 d",
+        ltp={"type": "long_term_presence", "estimator": "likelihood"},
+        rtp={"type": "real_time_presence"},
+    )
     slow["simulation"] |= {"step": "5 min"}
     slow["artifacts"] |= {"trajectories": "off"}
     assert len(table(fleet2d.run(slow), "rtp")["step"]) == 2 * 288 * 3 * 7
 
 
 def test_a_run_can_start_from_the_learned_state_of_another(tmp_path: Path) -> None:
-    algorithms = {"ltp": {"type": "ltp", "estimator": "likelihood"}, "rtp": {"type": "rtp"}}
+    algorithms = {
+        "ltp": {"type": "long_term_presence", "estimator": "likelihood"},
+        "rtp": {"type": "real_time_presence"},
+    }
     before = content("1 d", **algorithms)
     before["artifacts"] |= {"learned": True}
     first = fleet2d.run(before, out=tmp_path / "one")
@@ -168,7 +190,7 @@ def test_every_estimator_has_all_variants_for_everybody() -> None:
     for name in ESTIMATORS:
         for half_life in ("null", "1 d"):
             key = f"{name}_{half_life.replace(' ', '')}"
-            fields = {"type": "ltp", "estimator": name, "period": "9 h"}
+            fields = {"type": "long_term_presence", "estimator": name, "period": "9 h"}
             fields |= {} if half_life == "null" else {"half_life": half_life}
             algorithms[f"w_{key}"] = {**fields, "by": "hour_of_week"}
             algorithms[f"o_{key}"] = {**fields, **({} if name == "fremen" else {"interval": 0.9})}

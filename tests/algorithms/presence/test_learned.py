@@ -21,7 +21,7 @@ from fleet2d.learning.datasets.training import predict
 from fleet2d.learning.datasets.windows import windows_of
 from fleet2d.metrics.rtp_score import calibration_error
 
-LEARNED = {"rtp": {"type": "rtp", "model": "learned"}}
+LEARNED = {"rtp": {"type": "real_time_presence", "model": "learned"}}
 
 
 def begun(rooms: int = 3, users: int = 2) -> LearnedModel:
@@ -65,7 +65,7 @@ def test_forecasts_begin_with_the_present_belief() -> None:
 
 @pytest.mark.slow
 def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
-    routine = {"type": "rtp", "model": "routine"}
+    routine = {"type": "real_time_presence", "model": "routine"}
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=5 d",
@@ -173,7 +173,7 @@ def test_a_damaged_file_is_refused_before_the_run(tmp_path: Path) -> None:
             "bundled:paper",
             "simulation.duration=1 h",
             seed=1,
-            algorithms={"rtp": {"type": "rtp", "model": model}},
+            algorithms={"rtp": {"type": "real_time_presence", "model": model}},
         )
 
 
@@ -188,7 +188,10 @@ def test_weights_are_read_as_they_were_saved(tmp_path: Path) -> None:
 
 
 def test_a_run_names_a_missing_file(tmp_path: Path) -> None:
-    missing = {"type": "rtp", "model": {"type": "learned", "weights": str(tmp_path / "no.npz")}}
+    missing = {
+        "type": "real_time_presence",
+        "model": {"type": "learned", "weights": str(tmp_path / "no.npz")},
+    }
     with pytest.raises(InputError, match=r"no\.npz"):
         fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=1, algorithms={"rtp": missing})
 

@@ -118,7 +118,10 @@ def product() -> dict[str, Any]:
                 "charger": [1, 3],
             },
         },
-        algorithms={"ltp": {"type": "ltp", "period": "30 min"}, "rtp": {"type": "rtp"}},
+        algorithms={
+            "ltp": {"type": "long_term_presence", "period": "30 min"},
+            "rtp": {"type": "real_time_presence"},
+        },
         objects={
             "gate": {"type": "door", "doorway": "living_room_0-kitchen_0", "schedule": agenda}
         },

@@ -51,7 +51,7 @@ def lived_in(behavior: str, keep_out: list[str]) -> Run:
             duration="2 h",
             users={"ana": {"type": "meander"}},
             astro={"battery": {"driving": "1 h", "standing": "3 h", "charging": "20 min", "charger": [2.0, 3.5]}},
-            algorithms={"ltp": {"type": "ltp", "period": "10 min"}},
+            algorithms={"ltp": {"type": "long_term_presence", "period": "10 min"}},
             interactions={"tea": {"do": "offer", "to": "ana", "at": ["07:10", "08:00"], "within": "1 h"}},
         )
     )  # fmt: skip

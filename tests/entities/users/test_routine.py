@@ -336,7 +336,7 @@ def locked_out(*changes: dict[str, Any]) -> fleet2d.Run:
     door = {"type": "door", "doorway": "office_0"}
     shut = [{"at": "10 min", "shut": "office"}, {"at": "10 min", "lock": "office"}]
     life = {**lives("works_from_home"), **HOME, "objects": {"office": door}}
-    return run({**life, "changes": [*shut, *changes]})
+    return run({**life, "script": [*shut, *changes]})
 
 
 def test_what_is_done_behind_a_locked_door_is_left_out_and_nothing_else() -> None:

@@ -98,8 +98,12 @@ def test_windows_equal_those_of_the_model_in_the_loop() -> None:
         seed=3,
         algorithms={
             "evidence": {"type": "evidence_table"},
-            "belief_routine": {"type": "rtp", "model": "routine", "period": "10 min"},
-            "rtp": {"type": "rtp", "model": "learned", "period": "10 min"},
+            "belief_routine": {
+                "type": "real_time_presence",
+                "model": "routine",
+                "period": "10 min",
+            },
+            "rtp": {"type": "real_time_presence", "model": "learned", "period": "10 min"},
         },
         metrics={"stays": {}},
     )

@@ -27,7 +27,7 @@ def forecast_run() -> Any:
             users=users,
             robots={"astro": {"type": "patrol", "dwell": "20 s"}},
             algorithms={
-                "rtp": {"type": "rtp"},
+                "rtp": {"type": "real_time_presence"},
                 "later": {"type": "belief_table", "period": "1 h", "every": "5 min"},
                 "share": {"type": "tests.own_components:Share"},
             },

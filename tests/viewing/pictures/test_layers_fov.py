@@ -12,7 +12,7 @@ import fleet2d
 from fleet2d.errors import InputError, PlacementError
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Reach
-from fleet2d.sight.fov import Flashlight
+from fleet2d.sight.cached_fov import Flashlight
 from fleet2d.viewing.pictures.layers import (
     CameraPose,
     cells_panel,

@@ -439,13 +439,13 @@ def divide(
     free: Bool,
     regions: Sequence[LabelledRegion],
     kind: RegionKind,
-    passages: Passages | None,
+    passages: Passages,
 ) -> tuple[I16, tuple[Room, ...], list[str]]:
     """Divide the free cells among rooms.
 
     See `assign_rooms`, `label_rooms`, `segment_rooms` and `divide_by_shape`.
     """
-    if kind in ("exact", "segments") or passages is None:
+    if kind in ("exact", "segments"):
         return assign_rooms(lattice, free, regions)
     if kind == "vacuum" or (kind == "none" and not passages.between_straight_walls):
         limits = OF_VACUUMS if kind == "vacuum" else IN_RAGGED_WALLS

@@ -14,11 +14,12 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Segment
 from fleet2d.floorplan.placed_objects import Point
-from fleet2d.floorplan.rooms.segmentation import MIN_APART_M
 from fleet2d.kernels import F64, I16, I64, Bool
 
 # How far beyond the end of a door line its wall may be [m].
 REACH_M = 0.3
+MIN_APART_M = 0.5
+"""Passages with middles nearer than this are the two sides of one wall."""
 # A line that meets a wall within this distance of a corner ends at the corner [lattice].
 CORNER_DISTANCE = 8
 # Distances from a door line at which the rooms on its two sides are looked up [m].

@@ -22,6 +22,7 @@ from shapely import Polygon
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
+from fleet2d.floorplan.rooms.doorways import MIN_APART_M
 from fleet2d.floorplan.rooms.shape import by_size, without_furniture
 from fleet2d.kernels import (
     F64,
@@ -55,8 +56,6 @@ WIDENINGS_M = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 MIN_WIDENING_M = 0.3
 WIDENING_SHARE = 0.2
 """Least widening behind a passage: in metres, and as a share of its width."""
-MIN_APART_M = 0.5
-"""Passages with middles nearer than this are the two sides of one wall."""
 VISIBLE_SHARE = 0.97
 """Share of a passage that must be visible from its middle; the very ends are on walls."""
 STUBS_M = (0.15, 0.3, 0.45)

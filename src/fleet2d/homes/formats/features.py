@@ -20,6 +20,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject, Point, Portal, distin
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import (
     BORDER_M,
+    MIN_APART_M,
     NEAR_M,
     TOUCH_M,
     DoorLine,
@@ -29,7 +30,6 @@ from fleet2d.floorplan.rooms.doorways import (
     shared_borders,
 )
 from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_type
-from fleet2d.floorplan.rooms.segmentation import MIN_APART_M
 from fleet2d.homes.formats.enclosure import (
     draws_walls,
     enclosed_space,

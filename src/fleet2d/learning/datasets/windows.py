@@ -96,8 +96,8 @@ def windows_of_run(run: "Run") -> list[Windows]:
     if lacking:
         raise InputError(
             f"the run has no table {lacking[0]!r}: run it with algorithms: {{{EVIDENCE}: {{type:"
-            f" evidence_table}}, {BELIEF}{PRIOR}: {{type: rtp, model: {PRIOR}}}}} and metrics:"
-            f" {{{STAYS}: {{}}}}"
+            f" evidence_table}}, {BELIEF}{PRIOR}: {{type: real_time_presence, model: {PRIOR}}}}}"
+            f" and metrics: {{{STAYS}: {{}}}}"
         )
     labels = {"home": "", "household": ""}
     planned = PlannedRun(0, "", labels, {"simulation": {"seed": run.manifest["seed"]}})

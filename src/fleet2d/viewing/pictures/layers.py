@@ -18,8 +18,9 @@ from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import TURN, Reach
 from fleet2d.palette import TEXT_COLOR, VIEW_EDGE
 from fleet2d.runs.run import LAYER_PREFIX, Run, layer_steps, read_layer
+from fleet2d.sight.cached_fov import Flashlight
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
-from fleet2d.sight.fov import FieldOfView, Flashlight, VisibleRegion
+from fleet2d.sight.fov import FieldOfView, VisibleRegion
 from fleet2d.viewing.pictures.floorplan import draw_cells, figure_size, floorplan_axes, picture
 from fleet2d.viewing.pictures.life import SightWalls, draw_region, draw_robot, field_of_view
 

@@ -514,7 +514,7 @@ def _length(us: int) -> str:
     for unit, size in (("day", DAY_US), ("hour", HOUR_US), ("minute", 60_000_000)):
         if us >= size:
             count = us / size
-            return f"{count:.3g} {unit}{'s' * (count != 1)}"
+            return f"{count:.3g} {unit if count == 1 else unit + 's'}"
     return f"{us / 1e6:g} s"
 
 

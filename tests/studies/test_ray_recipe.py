@@ -1,13 +1,16 @@
-"""Ray: the same results on a cluster of several nodes, one of which is killed in the middle."""
+"""The recipe for Ray in the docs: the same results on a cluster, a node of which is killed."""
 
+import importlib
+import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.studies.scenes import base, digests, optional, run, small
+from tests.test_docs import ROOT, blocks
 
-from fleet2d.studies.cluster_executors import RayExecutor
 from fleet2d.studies.driver import Observer
 from fleet2d.studies.results import VariantResult
 
@@ -49,9 +52,13 @@ def test_a_node_that_dies_loses_only_what_it_ran(
 ) -> None:
     # Runs take longer than a node takes to die: one that had just finished would lose nothing.
     study = small(base=base("4 days"), replicates=5)
-    monkeypatch.setenv("RAY_ADDRESS", cluster.address)
-    executor = RayExecutor()
-    assert 2 == executor.cores
+    (recipe,) = [each for each in blocks(ROOT / "docs/studies.md") if each.title == "ray_study.py"]
+    (tmp_path / "ray_study.py").write_text(recipe.text, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    executor = importlib.import_module("ray_study").RayExecutor()
+    # Workers on this machine import the same modules as this process.
+    paths = {"env_vars": {"PYTHONPATH": os.pathsep.join(sys.path)}}
+    ray.init(cluster.address, runtime_env=paths, log_to_driver=False)
     observer = KillsANode(cluster)
     counts, killed = run(study, tmp_path / "killed", executor, 3, observer=observer)
     assert (10, 0) == (counts.complete, counts.failed)
