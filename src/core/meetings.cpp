@@ -13,9 +13,9 @@ std::size_t number_of(i64 i) { return static_cast<std::size_t>(i); }
 
 // A straight stretch of a way, from one moment to another.
 struct Straight {
-    i64 begin, end;  // us; the part of it that counts
-    i64 from, whole; // us; when it began, and how long it takes in all; 0 at rest
-    Point at;        // where it began
+    i64 begin, end;   // us; the part of it that counts
+    i64 from, whole;  // us; when it began, and how long it takes in all; 0 at rest
+    Point at;         // where it began
     i64 dx, dy;
     bool away;
 
@@ -166,7 +166,7 @@ std::optional<Meeting> first_meeting(const std::vector<Way>& ways, const Way& wa
         const i64 lead = distances.lead(number, other);
         if (other == row || lead < 0) continue;
         const MeetingLimits limits{distances.near(number, other), distances.hard(number, other),
-                            static_cast<MotionCounts>(distances.counts(number, other))};
+                                   static_cast<MotionCounts>(distances.counts(number, other))};
         const i64 step = first_meeting_step(way, ways[number_of(other)], limits, step_us);
         if (step < 0) continue;
         const i64 due = std::max(first, step - lead);

@@ -27,10 +27,10 @@ enum MotionCounts : u8 {
 
 // What each of some bodies keeps from all bodies, (rows, bodies) each.
 struct Distances {
-    View<const i64, 2> lead;  // steps by which it reacts before a meeting; below 0: it ignores the other one
-    View<const i64, 2> near;  // distance of the middles below which they mustn't approach [lattice units]
-    View<const i64, 2> hard;  // distance below which they overlap, and must part [lattice units]; 0: they needn't
-    View<const u8, 2> counts; // whose motion counts: a MotionCounts
+    View<const i64, 2> lead;   // steps by which it reacts before a meeting; below 0: it ignores the other one
+    View<const i64, 2> near;   // distance of the middles below which they mustn't approach [lattice units]
+    View<const i64, 2> hard;   // distance below which they overlap, and must part [lattice units]; 0: they needn't
+    View<const u8, 2> counts;  // whose motion counts: a MotionCounts
 };
 
 // For each of some bodies, the first meeting that is due in the steps first to end - 1; of several that are due at a
@@ -38,8 +38,8 @@ struct Distances {
 std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
                               i64 end);
 
-// The first meeting in the steps first to end - 1 of a body that follows a track from step `first` on. All distances are
-// those of row 0.
+// The first meeting in the steps first to end - 1 of a body that follows a track from step `first` on. All distances
+// are those of row 0.
 std::optional<Meeting> meeting_on(Timelines& timelines, i64 row, const TrackPiece& track, const Distances& distances,
                                   i64 first, i64 end);
 

@@ -112,8 +112,7 @@ public:
         return result;
     }
 
-    std::tuple<i64, i64> meeting_on(i64 row, const Breakpoints& track, const Distances& distances, i64 first,
-                                    i64 end) {
+    std::tuple<i64, i64> meeting_on(i64 row, const Breakpoints& track, const Distances& distances, i64 first, i64 end) {
         check_meetings(1, distances, first, end);
         check(row, first);
         const auto found = fleet2d::meeting_on(timelines_, row, piece_of(track), distances, first, end);
@@ -172,8 +171,8 @@ private:
                     track.away.size() == count,
                 "all arrays of a track must have one length, 1 or more");
         require(is_traceable(track), "a track's times must ascend, and its legs be short and its coordinates small");
-        return {copied(track.time), copied(track.x), copied(track.y), copied(track.heading), copied(track.away), {},
-                {0}};
+        return {
+            copied(track.time), copied(track.x), copied(track.y), copied(track.heading), copied(track.away), {}, {0}};
     }
     void check_meetings(i64 rows, const Distances& distances, i64 first, i64 end) const {
         require(first <= end && end - first <= FAR, "end must not be before first");

@@ -347,11 +347,10 @@ class Scenario(Settings):
         return self
 
     def moments(self) -> Iterator[tuple[tuple[str, int], datetime]]:
-        """Yield the dated moments of its changes and its script, and the entry of each."""
-        for section in ("changes", "script"):
-            for number, entry in enumerate(getattr(self, section)):
-                if isinstance(entry.at, datetime):
-                    yield (section, number), entry.at
+        """Yield the dated moments of its script, and the entry of each."""
+        for number, entry in enumerate(self.script):
+            if isinstance(entry.at, datetime):
+                yield ("script", number), entry.at
 
     def set_origin(self, folder: Path, document: Document) -> None:
         """Keep the folder of the file that it was read from, and the places of its keys."""
