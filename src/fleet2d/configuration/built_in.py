@@ -85,7 +85,7 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "coverage": "fleet2d.metrics.sightings:Coverage",
         "detections": "fleet2d.metrics.sightings:Detections",
         "distance": "fleet2d.metrics.bodies:Distance",
-        "household": "fleet2d.metrics.household:Household",
+        "household": "fleet2d.metrics.household:HouseholdReward",
         "interactions": "fleet2d.metrics.interactions:Interactions",
         "intrusion": "fleet2d.metrics.robots:Intrusion",
         "ltp_error": "fleet2d.metrics.ltp_error:LtpError",

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from fleet2d.configuration.problems import check_known
-from fleet2d.engine.conversations import Conversations
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.state import State
 from fleet2d.entities.body import NEVER
@@ -30,6 +29,8 @@ BY_BATTERY = "its battery"
 
 def switch_off(state: State, actor: DecidingActor, step: int) -> None:
     """Let a robot lose its power at a step: it sees nobody any more, and drops what it wanted."""
+    from fleet2d.engine.conversations import Conversations  # few runs need them
+
     state.settle(step)
     actor.off_at = actor.state
     _set_charge_off(actor, step, is_off=True)

@@ -89,7 +89,7 @@ class RobotTrack:
     searches: bool = False
 
 
-class Household(Metric):
+class HouseholdReward(Metric):
     """What a household makes of each robot, from the beginning of the run.
 
     `TERMS` names the numbers and their units. A person *has time* who is at home, awake, outside

@@ -32,7 +32,7 @@ KEPT = 512
 HOMES = 128
 
 METRIC = "household"
-"""The metric of every life, which counts what rewards are made of: see `Household`."""
+"""The metric of every life, which counts what rewards are made of: see `HouseholdReward`."""
 
 
 class Values(Settings):
