@@ -271,7 +271,7 @@ def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
                 assert re.search(rf"^ +{field}:", out, re.MULTILINE), (name, field)
     assert "    and the keys of Behavior, BeliefBehavior\n" in out
     assert "shared: Behavior\n" in out
-    for word in ("long_term_presence or ltp", "[deg", "dwell", "5 min"):
+    for word in ("long_term_presence", "[deg", "dwell", "5 min"):
         assert word in out
 
 

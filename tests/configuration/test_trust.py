@@ -59,7 +59,7 @@ def fleet2d(
     Path("study.yaml").write_text(yaml.safe_dump(study))
     search = {
         "trials": 1,
-        "objectives": {"distance.ana": "maximize"},
+        "objective": {"distance.ana": "maximize"},
         "search": {"speed": {"key": "users.ana.speed", "low": 0.5, "high": 1.0}},
         "held_out": {"robots.astro.speed": [0.3]},
     }

@@ -108,10 +108,10 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
             phase(state, span)
         ahead, whole = (copy.deepcopy(simulation)._state for _ in range(2))
         limits, end = [span.end], span.end
-        for cameras in ahead.cameras:
-            if cameras.waits:
-                ahead.take(cameras, span.first)
-                limits.append(cameras.limit(ahead.bodies, end))
+        for watcher in ahead.watchers:
+            if watcher.waits:
+                ahead.take(watcher, span.first)
+                limits.append(watcher.limit(ahead.bodies, end))
         loop.watch(state, span)
         assert min(limits) == span.end == state.bodies.step
         ended += span.end < end

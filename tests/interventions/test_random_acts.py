@@ -257,6 +257,7 @@ class Chance:
                 "turn_deg": self.one(0, 45, 90),
             },
             "room": lambda: {"room": self.one(*self.rooms), "type": self.one(*KINDS)},
+            "steer": lambda: {"steer": self.robot(), "forward": self.one(-0.2, 0.1, 0.5)},
             "lights": lambda: {
                 "lights": self.one(*KINDS, "all"), "turn": self.one("on", "off")
             },

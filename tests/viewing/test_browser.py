@@ -830,7 +830,7 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     live.end()
     assert live.run is not None
     assert "complete" == live.run.status
-    assert {"change", "put"} == {entry["do"] for entry in live.run.manifest["interventions"]}
+    assert {"put", "shut"} == {entry["do"] for entry in live.run.manifest["interventions"]}
     events = live.run.tables["events"].to_pylist()
     assert ("bath_door", "shut") in [(row["entity"], row["event"]) for row in events]
 

@@ -57,7 +57,7 @@ def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(
     branch = served.data(1).run
     assert (branch.status, branch.directory) == ("complete", parent.parent / "day-branch-1")
     done = [(entry["do"], entry["step"]) for entry in branch.manifest["interventions"]]
-    assert [("configure", AT), ("change", AT)] == done
+    assert [("configure", AT), ("shut", AT)] == done
     for name in ("ana", "astro"):
         now, then = branch.path(name), fleet2d.open_run(parent).path(name)
         assert np.array_equal(now.x[: AT // 60 + 1], then.x[: AT // 60 + 1])

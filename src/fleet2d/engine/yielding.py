@@ -71,7 +71,7 @@ OWN = 1
 OTHERS = 2
 
 
-class Wait(NamedTuple):
+class GivenWay(NamedTuple):
     """The wait of a robot for others.
 
     Attributes:
@@ -118,7 +118,7 @@ class Yielding(Watcher):
         self._rows = np.array(self.rows, np.int64)
         self._step_us = basis.clock.step_us
         self._ahead = self._steps(AHEAD)
-        self._waits: dict[int, Wait] = {}
+        self._waits: dict[int, GivenWay] = {}
         self._looked_round: dict[int, int] = {}  # when it last found no way round
         self._told: dict[tuple[int, int], int] = {}
         self._patience: dict[tuple[int, int], Patience] = {}
@@ -477,12 +477,12 @@ class Yielding(Watcher):
         if wait is not None and self._goes_on(wait, now):
             self._waits[row] = wait._replace(last=now.step)
         else:
-            self._waits[row] = Wait(now.step, now.step, now.actor.state.position)
+            self._waits[row] = GivenWay(now.step, now.step, now.actor.state.position)
             note = Note(now.step * self._step_us, EventKind.GIVES_WAY, self._actors[other].name)
             plan.notes.insert(0, note)
         return plan
 
-    def _goes_on(self, wait: Wait, now: Situation) -> bool:
+    def _goes_on(self, wait: GivenWay, now: Situation) -> bool:
         """Return whether a robot that has to wait now does so still."""
         is_soon = now.step - wait.last <= self._steps(SAME_WAIT)
         return is_soon and math.dist(wait.place, now.actor.state.position) <= self._same_place

@@ -1,10 +1,11 @@
 """Bodies: how a scenario declares them, how they move, and where in a home they can be."""
 
 import copy
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -47,9 +48,6 @@ from fleet2d.kernels import (
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.sight.camera import Camera
-
-if TYPE_CHECKING:
-    from fleet2d.entities.keep_out import KeepOutRules
 
 
 class Pose(NamedTuple):
@@ -97,6 +95,27 @@ class RandomWalk:
 Motion = Track | RandomWalk
 
 
+class KeepsOut(Protocol):
+    """Where a body keeps out: see `fleet2d.entities.keep_out.KeepOutRules`."""
+
+    always: frozenset[int]
+    no_stops: frozenset[int]
+
+    @property
+    def timed(self) -> Sequence[Any]:
+        """The zones that it keeps out of at some times."""
+
+    @property
+    def minds_sleep(self) -> bool:
+        """Whether it depends on where somebody sleeps."""
+
+    def active(self, time: datetime, sleepers: frozenset[int]) -> frozenset[int]:
+        """Return the zones of `timed` that it keeps out of at a local time."""
+
+    def changes_at(self, time: datetime) -> Iterator[datetime]:
+        """Yield when hours begin or end after a local time."""
+
+
 class BodySettings(Settings):
     """A body in the home: its size, how fast it moves, and where it is at first.
 
@@ -139,6 +158,10 @@ class BodySettings(Settings):
     def climbs_stairs(self) -> bool:
         """Whether it climbs stairs and takes lifts."""
         return self.uses_portals
+
+    def keep_out_rules(self, body: "Body") -> KeepsOut | None:
+        """Return where its body keeps out; None if it may go everywhere."""
+        return None
 
     @property
     def eyes(self) -> dict[str, Camera]:
@@ -344,7 +367,7 @@ class Body:
 
     def __post_init__(self) -> None:
         lattice = self.home.plan.lattice
-        self.rules: KeepOutRules | None = self._rules()
+        self.rules = self.entity.keep_out_rules(self)
         self.forbidden = frozenset[int]() if self.rules is None else self.rules.always
         self.kept_out = self.forbidden
         if self.rules is not None:
@@ -369,15 +392,6 @@ class Body:
         self._state_step = 0
         self.row = 0
         self.interrupts: frozenset[str] = frozenset()
-
-    def _rules(self) -> "KeepOutRules | None":
-        """Return the rules of where it keeps out; None without any."""
-        entries = getattr(self.entity, "keep_out", ())
-        if not entries:
-            return None
-        from fleet2d.entities.keep_out import KeepOutRules  # it reads hours, as behaviors do
-
-        return KeepOutRules(self, entries)
 
     def join(self, bodies: Bodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""

@@ -11,11 +11,11 @@ from fleet2d.configuration.components import Component, OneOf
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import Length, PeerAddress, Speed, TurnRateDeg
 from fleet2d.entities.behavior import Actor, Behavior, LightHours
-from fleet2d.entities.body import BodySettings
+from fleet2d.entities.body import Body, BodySettings, KeepsOut
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
 from fleet2d.entities.giving_way import GivesWay
-from fleet2d.entities.keep_out import KeptOutField
+from fleet2d.entities.keep_out import KeepOutRules, KeptOutField
 from fleet2d.entities.power import Power
 from fleet2d.interactions.answers import AnswersField
 from fleet2d.interactions.interaction import REQUEST_EVENTS
@@ -210,6 +210,10 @@ class Robot(Entity):
     def climbs_stairs(self) -> bool:
         """Whether it climbs stairs and takes lifts."""
         return self.climbs
+
+    def keep_out_rules(self, body: Body) -> KeepsOut | None:
+        """Return where its body keeps out; None if it may go everywhere."""
+        return KeepOutRules(body, self.keep_out) if self.keep_out else None
 
     def model_post_init(self, _: object, /) -> None:
         """Require cameras for what needs them, and one way to perceive."""

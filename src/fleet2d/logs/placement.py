@@ -262,7 +262,7 @@ def meanings(label: str) -> Iterator[RoomChoice]:
 
     Example:
         >>> next(meanings("binary_sensor.kitchen_motion_2"))
-        ('motion',)
+        ('kitchen_motion',)
         >>> ("kitchen",) in meanings("binary_sensor.kitchen_motion_2")
         True
     """

@@ -33,7 +33,7 @@ TERMS = {
     "near_min": "minutes for which it rests in the room of a person who has time for it",
     "disturbing_min": "minutes in the room of a person who sleeps, or is in a bedroom or bathroom",
     "relocations": "rests at another place than the one before",
-    "found": "searches that end with a person in view who is awake, outside bedrooms and bathrooms",
+    "finds": "searches that end with a person in view who is awake, outside bedrooms and bathrooms",
     "searching_min": "minutes of searching",
     "unvisited_h": "hours since it was last in each room, mean over rooms and time, times days",
     "value": "value of the requests that were accepted in time, in the unit of their worth",
@@ -210,7 +210,7 @@ def _search(
             at = event.step - history.first
             named = [people[event.detail]] if event.detail in people else people.values()
             is_welcome = any(bool(person.may_be_found[at]) for person in named)
-            total["found"] += event.event == EventKind.FOUND and is_welcome
+            total["finds"] += event.event == EventKind.FOUND and is_welcome
     if track.searches:
         total["searching_min"] += history.end - since
 

@@ -37,7 +37,7 @@ SCHEMA = {
 }
 
 
-class Stay(NamedTuple):
+class PostureStay(NamedTuple):
     """A stretch of time [us since the start] that a user spends at one place [m] at home."""
 
     user: str
@@ -133,7 +133,7 @@ def posture_facts(run: Run, plan: FloorPlan) -> PostureFacts:
     return facts
 
 
-def _stays(run: Run) -> Iterator[Stay]:
+def _stays(run: Run) -> Iterator[PostureStay]:
     """Yield the stays of each user at home, in order."""
     if KEY_FRAMES not in run.tables:
         return
@@ -171,7 +171,7 @@ class _Keys(NamedTuple):
     end_us: int
 
 
-def _stays_of(user: str, rows: I64, keys: _Keys) -> Iterator[Stay]:
+def _stays_of(user: str, rows: I64, keys: _Keys) -> Iterator[PostureStay]:
     """Yield the stays of a user; a piece of key frames holds until the next one begins."""
     firsts = np.flatnonzero(keys.begins[rows] | (np.arange(len(rows)) == 0)).tolist()
     for first, end in zip(firsts, [*firsts[1:], len(rows)], strict=True):
@@ -187,4 +187,4 @@ def _stays_of(user: str, rows: I64, keys: _Keys) -> Iterator[Stay]:
                 stay_ends = min(int(keys.time_us[following]), until)
             begin = max(int(keys.time_us[row]), since)
             if stay_ends > begin and not keys.away[row]:
-                yield Stay(user, begin, stay_ends, x, y)
+                yield PostureStay(user, begin, stay_ends, x, y)

@@ -16,7 +16,7 @@ from fleet2d.learning.fit.persona import fit_persona, gaps, to_yaml
 from fleet2d.learning.fit.privacy import private_days, repeats
 from fleet2d.learning.fit.timeline import (
     ActivityPlace,
-    Distances,
+    RoutineDistances,
     Timeline,
     by_hour,
     distances,
@@ -166,7 +166,7 @@ def test_a_fitted_persona_lives_days_that_nobody_lived(life: Timeline) -> None:
 
 
 def test_the_report_names_what_is_worse_than_copying() -> None:
-    near, far = Distances(0.1, 0.2, 0.1, 5, 0.1), Distances(0.1, 0.1, 0.2, 5, 0.1)
+    near, far = RoutineDistances(0.1, 0.2, 0.1, 5, 0.1), RoutineDistances(0.1, 0.1, 0.2, 5, 0.1)
     models, equal = (near, far, near, near), (near, near, near, near)
     assert ["hours 0.200, copies 0.100"] == Validation(
         9, 3, models, models, equal

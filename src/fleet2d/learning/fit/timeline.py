@@ -335,8 +335,8 @@ def _runs(flat: I16, begin: int, end: int, midnight: int) -> tuple[Stretch, ...]
     )
 
 
-class Distances(NamedTuple):
-    """Distances between sets of days, 0 where they are alike.
+class RoutineDistances(NamedTuple):
+    """RoutineDistances between sets of days, 0 where they are alike.
 
     Attributes:
         share: Total variation between the shares of time, 0 to 1.
@@ -353,7 +353,7 @@ class Distances(NamedTuple):
     transitions: float
 
 
-def distances(real: I16, other: I16, count: int) -> Distances:
+def distances(real: I16, other: I16, count: int) -> RoutineDistances:
     """Return the distances between days, labels int16 (days, n), -1 where unknown.
 
     A label is that of a minute (n = 1440) or of a second (n = 86400).
@@ -364,7 +364,7 @@ def distances(real: I16, other: I16, count: int) -> Distances:
     stays = zip(dwell_times(real, count), dwell_times(other, count), strict=True)
     pairs = [pair for pair in stays if len(pair[0]) >= MIN_STAYS]
     total = max(sum(len(times) for times, _ in pairs), 1)
-    return Distances(
+    return RoutineDistances(
         share=float(total_variation(shares(real, count), shares(other, count))),
         hours=float(np.mean(total_variation(by_hour(real, count), by_hour(other, count)))),
         ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,

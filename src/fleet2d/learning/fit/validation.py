@@ -11,8 +11,8 @@ from fleet2d.kernels import I16
 from fleet2d.learning.fit.persona import FittedPersona, Model, fit_persona
 from fleet2d.learning.fit.privacy import Repeats, repeats
 from fleet2d.learning.fit.timeline import (
-    Distances,
     LivedDay,
+    RoutineDistances,
     Timeline,
     by_minute,
     distances,
@@ -130,7 +130,7 @@ def simulated_repeats(fitted: FittedPersona, days: int = 140, seed: int = 0) -> 
 
 
 class Validation(NamedTuple):
-    """Distances to held-back days, averaged over the folds.
+    """RoutineDistances to held-back days, averaged over the folds.
 
     Attributes:
         days: The number of days, each held back once.
@@ -142,9 +142,9 @@ class Validation(NamedTuple):
 
     days: int
     folds: int
-    rooms: tuple[Distances, ...]
-    activities: tuple[Distances, ...]
-    seconds: tuple[Distances, ...]
+    rooms: tuple[RoutineDistances, ...]
+    activities: tuple[RoutineDistances, ...]
+    seconds: tuple[RoutineDistances, ...]
 
     def worse_than_copying(self) -> list[str]:
         """Return a line for each measure in which the persona is worse than days copied from a log.
@@ -200,7 +200,7 @@ def _fold(
     rest: Sequence[LivedDay],
     held: Sequence[LivedDay],
     seed: int,
-) -> list[tuple[Distances, ...]]:
+) -> list[tuple[RoutineDistances, ...]]:
     """Return how far the days of each model are from days held back.
 
     They are compared in rooms and in activities by minutes, and in rooms by seconds.
@@ -225,6 +225,6 @@ def _fold(
     return result
 
 
-def _mean(folds: Sequence[tuple[Distances, ...]]) -> tuple[Distances, ...]:
+def _mean(folds: Sequence[tuple[RoutineDistances, ...]]) -> tuple[RoutineDistances, ...]:
     """Return the mean distances of each model over the folds."""
-    return tuple(Distances(*row) for row in np.mean(np.array(folds), axis=0).tolist())
+    return tuple(RoutineDistances(*row) for row in np.mean(np.array(folds), axis=0).tolist())

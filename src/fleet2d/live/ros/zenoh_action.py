@@ -15,7 +15,7 @@ _NONE, _UNKNOWN_GOAL, _IS_OVER = 0, 2, 3  # of action_msgs/srv/CancelGoal
 Reply = Callable[[Fields], None]
 
 
-class _Goal(ActionGoal):
+class _AcceptedGoal(ActionGoal):
     """A goal, with its result and with who waits for that."""
 
     result: Fields = MappingProxyType({})
@@ -54,7 +54,7 @@ class ZenohAction:
         """
         self._feedback, self._states = feedback, states
         self._begin, self._cancel, self._stamp = begin, cancel, stamp
-        self._goals: dict[str, _Goal] = {}
+        self._goals: dict[str, _AcceptedGoal] = {}
         self._lock = threading.RLock()
 
     def goal(self, name: str) -> ActionGoal | None:
@@ -91,7 +91,7 @@ class ZenohAction:
     def accept(self, request: dict[str, Any], reply: Reply) -> None:
         """Serve `send_goal`."""
         identifier = bytes(request["goal_id"]["uuid"])
-        goal = _Goal(identifier, request["goal"], self._stamp())
+        goal = _AcceptedGoal(identifier, request["goal"], self._stamp())
         with self._lock:
             is_accepted = goal.id not in self._goals and self._begin(goal)
             if is_accepted:

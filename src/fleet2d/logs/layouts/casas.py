@@ -29,7 +29,7 @@ _WITHOUT_ROOM = re.compile(rf"{_STAMP}\s+(\S+)\s+(\S+)(?:\s+(.*))?")
 _MARK = re.compile(r"(.*?)[\s_]*\b(begin|start|end|stop)\b\W*", re.IGNORECASE)
 
 
-class _Event(NamedTuple):
+class _SensorLine(NamedTuple):
     """A line: `activity` is what it says of one."""
 
     day: str
@@ -43,12 +43,12 @@ def _is_value(text: str) -> bool:
     return text.upper() in ON | OFF or _NUMBER.fullmatch(text) is not None
 
 
-def _event(line: str, has_rooms: bool) -> _Event | None:
+def _event(line: str, has_rooms: bool) -> _SensorLine | None:
     match = (_WITH_ROOM if has_rooms else _WITHOUT_ROOM).fullmatch(line)
     if match is None:
         return None
     day, time, label, *_, value, activity = match.groups()
-    return _Event(day, time, label, value, (activity or "").strip())
+    return _SensorLine(day, time, label, value, (activity or "").strip())
 
 
 def _has_rooms(line: str) -> bool | None:

@@ -65,7 +65,7 @@ _MAX_SECONDS = 60.0
 _STEPS_BETWEEN = 1_000_000
 
 
-class _State(NamedTuple):
+class _StateLine(NamedTuple):
     """A state of an entity, from a time on."""
 
     entity: str
@@ -134,7 +134,7 @@ def read_states(
     return ActivityLog(path, "states", first_day, tuple(readings), tuple(notes))
 
 
-def _in_order(path: Path, states: list[_State], *, sort: bool) -> list[_State]:
+def _in_order(path: Path, states: list[_StateLine], *, sort: bool) -> list[_StateLine]:
     """Return states in order of time; a file may have one entity after the other.
 
     Raises:
@@ -152,7 +152,9 @@ def _in_order(path: Path, states: list[_State], *, sort: bool) -> list[_State]:
 
 
 def is_database(path: Path) -> bool:
-    """Return whether a file is a database of SQLite."""
+    """Return whether a file is a database of SQLite; a pipe or a device is none, and isn't read."""
+    if not path.is_file():
+        return False
     with path.open("rb") as file:
         return file.read(len(DATABASE)) == DATABASE
 
@@ -240,7 +242,7 @@ def _of_years(path: Path, rows: list[tuple[str, str, datetime, int]], zone: Zone
 
 def _local(
     path: Path, rows: Iterable[tuple[str, str, datetime, int]], zone: Zone | str | None
-) -> Iterator[_State]:
+) -> Iterator[_StateLine]:
     """Yield states with local times: of a clock that changes, if it is given.
 
     Raises:
@@ -261,4 +263,4 @@ def _local(
             )
         elif moment.tzinfo is not None:
             local = moment.astimezone(rules).replace(tzinfo=None)
-        yield _State(entity, state, local, line)
+        yield _StateLine(entity, state, local, line)
