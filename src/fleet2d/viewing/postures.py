@@ -80,6 +80,10 @@ def postures_of(run: Run, plan: FloorPlan) -> Any:
         name, use = rests[nearest]
         step = -(-stay.begin_us // step_us)
         at = (use.x, use.y, use.heading)
+        # Who turns around on furniture stays on it.
+        if rows and rows[-1][2:4] == (stay.begin_us, stay.user) and rows[-1][5:] == (name, *at):
+            step, begin_us, *_ = rows.pop()
+            stay = stay._replace(begin_us=begin_us)
         rows.append((step, stay.begin_us, stay.end_us, stay.user, use.posture, name, *at))
     columns = zip(*rows, strict=True) if rows else ([] for _ in SCHEMA)
     arrays = [
