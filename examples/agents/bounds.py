@@ -231,7 +231,7 @@ def find_bound(
     """Return a bound of the reward of searching: all that can succeed do, at once."""
     may = np.any([person.may_be_found for person in people], axis=0)
     found = sum(bool(may[begin : begin + lasts_s].any()) for begin in range(0, len(may), every_s))
-    return found * weights["found"]
+    return found * weights["finds"]
 
 
 def patrol_bound(rooms: int, steps: int, weights: dict[str, float]) -> float:

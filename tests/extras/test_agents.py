@@ -171,7 +171,7 @@ def test_bounds_of_searches_and_visits(script: Any) -> None:
     may[7200 + 599] = may[2 * 7200 + 600] = True
     person = bounds["Person"](may, [0], [""], may, ~may, may, ~may)
 
-    assert 2 == bounds["find_bound"]([person], {"found": 2.0}, 7200, 600)
+    assert 2 == bounds["find_bound"]([person], {"finds": 2.0}, 7200, 600)
     weights = {"unvisited_h": -1.0, "relocations": -0.1}
     rewards = [-0.64 * 24 * 4 / 2 / (m + 2) - 0.1 * m for m in range(100)]
     assert pytest.approx(max(rewards)) == bounds["patrol_bound"](5, 2 * 86400, weights)

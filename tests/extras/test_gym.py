@@ -244,12 +244,12 @@ def test_empty_battery_terminates_the_life() -> None:
 
 def test_nobody_at_home_is_never_found() -> None:
     env = RobotEnv(
-        {"scenario": flat("find", ana=OUT), "reward": {"found": 1.0, "searching_min": -1.0}}
+        {"scenario": flat("find", ana=OUT), "reward": {"finds": 1.0, "searching_min": -1.0}}
     )
 
     steps = [reward for _, reward, *_ in play(env)]
 
-    assert 0 == env.present.terms("astro")["found"]
+    assert 0 == env.present.terms("astro")["finds"]
     assert sum(steps) == pytest.approx(-env.present.terms("astro")["searching_min"]) != 0
 
 

@@ -75,7 +75,7 @@ def twin(stored: Run) -> dict[str, float]:
             begun = int(step)
         elif begun is not None and kind in ("found", "gave_up", "not_at_home"):
             terms["searching_min"] += (int(step) - begun) / 60
-            terms["found"] += kind == "found" and welcome[step]
+            terms["finds"] += kind == "found" and welcome[step]
             begun = None
     if begun is not None:
         terms["searching_min"] += (len(robot.step) - begun) / 60
@@ -95,7 +95,7 @@ def twin(stored: Run) -> dict[str, float]:
     ("behaviors", "interactions", "counted"),
     [
         ([HANGOUT], {}, ["near_min", "disturbing_min", "unvisited_h"]),
-        ([FIND, HANGOUT], {}, ["found", "searching_min", "relocations"]),
+        ([FIND, HANGOUT], {}, ["finds", "searching_min", "relocations"]),
         ([ASKS, {"type": "patrol"}], {"pill": PILL}, ["value", "bother", "unvisited_h"]),
     ],
 )
