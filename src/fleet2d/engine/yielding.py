@@ -265,9 +265,10 @@ class Yielding(Watcher):
     def _now_kept(self) -> Distances:
         first = self._first.copy()
         for one, other in self._swapped:
-            i, j = self._number[one], self._number[other]
-            first[i, other] = not first[i, other]
-            first[j, one] = not first[j, one]
+            row = self._number[one]
+            first[row, other] = not first[row, other]
+            row = self._number[other]
+            first[row, one] = not first[row, one]
         for number, is_stuck in enumerate(self._stuck):
             if is_stuck:
                 first[:, self.rows[number]] = False

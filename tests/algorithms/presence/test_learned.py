@@ -119,7 +119,7 @@ def tempered(belief: F64, temperature: float) -> F64:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="0.053: its weights are of homes as they were generated before")
+@pytest.mark.xfail(reason="its error is 0.053")
 def test_it_is_calibrated_in_unseen_homes_with_unseen_people(
     unseen_error: Callable[[Callable[[F64], F64]], float],
 ) -> None:

@@ -199,7 +199,8 @@ def wall_gaps(walls: BaseGeometry, rooms: Sequence[MultiPolygon]) -> Iterator[Li
         at_walls = [_share_beside(side, walls) for side in sides]
         at_rooms = [_share_beside(side, inner) for side in sides]
         for k in (0, 1):
-            width, depth = sides[k].length, sides[k + 1].length
+            width = sides[k].length
+            depth = sides[k + 1].length
             is_between = min(at_walls[k + 1], at_walls[(k + 3) % 4]) >= SIDE_SHARE
             is_at_room = max(at_rooms[k], at_rooms[k + 2]) >= SIDE_SHARE
             is_thin = TOUCH_M < depth <= MAX_WALL_M and width >= LEAST_WAY_M
