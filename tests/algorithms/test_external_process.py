@@ -1,6 +1,7 @@
 """Algorithms and behaviors in other processes: same results, checkpoints, and what goes wrong."""
 
 import copy
+import json
 import pickle
 import shutil
 import subprocess
@@ -236,6 +237,47 @@ def test_a_program_decides_where_the_robot_goes() -> None:
     path = run.path("astro")
     rooms = [run.plan.rooms[r].name for r in dict.fromkeys(path.room.tolist()) if r >= 0]
     assert len(rooms) > 4
+
+
+ERRANDS = """
+import json, sys
+
+errands = iter({errands!r})
+for line in sys.stdin:
+    message = json.loads(line)
+    answer = {{"type": "ready"}}
+    if message["type"] == "decide":
+        with open({heard!r}, "a") as file:
+            file.write(json.dumps(message["goal"]) + "\\n")
+        answer = {{"type": "plan", "plan": [{{"go_to": next(errands, "kitchen_0")}}, {{"stay_s": 60}}]}}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+def errands(folder: Path, places: list[Any]) -> tuple[Path, Path]:
+    """A program that sends the robot to places, and the file with the goals it is told of."""
+    heard = folder / "heard.jsonl"
+    program = folder / "errands.py"
+    program.write_text(ERRANDS.format(errands=places, heard=str(heard)))
+    return program, heard
+
+
+def behind_a_door(command: Path) -> dict[str, Any]:
+    door = {"type": "door", "doorway": "office_0", "open": False}
+    return robots(command) | {"objects": {"office_door": door}}
+
+
+def test_a_program_is_told_what_became_of_its_goals(tmp_path: Path) -> None:
+    program, heard = errands(tmp_path, ["kitchen_0", "office_0", "hallway_0"])
+
+    fleet2d.run(behind_a_door(program))
+
+    goals = [json.loads(line) for line in heard.read_text().splitlines()]
+    assert goals[0] is None
+    assert {"go_to": "kitchen_0", "state": "reached", "detail": ""} == goals[1]
+    assert ("office_0", "impossible") == (goals[2]["go_to"], goals[2]["state"])
+    assert "'office_0' can't be reached" in goals[2]["detail"]
+    assert ("hallway_0", "reached") == (goals[3]["go_to"], goals[3]["state"])
 
 
 @pytest.mark.slow

@@ -23,7 +23,6 @@ from fleet2d.runtime.memory import rare_collections
 GROUP = "fleet2d.command"
 COMMANDS = {
     "components": "scenarios",
-    "convert": "scenarios",
     "resume": "run",
     "run": "run",
     "validate": "scenarios",

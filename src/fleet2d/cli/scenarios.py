@@ -1,8 +1,7 @@
-"""Commands on scenarios and plans: `fleet2d validate`, `convert` and `components`."""
+"""Commands on scenarios and plans: `fleet2d validate` and `components`."""
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -85,30 +84,6 @@ def _check_floorplan(plan: "FloorPlan", radius: float) -> None:
         typer.echo(f"note: {note}")
     if any(finding.severity != "odd" for finding in findings):
         raise typer.Exit(2)
-
-
-def convert(
-    source: Annotated[Path, typer.Argument(help="A floor plan of any format.")],
-    target: Annotated[
-        Path, typer.Argument(help="The floor plan to write: .json, .yaml or .geojson.")
-    ],
-    resolution: Resolution = None,
-    scale: Scale = None,
-) -> None:
-    """Convert a floor plan to our own format, or to GeoJSON.
-
-    What is odd or lost is listed.
-
-    Examples:
-      fleet2d convert flat.dxf flat.json --scale 0.001
-    """
-    from fleet2d.floorplan.load import load_floorplan, save_floorplan
-
-    plan = load_floorplan(source, resolution=resolution, scale=scale)
-    save_floorplan(plan, target)
-    for note in plan.notes:
-        typer.echo(f"note: {note}")
-    typer.echo(target)
 
 
 def components(

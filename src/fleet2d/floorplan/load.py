@@ -298,7 +298,7 @@ def save_floorplan(plan: FloorPlan, path: str | Path) -> None:
         text = _yaml(native_document(plan), path)
     else:
         raise FloorPlanError(f"{path}: a floor plan is written as .json, .yaml or .geojson")
-    _write_new(path, text)
+    write_new(path, text.encode())
 
 
 def _json(document: dict[str, Any]) -> str:
@@ -319,13 +319,18 @@ def _yaml(document: dict[str, Any], path: Path) -> str:
     return text
 
 
-def _write_new(path: Path, text: str) -> None:
+def write_new(path: Path, content: bytes) -> None:
+    """Write a new file.
+
+    Raises:
+        FloorPlanError: It exists, or can't be written.
+    """
     from fleet2d.storage.files import write_atomically  # few homes are written
 
     try:
         path.touch(exist_ok=False)  # at once, so that no file that appears meanwhile is replaced
         try:
-            write_atomically(path, text.encode())
+            write_atomically(path, content)
         except BaseException:
             with suppress(OSError):
                 path.unlink()

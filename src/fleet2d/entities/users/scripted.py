@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import Field
 
 from fleet2d.configuration.trust import check_may_run
 from fleet2d.configuration.units import InputPath, PeerAddress, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior, Situation
+from fleet2d.entities.body import Pose
 from fleet2d.entities.plan import Plan
-from fleet2d.errors import ComponentError, Fleet2DError
+from fleet2d.errors import ComponentError, Fleet2DError, NoWayError, PlacementError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.runtime.events import EventKind
 from fleet2d.runtime.program import ExternalProgram
 
@@ -72,12 +74,31 @@ class Live(Behavior):
         return now.plan().stay()
 
 
+class _Goal(NamedTuple):
+    """Where a program sent a body: as it said it, the point, or why no way leads there."""
+
+    to: Any
+    point: LatticePoint | None
+    reason: str
+
+    def outcome(self, body: Pose) -> dict[str, Any]:
+        """Return what became of it, once the body has to decide anew."""
+        if self.point == (body.x, body.y):
+            return {"go_to": self.to, "state": "reached", "detail": ""}
+        if self.point is None:
+            return {"go_to": self.to, "state": "impossible", "detail": self.reason}
+        detail = "another behavior, an order or an obstacle ended the way"
+        return {"go_to": self.to, "state": "cancelled", "detail": detail}
+
+
 class ProcessBehavior(Behavior):
     """A behavior in another process, of any language.
 
-    Whenever the body has to decide, the program is told where it is, and answers with a plan, a
-    list of `{go_to: PLACE}`, `{turn_deg: 90}` and `{stay_s: 60}`; or with the type `none`: then
-    the next behavior decides. See `fleet2d.runtime.program` for the messages.
+    Whenever the body has to decide, the program is told where it is and what became of the last
+    place that it was sent to, and answers with a plan, a list of `{go_to: PLACE}`,
+    `{turn_deg: 90}` and `{stay_s: 60}`; or with the type `none`: then the next behavior decides.
+    Where no way leads, as a door is shut, the body waits before the program is asked again. See
+    `fleet2d.runtime.program` for the messages.
 
     Attributes:
         command: The program; a file .py is run by Python, .js and .mjs by Node.
@@ -104,9 +125,11 @@ class ProcessBehavior(Behavior):
         self.program = ExternalProgram(
             self.command, self.arguments, self.timeout.total_seconds(), about
         )
+        self._goal: _Goal | None = None
 
     def decide(self, now: Situation) -> Plan | None:
         """Ask the program."""
+        goal = None if self._goal is None else self._goal.outcome(now.actor.state)
         x, y = now.home.plan.lattice.to_metres([now.actor.state.x, now.actor.state.y]).tolist()
         room = now.home.plan.room_at(x, y)
         shares = {
@@ -123,6 +146,7 @@ class ProcessBehavior(Behavior):
             "room": room.name if room else None,
             "away": bool(now.actor.state.away),
             "outputs": shares,
+            "goal": goal,
         }
         content = self.program.ask(message).content
         if content.get("type") == "none":
@@ -134,16 +158,26 @@ class ProcessBehavior(Behavior):
                 f" {MAX_ITEMS} items, or the type 'none'"
             )
         plan = now.plan()
+        self._goal = None
         for item in items:
             self._add(plan, item)
         return plan
+
+    def _send(self, plan: Plan, place: Any) -> None:
+        """Let a plan go to a place, and keep what the program is to be told of it."""
+        try:
+            plan.go_to(place)
+        except (PlacementError, NoWayError) as error:
+            self._goal = _Goal(place, None, str(error))
+            raise
+        self._goal = _Goal(place, plan.position, "")
 
     def _add(self, plan: Plan, item: Mapping[str, Any]) -> None:
         """Add an item of an answer to a plan."""
         try:
             ((verb, value),) = item.items()
             if verb == "go_to":
-                plan.go_to(value)
+                self._send(plan, value)
             elif verb == "turn_deg":
                 plan.turn_by(float(value) / 360)
             elif verb == "stay_s":

@@ -186,6 +186,10 @@ _FORMATS = {
         "GeoJSON in metres: rooms, doorways and furniture, a line for each way, a point for each"
         " event.",
     ),
+    "home_assistant": (
+        "home_assistant",
+        "The database of a Home Assistant's recorder: rooms of people and robots, sensors.",
+    ),
     "jsonl": (
         "texts",
         "JSON Lines: an object for each pose, event, observation and row of a table, in order of"
@@ -209,7 +213,7 @@ _FORMATS = {
 """The module of each format, and what it is."""
 
 # Formats whose files have another suffix than the name of the format.
-_SUFFIXES = {".txt": "casas", ".rrd": "rerun", "": "rosbag2"}
+_SUFFIXES = {".txt": "casas", ".rrd": "rerun", ".db": "home_assistant", "": "rosbag2"}
 
 
 def export(
@@ -264,7 +268,7 @@ def format_of(path: Path) -> str:
         suffixes = ", ".join(f".{own}" for own in formats() if own not in _SUFFIXES.values())
         raise InputError(
             f"{path}: no format has the suffix {path.suffix!r}: name the format by --format, or"
-            f" write a file with one of {suffixes}, .rrd, .txt, or a folder"
+            f" write a file with one of {suffixes}, .rrd, .txt, .db, or a folder"
         )
     return name
 

@@ -1,0 +1,40 @@
+"""`fleet2d convert`: homes in our own format, and for other programs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleet2d.options import Resolution, Scale
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(help="A floor plan of any format.")],
+    target: Annotated[
+        Path,
+        typer.Argument(
+            help="The file to write: .json or .yaml of our own, .geojson, .pgm with a .yaml beside"
+            " it for ROS's map_server, or .sdf for Gazebo."
+        ),
+    ],
+    resolution: Resolution = None,
+    scale: Scale = None,
+) -> None:
+    """Convert a floor plan to our own format, or for other programs.
+
+    What is odd or lost is listed.
+
+    Examples:
+      fleet2d convert flat.dxf flat.json --scale 0.001
+      fleet2d convert flat.json map.pgm
+      fleet2d convert synthetic:7 home.sdf
+    """
+    from fleet2d.floorplan.load import load_floorplan, save_floorplan
+    from fleet2d.homes.for_robots import save_map, save_world
+
+    plan = load_floorplan(source, resolution=resolution, scale=scale)
+    save = {".pgm": save_map, ".sdf": save_world}.get(target.suffix.lower(), save_floorplan)
+    save(plan, target)
+    for note in plan.notes:
+        typer.echo(f"note: {note}")
+    typer.echo(target)
