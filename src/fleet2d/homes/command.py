@@ -20,7 +20,7 @@ def convert(
     resolution: Resolution = None,
     scale: Scale = None,
 ) -> None:
-    """Convert a floor plan to our own format, or for other programs.
+    """Convert a floor plan to our format, or for other programs.
 
     What is odd or lost is listed.
 
