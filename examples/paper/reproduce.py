@@ -42,7 +42,7 @@ from fleet2d.runtime.clock import HOUR_S
 from fleet2d.studies.answers import group_means
 from fleet2d.studies.api import ExecutorName, study
 from fleet2d.studies.executors import cores
-from fleet2d.studies.figures import COLORS, DARK, draw_interaction
+from fleet2d.studies.figures import COLORS, DARK
 from fleet2d.studies.progress import progress_bar
 from fleet2d.studies.reader import Study
 from fleet2d.viewing.film import draw_frames, stage_of
@@ -541,11 +541,21 @@ def draw_ltp_gap(numbers: Mapping[str, Any]) -> Figure:
 
 def draw_rtp_gap(numbers: Mapping[str, Any]) -> Figure:
     """Draw the share of right rooms by gap, with intervals."""
+    figure, axes = _figure()
     rows = [row for row in numbers["means"]["top_1"] if row["gap"] in DRAWN_GAPS]
-    means = pl.DataFrame(rows).rename({"gap": "time since the user was last seen"})
-    figure = draw_interaction(means, means.columns[1], "model", "share of right rooms")
-    figure.set_size_inches(*SIZE)
-    figure.axes[0].set_ylim(0, 1)
+    models = pl.DataFrame(rows).partition_by("model", maintain_order=True)
+    gaps = list(dict.fromkeys(row["gap"] for row in rows))
+    for number, of in enumerate(models):
+        x = np.array([gaps.index(gap) for gap in of["gap"]]) + 0.08 * (
+            number - (len(models) - 1) / 2
+        )
+        mean, low, high = of.select("mean", "low", "high").to_numpy().T
+        is_told = of["doubt"].to_numpy() == ""
+        ends = np.where(is_told, (mean - low, high - mean), 0)
+        axes.errorbar(x, mean, ends, fmt="o-", color=COLORS[number], label=of["model"][0], ms=4)
+    axes.set_xticks(range(len(gaps)), gaps)
+    axes.set(xlabel="time since the user was last seen", ylabel="share of right rooms", ylim=(0, 1))
+    axes.legend(frameon=False, fontsize=8, title="model", title_fontsize=8)
     return figure
 
 

@@ -11,6 +11,7 @@ import pytest
 import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.studies.answers import StudyAnswers, holm, judged, variance_ratio
+from fleet2d.studies.directory import Meta
 
 COLUMNS = ("method", "robot", "home", "seed")
 
@@ -36,6 +37,7 @@ def variants(
 class Answers(StudyAnswers):
     """The answers of a study with these variants, whose metric is `score`."""
 
+    meta = Meta(name="", description="", code="", columns=(), populations=(), tables=())
     populations = ("home", "seed")
 
     def __init__(self, frame: pl.DataFrame, *more: str) -> None:
@@ -77,7 +79,7 @@ def test_missing_variants_leave_out_their_pairs_only() -> None:
 def test_too_few_replicates_are_named_with_how_many_are_needed() -> None:
     (row,) = compare(variants(homes=3, effect=0.05, noise=0.4))
     assert "too few replicates to tell" in row["verdict"]
-    assert "values of home (now 3)" in row["verdict"]
+    assert "homes (now 3)" in row["verdict"]
 
 
 def test_one_pair_tells_nothing() -> None:
@@ -288,19 +290,20 @@ def test_tables_that_are_read_together_are_corrected_together() -> None:
     old = generator.normal(0, 1, 30)
     new = old + 0.5 + generator.normal(0, 1, 30)
     answers = Answers(by_method(old.tolist(), new.tolist()))
-    alone = answers.paired("score", {"method": "old"})
-    assert alone["clear"].all()
+    (alone,) = judged(answers.compared("score", {"method": "old"}))
+    assert alone.is_clear
     together = judged([alone] * 30)
     assert 30 == len(together)
-    assert not any(table["clear"].any() for table in together)
-    assert all("for so many comparisons" in table["verdict"][0] for table in together)
+    assert not any(each.is_clear for each in together)
+    assert all("for so many comparisons" in each.verdict for each in together)
+    assert all(each.interval[0] < 0 < each.interval[1] for each in together)
 
 
 def test_a_clear_difference_of_few_homes_is_told_without_its_amount() -> None:
     (row,) = compare(variants())
     assert row["clear"]
     assert "above old in 64 of 64 pairs; how much can't be told" in row["verdict"]
-    assert "with 8 values of home, 43 % of studies miss a kind" in row["doubt"]
+    assert "with 8 homes, 43 % of studies miss a kind" in row["doubt"]
 
 
 def test_enough_homes_have_an_interval_that_is_told() -> None:

@@ -152,7 +152,7 @@ def test_p_values_of_one_value_or_of_equal_ones() -> None:
 
 def test_a_study_of_the_size_that_is_needed_detects_the_effect() -> None:
     spread = study_of(6, 0.7).spread
-    homes = spread.needed(0.7, "home", seed=10)
+    homes = spread.needed(0.7, "home", units={"seed": 10})
     assert homes is not None
     assert spread.detectable({"home": homes, "seed": 10}) <= 0.7
     assert spread.detectable({"home": homes - 1, "seed": 10}) > 0.7
@@ -182,7 +182,7 @@ def test_one_home_in_ten_that_is_eight_times_the_others_is_told_from_forty_homes
 
 def test_a_doubt_names_the_units_and_how_many_more_would_do() -> None:
     doubt = estimate(np.arange(10.0), {"home": range(10)}).doubt
-    missed = "with 10 values of home, 35 % of studies miss a kind that makes up a tenth of all"
+    missed = "with 10 homes, 35 % of studies miss a kind that makes up a tenth of all"
     assert f"{missed}; 19 more" in doubt
     assert not estimate(np.arange(29.0)).doubt
 
@@ -193,14 +193,14 @@ def test_few_seeds_are_doubted_only_where_they_matter() -> None:
     of_home, of_seed = generator.normal(0, 1, 40), generator.normal(0, 1, 4)
     levels = {"home": home, "seed": seed}
     assert not estimate(of_home[home] + 0.01 * of_seed[seed], levels).doubt
-    assert "4 values of seed" in estimate(of_home[home] + 3 * of_seed[seed], levels).doubt
+    assert "4 seeds" in estimate(of_home[home] + 3 * of_seed[seed], levels).doubt
 
 
 def test_many_seeds_do_not_make_up_for_few_homes() -> None:
     generator = np.random.default_rng(6)
     home, seed = np.divmod(np.arange(250), 50)
     doubt = estimate(generator.normal(0, 1, 250), {"home": home, "seed": seed}).doubt
-    assert "5 values of home" in doubt
+    assert "5 homes" in doubt
 
 
 @pytest.mark.parametrize("values", [[0.0, 0.0, 0.0, 0.4], [0.99, 1.0, 1.0, 0.2], [0.0, 1.0]])

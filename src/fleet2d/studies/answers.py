@@ -3,18 +3,30 @@
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.errors import InputError
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.studies.intervals import LEVEL, POWER, UNLIMITED, Limits, MeanEstimate, estimate
-from fleet2d.studies.results import VARIANT
+from fleet2d.studies.directory import COMPLETE, FAILED, Counts, Meta
+from fleet2d.studies.intervals import (
+    LEVEL,
+    POWER,
+    UNLIMITED,
+    Limits,
+    MeanEstimate,
+    estimate,
+    plural,
+)
+from fleet2d.studies.results import RESULT_COLUMNS, VARIANT
 
 if TYPE_CHECKING:
     import polars as pl
+
+    from fleet2d.studies.specification import PairedComparison
 
 
 MAX_P = 1 - LEVEL  # below which a difference is clear
@@ -36,15 +48,51 @@ def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
 
 
 class StudyAnswers:
-    """What a study says of its metrics: the base of `Study`, which has its variants.
+    """What a study says of its metrics: the base of `Study`, which reads its variants.
 
     Attributes:
+        location: The folder or store, without secrets.
+        meta: Its description: name, columns, populations, comparisons.
         columns: The columns of the axes, the seed last.
         populations: The columns whose values are a sample of a population.
     """
 
+    location: str
+    meta: Meta
     columns: tuple[str, ...]
     populations: tuple[str, ...]
+
+    @property
+    def variants(self) -> "pl.DataFrame":
+        """The variants, a row each: parameters, status, time, digest and metrics."""
+        raise NotImplementedError
+
+    @property
+    def comparisons(self) -> "tuple[PairedComparison, ...]":
+        """The comparisons that the study file asks for."""
+        raise NotImplementedError
+
+    @property
+    def counts(self) -> Counts:
+        """The numbers of complete, failed and missing variants."""
+        return Counts.of(self.variants)
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """The names of the metrics, such as `ltp_error.ana.tv`."""
+        no_metrics = {*self.columns, *RESULT_COLUMNS, "simulated_s"}
+        return tuple(name for name in self.variants.columns if name not in no_metrics)
+
+    @property
+    def failures(self) -> "pl.DataFrame":
+        """The variants that failed, with their errors."""
+        frame = self.variants.filter(status=FAILED)
+        return frame.select(VARIANT, *self.columns, "error", "trace", "attempts")
+
+    @property
+    def complete(self) -> "pl.DataFrame":
+        """The variants that are complete."""
+        return self.variants.filter(status=COMPLETE)
 
     def with_metric(self, metric: str) -> "pl.DataFrame":
         """Return the variants that are complete and have a metric.
@@ -52,15 +100,25 @@ class StudyAnswers:
         Raises:
             InputError: There is no such metric.
         """
-        raise NotImplementedError
+        if not self.counts.complete:
+            raise InputError(f"{self.location} has no complete variant, and so no {metric!r}")
+        if metric not in self.metrics:
+            hint = did_you_mean(metric, self.metrics)
+            raise InputError(
+                f"no variant has a numeric metric {metric!r}{hint} There are:"
+                f" {', '.join(self.metrics[:20])}{', …' if len(self.metrics) > 20 else ''}"
+            )
+        import polars as pl
+
+        return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
 
     def limits(self, metric: str) -> Limits:
         """Return the least and the largest value that a metric can have."""
-        return UNLIMITED
+        return self.meta.limits(metric)
 
     def better(self, metric: str) -> str:
         """Return which values of a metric are better: `higher`, `lower`, or empty: neither is."""
-        return ""
+        return self.meta.better(metric)
 
     def paired(
         self,
@@ -82,42 +140,54 @@ class StudyAnswers:
                 are averaged.
 
         Returns:
-            A row for each other value: mean, reference, difference, low and high (95 %), doubt (why
-            the interval can't be trusted), relative (to the size of the reference), effect_size (in
-            standard deviations of the units' differences), p, p_holm (corrected for the rows of
-            this table), pairs, and how many are above and below the reference, n_UNIT,
-            variance_ratio (of unpaired to paired differences), needed (replicates for a difference
-            of this size to show), clear (whether `p_holm` shows one), and a verdict in words.
+            A row for each other value: mean, reference, difference, low and high (of an interval
+            that all rows of this table keep in 95 % of studies), doubt (why the interval can't be
+            trusted), relative (to the size of the reference), effect_size (in standard deviations
+            of the units' differences), p, p_holm (corrected for the rows of this table), pairs, and
+            how many are above and below the reference, n_UNIT, variance_ratio (of unpaired to
+            paired differences), needed (replicates for a difference of this size to show), clear
+            (whether `p_holm` shows one), and a verdict in words.
 
         Raises:
             InputError: There is no such metric, axis or value, or no pair.
         """
         import polars as pl
 
+        rows = [each.row() for each in judged(self.compared(metric, against, by, within))]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def compared(
+        self,
+        metric: str,
+        against: Mapping[str, Any],
+        by: Sequence[str] | None = None,
+        within: Sequence[str] = (),
+    ) -> "list[Comparison]":
+        """Return what `paired` makes rows of, as yet without corrected p values.
+
+        Raises:
+            InputError: There is no such metric, axis or value, or no pair.
+        """
         frame = self.with_metric(metric)
         units = self._units(by, against)
         limits = difference_limits(self.limits(metric))
-        better = self.better(metric)
         ((axis, reference),) = against.items()
         check_axes((axis, *within), self.columns)
         if axis in (*units, *within):
             raise InputError(f"{axis} is what is compared: leave it out of `by` and `within`")
-        rows = []
+        found = []
         for value, pairs in self._pairs(frame, metric, axis, reference):
             groups = pairs.partition_by(list(within), as_dict=True) if within else {(): pairs}
             for key, group in groups.items():
                 if len(group):
-                    labels = dict(zip(within, key, strict=True))
-                    facts = {"to": str(reference), "better": better}
-                    row = _difference(group, units, limits)
-                    rows.append({axis: value, **labels, **row, **facts})
-        if not rows:
+                    labels = {axis: value, **dict(zip(within, key, strict=True))}
+                    found.append(comparison(group, units, limits, metric, labels, reference))
+        if not found:
             raise InputError(
                 f"no two variants differ by {axis} alone, one of them with {axis} = {reference!r}:"
                 " a paired comparison needs the same homes and seeds on both sides"
             )
-        (table,) = judged([pl.DataFrame(rows, infer_schema_length=None)])
-        return table
+        return [replace(each, better=self.better(metric)) for each in found]
 
     def differences(
         self, metric: str, against: Mapping[str, Any], unit: str, within: Sequence[str] = ()
@@ -180,7 +250,7 @@ class StudyAnswers:
                 sizes = dict(zip(others, counts, strict=True))
                 label = {axis: value, **sizes}
                 if effect is not None:
-                    rows.append({**label, first: spread.needed(effect, first, power, **sizes)})
+                    rows.append({**label, first: spread.needed(effect, first, power, units=sizes)})
                     continue
                 for count in SIZES[SIZES.index(FEW_UNITS) :]:
                     detectable = spread.detectable({**sizes, first: count}, power)
@@ -328,36 +398,191 @@ def difference_limits(limits: Limits) -> Limits:
     return least - largest, largest - least
 
 
-def _difference(pairs: "pl.DataFrame", by: Sequence[str], limits: Limits) -> dict[str, Any]:
-    """Return the columns of a comparison."""
+@dataclass(frozen=True)
+class Comparison:
+    """A value of an axis beside the reference: what pairs of variants say of a metric.
+
+    Attributes:
+        metric: The metric.
+        labels: The value of the compared axis, which comes first, and those of the axes within.
+        reference: The label of the reference.
+        better: Which values of the metric are better: `higher`, `lower`, or empty: neither is.
+        mean: The mean over units.
+        reference_mean: That of the reference.
+        estimate: The mean difference.
+        deviation: The standard deviation of the units' differences.
+        variance_ratio: The variance of unpaired differences over that of paired ones.
+        pairs: The number of pairs.
+        above: How many of them are above the reference.
+        below: How many of them are below it.
+        units: The number of units of each kind.
+        p_holm: The p value, corrected for all comparisons that are read together; see `judged`.
+        number: How many those are.
+    """
+
+    metric: str
+    labels: Mapping[str, Any]
+    reference: Any
+    mean: float
+    reference_mean: float
+    estimate: MeanEstimate
+    deviation: float
+    variance_ratio: float
+    pairs: int
+    above: int
+    below: int
+    units: Mapping[str, int]
+    better: str = ""
+    p_holm: float = math.nan
+    number: int = 1
+
+    @property
+    def difference(self) -> float:
+        """The mean difference."""
+        return self.estimate.mean
+
+    @property
+    def p(self) -> float:
+        """The p value of the mean; of too few units that of the exact sign test."""
+        return self.estimate.sign_p if self.estimate.doubt else self.estimate.p_value
+
+    @property
+    def level(self) -> float:
+        """The level of each interval, so that all that are read together hold in 95 %."""
+        return 1 - MAX_P / self.number
+
+    @property
+    def interval(self) -> Limits:
+        """The interval of the difference: it excludes zero exactly if the difference is clear."""
+        low, high = self.estimate.interval(self.level)
+        if not self.is_clear or self.estimate.doubt:
+            return low, high
+        # Holm's method shows a few more differences than the intervals, which are Bonferroni's.
+        return (max(low, 0.0), high) if self.difference > 0 else (low, min(high, 0.0))
+
+    @property
+    def direction(self) -> str:
+        """Whether the mean is `higher` or `lower` than the reference."""
+        return "higher" if self.difference > 0 else "lower"
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it shows a difference: all claims of one follow from this.
+
+        The corrected p value must be small enough; and if there are too few units to trust the
+        mean, most pairs and most units must differ in its direction, too.
+        """
+        if not self.p_holm < MAX_P:
+            return False
+        side = int(self.direction == "lower")
+        agreeing = (self.above, self.below)[side]
+        is_majority = 2 * agreeing > self.pairs
+        is_one_way = all(signs[side] > signs[1 - side] for signs in self.estimate.signs.values())
+        return not self.estimate.doubt or (is_majority and is_one_way)
+
+    @property
+    def is_same(self) -> bool:
+        """Whether no pair differs."""
+        return not self.above and not self.below
+
+    @property
+    def outcome(self) -> str:
+        """What it says, in a word or two."""
+        if self.is_same:
+            return "the same"
+        if not self.is_clear:
+            return "can't tell"
+        if not self.better:
+            return self.direction
+        return "better" if self.better == self.direction else "worse"
+
+    @property
+    def needed(self) -> str:
+        """How many units would show a difference of this size, in words."""
+        spread = self.estimate.spread
+        parts = [
+            f"{count:,} {plural(kind)} (now {spread.units[kind]})"
+            for kind, count in self.estimate.needed(self.level).items()
+        ]
+        return " or ".join(parts) or f"many more {' and '.join(map(plural, spread.units))}"
+
+    @property
+    def verdict(self) -> str:
+        """What it shows in words, or how many more replicates are needed."""
+        side = "above" if self.difference > 0 else "below"
+        count = self.above if side == "above" else self.below
+        doubt = self.estimate.doubt
+        if math.isnan(self.p):
+            return "one pair only: no interval; run the study with more seeds and homes"
+        if self.is_same:
+            return f"the same as {self.reference} in every pair"
+        if self.is_clear:
+            judgement = f", which is {self.outcome}" if self.better else ""
+            amount = f"; how much can't be told: {doubt}" if doubt else ""
+            return f"{side} {self.reference} in {count} of {self.pairs} pairs{judgement}{amount}"
+        if self.p_holm < MAX_P:
+            return (
+                f"too few replicates to tell: the mean is {side} {self.reference}, but only"
+                f" {count} of {self.pairs} pairs are"
+            )
+        many = f"p is {self.p_holm:.2g} for so many comparisons; " if self.p < MAX_P else ""
+        size = f"a difference of this size would show with {self.needed}"
+        return f"too few replicates to tell: {many}{size}"
+
+    def row(self) -> dict[str, Any]:
+        """Return the columns of `StudyAnswers.paired`."""
+        reference = self.reference_mean
+        low, high = self.interval
+        return {
+            **self.labels,
+            "mean": self.mean,
+            "reference": reference,
+            "difference": self.difference,
+            "low": low,
+            "high": high,
+            "doubt": self.estimate.doubt,
+            "relative": self.difference / abs(reference) if reference else math.nan,
+            "effect_size": self.difference / self.deviation if self.deviation > 0 else math.nan,
+            "p": self.p,
+            "p_holm": self.p_holm,
+            "pairs": self.pairs,
+            "above": self.above,
+            "below": self.below,
+            **{f"n_{kind}": count for kind, count in self.units.items()},
+            "variance_ratio": self.variance_ratio,
+            "needed": self.needed,
+            "clear": self.is_clear,
+            "verdict": self.verdict,
+        }
+
+
+def comparison(
+    pairs: "pl.DataFrame",
+    by: Sequence[str],
+    limits: Limits,
+    metric: str,
+    labels: Mapping[str, Any],
+    reference: Any,
+) -> Comparison:
+    """Return what pairs say of a metric; see `Comparison`."""
     units = by_units(pairs, by, "metric", "reference_metric", "difference")
-    difference = estimate_units(units, by, "difference", limits)
     values = units["metric"].to_numpy()
     references = units["reference_metric"].to_numpy()
-    reference_mean = float(references.mean())
     differences = values - references
-    deviation = float(differences.std(ddof=1)) if len(differences) > 1 else math.nan
-    needed = [
-        f"{n} values of {level} (now {difference.spread.units[level]})"
-        for level, n in difference.needed().items()
-    ]
-    return {
-        "mean": float(values.mean()),
-        "reference": reference_mean,
-        "difference": difference.mean,
-        "low": difference.low,
-        "high": difference.high,
-        "doubt": difference.doubt,
-        "relative": difference.mean / abs(reference_mean) if reference_mean else math.nan,
-        "effect_size": difference.mean / deviation if deviation > 0 else math.nan,
-        "p": difference.p_value,
-        "pairs": len(pairs),
-        "above": int((pairs["difference"] > 0).sum()),
-        "below": int((pairs["difference"] < 0).sum()),
-        **{f"n_{column}": units[column].n_unique() for column in by},
-        "variance_ratio": variance_ratio(values, references),
-        "needed": " or ".join(needed) or "many more of " + " and of ".join(difference.spread.units),
-    }
+    return Comparison(
+        metric,
+        labels,
+        reference,
+        float(values.mean()),
+        float(references.mean()),
+        estimate_units(units, by, "difference", limits),
+        float(differences.std(ddof=1)) if len(differences) > 1 else math.nan,
+        variance_ratio(values, references),
+        len(pairs),
+        int((pairs["difference"] > 0).sum()),
+        int((pairs["difference"] < 0).sum()),
+        {column: units[column].n_unique() for column in by},
+    )
 
 
 def by_units(frame: "pl.DataFrame", by: Sequence[str], *columns: str) -> "pl.DataFrame":
@@ -393,59 +618,9 @@ def variance_ratio(values: Any, references: Any) -> float:
     return unpaired / differences if differences > 0 else math.inf
 
 
-def judged(tables: "Sequence[pl.DataFrame]") -> "list[pl.DataFrame]":
-    """Return tables of comparisons with corrected p values, and the verdicts that follow from them.
-
-    Args:
-        tables: Comparisons that are read together: p values are corrected for all of their rows.
-    """
-    import polars as pl
-
-    p_values = itertools.chain.from_iterable(table["p"].to_list() for table in tables)
-    corrected = iter(holm(list(p_values)))
-    results = []
-    for table in tables:
-        position = table.get_column_index("p") + 1
-        bare = table.drop("p_holm", "clear", "verdict", strict=False)
-        p_holm = pl.Series("p_holm", list(itertools.islice(corrected, len(table))), pl.Float64)
-        result = bare.insert_column(position, p_holm)
-        rows = result.to_dicts()
-        clear = pl.Series("clear", [is_clear(row) for row in rows])
-        verdicts = pl.Series("verdict", [verdict(row) for row in rows])
-        results.append(result.with_columns(clear, verdicts))
-    return results
-
-
-def is_clear(row: Mapping[str, Any]) -> bool:
-    """Whether a comparison shows a difference: all claims of one follow from this.
-
-    The corrected p value must be small enough; and if there are too few units to trust the mean,
-    most pairs must differ in its direction, too.
-    """
-    agreeing = row["above"] if row["difference"] > 0 else row["below"]
-    return row["p_holm"] < MAX_P and (not row["doubt"] or 2 * agreeing > row["pairs"])
-
-
-def verdict(row: Mapping[str, Any]) -> str:
-    """Return in words what a comparison shows, or how many more replicates are needed."""
-    if math.isnan(row["p"]):
-        return "one pair only: no interval; run the study with more seeds and homes"
-    if not row["above"] and not row["below"]:
-        return f"the same as {row['to']} in every pair"
-    side = "above" if row["difference"] > 0 else "below"
-    if is_clear(row):
-        direction = "higher" if side == "above" else "lower"
-        value = "better" if row["better"] == direction else "worse"
-        judgement = f", which is {value}" if row["better"] else ""
-        amount = f"; how much can't be told: {row['doubt']}" if row["doubt"] else ""
-        return f"{side} {row['to']} in {row[side]} of {row['pairs']} pairs{judgement}{amount}"
-    if row["p"] >= MAX_P:
-        return (
-            f"too few replicates to tell: a difference of this size would show with {row['needed']}"
-        )
-    if row["p_holm"] >= MAX_P:
-        return f"too few replicates to tell: p is {row['p_holm']:.2g} for so many comparisons"
-    return (
-        f"too few replicates to tell: the mean is {side} {row['to']}, but only {row[side]} of"
-        f" {row['pairs']} pairs are"
-    )
+def judged(comparisons: Sequence[Comparison]) -> list[Comparison]:
+    """Return comparisons that are read together, with p values corrected for all of them."""
+    corrected = holm([each.p for each in comparisons])
+    number = max(1, sum(not math.isnan(p) for p in corrected))
+    pairs = zip(comparisons, corrected, strict=True)
+    return [replace(each, p_holm=p, number=number) for each, p in pairs]

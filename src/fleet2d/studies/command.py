@@ -74,6 +74,7 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.api import default_location, open_crew
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
+    from fleet2d.studies.reader import open_study
 
     free_memory_of_polars()
     checked = check_study(source, _print_size)
@@ -90,10 +91,12 @@ def run(  # noqa: PLR0913 - options of the command line
         counts = run_study(
             checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
         )
+    answer = open_study(location).answer
     if as_json:
-        _print(json.dumps({"study": location, **vars(counts), "missing": counts.missing}))
+        facts = {"study": location, **vars(counts), "missing": counts.missing}
+        _print(json.dumps({"answer": answer.content, **facts}))
     elif not quiet:
-        _print(f"{counts.complete} of {counts.total} variants complete in {location}")
+        _print(f"{counts.complete} of {counts.total} variants complete in {location}\n\n{answer}")
     if counts.failed:
         _print_failures(location)
     if counts.failed or counts.missing:
@@ -181,7 +184,8 @@ def report(
         raise InputError(
             "give --out, a local folder for the report: the study is in a remote store"
         )
-    _print(write_report(study, out or Path(study.location) / "report"))
+    path = write_report(study, out or Path(study.location) / "report")
+    _print(f"{study.answer}\n\n{path}")
 
 
 @studying.command()
@@ -264,7 +268,7 @@ def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
     """Print the axes, the first variants, and how much all of them are."""
     from fleet2d.studies.api import open_crew
     from fleet2d.studies.plan import check_setups
-    from fleet2d.studies.progress import in_words
+    from fleet2d.studies.sentences import in_words
 
     plan = checked.plan
     with open_crew("local", workers) as crew:
@@ -370,10 +374,4 @@ def tune(
     _print(f"the best setting: {result.value:.4g} on the training homes")
     for key, value in result.settings.items():
         _print(f"  {key}={value}")
-    _print(f"{tune.metric} on the homes held out:")
-    for row in result.held_out.paired(tune.metric, {"setting": "base"}).to_dicts():
-        interval = "" if row["doubt"] else f" ({row['low']:.4g} to {row['high']:.4g})"
-        _print(
-            f"  {row['setting']}: {row['mean']:.4g} instead of {row['reference']:.4g},"
-            f" difference {row['difference']:.4g}{interval}: {row['verdict']}"
-        )
+    _print(f"{tune.metric} on the homes held out:\n\n{result.held_out.answer}")

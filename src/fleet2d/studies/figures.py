@@ -1,4 +1,4 @@
-"""The figures of a report: comparisons, means by axis, distributions, and metrics over time."""
+"""The figures of a report: comparisons, differences of units, and metrics over time."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fleet2d.errors import extra
-from fleet2d.kernels import F64
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.studies.intervals import estimate
 from fleet2d.studies.results import VARIANT
@@ -128,48 +127,6 @@ def draw_unit_differences(
     return figure
 
 
-def draw_interaction(table: "pl.DataFrame", first: str, second: str, label: str) -> Figure:
-    """Draw the means of the cells of two axes with intervals, a line for each value of the second.
-
-    Lines that aren't parallel show that the effect of one axis depends on the other.
-    """
-    figure, axes = _figure(3.0)
-    labels = table[first].unique(maintain_order=True).to_list()
-    lines = table.partition_by(second, maintain_order=True)[:MAX_LINES]
-    for number, line in enumerate(lines):
-        x = np.array([labels.index(value) for value in line[first].to_list()], np.float64)
-        x += 0.08 * (number - (len(lines) - 1) / 2)
-        mean = line["mean"].to_numpy()
-        ends = _ends(line).T
-        axes.errorbar(
-            x, mean, yerr=ends, fmt="o-", color=COLORS[number], lw=1.2, ms=4, elinewidth=1,
-            label=str(line[second][0]),
-        )  # fmt: skip
-    _label(axes, [str(value) for value in labels])
-    axes.set_xlabel(first)
-    _label_y(axes, label)
-    axes.legend(frameon=False, fontsize=8, title=second, title_fontsize=8)
-    return figure
-
-
-def draw_means(tables: "dict[str, pl.DataFrame]", label: str) -> Figure:
-    """Draw the mean of a metric by the values of each axis, one panel for each axis."""
-    figure, panels = _panels(2.8, len(tables))
-    for panel, (axis, table) in zip(panels, tables.items(), strict=True):
-        labels = table[axis].to_list()
-        means = table["mean"].to_numpy()
-        ends = _ends(table)
-        is_numeric = all(isinstance(label, int | float) for label in labels)
-        x = np.array(labels, np.float64) if is_numeric else np.arange(len(labels))
-        panel.errorbar(x, means, yerr=ends.T, fmt="none", ecolor=PALE, lw=2)
-        panel.plot(x, means, "o-" if is_numeric else "o", color=COLORS[0], ms=5, lw=1)
-        if not is_numeric:
-            _label(panel, [str(label) for label in labels])
-        panel.set_xlabel(axis)
-    _label_y(panels[0], label)
-    return figure
-
-
 def draw_course(
     frame: "pl.DataFrame", label: str, axis: str | None, units: Sequence[str]
 ) -> Figure:
@@ -201,13 +158,6 @@ def draw_course(
     if axis is not None:
         axes.legend(frameon=False, fontsize=8, title=axis, title_fontsize=8)
     return figure
-
-
-def _ends(table: "pl.DataFrame") -> F64:
-    """Return the lengths of intervals below and above the mean, (n, 2); 0 if they can't be told."""
-    lengths = np.abs(table.select("low", "high").to_numpy() - table["mean"].to_numpy()[:, None])
-    lengths[table["doubt"].to_numpy() != ""] = 0.0
-    return lengths
 
 
 def _panels(height: float, count: int) -> tuple[Figure, list[Axes]]:

@@ -6,7 +6,8 @@ The standard error is that of a random-effects analysis of variance of crossed u
 degrees of freedom of Satterthwaite (1946, Biometrics Bulletin 2).
 
 Where there are too few units to trust an interval, the estimate has a doubt; as their skewness is
-uncertain, too, each end is then the wider of those with and without the transformation.
+uncertain, too, each end is then the wider of those with and without the transformation. What few
+units do tell is whether most of them are above zero: by the sign test, which is exact.
 `benchmarks/intervals.py` measures how often intervals contain the true mean.
 """
 
@@ -54,12 +55,15 @@ class Spread:
     residual: float
     values: int
 
-    def detectable(self, units: Mapping[str, int], power: float = POWER) -> float:
+    def detectable(
+        self, units: Mapping[str, int], power: float = POWER, level: float = LEVEL
+    ) -> float:
         """Return the smallest mean that a study of this size detects with a given power.
 
         Args:
             units: The number of units of each level, 2 or more.
             power: The share of such studies in which the interval excludes zero.
+            level: The level of that interval.
 
         Example:
             >>> spread = Spread({"home": 5}, {"home": 1.0}, 0.0, 5)
@@ -74,21 +78,31 @@ class Spread:
         if not variance:
             return 0.0
         freedom = variance**2 / sum_in_order(part**2 / df for part, df in parts)
-        return math.sqrt(variance) * (student_quantile(freedom) + NormalDist().inv_cdf(power))
+        quantiles = student_quantile(freedom, level) + NormalDist().inv_cdf(power)
+        return math.sqrt(variance) * quantiles
 
-    def needed(self, size: float, level: str, power: float = POWER, **units: int) -> int | None:
-        """Return how many units of a level tell a mean of `size` from zero; None: no number does.
+    def needed(
+        self,
+        size: float,
+        kind: str,
+        power: float = POWER,
+        *,
+        level: float = LEVEL,
+        units: Mapping[str, int] | None = None,
+    ) -> int | None:
+        """Return how many units of a kind tell a mean of `size` from zero; None: no number does.
 
         Args:
             size: The mean.
-            level: The level.
+            kind: The level whose units are counted, such as `home`.
             power: The share of such studies in which the interval excludes zero.
-            **units: The number of units of other levels, if they are to differ from the present.
+            level: The level of that interval.
+            units: The number of units of other kinds, if they are to differ from the present.
         """
-        others = {**self.units, **units}
+        others = {**self.units, **(units or {})}
 
         def is_enough(count: int) -> bool:
-            return self.detectable({**others, level: count}, power) <= abs(size)
+            return self.detectable({**others, kind: count}, power, level) <= abs(size)
 
         if not is_enough(MAX_NEEDED_UNITS):
             return None
@@ -101,23 +115,46 @@ class MeanEstimate:
 
     Attributes:
         mean: The mean.
-        low: The lower end of the interval; NaN if values don't differ, or there is one only.
-        high: The upper end.
         doubt: Why the interval can't be trusted, or why there is none; empty if it can.
         error: The standard error.
         freedom: Degrees of freedom.
         skewness: The skewness of the mean, estimated from that of the units.
         spread: The variance of the values by level.
+        signs: The numbers of units above and below zero, by level, of levels with too few units.
+        limits: The least and the largest mean that are possible.
     """
 
     mean: float
-    low: float = math.nan
-    high: float = math.nan
     doubt: str = ""
     error: float = math.nan
     freedom: float = math.nan
     skewness: float = 0.0
     spread: Spread = field(default_factory=lambda: Spread({}, {}, 0.0, 1))
+    signs: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    limits: Limits = UNLIMITED
+
+    @property
+    def low(self) -> float:
+        """The lower end of the 95 % interval; NaN if values don't differ, or there is one only."""
+        return self.interval()[0]
+
+    @property
+    def high(self) -> float:
+        """The upper end."""
+        return self.interval()[1]
+
+    def interval(self, level: float = LEVEL) -> Limits:
+        """Return the interval that contains the true mean in a share of studies."""
+        if not self.error > 0:
+            return math.nan, math.nan
+        quantile = student_quantile(self.freedom, level)
+        low = self.mean - self.error * _inverse(quantile, self.skewness)
+        high = self.mean - self.error * _inverse(-quantile, self.skewness)
+        if self.doubt:
+            low = min(low, self.mean - self.error * quantile)
+            high = max(high, self.mean + self.error * quantile)
+        least, largest = self.limits
+        return max(low, least), min(high, largest)
 
     @property
     def is_clear(self) -> bool:
@@ -131,7 +168,7 @@ class MeanEstimate:
         If all values are equal, it is that of the sign test; NaN for a single value.
         """
         if self.error == 0:
-            return 0.5 ** (min(self.spread.units.values()) - 1) if self.mean else 1.0
+            return self.sign_p
         with extra("study", "intervals need scipy"):
             from scipy.special import stdtr
         ratio = self.mean / self.error
@@ -140,16 +177,31 @@ class MeanEstimate:
             distance = min(distance, abs(ratio))
         return float(2 * stdtr(self.freedom, -distance))
 
-    def needed(self) -> dict[str, int]:
-        """Return for each level how many units are needed to show that the mean isn't zero.
+    @property
+    def sign_p(self) -> float:
+        """The p value of the exact sign test, whether as many units are above zero as below.
 
-        Each number is for one level while the others stay as they are; levels of which no number
+        It is the largest of the levels with too few units; NaN without such a level.
+        """
+        with extra("study", "intervals need scipy"):
+            from scipy.special import bdtr
+        both = (2 * float(bdtr(min(signs), sum(signs), 0.5)) for signs in self.signs.values())
+        return max((min(1.0, p) for p in both), default=math.nan)
+
+    def needed(self, level: float = LEVEL) -> dict[str, int]:
+        """Return for each kind of units how many are needed to show that the mean isn't zero.
+
+        Each number is for one kind while the others stay as they are; kinds of which no number
         is enough are missing. The power is 80 %.
+
+        Args:
+            level: The level of the interval that would exclude zero.
         """
         return {
-            level: max(count, current + 1)
-            for level, current in self.spread.units.items()
-            if current >= 2 and (count := self.spread.needed(self.mean, level)) is not None
+            kind: max(count, current + 1, ENOUGH_UNITS if kind in self.signs else 0)
+            for kind, current in self.spread.units.items()
+            if current >= 2
+            and (count := self.spread.needed(self.mean, kind, level=level)) is not None
         }
 
 
@@ -157,7 +209,6 @@ def estimate(
     values: Sequence[float] | F64,
     levels: Mapping[str, Sequence[Any]] | None = None,
     *,
-    level: float = LEVEL,
     limits: Limits = UNLIMITED,
 ) -> MeanEstimate:
     """Return the mean of values and its interval over the units that they belong to.
@@ -166,7 +217,6 @@ def estimate(
         values: One for each combination of units, such as home and seed.
         levels: For each level the unit of each value, the most important first; None: each value is
             a unit of its own.
-        level: The share of studies whose interval contains the true mean.
         limits: The least and the largest mean that are possible, which an interval doesn't exceed.
 
     Example:
@@ -182,34 +232,55 @@ def estimate(
     if not codes:
         return MeanEstimate(mean, doubt="one value alone doesn't tell how much others differ")
     spread, variance, freedom, third_moment = _analyse(data, codes)
+    signs = {name: _signs(data, numbers) for name, numbers in codes.items()}
     if variance <= 0 or np.ptp(data) <= ROUNDING * np.abs(data).max():
         doubt = f"all {len(data)} values are equal, so how much others differ is unknown"
-        return MeanEstimate(mean, doubt=doubt, error=0.0, freedom=freedom, spread=spread)
+        return MeanEstimate(mean, doubt, 0.0, freedom, spread=spread, signs=signs)
     error = math.sqrt(variance)
     skewness = third_moment / (error * variance) if freedom >= MIN_FREEDOM else 0.0
-    quantile = student_quantile(freedom, level)
-    low = mean - error * _inverse(quantile, skewness)
-    high = mean - error * _inverse(-quantile, skewness)
-    doubt = _doubt(spread, variance)
-    if doubt:
-        low, high = min(low, mean - error * quantile), max(high, mean + error * quantile)
+    few = _few(spread, variance)
     least, largest = limits
-    if least <= data.min() and data.max() <= largest:
-        low, high = max(low, least), min(high, largest)
-    return MeanEstimate(mean, low, high, doubt, error, freedom, skewness, spread)
+    is_within = least <= data.min() and data.max() <= largest
+    return MeanEstimate(
+        mean,
+        next(iter(few.values()), ""),
+        error,
+        freedom,
+        skewness,
+        spread,
+        {name: signs[name] for name in few},
+        limits if is_within else UNLIMITED,
+    )
 
 
-def _doubt(spread: Spread, variance: float) -> str:
-    """Return why an interval can't be trusted: a level whose units may lack a kind of them."""
+def _signs(data: F64, numbers: I64) -> tuple[int, int]:
+    """Return how many units have a mean above zero, and how many one below."""
+    sums = np.bincount(numbers, data)
+    smallest = ROUNDING * np.abs(data).max()
+    return int((sums > smallest).sum()), int((sums < -smallest).sum())
+
+
+def _few(spread: Spread, variance: float) -> dict[str, str]:
+    """Return the levels whose units may lack a kind of them, and why they can't be trusted."""
+    reasons = {}
     for number, (level, count) in enumerate(spread.units.items()):
         share = spread.components[level] / count / variance
         if count < ENOUGH_UNITS and (number == 0 or share > MINOR):
             missing = 100 * (1 - RARE) ** count
-            return (
-                f"with {count} values of {level}, {missing:.0f} % of studies miss a kind that makes"
+            reasons[level] = (
+                f"with {count} {plural(level)}, {missing:.0f} % of studies miss a kind that makes"
                 f" up a tenth of all; {ENOUGH_UNITS - count} more would be enough"
             )
-    return ""
+    return reasons
+
+
+def plural(kind: str) -> str:
+    """Return the name of several units of a kind.
+
+    >>> plural("home"), plural("users.ana.persona")
+    ('homes', 'values of users.ana.persona')
+    """
+    return f"{kind}s" if kind.isalpha() else f"values of {kind}"
 
 
 def _transformed(ratio: float, skewness: float) -> float:

@@ -3,10 +3,8 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from fleet2d.runtime.clock import DAY_S, HOUR_S
 from fleet2d.runtime.progress import progress_bar
 from fleet2d.studies.driver import Observer
 
@@ -74,26 +72,6 @@ def observing(*, quiet: bool = False) -> Iterator[Observer]:
     """
     with progress_bar(show=not quiet) as progress:
         yield Observer() if quiet else BarObserver(progress)
-
-
-def in_words(time_span: timedelta) -> str:
-    """Return a duration in its largest fitting unit.
-
-    >>> in_words(timedelta(seconds=200)), in_words(timedelta(hours=30))
-    ('3.3 min', '30.0 h')
-    """
-    seconds = time_span.total_seconds()
-    units = (
-        ("years", 31_557_600),
-        ("months", 2_629_800),
-        ("days", DAY_S),
-        ("h", HOUR_S),
-        ("min", 60),
-    )
-    for name, unit in units:
-        if seconds >= unit * (2 if unit >= DAY_S else 1):
-            return f"{seconds / unit:,.1f} {name}"
-    return f"{seconds:.1f} s"
 
 
 @contextmanager

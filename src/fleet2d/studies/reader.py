@@ -4,12 +4,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fleet2d.configuration.problems import did_you_mean, suggest
-from fleet2d.errors import ArtifactError, InputError
+from fleet2d.configuration.problems import suggest
+from fleet2d.errors import ArtifactError
 from fleet2d.studies.answers import StudyAnswers
-from fleet2d.studies.directory import COMPLETE, FAILED, META, Counts, StudyDirectory
-from fleet2d.studies.intervals import Limits
-from fleet2d.studies.results import RESULT_COLUMNS, TABLES, VARIANT, part_names, table_files
+from fleet2d.studies.directory import META, StudyDirectory
+from fleet2d.studies.results import TABLES, VARIANT, part_names, table_files
+from fleet2d.studies.sentences import Answer, StudyAnswer
 from fleet2d.studies.storage import damaged
 
 if TYPE_CHECKING:
@@ -47,6 +47,14 @@ class Study(StudyAnswers):
         counts = self.counts
         return f"<Study {self.location}: {counts.complete} of {counts.total} variants complete>"
 
+    @property
+    def answer(self) -> Answer:
+        """What the study found, in sentences and a table; `print` shows it, and so do notebooks."""
+        return StudyAnswer(self).answer()
+
+    def _repr_html_(self) -> str:
+        return self.answer._repr_html_()
+
     @cached_property
     def variants(self) -> "pl.DataFrame":
         """The variants, a row each: parameters, status, time, digest and metrics.
@@ -60,11 +68,6 @@ class Study(StudyAnswers):
             raise damaged(self.location, f"its variants have no {', '.join(sorted(missing))}")
         return frame
 
-    @property
-    def counts(self) -> Counts:
-        """The numbers of complete, failed and missing variants."""
-        return Counts.of(self.variants)
-
     @cached_property
     def comparisons(self) -> "tuple[PairedComparison, ...]":
         """The comparisons that the study file asks for.
@@ -76,18 +79,6 @@ class Study(StudyAnswers):
 
         with self._directory.storage.reading(META):
             return tuple(map(PairedComparison.model_validate, self.meta.compare))
-
-    @property
-    def metrics(self) -> tuple[str, ...]:
-        """The names of the metrics, such as `ltp_error.ana.tv`."""
-        no_metrics = {*self.columns, *RESULT_COLUMNS, "simulated_s"}
-        return tuple(name for name in self.variants.columns if name not in no_metrics)
-
-    @property
-    def failures(self) -> "pl.DataFrame":
-        """The variants that failed, with their errors."""
-        frame = self.variants.filter(status=FAILED)
-        return frame.select(VARIANT, *self.columns, "error", "trace", "attempts")
 
     @cached_property
     def tables(self) -> tuple[str, ...]:
@@ -167,37 +158,6 @@ class Study(StudyAnswers):
         scenario = self.scenario(variant)
         with stored_code(f"variant {variant} of {self._directory.location}", scenario, trust=trust):
             return run_scenario(scenario, out=out, **settings)
-
-    @property
-    def complete(self) -> "pl.DataFrame":
-        """The variants that are complete."""
-        return self.variants.filter(status=COMPLETE)
-
-    def with_metric(self, metric: str) -> "pl.DataFrame":
-        """Return the variants that are complete and have a metric.
-
-        Raises:
-            InputError: There is no such metric.
-        """
-        if not self.counts.complete:
-            raise InputError(f"{self.location} has no complete variant, and so no {metric!r}")
-        if metric not in self.metrics:
-            hint = did_you_mean(metric, self.metrics)
-            raise InputError(
-                f"no variant has a numeric metric {metric!r}{hint} There are:"
-                f" {', '.join(self.metrics[:20])}{', …' if len(self.metrics) > 20 else ''}"
-            )
-        import polars as pl
-
-        return self.complete.filter(pl.col(metric).is_not_null() & pl.col(metric).is_finite())
-
-    def limits(self, metric: str) -> Limits:
-        """Return the least and the largest value that a metric can have."""
-        return self.meta.limits(metric)
-
-    def better(self, metric: str) -> str:
-        """Return which values of a metric are better: `higher`, `lower`, or empty: neither is."""
-        return self.meta.better(metric)
 
     @cached_property
     def _files(self) -> list[dict[str, str]]:

@@ -2,21 +2,28 @@
 
 import base64
 import html
-import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import timedelta
-from functools import cached_property
 from pathlib import Path
 from statistics import median_high
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import ArtifactError, InputError, os_errors_as
-from fleet2d.studies.answers import NOISE, RESIDUAL, judged
+from fleet2d.studies.answers import NOISE, RESIDUAL, Comparison
 from fleet2d.studies.figures import over_time
 from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL
+from fleet2d.studies.sentences import (
+    INTERVAL,
+    MAX_METRICS,
+    StudyAnswer,
+    cells_of,
+    html_table,
+    text_of,
+)
+from fleet2d.studies.sentences import number as shown_number
 from fleet2d.studies.specification import PairedComparison
 
 if TYPE_CHECKING:
@@ -26,18 +33,11 @@ if TYPE_CHECKING:
     from fleet2d.studies.reader import Study
 
 
-MAX_METRICS = 12
 MAX_VALUES = 12  # of an axis that are listed
-MAX_SHARES = 8
-MAX_INTERACTIONS = 3  # pairs of axes with a table of cell means, for each metric
-MAX_CELLS = 60  # of such a table
+MAX_SHARES = 3  # sources of the variance of a metric
 # from how many characters on names are shortened, and to how many
 LONG_NAME = 16
 SHORT_NAME = 6
-INTERVAL = f"{LEVEL:.0%} interval"
-HEADINGS = {"p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL}
-# Columns that stand elsewhere on the page.
-NOT_SHOWN = ("high", "doubt", "variance_ratio", "needed", "to", "better", "clear", "verdict")
 GLOSSARY = {
     "mean": "mean over the units, such as homes and seeds, each of equal weight",
     "reference": "the same of the value that all others are compared with",
@@ -93,6 +93,7 @@ class _Page:
         self.study = study
         self.meta = study.meta
         self.folder = folder
+        self.answer = StudyAnswer(study)
         labels = {
             column: study.complete[column].unique(maintain_order=True).drop_nulls().to_list()
             for column in study.columns
@@ -107,13 +108,9 @@ class _Page:
     def sections(self) -> Iterator[str]:
         """Yield the page, section by section."""
         yield from self._head()
-        for number, comparison in enumerate(self.study.comparisons):
+        for number, comparison in enumerate(self.answer.asked):
             yield from self._comparison(number, comparison)
-        metrics = self._metrics()
-        for metric in metrics:
-            yield from self._metric(metric)
-        if more := len(self.study.metrics) - len(metrics):
-            yield f"<p>{more} more numbers are in <code>variants.parquet</code>.</p>"
+        yield from self._numbers()
         yield from self._methods()
         yield from self._failures()
         if self.meta.source:
@@ -122,9 +119,9 @@ class _Page:
     def _head(self) -> Iterator[str]:
         counts = self.study.counts
         meta = self.meta
-        yield f"<h1>{html.escape(meta.name)}</h1>"
-        for text in filter(None, (meta.description, meta.notes)):
-            yield f"<p>{html.escape(text)}</p>"
+        yield f"<h1>{html.escape(meta.name)}</h1>{self.answer.answer()._repr_html_()}"
+        if meta.notes:
+            yield f"<p>{html.escape(meta.notes)}</p>"
         if meta.tags:
             yield f"<p>Tags: {html.escape(', '.join(meta.tags))}.</p>"
         yield (
@@ -135,129 +132,110 @@ class _Page:
         for column in self.study.columns:
             labels = self.study.variants[column].unique(maintain_order=True).to_list()
             kind = "units of intervals" if column in meta.populations else "compared"
-            values = [_text(self._name(column, label)) for label in labels[:MAX_VALUES]]
+            values = [text_of(self._name(column, label)) for label in labels[:MAX_VALUES]]
             if len(labels) > MAX_VALUES:
                 values.append("…")
             rows.append([column, kind, str(len(labels)), ", ".join(values)])
-        yield _table(["axis", "its values are", "number", "which"], rows, text=(0, 1, 3))
-        yield from self._warnings(counts.total - counts.complete)
-        yield '<p><a href="#methods">How answers were computed, and what columns mean</a></p>'
-
-    def _warnings(self, missing: int) -> Iterator[str]:
-        if missing:
-            yield _warning(f"{missing} variants have no results: the answers below leave them out.")
+        yield html_table(["axis", "its values are", "number", "which"], rows, text=(0, 1, 3))
         for column in self.units:
             if (count := self.counts[column]) < ENOUGH_UNITS:
                 yield _warning(
                     f"There are only {count} values of {column}: a kind that is rare among all may"
                     f" be missing. {ENOUGH_UNITS} or more are better."
                 )
-        for column in self.meta.populations:
-            if column not in self.units:
-                yield _warning(f"There is only one {column}: answers hold for that one only.")
+        yield '<p><a href="#methods">How answers were computed, and what columns mean</a></p>'
 
-    @cached_property
-    def _comparisons(self) -> "list[pl.DataFrame | InputError]":
-        """The table of each comparison, or why there is none; p values corrected over all."""
+    def _comparison(self, number: int, asked: PairedComparison) -> Iterator[str]:
+        metric = asked.metric
+        ((axis, reference),) = asked.against.items()
+        yield f"<h2>{html.escape(f'{metric} by {axis}, against {text_of(reference)}')}</h2>"
+        found = self.answer.tables[number]
+        if isinstance(found, InputError):
+            yield _warning(str(found))
+            return
+        yield from self._compared(f"compare-{number + 1}", metric, asked, found)
+
+    def _compared(
+        self, name: str, metric: str, asked: PairedComparison, found: list[Comparison]
+    ) -> Iterator[str]:
+        """Yield the table and the figures of a comparison."""
         import polars as pl
 
-        tables: list[pl.DataFrame | InputError] = []
-        for c in self.study.comparisons:
-            try:
-                tables.append(self.study.paired(c.metric, c.against, c.by, c.within))
-            except InputError as error:
-                tables.append(error)
-        found = iter(judged([table for table in tables if isinstance(table, pl.DataFrame)]))
-        return [next(found) if isinstance(table, pl.DataFrame) else table for table in tables]
+        from fleet2d.studies.figures import draw_comparison, draw_course, draw_unit_differences
 
-    def _comparison(self, number: int, comparison: PairedComparison) -> Iterator[str]:
-        from fleet2d.studies.figures import draw_comparison, draw_unit_differences
-
-        metric = comparison.metric
-        against = comparison.against
-        name = f"compare-{number + 1}"
-        ((axis, reference),) = against.items()
-        yield f"<h2>{html.escape(f'{metric} by {axis}, against {_text(reference)}')}</h2>"
-        yield self._describe(metric)
-        table = self._comparisons[number]
-        if isinstance(table, InputError):
-            yield _warning(str(table))
-            return
+        ((axis, reference),) = asked.against.items()
         label = self._label(metric)
+        table = pl.DataFrame([each.row() for each in found], infer_schema_length=None)
         yield self._figure(draw_comparison(table, axis, reference, label), name)
-        within = (axis, *comparison.within)
+        within = (axis, *asked.within)
         yield self._frame(table, name, within)
-        for row in table.to_dicts():
-            labels = ", ".join(_text(row[column]) for column in within)
-            words = html.escape(row["verdict"])
-            words = f"<b>{words}</b>" if row["clear"] else words
+        for each in found:
+            labels = ", ".join(map(text_of, each.labels.values()))
+            words = html.escape(each.verdict)
+            words = f"<b>{words}</b>" if each.is_clear else words
             yield f"<p>{html.escape(labels)}: {words}.</p>"
-        ratios = [r for r in table["variance_ratio"].to_list() if r and math.isfinite(r)]
-        if ratios:
+        ratios = [each.variance_ratio for each in found if math.isfinite(each.variance_ratio)]
+        if any(ratios):
             yield (
                 f"<p>Differences are taken in pairs with the same homes, people and seeds; their"
-                f" variance is {_number(1 / median_high(ratios))} of that of"
+                f" variance is {shown_number(1 / median_high(filter(None, ratios)))} of that of"
                 " unpaired differences.</p>"
             )
         unit = self.units[0] if self.units else None
         if unit is not None and unit != axis:
-            others = [column for column in comparison.within if column != unit]
-            rows = self._shortened(self.study.differences(metric, against, unit, others))
+            others = [column for column in asked.within if column != unit]
+            rows = self._shortened(self.study.differences(metric, asked.against, unit, others))
             yield f"<h3>in each {html.escape(unit)}</h3>"
             yield self._figure(
                 draw_unit_differences(rows, (axis, *others), unit, label), f"{name}-{unit}"
             )
-
-    def _metrics(self) -> list[str]:
-        """Return the metrics of the report, those of comparisons first."""
-        compared = [comparison.metric for comparison in self.study.comparisons]
-        ordered = dict.fromkeys([*compared, *self.study.metrics])
-        return [name for name in ordered if name in self.study.metrics][:MAX_METRICS]
-
-    def _metric(self, metric: str) -> Iterator[str]:
-        from fleet2d.studies.figures import draw_course, draw_means
-
-        study = self.study
-        name = _file_name(metric)
-        label = self._label(metric)
-        frame = self._shortened(study.with_metric(metric))
-        if not len(frame):
-            return
-        yield f"<h2>{html.escape(metric)}</h2>{self._describe(metric)}"
-        if lacking := study.counts.complete - len(frame):
-            yield _warning(f"{lacking} complete variants have no such number.")
-        axes = self.axes or self.units[:1]
-        tables = {a: self._shortened(study.summary(metric, [a], self.units)) for a in axes}
-        if tables:
-            yield self._figure(draw_means(tables, label), f"{name}-means")
-        for axis, table in tables.items():
-            yield f"<h3>by {html.escape(axis)}</h3>"
-            yield self._frame(table, f"{name}-by-{_file_name(axis)}", (axis,))
-        main = axes[0] if axes else None
-        course = over_time(study, metric)
+        course = over_time(self.study, metric)
         if course is not None and course["day"].n_unique() > 1:
             yield "<h3>over time</h3>"
-            yield self._figure(draw_course(course, label, main, self.units), f"{name}-time")
-        yield from self._interactions(metric, label)
-        shares = study.shares(metric)
-        if len(shares):
-            yield "<h3>share of the variance, by axis and by interaction</h3>"
-            largest = shares.head(MAX_SHARES - 1).extend(shares.tail(1)).unique(maintain_order=True)
-            yield self._frame(largest, f"{name}-variance", ("source",))
-            if shares["share"].sum() > 1 + NOISE:
-                yield "<p>Shares overlap, as not all combinations have this number.</p>"
+            figure = draw_course(course, label, axis, self.units)
+            yield self._figure(figure, f"{_file_name(metric)}-time")
 
-    def _interactions(self, metric: str, label: str) -> Iterator[str]:
-        from fleet2d.studies.figures import draw_interaction
+    def _numbers(self) -> Iterator[str]:
+        """Yield one table of all metrics, those of comparisons first: their means, by axis."""
+        import polars as pl
 
-        pairs = itertools.combinations(self.axes, 2)
-        small = [p for p in pairs if self.counts[p[0]] * self.counts[p[1]] <= MAX_CELLS]
-        for first, second in small[:MAX_INTERACTIONS]:
-            name = f"{_file_name(metric)}-{_file_name(first)}-{_file_name(second)}"
-            table = self.study.summary(metric, [first, second], self.units)
-            yield f"<h3>{html.escape(f'{first} × {second}')}</h3>"
-            yield self._figure(draw_interaction(table, first, second, label), name)
-            yield self._frame(table, name, (first, second))
+        study = self.study
+        asked = [comparison.metric for comparison in self.answer.asked]
+        known = [name for name in dict.fromkeys([*asked, *study.metrics]) if name in study.metrics]
+        means = []
+        shares = []
+        overlapping = []
+        for metric in known[:MAX_METRICS]:
+            for axis in (*self.axes, None):
+                table = study.summary(metric, [axis] if axis else [], self.units)
+                for row in table.to_dicts():
+                    value = text_of(row.pop(axis)) if axis else "all"
+                    label = f"{axis} = {value}" if axis else value
+                    means.append({"number": self._label(metric), "in": label, **row})
+            of_it = study.shares(metric)
+            largest = of_it.head(MAX_SHARES).extend(of_it.tail(1)).unique(maintain_order=True)
+            shares += [{"number": self._label(metric), **row} for row in largest.to_dicts()]
+            if of_it["share"].sum() > 1 + NOISE:
+                overlapping.append(metric)
+        if means:
+            yield "<h2>All numbers</h2>"
+            yield self._frame(pl.DataFrame(means, infer_schema_length=None), "numbers", ("in",))
+        if shares:
+            yield "<h3>What their variance is due to</h3>"
+            yield self._frame(pl.DataFrame(shares), "variance", ("source",))
+        if overlapping:
+            names = html.escape(", ".join(overlapping))
+            yield f"<p>Shares overlap, as not all combinations have a number, of {names}.</p>"
+        facts = {name.split(".")[0]: self.meta.metrics.get(name.split(".")[0]) for name in known}
+        terms = [
+            f"<dt>{html.escape(name)}</dt><dd>{html.escape(fact.description)}</dd>"
+            for name, fact in facts.items()
+            if fact is not None and fact.description
+        ]
+        yield f"<dl>{''.join(terms)}</dl>"
+        if len(known) > MAX_METRICS:
+            more = len(known) - MAX_METRICS
+            yield f"<p>{more} more numbers are in <code>variants.parquet</code>.</p>"
 
     def _methods(self) -> Iterator[str]:
         """Yield a paragraph that can be cited, and the names of the units."""
@@ -265,7 +243,7 @@ class _Page:
         combinations = math.prod(self.counts[axis] for axis in self.axes)
         units = " and ".join(f"{self.counts[c]} values of {c}" for c in self.units)
         sizes = ", ".join(f"{self.counts[axis]} values of {axis}" for axis in self.axes)
-        number = sum(len(t) for t in self._comparisons if not isinstance(t, InputError))
+        number = len(self.answer.comparisons)
         settings = f"{counted(combinations, 'combination')} of settings"
         if sizes:
             settings += f" ({sizes})"
@@ -286,12 +264,14 @@ class _Page:
                 " variance with Satterthwaite's degrees of freedom, and intervals are those of"
                 " Student's t after Hall's (1992) transformation, which corrects for skewness. p"
                 f" values belong to the same intervals. From fewer than {ENOUGH_UNITS} units an"
-                " interval can't be told: a kind that is one in ten may be missing among them."
+                " interval can't be told: a kind that is one in ten may be missing among them; p is"
+                " then that of the exact sign test."
             )
         if number:
             text += (
                 f" Those of the {number} comparisons of this report were also corrected by Holm's"
-                " (1979) method. Effect sizes are Cohen's d of paired differences."
+                " (1979) method, and intervals by Bonferroni's: in 95 % of studies all of them"
+                " hold. Effect sizes are Cohen's d of paired differences."
             )
         yield f'<h2 id="methods">Methods</h2><p>{html.escape(text)}</p>'
         terms = "".join(f"<dt>{term}</dt><dd>{text}</dd>" for term, text in GLOSSARY.items())
@@ -300,7 +280,7 @@ class _Page:
             rows = [[short, label] for label, short in names.items() if short != label]
             if rows:
                 yield f"<h3>names of {html.escape(column)}</h3>"
-                yield _table(["in this report", "name"], rows, text=(0, 1))
+                yield html_table(["in this report", "name"], rows, text=(0, 1))
 
     def _failures(self) -> Iterator[str]:
         failures = self.study.failures
@@ -308,14 +288,6 @@ class _Page:
             yield "<h2>Failures</h2>"
             table = failures.select("variant", *self.study.columns, "error").head(50)
             yield self._frame(table, "failures", (*self.study.columns, "error"))
-
-    def _describe(self, metric: str) -> str:
-        """Return a paragraph of what a metric is, and its unit."""
-        facts = self.meta.metrics.get(metric.split(".")[0])
-        unit = self.meta.unit(metric)
-        description = facts.description if facts else ""
-        text = f"{description} {f'Unit: {unit}.' if unit else ''}".strip()
-        return f"<p>{html.escape(text)}</p>" if text else ""
 
     def _label(self, metric: str) -> str:
         """Return a metric with its unit, as axes of figures name it."""
@@ -349,12 +321,10 @@ class _Page:
     def _frame(self, frame: "pl.DataFrame", name: str, text: Sequence[str] = ()) -> str:
         """Write a data frame as CSV; return it as HTML. `text`: its columns of text."""
         frame.write_csv(self.folder / "tables" / f"{name}.csv")
-        columns = [c for c in frame.columns if c not in NOT_SHOWN]
-        head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
-        rows = [[_cell(c, row) for c in columns] for row in frame.to_dicts()]
-        texts = tuple(i for i, c in enumerate(columns) if c in text)
+        head, rows = cells_of(frame.to_dicts())
+        texts = (0, *(i for i, c in enumerate(frame.columns) if c in text))
         file = f'<p class="files"><a href="tables/{name}.csv">CSV</a></p>'
-        return _table(head, rows, texts) + file
+        return html_table(head, rows, texts, GLOSSARY) + file
 
 
 def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
@@ -383,47 +353,3 @@ def _file_name(metric: str) -> str:
 
 def _warning(text: str) -> str:
     return f'<p class="warning">{html.escape(text)}</p>'
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = ()) -> str:
-    """Return an HTML table; `text` holds the indices of its columns of text."""
-
-    def cells(tag: str, values: Sequence[str]) -> str:
-        found = []
-        for i, value in enumerate(values):
-            kind = " class=text" if i in text else ""
-            hint = f' title="{GLOSSARY[value]}"' if tag == "th" and value in GLOSSARY else ""
-            found.append(f"<{tag}{kind}{hint}>{html.escape(value)}</{tag}>")
-        return "".join(found)
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
-
-
-def _cell(column: str, row: Mapping[str, Any]) -> str:
-    """Return a cell of a table of answers as text."""
-    value = row[column]
-    if column == "low":
-        return "can't tell" if row["doubt"] else f"{_number(value)} to {_number(row['high'])}"
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return "–"
-    if column in ("p", "p_holm"):
-        return "< 0.001" if value < 0.001 else f"{value:.3f}"
-    return f"{value:.1%}".replace("%", " %") if column in ("relative", "share") else _text(value)
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return "–"
-    return _number(value) if isinstance(value, float) else str(value)
-
-
-def _number(value: float) -> str:
-    """Return a number with three significant digits.
-
-    >>> _number(0.12345), _number(1234.5), _number(float("nan"))
-    ('0.123', '1,234', '–')
-    """
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"

@@ -1,0 +1,354 @@
+"""What a study, a test or a search says: a question, two to six sentences, and one small table."""
+
+import html
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from fleet2d.configuration.problems import counted
+from fleet2d.errors import InputError
+from fleet2d.runtime.clock import DAY_S, HOUR_S
+from fleet2d.studies.answers import Comparison, StudyAnswers, judged
+from fleet2d.studies.intervals import LEVEL, plural
+
+if TYPE_CHECKING:
+    from fleet2d.studies.specification import PairedComparison
+
+MAX_METRICS = 12
+MAX_NAMED = 3  # findings of a kind that sentences name; the table has all
+MAX_ROWS = 12
+INTERVAL = f"{LEVEL:.0%} interval"
+HEADINGS = {"p_holm": "p (Holm)", "effect_size": "effect size", "low": INTERVAL}
+NOT_SHOWN = ("high", "doubt", "variance_ratio", "needed", "clear", "verdict")
+"""Columns of answers that stand in another one, or elsewhere on a page."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was found, to be read and acted on.
+
+    Attributes:
+        question: The question.
+        sentences: The answer.
+        table: Its numbers: rows of the same columns, which may be `low`, `high` and `doubt`. Texts
+            show the first twelve.
+    """
+
+    question: str
+    sentences: tuple[str, ...]
+    table: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The same for JSON, which has no NaN."""
+        rows = [
+            {name: None if is_missing(value) else value for name, value in row.items()}
+            for row in self.table
+        ]
+        return {"question": self.question, "sentences": list(self.sentences), "table": rows}
+
+    def __str__(self) -> str:
+        """Return it as lines of text."""
+        lines = [self.question] if self.question else []
+        lines += self.sentences
+        if self.table:
+            head, rows = cells_of(self.table[:MAX_ROWS])
+            widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+            padded = (
+                "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+                for row in (head, *rows)
+            )
+            lines += ["", *(line.rstrip() for line in padded)]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Return it for notebooks and pages."""
+        parts = [f"<h3>{html.escape(self.question)}</h3>"] if self.question else []
+        parts += [f"<p>{html.escape(' '.join(self.sentences))}</p>"]
+        return "".join([*parts, html_table(*cells_of(self.table[:MAX_ROWS])) if self.table else ""])
+
+
+def is_missing(value: Any) -> bool:
+    """Return whether a value of a table is none, or no number that can be shown."""
+    return value is None or (isinstance(value, float) and not math.isfinite(value))
+
+
+def cells_of(rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
+    """Return the heads of the columns of a table of answers that are shown, and its cells."""
+    columns = [column for column in rows[0] if column not in NOT_SHOWN]
+    head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
+    return head, [[cell(column, row) for column in columns] for row in rows]
+
+
+def html_table(
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    text: Sequence[int] = (0,),
+    hints: Mapping[str, str] | None = None,
+) -> str:
+    """Return an HTML table; `text` holds the indices of its columns of text, `hints` is by head."""
+
+    def line(tag: str, values: Sequence[str]) -> str:
+        found = []
+        for i, value in enumerate(values):
+            kind = " class=text" if i in text else ""
+            hint = (hints or {}).get(value) if tag == "th" else None
+            title = f' title="{html.escape(hint)}"' if hint else ""
+            found.append(f"<{tag}{kind}{title}>{html.escape(value)}</{tag}>")
+        return f"<tr>{''.join(found)}</tr>"
+
+    body = "".join(line("td", row) for row in rows)
+    return f"<table>{line('th', head)}{body}</table>"
+
+
+def cell(column: str, row: Mapping[str, Any]) -> str:
+    """Return a cell of a table of answers as text."""
+    value = row[column]
+    if column == "low":
+        return "can't tell" if row["doubt"] else f"{number(value)} to {number(row['high'])}"
+    if is_missing(value):
+        return "–"
+    if column in ("p", "p_holm"):
+        return "< 0.001" if value < 0.001 else f"{value:.3f}"
+    return f"{value:.1%}".replace("%", " %") if column in ("relative", "share") else text_of(value)
+
+
+def text_of(value: Any) -> str:
+    """Return a value of a table as text."""
+    return number(value) if isinstance(value, float) else "–" if value is None else str(value)
+
+
+def number(value: float) -> str:
+    """Return a number with three significant digits.
+
+    >>> number(0.12345), number(1234.5), number(float("nan"))
+    ('0.123', '1,234', '–')
+    """
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
+def in_words(time_span: timedelta) -> str:
+    """Return a duration in its largest fitting unit.
+
+    >>> in_words(timedelta(seconds=200)), in_words(timedelta(hours=30))
+    ('3.3 min', '30.0 h')
+    """
+    seconds = time_span.total_seconds()
+    units = (
+        ("years", 31_557_600),
+        ("months", 2_629_800),
+        ("days", DAY_S),
+        ("h", HOUR_S),
+        ("min", 60),
+    )
+    for name, unit in units:
+        if seconds >= unit * (2 if unit >= DAY_S else 1):
+            return f"{seconds / unit:,.1f} {name}"
+    return f"{seconds:.1f} s"
+
+
+def listed(parts: Sequence[str], of: str) -> str:
+    """Return the first parts of a sentence, and how many more there are.
+
+    >>> listed(["a", "b", "c", "d", "e"], "difference")
+    'a; b; c; and 2 more differences'
+    """
+    more = len(parts) - MAX_NAMED
+    rest = [f"and {counted(more, f'more {of}')}"] if more > 0 else []
+    return "; ".join([*parts[:MAX_NAMED], *rest])
+
+
+class StudyAnswer:
+    """Writes the answer of a study.
+
+    Attributes:
+        tables: For each comparison that the study asks for what it says, corrected for all of
+            them; or why there is none.
+    """
+
+    def __init__(self, study: StudyAnswers) -> None:
+        """Compare what the study asks for, or else each axis by what it can judge."""
+        self._study = study
+        self.asked = study.comparisons or tuple(self._default())
+        found: list[list[Comparison] | InputError] = []
+        for c in self.asked:
+            try:
+                found.append(study.compared(c.metric, c.against, c.by, c.within))
+            except InputError as error:
+                found.append(error)
+        corrected = iter(judged([c for each in found if isinstance(each, list) for c in each]))
+        self.tables: list[list[Comparison] | InputError] = [
+            each if isinstance(each, InputError) else list(itertools.islice(corrected, len(each)))
+            for each in found
+        ]
+
+    def _default(self) -> "Iterator[PairedComparison]":
+        """Yield the comparisons of a study that names none: by the numbers that can be judged."""
+        from fleet2d.studies.specification import PairedComparison
+
+        study = self._study
+        judged_numbers = [name for name in study.metrics if study.better(name)]
+        for metric in (judged_numbers or study.metrics)[:MAX_METRICS]:
+            for axis in self._varying(metric, populations=False):
+                values = study.with_metric(metric)[axis].drop_nulls()
+                yield PairedComparison(metric=metric, against={axis: values[0]})
+
+    def _varying(self, metric: str, *, populations: bool) -> list[str]:
+        """Return the axes, or the populations, with several values in variants with a metric."""
+        study = self._study
+        frame = study.with_metric(metric)
+        return [
+            column
+            for column in study.columns
+            if (column in study.populations) == populations
+            and frame[column].drop_nulls().n_unique() > 1
+        ]
+
+    @cached_property
+    def comparisons(self) -> list[Comparison]:
+        """All that could be compared."""
+        return [c for table in self.tables if isinstance(table, list) for c in table]
+
+    def answer(self) -> Answer:
+        """Return the answer."""
+        study = self._study
+        clear_first = sorted(self.comparisons, key=lambda c: not c.is_clear)
+        table = [self._row(each) for each in clear_first]
+        if not study.counts.complete:
+            sentences = [self._nothing()]
+        else:
+            if not self.asked:
+                table = [self._mean(metric) for metric in study.metrics[:MAX_METRICS]]
+            sentences = list(filter(None, [*self._findings(), self._left_out(), self._cost()]))
+        return Answer(study.meta.description or study.meta.name, tuple(sentences), tuple(table))
+
+    def _nothing(self) -> str:
+        study = self._study
+        counts = study.counts
+        reasons = Counter(study.variants.filter(status="failed")["error"].to_list())
+        why = "".join(f", most often because: {reason}" for reason, _ in reasons.most_common(1))
+        return (
+            f"Nothing can be told, as no variant is complete: of {counts.total} variants"
+            f" {counts.failed} failed{why}, and {counts.missing} have not run."
+        )
+
+    def _findings(self) -> Iterator[str]:
+        """Yield what was found, for whom, and what can't be told."""
+        if not self.asked:
+            yield "There is nothing to compare: the table has the means."
+        many = len(self.comparisons)
+        clear = sorted((c for c in self.comparisons if c.is_clear), key=lambda c: c.p_holm)
+        if clear:
+            corrected = f" (corrected for {many} comparisons)" if many > 1 else ""
+            yield f"Clear{corrected}: {listed([self._finding(c) for c in clear], 'difference')}."
+            yield self._for_whom(clear[0])
+        elif many:
+            yield f"No difference is clear, of {counted(many, 'comparison')}."
+        same = [c for c in self.comparisons if c.is_same]
+        open_ones = [c for c in self.comparisons if not c.is_same and not c.is_clear]
+        if same:
+            parts = [f"{c.metric} with {self._sides(c)}" for c in same]
+            yield f"The same in every pair: {listed(parts, 'comparison')}."
+        problems = [str(error) for error in self.tables if isinstance(error, InputError)]
+        if open_ones or problems:
+            parts = [*(self._unclear(c) for c in open_ones), *problems]
+            yield f"Can't be told: {listed(parts, 'comparison')}."
+
+    def _sides(self, c: Comparison) -> str:
+        (axis, value), *within = c.labels.items()
+        where = "".join(f", {column} = {text_of(label)}" for column, label in within)
+        return f"{axis} = {text_of(value)} against {text_of(c.reference)}{where}"
+
+    def _finding(self, c: Comparison) -> str:
+        """Return a difference in words, with its interval or how many units agree."""
+        unit = self._study.meta.unit(c.metric)
+        judgement = f", which is {c.outcome}" if c.better else ""
+        low, high = sorted(map(abs, c.interval))
+        amount = f"by {number(abs(c.difference))} ({number(low)} to {number(high)})"
+        if unit:
+            amount += f" [{unit}]"
+        if c.estimate.doubt:
+            side = int(c.direction == "lower")
+            signs = c.estimate.signs.items()
+            parts = [f"{s[side]} of {c.units.get(k, sum(s))} {plural(k)}" for k, s in signs]
+            amount = f"in {' and '.join(parts)}; by how much can't be told, as {c.estimate.doubt}"
+        return f"{c.metric} is {c.direction}{judgement}, with {self._sides(c)}, {amount}"
+
+    def _unclear(self, c: Comparison) -> str:
+        if math.isnan(c.p):
+            return f"{c.metric} with {self._sides(c)}: there is only one pair"
+        return (
+            f"{c.metric} with {self._sides(c)}, where the mean is {number(abs(c.difference))}"
+            f" {c.direction} (p {cell('p', {'p': c.p_holm})}): {c.needed} would show that"
+        )
+
+    def _for_whom(self, c: Comparison) -> str:
+        """Return in which homes and other groups a difference is the other way round."""
+        study = self._study
+        (axis, _), *within = c.labels.items()
+        varying = self._varying(c.metric, populations=True)
+        kinds = [kind for kind in varying if kind != study.columns[-1]] or varying
+        kinds += self._varying(c.metric, populations=False)
+        sign = 1 if c.difference > 0 else -1
+        parts = []
+        for kind in (each for each in kinds if each not in c.labels):
+            columns = [column for column, _ in within]
+            rows = study.differences(c.metric, {axis: c.reference}, kind, columns).drop_nulls(kind)
+            for column, label in c.labels.items():
+                rows = rows.filter(rows[column].eq_missing(label))
+            other = rows.filter(rows["difference"] * sign < 0)[kind].to_list()
+            names = f" ({', '.join(map(text_of, other))})" if len(other) <= MAX_NAMED else ""
+            text = f"{len(other) or 'none'} of {len(rows)} {plural(kind)}{names if other else ''}"
+            parts.append(text)
+        return f"It is the other way round in {' and '.join(parts)}." if parts else ""
+
+    def _left_out(self) -> str:
+        study = self._study
+        counts = study.counts
+        parts = []
+        if counts.total > counts.complete:
+            parts += [f"{counts.total - counts.complete} of {counts.total} variants have no result"]
+        for metric in dict.fromkeys(c.metric for c in self.comparisons):
+            if lacking := counts.complete - len(study.with_metric(metric)):
+                parts.append(f"{lacking} complete variants lack {metric}")
+        only = [c for c in study.populations if study.variants[c].n_unique() == 1]
+        parts += [f"there is only one {kind}, and the answer holds for it alone" for kind in only]
+        text = "; ".join(parts)
+        return f"{text[0].upper()}{text[1:]}." if text else ""
+
+    def _cost(self) -> str:
+        complete = self._study.variants.filter(status="complete")
+        simulated, wall = (
+            in_words(timedelta(seconds=float(complete[name].fill_null(0).sum())))
+            for name in ("simulated_s", "wall_s")
+        )
+        runs = counted(len(complete), "run")
+        return f"It took {runs}: {simulated} simulated in {wall} of computing."
+
+    def _row(self, c: Comparison) -> dict[str, Any]:
+        unit = self._study.meta.unit(c.metric)
+        low, high = c.interval
+        return {
+            "number": f"{c.metric} [{unit}]" if unit else c.metric,
+            "compared": self._sides(c),
+            "mean": c.mean,
+            "reference": c.reference_mean,
+            "difference": c.difference,
+            "low": low,
+            "high": high,
+            "doubt": c.estimate.doubt,
+            "p_holm": c.p_holm,
+            "outcome": c.outcome,
+        }
+
+    def _mean(self, metric: str) -> dict[str, Any]:
+        unit = self._study.meta.unit(metric)
+        (row,) = self._study.summary(metric, []).to_dicts()
+        return {"number": f"{metric} [{unit}]" if unit else metric, **row}
