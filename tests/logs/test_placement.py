@@ -75,3 +75,9 @@ def test_a_label_without_its_room_proposes_the_most_similar_one(
     rooms: Any = [SimpleNamespace(name=f"{kind}_0", type=kind) for kind in kinds]
     with pytest.raises(LogError, match=rf"rooms: {{{label}: {proposal}}}, or another: "):
         map_rooms({label: 3}, {}, rooms)
+
+
+def test_a_label_means_the_first_of_its_rooms_that_the_home_has() -> None:
+    rooms: Any = [SimpleNamespace(name="toilet_0", type="toilet")]
+    known = map_rooms({"Sink": 3, "Sofa": 1}, {"Sink": ("bathroom", "toilet"), "Sofa": None}, rooms)
+    assert known == {"Sink": ("toilet",), "Sofa": None}

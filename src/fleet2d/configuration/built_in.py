@@ -85,6 +85,7 @@ COMPONENTS: dict[str, dict[str, str]] = {
         "coverage": "fleet2d.metrics.sightings:Coverage",
         "detections": "fleet2d.metrics.sightings:Detections",
         "distance": "fleet2d.metrics.bodies:Distance",
+        "habits": "fleet2d.metrics.habits:Habits",
         "household": "fleet2d.metrics.household:HouseholdReward",
         "interactions": "fleet2d.metrics.interactions:Interactions",
         "intrusion": "fleet2d.metrics.robots:Intrusion",

@@ -212,7 +212,9 @@ def map_rooms(
     _check_overrides(labels, overrides, rooms)
     mapped: dict[str, RoomChoice | None] = {}
     for label, count in labels.items():
-        choice = overrides[label] if label in overrides else _usual(label, rooms)
+        wish = overrides.get(label)
+        usual = None if label in overrides else _usual(label, rooms)
+        choice = usual if wish is None else _first_fit(wish, rooms)
         if choice is None and label not in overrides:
             raise LogError(
                 f"no room of this home stands for {label!r} (readings in the log: {count}); choose"

@@ -29,6 +29,8 @@ ALL = "all"
 TRUTH_UNKNOWN = "truth unknown"
 SUMMARY_SCORES = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in the closing table
 NEVER = -1
+GapMeasures = Mapping[str, Mapping[str, Mapping[str, tuple[float, float, float]]]]
+"""By measure, model and gap: a mean, and the ends of its interval, NaN if there is none."""
 
 
 def log_loss(probability: F64, truth: I64, floor: float = MIN_PROBABILITY) -> F64:

@@ -1,5 +1,6 @@
 """Reliability diagrams: forecasts and truth as stored, the same bytes, and other tables refused."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -90,6 +91,26 @@ def test_both_panels_have_their_probabilities_at_the_same_places(
     figure.draw_without_rendering()
     curve, counts = (axes.get_window_extent().intervalx for axes in figure.axes)
     np.testing.assert_allclose(curve, counts)
+
+
+def test_gaps_have_a_panel_for_each_measure_and_a_line_for_each_model(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    figure = Figure()
+
+    @contextmanager
+    def kept(*_: object) -> Iterator[Figure]:
+        yield figure
+
+    monkeypatch.setattr(charts, "picture", kept)
+    gaps = {"0-1 min": (0.5, 0.4, 0.7), "over 4 h": (0.9, math.nan, math.nan)}
+    charts.draw_gaps({"log loss": {"routine": gaps, "learned": gaps}}, tmp_path / "x.png")
+
+    [axes] = figure.axes
+    assert ["0-1 min", "over 4 h"] == [label.get_text() for label in axes.get_xticklabels()]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert ["routine", "learned"] == names
+    assert [0.5, 0.9] == axes.containers[0].lines[0].get_ydata().tolist()
 
 
 @pytest.mark.parametrize(

@@ -173,6 +173,10 @@ def leaderboard(
             help="Draw how reliable the first network is, or the shipped one; scores nothing."
         ),
     ] = None,
+    gaps: Annotated[
+        Path | None,
+        typer.Option(help="Draw accuracy and log loss by gap, of all models; scores nothing."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Score baselines and your own networks on a data set.
@@ -183,19 +187,23 @@ def leaderboard(
     """
     from fleet2d.algorithms.presence.learned import Weights
     from fleet2d.learning.datasets.reader import open_dataset
-    from fleet2d.learning.datasets.tasks import forecasts
+    from fleet2d.learning.datasets.tasks import forecasts, measures_by_gap
     from fleet2d.learning.datasets.tasks import leaderboard as score
 
     models = {path.name: Weights.read(path) for path in weights or []}
-    if picture is not None:
-        from fleet2d.viewing.pictures.charts import draw_forecasts
+    if picture is not None or gaps is not None:
+        from fleet2d.viewing.pictures.charts import draw_forecasts, draw_gaps
 
         made = forecasts(open_dataset(directory), split, models)
         name = [*models, "learned"][0]
         if made is None:
             raise InputError(f"{directory} has no windows in {split!r}: nothing to draw")
-        draw_forecasts(name, made.beliefs[name], made.truth, picture)
-        typer.echo(f"{picture}: how reliable {name} is")
+        if picture is not None:
+            draw_forecasts(name, made.beliefs[name], made.truth, picture)
+            typer.echo(f"{picture}: how reliable {name} is")
+        if gaps is not None:
+            draw_gaps(measures_by_gap(made), gaps)
+            typer.echo(f"{gaps}: accuracy and log loss by gap")
         return
     entries = score(open_dataset(directory), task or (), split, models)
     if as_json:
@@ -208,12 +216,21 @@ def leaderboard(
 
 
 def _print_scores(entries: "Sequence[LeaderboardEntry]", split: str) -> None:
-    """Print a line for each metric of each task, with the score of each model."""
+    """Print a table for each task: a line for each metric, a column for each model."""
+    from fleet2d.learning.datasets.tasks import LOWER_END, UPPER_END
+
+    def cell(entry: "LeaderboardEntry", metric: str) -> str:
+        ends = [entry.scores.get(f"{metric}{end}") for end in (LOWER_END, UPPER_END)]
+        interval = "" if None in ends else " ({:.3f} to {:.3f})".format(*ends)
+        return f"{entry.scores[metric]:.3f}{interval}"
+
     for name in dict.fromkeys(entry.task for entry in entries):
         own = [entry for entry in entries if entry.task == name]
+        metrics = [m for m in own[0].scores if not m.endswith((LOWER_END, UPPER_END))]
+        columns = [["", *metrics]]
+        columns += [[printable(e.model), *(cell(e, metric) for metric in metrics)] for e in own]
+        widths = [max(map(len, column)) for column in columns]
         typer.echo(f"{name} ({own[0].cases:,} cases of {split})")
-        for metric in own[0].scores:
-            cells = "  ".join(
-                f"{printable(entry.model)} {entry.scores[metric]:.3f}" for entry in own
-            )
-            typer.echo(f"  {metric:22} {cells}")
+        for first, *others in zip(*columns, strict=True):
+            cells = [f"{c:>{width}}" for c, width in zip(others, widths[1:], strict=True)]
+            typer.echo("  ".join([f"  {printable(first):{widths[0]}}", *cells]))

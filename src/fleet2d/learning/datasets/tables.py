@@ -134,7 +134,10 @@ def columns_of(run: "Run", name: str, columns: Sequence[str]) -> dict[str, Any]:
 
 
 def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
-    """Return where a user truly was at some steps, where next and when, and what the user did."""
+    """Return where a user truly was at some steps, where next and when, and what the user did.
+
+    Steps at which nobody knows, as in the gaps of a log, are left out.
+    """
     stays = columns_of(run, STAYS, ["user", "place", "begin"])
     own = stays["user"] == user
     place = stays["place"][own]
@@ -149,6 +152,10 @@ def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
         is_own = (events["event"] == EventKind.ACTIVITY) & (events["entity"] == user)
         since = events["step"][is_own]
         activity = events["detail"][is_own]
+        is_change = np.isin(events["event"], [EventKind.KNOWN, EventKind.UNKNOWN])
+        is_change &= events["entity"] == user
+        is_unknown = np.append(False, events["event"][is_change] == EventKind.UNKNOWN)
+        steps = steps[~is_unknown[np.searchsorted(events["step"][is_change], steps, "right")]]
     stay = np.searchsorted(begin, steps, side="right") - 1
     is_last = stay + 1 == len(begin)
     following = np.where(is_last, -1, stay + 1)

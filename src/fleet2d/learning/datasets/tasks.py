@@ -1,8 +1,9 @@
 """Tasks on a data set, each with its metrics and baselines, and the leaderboard that they fill.
 
 - `rtp`: where a person is now, given the evidence so far, at each label with a stored belief: log
-  loss [nats], accuracy and calibration error, over all and by the gap since the last sighting; and
-  the difference in log loss to `routine`, by home, with its 95 % interval.
+  loss [nats], accuracy and calibration error, over all and by the gap since the last sighting; log
+  loss by household; and the difference in log loss to `routine`, over all and by gap, with its
+  95 % interval over homes.
 - `ltp`: the share of time in each room, at home: total variation distance to the true shares.
 - `next_room`: the kind of place where a person goes next, for each stay: log loss, accuracy.
 - `time_to_return`: when a person who is away comes back: mean absolute error [min].
@@ -23,17 +24,28 @@ from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.learned import Weights, shipped_weights
 from fleet2d.configuration.problems import check_known
 from fleet2d.errors import InputError, errors_as
-from fleet2d.kernels import F64, I64
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.training import predict
 from fleet2d.learning.datasets.windows import PRIOR, Windows, windows_of
-from fleet2d.metrics.rtp_score import GAP_ENDS, GAPS, calibration_error, log_loss, top_k
-from fleet2d.studies.intervals import estimate
+from fleet2d.metrics.rtp_score import (
+    GAP_ENDS,
+    GAPS,
+    GapMeasures,
+    calibration_error,
+    log_loss,
+    top_k,
+)
+from fleet2d.studies.intervals import MeanEstimate, estimate
 
 TRAIN = "train"
 Scores = dict[str, tuple[dict[str, float], int]]
 """By model: its numbers by metric, and the number of cases that were scored."""
 SMOOTHING = 1.0  # added to each count of a baseline
+MAX_HOUSEHOLDS = 12  # that are scored each
+# of an interval: what its ends are named, after the name of what they enclose
+LOWER_END = " lower end"
+UPPER_END = " upper end"
 
 
 class LeaderboardEntry(NamedTuple):
@@ -122,13 +134,22 @@ def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
         "accuracy": float(hit.mean()),
         "ece": calibration_error(belief, truth),
     }
-    classes = np.searchsorted(GAP_ENDS, gap)
-    for k, name in enumerate(GAPS[: len(GAP_ENDS) + 1]):
-        own = classes == k
-        if own.any():
-            scores[f"log_loss {name}"] = float(loss[own].mean())
-            scores[f"accuracy {name}"] = float(hit[own].mean())
+    for measure, values in (("log_loss", loss), ("accuracy", hit)):
+        for name, own in by_gap(gap):
+            scores[f"{measure} {name}"] = float(values[own].mean())
     return scores
+
+
+def by_gap(gap: F64) -> Iterator[tuple[str, Bool]]:
+    """Yield each class of gaps that there are, and which windows are in it.
+
+    Example:
+        >>> [(name, own.tolist()) for name, own in by_gap(np.array([3.0, 300.0]))]
+        [('1-5 min', [True, False]), ('over 4 h', [False, True])]
+    """
+    classes = np.searchsorted(GAP_ENDS, gap)
+    for k in np.unique(classes).tolist():
+        yield GAPS[k], classes == k
 
 
 class SplitForecasts(NamedTuple):
@@ -139,12 +160,25 @@ class SplitForecasts(NamedTuple):
         truth: int64 (n,), the place where the person was.
         gap: float64 (n,), minutes since the newest sighting.
         home: str (n,), the home.
+        household: str (n,), the household.
     """
 
     beliefs: Mapping[str, F64]
     truth: I64
     gap: F64
     home: Any
+    household: Any
+
+    def over_homes(self, values: F64, own: Bool) -> MeanEstimate:
+        """Return the mean over homes of the means of some windows, and its 95 % interval.
+
+        Args:
+            values: float64 (n,).
+            own: bool (n,), which of them count.
+        """
+        homes, number = np.unique(self.home[own], return_inverse=True)
+        means = np.bincount(number, values[own]) / np.bincount(number)
+        return estimate(means, {"home": homes.tolist()})
 
 
 def forecasts(
@@ -164,6 +198,7 @@ def forecasts(
         for name, belief in {**part.beliefs, **new}.items():
             beliefs.setdefault(name, []).append(belief)
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
+    counts = [len(part.truth) for part in parts]
     return SplitForecasts(
         {
             name: np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in own])
@@ -171,7 +206,8 @@ def forecasts(
         },
         np.concatenate([part.truth for part in parts]),
         np.concatenate([part.gap for part in parts]),
-        np.repeat([part.home for part in parts], [len(part.truth) for part in parts]),
+        np.repeat([part.home for part in parts], counts),
+        np.repeat([part.household for part in parts], counts),
     )
 
 
@@ -189,15 +225,42 @@ def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> Scor
 
 
 def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
-    """Return the difference in log loss to `routine`, and the ends of its interval over homes."""
+    """Return log loss by household; and its difference to `routine`, with an interval over homes.
+
+    The difference stands last, over all windows and by gap.
+    """
     loss, prior = (log_loss(made.beliefs[model], made.truth) for model in (name, PRIOR))
-    homes, number = np.unique(made.home, return_inverse=True)
-    by_home = np.bincount(number, loss - prior) / np.bincount(number)
-    difference = estimate(by_home, {"home": homes.tolist()})
-    low, high = (0.0, 0.0) if name == PRIOR else (difference.low, difference.high)
-    ends = {"lower end": low, "upper end": high}
-    scores = {"": difference.mean, **(ends if len(homes) > 1 else {})}
-    return {f"log_loss - {PRIOR} {words}".rstrip(): value for words, value in scores.items()}
+    every = np.ones(len(loss), np.bool_)
+    households = np.unique(made.household).tolist()
+    scores = {
+        f"log_loss of {household}": float(loss[made.household == household].mean())
+        for household in households[: MAX_HOUSEHOLDS if len(households) > 1 else 0]
+    }
+    for gap, own in (("", every), *by_gap(made.gap)):
+        difference = made.over_homes(loss - prior, own)
+        measure = f"log_loss - {PRIOR} {gap}".rstrip()
+        scores[measure] = difference.mean
+        if len(np.unique(made.home[own])) > 1:
+            scores[f"{measure}{LOWER_END}"] = 0.0 if name == PRIOR else difference.low
+            scores[f"{measure}{UPPER_END}"] = 0.0 if name == PRIOR else difference.high
+    return scores
+
+
+def measures_by_gap(made: SplitForecasts) -> GapMeasures:
+    """Return accuracy and log loss of each model in each class of gaps, as means over homes."""
+    measures = {"accuracy": partial(top_k, k=1), "log loss [nats]": log_loss}
+    return {
+        measure: {
+            name: {
+                gap: (mean.mean, mean.low, mean.high)
+                for values in [score(belief, made.truth)]
+                for gap, own in by_gap(made.gap)
+                for mean in [made.over_homes(values, own)]
+            }
+            for name, belief in made.beliefs.items()
+        }
+        for measure, score in measures.items()
+    }
 
 
 def _score_ltp(data: Dataset, split: str, _: object) -> Scores:

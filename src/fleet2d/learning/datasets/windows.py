@@ -34,6 +34,7 @@ class Windows(NamedTuple):
     Attributes:
         run: The number of the run.
         home: Its home, by name.
+        household: Its household, by the personas or logs of its people.
         user: The user.
         places: float64 (places, PLACE_FEATURES), what doesn't change, away last.
         features: float32 (windows, places, TRACE_FEATURES), what is known of each place.
@@ -44,6 +45,7 @@ class Windows(NamedTuple):
 
     run: int
     home: str
+    household: str
     user: str
     places: F64
     features: Any
@@ -83,7 +85,7 @@ def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
         start = np.datetime64(run["start"][0], "us")
         dense = _Dense(evidence, labels, beliefs, names, facts, start)
         for user in run["users"][0]:
-            yield dense.windows(number, run["home"][0], user)
+            yield dense.windows(number, run["home"][0], run["household"][0], user)
 
 
 def windows_of_run(run: "Run") -> list[Windows]:
@@ -155,7 +157,7 @@ class _Dense:
         belief = np.ones((len(self.step), self.watched.shape[1] + 1))
         return TracedEvidence(self.day, self.minute, self.watched, seen, self.unknown, belief)
 
-    def windows(self, number: int, home: str, user: str) -> Windows:
+    def windows(self, number: int, home: str, household: str, user: str) -> Windows:
         """Return the windows of a user of the run."""
         labels = self.labels
         beliefs = self.beliefs
@@ -179,7 +181,8 @@ class _Dense:
         features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
         places = self.facts.features
         known = features.astype(np.float32)
-        return Windows(number, home, user, places, known, truth[kept], self.step[kept], stored)
+        step = self.step[kept]
+        return Windows(number, home, household, user, places, known, truth[kept], step, stored)
 
 
 def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:

@@ -17,7 +17,14 @@ from fleet2d.configuration.units import WEEKDAYS
 from fleet2d.errors import ArtifactError, InputError
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import F64, I64
-from fleet2d.metrics.rtp_score import calibration_error, classwise_error, reliability_curve, top_k
+from fleet2d.metrics.rtp_score import (
+    GapMeasures,
+    calibration_error,
+    classwise_error,
+    reliability_curve,
+    top_k,
+)
+from fleet2d.palette import USER_COLORS
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.life import Life
 from fleet2d.routines.persona import Persona
@@ -232,6 +239,31 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
         curve.set_title(f"{name}: {len(truth):,} forecasts", fontsize=11, loc="left")
         curve.legend(loc="upper left", frameon=False)
         counts.set(xlabel="forecast probability", ylabel="share")
+        figure.tight_layout()
+
+
+def draw_gaps(measures: GapMeasures, path: Path) -> None:
+    """Draw measures of models of presence by the time since a person was last seen.
+
+    Args:
+        measures: What is drawn, a panel for each measure.
+        path: The file.
+
+    Raises:
+        InputError: The file name has another suffix, or the file can't be written.
+    """
+    with picture(path, 5.2 * len(measures), 4.2) as figure:
+        panels = figure.subplots(1, len(measures), squeeze=False)[0]
+        for axes, (measure, models) in zip(panels, measures.items(), strict=True):
+            for k, (name, gaps) in enumerate(models.items()):
+                means, *ends = np.array(list(gaps.values())).T
+                reach = np.nan_to_num(np.abs(ends - means))
+                place = np.arange(len(gaps)) + (k - len(models) / 2) / 12  # side by side
+                color = USER_COLORS[k % len(USER_COLORS)]
+                axes.errorbar(place, means, reach, marker="o", capsize=2, color=color, label=name)
+                axes.set_xticks(range(len(gaps)), list(gaps), rotation=30)
+            axes.set(ylabel=measure, xlabel="time since last seen")
+        panels[0].legend(frameon=False)
         figure.tight_layout()
 
 
