@@ -41,7 +41,7 @@ class InstantExecutor(SerialExecutor):
 
     def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Return a result for each task, or that its set-up has no problem."""
-        content, tasks, _ = args
+        content, tasks, *_ = args
         if b"StudyJob" not in content:
             return super().submit(lambda: [""] * len(tasks))
         own = ({"variant": task.number, "identity": task.identity} for task in tasks)

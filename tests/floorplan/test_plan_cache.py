@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d.floorplan import home as homes
 from fleet2d.floorplan import source
 from fleet2d.floorplan.native import HOMES
-from fleet2d.floorplan.plan import Cache
+from fleet2d.floorplan.plan import Cache, FolderCache
 from fleet2d.metrics.ltp_error import walking_distances
 
 SHORT = "simulation.duration=6 h"
@@ -118,3 +118,30 @@ def test_equal_floor_plans_have_spaces_of_their_own() -> None:
     assert plans[0] == plans[1]
     assert first.space(0.15) is not second.space(0.15)  # each belongs to its own plan
     assert first.space(0.15).plan is plans[0]
+
+
+def test_a_folder_shares_a_home_among_processes_and_changes_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = {"type": "synthetic", "seed": 3, "furnish": True}
+    alone = fleet2d.run("bundled:paper", SHORT, seed=4, floorplan=home).digest
+    digests = []
+    for _ in range(2):  # with memories as empty as those of two processes
+        monkeypatch.setattr(source, "PLAN_CACHE", Cache(source.CACHED_PLANS))
+        with source.PLAN_FOLDER.within(tmp_path):
+            digests.append(fleet2d.run("bundled:paper", SHORT, seed=4, floorplan=home).digest)
+        monkeypatch.setattr(source, "place_furniture", None)  # not called again
+
+    assert [alone, alone] == digests
+    assert 1 == len(list(tmp_path.iterdir()))
+
+
+def test_a_damaged_or_missing_folder_is_no_error(tmp_path: Path) -> None:
+    cache = FolderCache()
+    with cache.within(tmp_path):
+        cache.get("a", lambda: 1)
+        (file,) = tmp_path.iterdir()
+        file.write_bytes(b"not a plan")
+        assert 2 == cache.get("a", lambda: 2)
+    with cache.within(tmp_path / "nowhere"):
+        assert 3 == cache.get("a", lambda: 3)

@@ -2,10 +2,15 @@
 
 import hashlib
 import json
+import os
+import pickle
+import zlib
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -100,6 +105,54 @@ class Cache:
     def grow(self, size: int) -> None:
         """Raise the capacity to at least `size` values."""
         self._size = max(self._size, size)
+
+
+class FolderCache:
+    """A cache in a folder, which the worker processes of a command share.
+
+    Values are pickled, so nobody else may write to the folder.
+
+    Example:
+        >>> import tempfile
+        >>> cache = FolderCache()
+        >>> with tempfile.TemporaryDirectory() as folder, cache.within(Path(folder)):
+        ...     cache.get("a", lambda: 1), cache.get("a", lambda: 2)
+        (1, 1)
+        >>> cache.get("a", lambda: 2)
+        2
+    """
+
+    def __init__(self) -> None:
+        """Use no folder."""
+        self._folder: Path | None = None
+
+    @contextmanager
+    def within(self, folder: Path | None) -> Iterator[None]:
+        """Use a folder for the time of a block; None: no folder."""
+        before = self._folder
+        self._folder = folder
+        try:
+            yield
+        finally:
+            self._folder = before
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the value of a key, whose `repr` tells it from others, made by the first process.
+
+        Where the folder can't be used, as on another machine, it is made again.
+        """
+        if self._folder is None:
+            return make()
+        file = self._folder / hashlib.sha256(repr(key).encode()).hexdigest()
+        with suppress(OSError, EOFError, zlib.error, pickle.UnpicklingError):
+            value: T = pickle.loads(zlib.decompress(file.read_bytes()))  # noqa: S301 - our own
+            return value
+        value = make()
+        part = file.with_suffix(f".{os.getpid()}")
+        with suppress(OSError):
+            part.write_bytes(zlib.compress(pickle.dumps(value), 1))
+            part.replace(file)
+        return value
 
 
 A = TypeVar("A", bound=NDArray[Any])

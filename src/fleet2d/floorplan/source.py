@@ -34,7 +34,7 @@ from fleet2d.floorplan.placed_objects import (
     Portal,
     number_objects,
 )
-from fleet2d.floorplan.plan import Cache, FloorPlan, read_only
+from fleet2d.floorplan.plan import Cache, FloorPlan, FolderCache, read_only
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (
     LabelledRegion,
@@ -292,6 +292,9 @@ CACHED_PLANS = 8
 PLAN_CACHE = Cache(CACHED_PLANS)
 """Homes, read and furnished."""
 
+PLAN_FOLDER = FolderCache()
+"""The same, for all processes of a command that runs many scenarios."""
+
 # Largest `scale`: of a file in kilometres.
 MAX_SCALE = 1000.0
 
@@ -375,13 +378,16 @@ class FloorPlanSource(Component):
     def plan(self) -> FloorPlan:
         """Return the floor plan with the rooms and furniture that the scenario adds.
 
-        A process reads a home only once, as long as its files and settings stay the same.
+        A process reads a home only once, as long as its files and settings stay the same, and so
+        do all the workers of a study together.
 
         Raises:
             FloorPlanError: The file can't be read, is not a home, or a piece doesn't fit into it.
         """
         key = self._cache_key()
-        return self._read() if key is None else PLAN_CACHE.get(key, self._read)
+        if key is None:
+            return self._read()
+        return PLAN_CACHE.get(key, lambda: PLAN_FOLDER.get(key, self._read))
 
     def _cache_key(self) -> Hashable:
         """Return all that the plan depends on, or None if that is unknown, as for a plugin."""

@@ -24,6 +24,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from multiprocessing.connection import Connection
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
@@ -81,24 +82,39 @@ class TaskQueue:
     def __init__(self, groups: Iterable[tuple[int, Iterator[WorkerTask]]] = ()) -> None:
         """Hold the number of tasks of each home, and the tasks, which may be made when taken."""
         self._groups = deque(groups)
+        self._waiting = sum(count for count, _ in self._groups)
+        self._alone = deque[WorkerTask]()
 
     def __bool__(self) -> bool:
         """Return whether tasks wait."""
-        return bool(self._groups)
+        return bool(self._groups or self._alone)
 
     def take(self, workers: int) -> list[WorkerTask]:
-        """Remove some tasks of one home: at most a worker's share of all that wait."""
-        share = math.ceil(sum(count for count, _ in self._groups) / workers)
+        """Remove some tasks: at most a worker's share of all that wait.
+
+        They are of one home, or of several homes with all of their tasks.
+        """
+        if self._alone:
+            return [self._alone.popleft()]
+        share = min(math.ceil(self._waiting / workers), MAX_BATCH)
         count, group = self._groups.popleft()
-        taken = list(itertools.islice(group, min(share, MAX_BATCH)))
+        taken = list(itertools.islice(group, share))
         if len(taken) < count:
             self._groups.appendleft((count - len(taken), group))
+        while self._groups and len(taken) + self._groups[0][0] <= share:
+            taken += self._groups.popleft()[1]
+        self._waiting -= len(taken)
         return taken
 
     def put_back(self, tasks: Collection[WorkerTask]) -> None:
-        """Return tasks of one home: they are next."""
+        """Return tasks that were taken together: they are next."""
         if tasks:
             self._groups.appendleft((len(tasks), iter(tasks)))
+            self._waiting += len(tasks)
+
+    def put_back_alone(self, task: WorkerTask) -> None:
+        """Return a task whose worker died, maybe by it: it is taken without others."""
+        self._alone.append(task)
 
 
 class TaskEnd(NamedTuple):
@@ -125,11 +141,14 @@ class Crew:
         executor: The executor.
         workers: How many calls it gets at a time.
         batch_s: After how long a call returns the results so far; the rest is called again.
+        plans: A folder for the homes that workers build, each once; None: each worker builds its
+            own.
     """
 
     executor: Executor
     workers: int = 1
     batch_s: float = BATCH_S
+    plans: Path | None = None
 
 
 def run_tasks(crew: Crew, job: WorkerJob, queue: TaskQueue) -> Generator[list[TaskEnd]]:
@@ -164,7 +183,7 @@ def run_tasks(crew: Crew, job: WorkerJob, queue: TaskQueue) -> Generator[list[Ta
 
 def _submitted(crew: Crew, content: bytes, batch: list[WorkerTask]) -> "Future[list[Any]]":
     try:
-        return crew.executor.submit(run_batch, content, batch, crew.batch_s)
+        return crew.executor.submit(run_batch, content, batch, crew.batch_s, crew.plans)
     except BrokenExecutor as error:
         raise ComponentError(
             f"the executor is broken: {error}; with a new one the same study goes on"
@@ -187,32 +206,38 @@ def _ends(
     if not isinstance(error, Exception) or isinstance(error, InputError):
         raise error
     last_line = (str(error).strip().splitlines() or [type(error).__name__])[-1]
-    for task in reversed(batch):
+    for task in batch:
         if attempts[task.number] < MAX_ATTEMPTS:
-            queue.put_back([task])
+            queue.put_back_alone(task)
         else:
             loss = f"{last_line} in each of {MAX_ATTEMPTS} attempts"
             yield TaskEnd(task, MAX_ATTEMPTS, loss=loss)
 
 
-def run_batch(content: bytes, tasks: Sequence[WorkerTask], seconds: float) -> list[Any]:
+def run_batch(
+    content: bytes, tasks: Sequence[WorkerTask], seconds: float, plans: Path | None
+) -> list[Any]:
     """Do some tasks in a worker; return the results of those done after some seconds, one at least.
 
     Args:
         content: The job, pickled.
         tasks: The tasks.
         seconds: After how long none is begun.
+        plans: The folder for homes, as of a crew.
 
     Raises:
         InputError: The job can't be loaded.
     """
+    from fleet2d.floorplan.source import PLAN_FOLDER  # the driver doesn't need it
+
     job = _loaded(content)
     end_s = time.monotonic() + seconds
     results = []
-    for task in tasks:
-        results.append(job(task))
-        if time.monotonic() >= end_s:
-            break
+    with PLAN_FOLDER.within(plans):
+        for task in tasks:
+            results.append(job(task))
+            if time.monotonic() >= end_s:
+                break
     return results
 
 
