@@ -8,6 +8,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
@@ -72,8 +73,8 @@ def study(
     """
     specification = read_specification(source)
     location = out or default_location(specification.name)
-    checked = check_study(specification)
     with observing() as observer, open_crew(executor, workers) as crew:
+        checked = check_study(specification, crew=crew, observer=observer)
         run_study(checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer)
     return open_study(location)
 
@@ -146,18 +147,20 @@ def open_crew(executor: ExecutorName | Executor, workers: int | None = None) -> 
         InputError: There is no executor of that name.
     """
     count = workers or cores()
-    match executor:
-        case "local":
-            crew = Crew(LocalExecutor(count), count)
-        case "serial":
-            crew = Crew(SerialExecutor())
-        case str():
-            raise InputError(f"there is no executor {executor!r}: give local or serial")
-        case _:
-            yield Crew(executor, count)
-            return
-    with crew.executor:
-        yield crew
+    with TemporaryDirectory(prefix="fleet2d-homes-", ignore_cleanup_errors=True) as folder:
+        plans = Path(folder)
+        match executor:
+            case "local":
+                crew = Crew(LocalExecutor(count), count, plans=plans)
+            case "serial":
+                crew = Crew(SerialExecutor(), plans=plans)
+            case str():
+                raise InputError(f"there is no executor {executor!r}: give local or serial")
+            case _:
+                yield Crew(executor, count, plans=plans)
+                return
+        with crew.executor:
+            yield crew
 
 
 def default_location(name: str) -> str:

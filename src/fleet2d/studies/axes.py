@@ -28,10 +28,12 @@ class Choice:
     Attributes:
         labels: Its label by column; an axis has one column, a group one for each of its axes.
         changes: (key path, value) pairs that it sets in the scenario.
+        seed: The seed of runs with it; None: that of replicates.
     """
 
     labels: Mapping[str, Label]
     changes: tuple[tuple[Keys, Any], ...] = field(default=(), compare=False)
+    seed: int | None = None
 
     @property
     def words(self) -> str:
@@ -295,18 +297,21 @@ class SyntheticAxis(Axis):
     first: int = Field(default=0, ge=0)
     settings: dict[str, Any] = Field(default={})
 
+    @property
+    def seeds(self) -> Sequence[int]:
+        """The seeds of the homes."""
+        if isinstance(self.synthetic, int):
+            return range(self.first, self.first + self.synthetic)
+        return self.synthetic
+
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each home; its label is its seed."""
-        seeds = self.synthetic
-        if isinstance(seeds, int):
-            seeds = tuple(range(self.first, self.first + seeds))
-        return [
-            Choice(
-                {name: seed},
-                ((("floorplan",), {"type": "synthetic", "seed": seed, **self.settings}),),
-            )
-            for seed in seeds
-        ]
+        return [self.choice(name, seed) for seed in self.seeds]
+
+    def choice(self, name: str, seed: int) -> Choice:
+        """Return the choice of a home."""
+        section = {"type": "synthetic", "seed": seed, **self.settings}
+        return Choice({name: seed}, ((("floorplan",), section),))
 
 
 class PersonasAxis(Axis):
@@ -444,20 +449,20 @@ KINDS: dict[str, type[Axis]] = {
 """The kinds of axes by the key that only they have."""
 
 
-def _axis_of(value: Any) -> Any:
+def axis_of(value: Any, kinds: Mapping[str, type[Axis]] = KINDS) -> Any:
     """Choose the kind of an axis by the key that only it has."""
     if isinstance(value, Axis):
         return value
     if not isinstance(value, Mapping):
         raise problem(f"expected an axis like {{key: PATH, values: […]}}, got {value!r}")
-    kinds = [kind for kind in KINDS if kind in value]
-    if len(kinds) != 1:
+    own = [kind for kind in kinds if kind in value and not isinstance(value[kind], bool)]
+    if len(own) != 1:
         unknown = next((key for key in value if key not in ("key", "when")), "")
-        hint = did_you_mean(unknown, KINDS) if not kinds else "."
-        keys = " and ".join(kinds) or ", ".join(map(repr, value)) or "nothing"
-        raise problem(f"expected exactly one of {', '.join(KINDS)}, got {keys}{hint}")
-    return KINDS[kinds[0]].model_validate(value)
+        hint = did_you_mean(unknown, kinds) if not own else "."
+        keys = " and ".join(own) or ", ".join(map(repr, value)) or "nothing"
+        raise problem(f"expected exactly one of {', '.join(kinds)}, got {keys}{hint}")
+    return kinds[own[0]].model_validate(value)
 
 
-AnyAxis = Annotated[Axis, BeforeValidator(_axis_of)]
+AnyAxis = Annotated[Axis, BeforeValidator(lambda value: axis_of(value))]
 """A field that takes an axis of any kind."""

@@ -17,6 +17,7 @@ from fleet2d.options import Trust, Workers, show_code
 
 if TYPE_CHECKING:
     from fleet2d.studies.driver import CheckedStudy
+    from fleet2d.studies.executors import Crew
     from fleet2d.studies.reader import Study
 
 studying = typer.Typer(
@@ -75,19 +76,21 @@ def run(  # noqa: PLR0913 - options of the command line
     from fleet2d.studies.driver import check_study, run_study
     from fleet2d.studies.progress import observing
     from fleet2d.studies.reader import open_study
+    from fleet2d.studies.specification import read_specification
 
     free_memory_of_polars()
-    checked = check_study(source, _print_size)
-    if dry_run:
-        _print_plan(checked, workers)
-        return
-    location = out or default_location(checked.specification.name)
+    specification = read_specification(source)
+    location = out or default_location(specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     with (
         _interruptible(location),
         observing(quiet=quiet) as observer,
         open_crew(executor, workers) as crew,
     ):
+        checked = check_study(specification, _print_size, crew, observer)
+        if dry_run:
+            _print_plan(checked, crew)
+            return
         counts = run_study(
             checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
         )
@@ -264,15 +267,13 @@ def _print_size(count: int) -> None:
         _print(f"{count:,} variants: all are checked first, a million takes minutes", err=True)
 
 
-def _print_plan(checked: "CheckedStudy", workers: int | None) -> None:
+def _print_plan(checked: "CheckedStudy", crew: "Crew") -> None:
     """Print the axes, the first variants, and how much all of them are."""
-    from fleet2d.studies.api import open_crew
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.sentences import in_words
 
     plan = checked.plan
-    with open_crew("local", workers) as crew:
-        check_setups(plan, crew)
+    check_setups(plan, crew)
     for column, labels in plan.design.labels.items():
         values = ", ".join(map(str, labels[:MAX_LINES]))
         more = f", … {len(labels)} in all" if len(labels) > MAX_LINES else ""

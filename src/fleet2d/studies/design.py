@@ -5,11 +5,11 @@ import itertools
 import json
 import math
 import platform
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
@@ -22,6 +22,14 @@ from fleet2d.scenario.compose import apply_changes, assignment, merge
 from fleet2d.scenario.load import scenario_of
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Choice, Label, key_path
+from fleet2d.studies.executors import Crew
+from fleet2d.studies.population import (
+    MAX_SEED,
+    Lives,
+    PopulationAxis,
+    find_lives,
+    first_life,
+)
 from fleet2d.studies.simulator import input_files
 from fleet2d.studies.specification import SEED, Specification
 
@@ -116,6 +124,8 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 NOT_APPLICABLE = -1
 MAX_VARIANTS = 1_000_000
+TRIED_FIRST = 100  # combinations of the first life of a population
+SEEDS_APART = 1_048_583  # between replicates of a life, so that no other life has one of its seeds
 SWITCHES = ("key_frames", "observations", "events", "decisions")
 """Keys of `artifacts` that are named after their tables."""
 
@@ -134,8 +144,43 @@ class AxisPlan(NamedTuple):
     name: str
     columns: tuple[str, ...]
     when: Mapping[str, Any]
-    choices: tuple[Choice, ...]
-    changes: tuple[Document, ...]
+    choices: Sequence[Choice]
+    changes: Sequence[Document]
+
+    def labels(self) -> dict[str, list[Label]]:
+        """Return the label of each choice, by column."""
+        labels: dict[str, list[Label]] = {column: [] for column in self.columns}
+        for choice in self.choices:
+            for column, own in labels.items():
+                own.append(choice.labels[column])
+        return labels
+
+
+@dataclass(frozen=True)
+class LifeChanges(Sequence[Document]):
+    """The scenario change of each life, made when it is needed.
+
+    Attributes:
+        lives: The lives.
+        place: What messages name.
+    """
+
+    lives: Lives
+    place: str
+
+    def __len__(self) -> int:
+        """Return the number of lives."""
+        return len(self.lives)
+
+    @overload
+    def __getitem__(self, index: int) -> Document: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Document]: ...
+    def __getitem__(self, index: int | slice) -> Document | list[Document]:
+        """Return the change of a life."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        return _change_of(self.lives[index], self.place)
 
 
 class RulePlan(NamedTuple):
@@ -177,6 +222,12 @@ class Design:
         return np.fromiter(rows, np.dtype((np.int32, (len(self.axes),))))
 
     @property
+    def left_out(self) -> str:
+        """How many lives of a population are left out, and why; empty without any."""
+        lives = (axis.choices for axis in self.axes if isinstance(axis.choices, Lives))
+        return "".join(each.words for each in lives)
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """The columns of all axes, and the seed."""
         return (*(column for axis in self.axes for column in axis.columns), SEED)
@@ -184,16 +235,30 @@ class Design:
     @property
     def labels(self) -> dict[str, list[Label]]:
         """The labels of each column, in order."""
-        labels: dict[str, list[Label]] = {
-            column: list(dict.fromkeys(choice.labels[column] for choice in axis.choices))
-            for axis in self.axes
-            for column in axis.columns
-        }
-        return {**labels, SEED: list(self.seeds)}
+        labels: dict[str, list[Label]] = {SEED: list(self.seeds)}
+        for axis in self.axes:
+            for column, own in axis.labels().items():
+                labels[column] = list(dict.fromkeys(own))
+            if lives := [choice for choice in axis.choices if choice.seed is not None]:
+                labels[SEED] = [choice.seed for choice in lives]
+        return labels
 
     def __len__(self) -> int:
         """Return the number of variants."""
         return len(self.combinations) * len(self.seeds)
+
+    def seeds_of(self, index: int) -> tuple[int, ...]:
+        """Return the seeds of the combination of a variant."""
+        combination, _ = divmod(index, len(self.seeds))
+        return self._seeds(self.combinations[combination].tolist())
+
+    def _seeds(self, combination: Sequence[int]) -> tuple[int, ...]:
+        """Return the seeds of a combination: those of a life, if there are lives, differ."""
+        for axis, choice in zip(self.axes, combination, strict=True):
+            own = None if choice == NOT_APPLICABLE else axis.choices[choice].seed
+            if own is not None:
+                return tuple((own + seed * SEEDS_APART) % MAX_SEED for seed in self.seeds)
+        return self.seeds
 
     def parameters(self, index: int) -> dict[str, Label]:
         """Return the labels of a variant by column."""
@@ -228,8 +293,9 @@ class Design:
         return f"variant {index} ({labels})"
 
     def _at(self, index: int) -> tuple[list[int], int]:
-        combination, seed = divmod(index, len(self.seeds))
-        return self.combinations[combination].tolist(), self.seeds[seed]
+        number, seed = divmod(index, len(self.seeds))
+        combination = self.combinations[number].tolist()
+        return combination, self._seeds(combination)[seed]
 
     def _labels(self, combination: Sequence[int]) -> dict[str, Label]:
         labels: dict[str, Label] = {}
@@ -280,22 +346,40 @@ def same_label(label: Label, value: Any) -> bool:
     return label == value and isinstance(label, bool) == isinstance(value, bool)
 
 
-def build_design(specification: Specification) -> Design:
+def build_design(
+    specification: Specification,
+    crew: Crew | None = None,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
+) -> Design:
     """Turn a study into its variants, without building their scenarios.
+
+    Args:
+        specification: The study.
+        crew: Where the homes of a population are built; None: in this process.
+        on_progress: Receives how many of these homes are built, of how many.
 
     Raises:
         ScenarioError: An axis has no values, a condition names a value that no axis has, or there
             are too many variants.
     """
     file = specification.file
-    axes = tuple(_axis_plan(specification, name) for name in file.axes)
+    base = specification.base
+    fleet = file.axes.get(file.fleet)
+    if isinstance(fleet, PopulationAxis) and fleet.replaces_people:
+        base = Document({**base.data, "users": {}}, base.places)
     rules = []
     for i, rule in enumerate(file.rules):
         place = ", ".join(filter(None, (f"rules.{i}", specification.places.place(("rules", i)))))
         rules.append(RulePlan(rule.when, _change(rule.set.items(), place)))
-    base = merge(specification.base, _artifacts(file.keep.tables))
-    seeds = file.replicates or (_base_seed(specification.base),)
-    design = Design(base, specification.folder, axes, tuple(rules), file.exclude, seeds)
+    base = merge(base, _artifacts(file.keep.tables))
+    seeds = file.replicates or (0 if file.fleet else _base_seed(base),)
+    design = Design(base, specification.folder, (), tuple(rules), file.exclude, seeds)
+    axes = {name: _axis_plan(specification, name) for name in file.axes}
+    if isinstance(fleet, PopulationAxis):
+        _check_first_life(replace(design, axes=tuple(axes.values())))
+        lives = find_lives(fleet, file.fleet, base, crew, on_progress)
+        axes[file.fleet] = _with_lives(axes[file.fleet], lives)
+    design = replace(design, axes=tuple(axes.values()))
     _check_size(specification.name, design)
     _check_conditions(specification, design)
     if not len(design.combinations):
@@ -323,19 +407,45 @@ def _check_size(name: str, design: Design) -> None:
         )
 
 
+def _check_first_life(design: Design) -> None:
+    """Check what can be checked before the homes of a population are built, which takes long.
+
+    Raises:
+        ScenarioError: A scenario of the first life is wrong.
+    """
+    for index in range(0, min(len(design), TRIED_FIRST * len(design.seeds)), len(design.seeds)):
+        design.scenario(index)
+
+
+def _with_lives(axis: AxisPlan, lives: Lives) -> AxisPlan:
+    """Return the axis of a population with its lives."""
+    changes = axis.changes
+    assert isinstance(changes, LifeChanges)
+    return axis._replace(choices=lives, changes=LifeChanges(lives, changes.place))
+
+
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:
+    """Return an axis; of a population, with the first life that may turn out to be left out."""
     axis = specification.file.axes[name]
     place = specification.places.place(("axes", name))
+    words = ", ".join(filter(None, (f"axis {name!r}", place)))
+    choices: Sequence[Choice]
+    changes: Sequence[Document]
     with errors_as(ScenarioError, specification.places.named(("axes", name))):
-        choices = tuple(axis.choices(name))
-        changes = tuple(
-            _change(
-                ((".".join(keys), value) for keys, value in choice.changes),
-                ", ".join(filter(None, (f"axis {name!r}", choice.words, place))),
-            )
-            for choice in choices
-        )
+        if isinstance(axis, PopulationAxis):
+            choices = first_life(axis, name)
+            changes = LifeChanges(choices, words)
+        else:
+            choices = tuple(axis.choices(name))
+            changes = tuple(_change_of(choice, words) for choice in choices)
     return AxisPlan(name, axis.columns(name), axis.when, choices, changes)
+
+
+def _change_of(choice: Choice, place: str) -> Document:
+    """Return the change of a choice; messages name it and the place of its axis."""
+    axis, _, line = place.partition(", ")
+    words = ", ".join(filter(None, (axis, choice.words, line)))
+    return _change(((".".join(keys), value) for keys, value in choice.changes), words)
 
 
 def _change(changes: Any, place: str) -> Document:

@@ -100,7 +100,8 @@ class Meta(BaseModel):
         source: The study file's text, for readers.
         metrics: The metrics of the scenarios, by name.
         tags: Words to find the study by.
-        notes: Remarks of its author.
+        notes: Remarks of its author, and how many lives of a population are left out.
+        fleet: The column with the numbers of the lives of a population; empty without one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -116,6 +117,7 @@ class Meta(BaseModel):
     metrics: dict[str, MetricFacts] = {}
     tags: tuple[str, ...] = ()
     notes: str = ""
+    fleet: str = ""
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric such as `ltp_error.ana.tv`; empty if unknown."""

@@ -168,12 +168,16 @@ class CheckedStudy:
 def check_study(
     source: str | Path | Mapping[str, Any] | Specification,
     on_size: Callable[[int], None] = lambda _: None,
+    crew: Crew | None = None,
+    observer: Observer | None = None,
 ) -> CheckedStudy:
     """Read a study, and build and check the scenarios of all of its variants.
 
     Args:
         source: The study file, or the same as a mapping.
         on_size: Receives the number of variants before they are built.
+        crew: Where the homes of a population are built; None: in this process.
+        observer: Follows the progress.
 
     Raises:
         InputError: The study is wrong; the message names file and line, or axis and value. Or
@@ -188,10 +192,13 @@ def check_study(
         scenarios.add(template, scenario)
         names.add(scenario)
 
-    design = build_design(specification)
+    observer = observer or Observer()
+    design = build_design(specification, crew, observer.on_check)
     on_size(len(design))
     plan = make_plan(design, on_scenario)
     names.check(specification)
+    if design.left_out:
+        observer.on_note(design.left_out)
     return CheckedStudy(specification, plan, scenarios, names.facts)
 
 
@@ -332,6 +339,7 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         source=source.read_text(encoding="utf-8") if source else "",
         metrics=dict(checked.metrics),
         tags=file.tags,
-        notes=file.notes,
+        notes="\n".join(filter(None, (file.notes, checked.plan.design.left_out))),
+        fleet=file.fleet,
     )
     directory.write_meta(meta)

@@ -3,8 +3,10 @@
 import itertools
 import json
 import re
+import tempfile
+import weakref
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -40,17 +42,19 @@ from fleet2d.studies.executors import (
     WorkerTask,
     run_tasks,
 )
+from fleet2d.studies.population import MAX_PROBLEMS, raise_problems
 from fleet2d.studies.results import VARIANT
 from fleet2d.studies.simulator import check_setup, is_kept
 from fleet2d.studies.specification import SEED, Specification
 
 if TYPE_CHECKING:
     import polars as pl
+    import pyarrow as pa
 
 
-MAX_PROBLEMS = 10  # in one report
 LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of robots' maps
 SLICE_ROWS = 5_000  # variants whose results are in memory at a time
+SCENARIO_ROWS = 1_000  # scenarios that are in memory at a time
 FEW_SETUPS = 8  # up to here starting workers costs more than it saves
 
 
@@ -71,11 +75,21 @@ class StudyPlan(NamedTuple):
 
     def queue(self, variants: "pl.DataFrame") -> TaskQueue:
         """Return the tasks to run some of its variants."""
-        columns = variants.select(VARIANT, "index", "identity", "home_key")
-        of_homes = columns.partition_by("home_key", maintain_order=True)
-        # As objects, all tasks together take several times the memory of the rows.
+        import polars as pl
+
+        place = pl.int_range(pl.len()).first().over("home_key")  # where its home comes first
+        rows = variants.select(VARIANT, "index", "identity", "home_key", place=place)
+        rows = rows.sort("place", maintain_order=True)
+        counts = rows["place"].rle().struct.field("len")
+        ends = counts.cum_sum()
+        columns = rows.drop("place")
+
+        def tasks(end: int, count: int) -> Iterator[WorkerTask]:
+            # As objects, all tasks together would take several times the memory of the rows.
+            yield from itertools.starmap(WorkerTask, columns[end - count : end].iter_rows())
+
         return TaskQueue(
-            (len(rows), itertools.starmap(WorkerTask, rows.iter_rows())) for rows in of_homes
+            (count, tasks(end, count)) for end, count in zip(ends, counts, strict=True)
         )
 
 
@@ -168,7 +182,8 @@ def make_plan(
     """
     import polars as pl
 
-    frames: list[pl.DataFrame] = []  # of combinations: as text, hashes take twice the memory
+    frames: list[pl.DataFrame] = []  # rows of Python objects take several times the memory
+    rows: list[tuple[str, str, str, int, float]] = []
     problems: list[str] = []
     first_of = dict[tuple[str, str], int]()
     repeated = _repeated(design.seeds)  # two variants with the same scenario
@@ -182,24 +197,20 @@ def make_plan(
             if len(problems) == MAX_PROBLEMS:
                 break
             continue
-        simulation = content["simulation"]
         template = template_hash(content)
         same = first_of.setdefault((template, inputs), first)
-        if same != first and repeated is None:
+        seeds = design.seeds_of(first)  # those of lives differ
+        if same != first and repeated is None and design.seeds_of(same) == seeds:
             repeated = same, first
-        step, duration = (parse_duration(simulation[key]) for key in ("step", "duration"))
-        identities = [identity(template, seed, inputs) for seed in design.seeds]
-        seeds = pl.Series(SEED, design.seeds, pl.Int64)
-        frame = pl.DataFrame({"identity": identities, SEED: seeds})
-        frames.append(
-            frame.with_columns(
-                template=pl.lit(template),
-                home_key=pl.lit(home_key(content)),
-                simulated_s=pl.lit((duration // step * step).total_seconds()),
-            )
-        )
-        on_scenario(template, scenario)
-    _raise_problems(problems)
+        home = home_key(content)
+        seconds = _simulated_s(content["simulation"])
+        rows += [(identity(template, s, inputs), template, home, s, seconds) for s in seeds]
+        if len(rows) >= SLICE_ROWS:
+            frames.append(_frame_of(rows))
+            rows = []
+        if same == first:
+            on_scenario(template, scenario)
+    raise_problems(problems)
     if repeated is not None:
         one, other = map(design.describe, repeated)
         raise ScenarioError(
@@ -207,8 +218,25 @@ def make_plan(
             " overrides, or has a value twice"
         )
     numbers = pl.int_range(pl.len(), dtype=pl.Int32)
-    variants = pl.concat(frames).with_columns(numbers.alias(VARIANT), numbers.alias("index"))
+    variants = pl.concat([*frames, _frame_of(rows)])
+    variants = variants.with_columns(numbers.alias(VARIANT), numbers.alias("index"))
     return StudyPlan(design, variants)
+
+
+def _frame_of(rows: list[tuple[str, str, str, int, float]]) -> "pl.DataFrame":
+    """Return variants as a data frame: identity, template, home, seed and simulated time [s]."""
+    import polars as pl
+
+    texts = dict.fromkeys(("identity", "template", "home_key"), pl.String)
+    schema = {**texts, SEED: pl.Int64, "simulated_s": pl.Float64}
+    return pl.DataFrame(rows, schema, orient="row")
+
+
+def _simulated_s(simulation: Mapping[str, Any]) -> float:
+    """Return the simulated time of a run in whole steps [s]."""
+    step = parse_duration(simulation["step"])
+    duration = parse_duration(simulation["duration"])
+    return (duration // step * step).total_seconds()
 
 
 def _repeated(seeds: Sequence[int]) -> tuple[int, int] | None:
@@ -283,47 +311,43 @@ def check_setups(
             for end in ends:
                 if text := end.loss or end.payload:
                     problems[end.task.index] = f"{plan.design.describe(end.task.index)}: {text}"
-            if len(problems) >= MAX_PROBLEMS:
-                break
-    _raise_problems([problems[index] for index in sorted(problems)[:MAX_PROBLEMS]])
-
-
-def _raise_problems(problems: list[str]) -> None:
-    """Raise an error about problems; of those that differ by their variant only, about the first.
-
-    Raises:
-        ScenarioError: There are problems.
-    """
-    if len(problems) == MAX_PROBLEMS:
-        problems = [*problems, f"… and perhaps more: these are the first {MAX_PROBLEMS}"]
-    first: dict[str, str] = {}
-    for text in problems:
-        first.setdefault(text.partition("): ")[2] or text, text)
-    if first:
-        raise ScenarioError("\n".join(first.values()))
+    raise_problems([problems[index] for index in sorted(problems)])
 
 
 Changed = Literal["redo", "keep"]
 
 
 class ScenarioFile:
-    """Collects the scenarios of combinations as compressed text."""
+    """Collects the scenarios of combinations as compressed text, outside of the memory."""
 
     def __init__(self) -> None:
         """Start without scenarios."""
-        self._rows: list[tuple[str, bytes]] = []
+        self._templates: list[str] = []
+        self._texts = tempfile.TemporaryFile()  # noqa: SIM115 - closed with this object
+        weakref.finalize(self, self._texts.close)
 
     def add(self, template: str, scenario: Scenario) -> None:
         """Add the scenario of a combination, with any of its seeds."""
-        self._rows.append((template, zlib.compress(json.dumps(scenario.resolved()).encode(), 1)))
+        text = zlib.compress(json.dumps(scenario.resolved()).encode(), 1)
+        self._templates.append(template)
+        self._texts.write(len(text).to_bytes(4) + text)
 
     def write(self, directory: StudyDirectory) -> None:
         """Write them."""
-        import polars as pl
+        directory.storage.write_table(SCENARIOS, self._parts())
 
-        rows = [(template, zlib.decompress(text).decode()) for template, text in self._rows]
-        frame = pl.DataFrame(rows, ["template", "scenario"], orient="row")
-        directory.storage.write_table(SCENARIOS, [frame.to_arrow()])
+    def _parts(self) -> "Iterator[pa.Table]":
+        import pyarrow as pa
+
+        self._texts.seek(0)
+        for first in range(0, len(self._templates), SCENARIO_ROWS):
+            templates = self._templates[first : first + SCENARIO_ROWS]
+            texts = [self._next_text() for _ in templates]
+            yield pa.table({"template": templates, "scenario": texts})
+
+    def _next_text(self) -> str:
+        size = int.from_bytes(self._texts.read(4))
+        return zlib.decompress(self._texts.read(size)).decode()
 
 
 def reconcile(
@@ -411,11 +435,8 @@ def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
     for number, axis in enumerate(design.axes):
         choices = design.combinations[:, number]
         used = set(np.unique(choices).tolist())
-        for column in axis.columns:
-            labels = [
-                choice.labels[column] if place in used else None
-                for place, choice in enumerate(axis.choices)
-            ]
+        for column, own in axis.labels().items():
+            labels = [label if place in used else None for place, label in enumerate(own)]
             places = choices[combination] % (len(labels) + 1)  # -1, of no choice, is the last
             columns.append(label_series([*labels, None]).gather(places).alias(column))
     names = (VARIANT, *PLAN_ONLY, "simulated_s")

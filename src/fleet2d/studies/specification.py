@@ -17,7 +17,8 @@ from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.load import explain
 from fleet2d.scenario.model import Scenario
-from fleet2d.studies.axes import AnyAxis, Parameter, check_count
+from fleet2d.studies.axes import Parameter, check_count
+from fleet2d.studies.population import PopulationAxis, StudyAxis
 from fleet2d.studies.results import RESULT_COLUMNS
 
 
@@ -143,7 +144,7 @@ class StudyFile(Settings):
     tags: tuple[str, ...] = ()
     notes: str = ""
     base: Any = None
-    axes: dict[str, AnyAxis] = Field(default={})
+    axes: dict[str, StudyAxis] = Field(default={})
     replicates: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**63)], ...], BeforeValidator(_numbers_or_count)
     ] = ()
@@ -161,6 +162,13 @@ class StudyFile(Settings):
         if not isinstance(axes, Mapping):
             return data
         return {**data, "axes": {name: _long_form(name, axis) for name, axis in axes.items()}}
+
+    @model_validator(mode="after")
+    def _has_one_population(self) -> Self:
+        names = [name for name, axis in self.axes.items() if isinstance(axis, PopulationAxis)]
+        if len(names) > 1:
+            raise problem_at(("axes", names[1]), f"there is a population already: {names[0]}")
+        return self
 
     @model_validator(mode="after")
     def _columns_differ(self) -> Self:
@@ -212,7 +220,13 @@ class StudyFile(Settings):
     def populations(self) -> tuple[str, ...]:
         """The columns whose values are a sample of a population, the seed last."""
         columns = (c for name, axis in self.axes.items() for c in axis.populations(name))
-        return (*columns, SEED)
+        return (*columns, *([] if self.fleet else [SEED]))
+
+    @property
+    def fleet(self) -> str:
+        """The name of the axis that is a population; empty without one."""
+        axes = self.axes.items()
+        return next((name for name, axis in axes if isinstance(axis, PopulationAxis)), "")
 
 
 def _long_form(name: str, axis: Any) -> Any:

@@ -38,7 +38,7 @@ from fleet2d.learning.datasets.specification import (
 from fleet2d.learning.datasets.tables import SCHEMAS, tables_of
 from fleet2d.runtime.progress import progress_bar
 from fleet2d.storage.files import FolderLock, partial_file, refuse_links, write_atomically
-from fleet2d.studies.api import map_runs
+from fleet2d.studies.api import map_runs, open_crew
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,8 +68,14 @@ BIASES = (
 )
 
 
-def write_card(data: Dataset, file: DatasetFile) -> None:
-    """Write the data card of a data set, with pictures if matplotlib is installed."""
+def write_card(data: Dataset, file: DatasetFile, left_out: Sequence[str] = ()) -> None:
+    """Write the data card of a data set, with pictures if matplotlib is installed.
+
+    Args:
+        data: The data set.
+        file: Its file.
+        left_out: What its conditions left out, a line for each split.
+    """
     root = data.root
     counts = {split: _count(data, split) for split in data.splits}
     text = [
@@ -95,6 +101,7 @@ def write_card(data: Dataset, file: DatasetFile) -> None:
         "\n`step` is the last step that a row knows of: join `evidence` up to a step with `labels`"
         " of that step.\n",
         "## Distributions\n",
+        *(f"{line}\n" for line in left_out),
         *(_distribution(split, c) for split, c in counts.items()),
         *(f"![{words}]({PICTURES}/{name}.png)\n" for name, words in _draw(root, counts).items()),
         "## Known biases\n",
@@ -233,7 +240,8 @@ def dataset(
         >>> people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
         >>> made = fleet2d.dataset({"splits": {"train": people}}, "small")  # doctest: +SKIP
     """
-    plan = plan_dataset(source)
+    with open_crew("local", workers) as crew:
+        plan = plan_dataset(source, crew)
     root = Path(out)
     parts = root / PARTS
     made = None
@@ -432,5 +440,5 @@ def _finish(root: Path, plan: DatasetPlan, files: Mapping[str, ShardRecord]) -> 
         file=plan.file.model_dump(mode="json"),
         files=dict(files),
     )
-    write_card(Dataset(root, manifest), plan.file)
+    write_card(Dataset(root, manifest), plan.file, plan.left_out)
     write_atomically(root / MANIFEST, manifest.model_dump_json(indent=1).encode())

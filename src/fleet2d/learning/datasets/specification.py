@@ -11,7 +11,6 @@ from itertools import combinations, takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
 from fleet2d.algorithms.evidence import steps_of_bin
@@ -21,34 +20,44 @@ from fleet2d.configuration.problems import problem, shown
 from fleet2d.configuration.units import PositiveDuration, micros, parse_duration
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.routines.persona import origins_of
-from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.load import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
+from fleet2d.studies.executors import Crew
+from fleet2d.studies.population import (
+    MAX_SEED,
+    SEED_STEP,
+    Draw,
+    DrawSettings,
+    Life,
+    LifeFinder,
+    left_out_words,
+    members_of,
+    personas_of,
+)
 
-NAMES = ("ana", "ben", "cleo", "dan", "eva", "finn", "gina", "hugo")
 # folders beside those of the splits
 PARTS = "unfinished"
 PICTURES = "pictures"
 EVIDENCE = "evidence"
 STAYS = "stays"
 BELIEF = "belief_"
-MAX_SEED = 1 << 31
 MAX_PERIOD = timedelta(days=1)
 
 
-class SplitSettings(Settings):
+class SplitSettings(DrawSettings):
     """The runs of one split, and what they are drawn from.
 
     Attributes:
         runs: The number of runs.
-        homes: Homes, as axes of a study have them: {synthetic: 40, first: 100}, {floorplans: …}.
-        households: Households: a list of the personas of their members, or of users by name.
     """
 
     runs: int = Field(ge=1, le=1_000_000)
-    homes: tuple[AnyAxis, ...] = Field(min_length=1)
-    households: tuple[tuple[Any, ...] | dict[str, Any], ...] = Field(min_length=1)
+
+    def model_post_init(self, _: object, /) -> None:
+        """Require people: the users of the base are replaced."""
+        if not self.households and self.table is None:
+            raise problem("give households: a list of the personas of each")
 
 
 class DatasetFile(Settings):
@@ -137,17 +146,21 @@ class DatasetPlan:
     Attributes:
         file: The settings.
         base: The scenario that all runs share.
-        homes: The homes of each split.
+        draws: What the runs of each split are drawn from.
+        numbers: The numbers of the lives of each split that meet its conditions.
+        left_out: How many lives didn't, and why, a line for each split.
     """
 
     file: DatasetFile
     base: Document
-    homes: Mapping[str, Sequence[Choice]]
+    draws: Mapping[str, Draw]
+    numbers: Mapping[str, Sequence[int]]
+    left_out: Sequence[str] = ()
 
     @property
     def digest(self) -> str:
         """SHA-256 of all that its content depends on, but the code."""
-        homes = {name: [home.changes for home in homes] for name, homes in self.homes.items()}
+        homes = {name: [home.changes for home in d.homes] for name, d in self.draws.items()}
         file = self.file.model_dump(mode="json", exclude={"base"})
         text = json.dumps([file, self.base.data, homes], sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
@@ -165,21 +178,11 @@ class DatasetPlan:
 
     def run(self, split: str, k: int) -> PlannedRun:
         """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
-        settings = self.file.splits[split]
-        homes = self.homes[split]
-        draws = Draws(np.uint64(stream_key(self.file.seed, f"datasets.{split}", "run")), k)
-        household = draws.choice(settings.households)
-        varied = [draws.choice(axis.choices(name)) for name, axis in self.file.vary.items()]
-        home = homes[k % len(homes)]
+        life = self.draws[split].life(self.numbers[split][k])
         number = self._first_number(split) + k
-        scenario = self._scenario(home, household, varied)
-        scenario["simulation"]["seed"] = (self.file.seed * 1_000_003 + number) % MAX_SEED
-        labels = {
-            "home": home.words.partition("= ")[2],
-            "household": " + ".join(personas_of(household)),
-        }
-        for choice in varied:
-            labels.update({name: str(label) for name, label in choice.labels.items()})
+        scenario = self._scenario(life)
+        scenario["simulation"]["seed"] = (self.file.seed * SEED_STEP + number) % MAX_SEED
+        labels = {name: str(label) for name, label in life.labels.items()}
         return PlannedRun(number, split, labels, scenario)
 
     def check(self) -> None:
@@ -191,35 +194,33 @@ class DatasetPlan:
         varied = {name: axis.choices(name) for name, axis in self.file.vary.items()}
         usual = [choices[0] for choices in varied.values()]
         for split, settings in self.file.splits.items():
-            homes = self.homes[split]
-            households = settings.households
+            draw = self.draws[split]
+            first = draw.life(self.numbers[split][0])
+            people = settings.households or (first.household,)
             firsts = [axis.choices("home")[0] for axis in settings.homes]
-            cases = [(f"homes: {home.words}", home, households[0], usual) for home in firsts]
+            cases = [(f"homes: {home.words}", home, people[0], usual) for home in firsts]
             cases += [
-                (f"households: {' + '.join(personas_of(people))}", homes[0], people, usual)
-                for people in households
+                (f"households: {' + '.join(personas_of(each))}", first.home, each, usual)
+                for each in people
             ]
             for k, (name, choices) in enumerate(varied.items()):
                 for choice in choices:
                     values = [*usual[:k], choice, *usual[k + 1 :]]
-                    cases.append((f"vary.{name}: {choice.words}", homes[0], households[0], values))
+                    cases.append((f"vary.{name}: {choice.words}", first.home, people[0], values))
             for words, home, household, values in cases:
                 with errors_as(ScenarioError, f"{split}, {words}"):
-                    load_scenario(self._scenario(home, household, values))
+                    load_scenario(
+                        self._scenario(Life(0, home, household, tuple(values), first.row))
+                    )
 
     def _first_number(self, split: str) -> int:
         """Return the number of the first run of a split."""
         before = takewhile(lambda name: name != split, self.file.splits)
         return sum(self.file.splits[name].runs for name in before)
 
-    def _scenario(self, home: Choice, household: Any, varied: Sequence[Choice]) -> dict[str, Any]:
-        changes = [
-            assignment(keys, value, choice.words)
-            for choice in (home, *varied)
-            for keys, value in choice.changes
-        ]
+    def _scenario(self, life: Life) -> dict[str, Any]:
+        changes = [assignment(keys, value, life.home.words) for keys, value in life.changes]
         scenario = deepcopy(apply_changes(self.base, changes).data)
-        scenario["users"] = members_of(household)
         every = f"{self.file.every.total_seconds()} s"
         period = f"{_period(scenario['simulation']).total_seconds()} s"
         scenario["algorithms"] = {
@@ -239,11 +240,12 @@ class DatasetPlan:
         return scenario
 
 
-def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
+def plan_dataset(source: str | Path | Mapping[str, Any], crew: Crew | None = None) -> DatasetPlan:
     """Read the file of a data set, and check that its splits don't overlap.
 
     Args:
         source: A YAML file, or the same as a mapping.
+        crew: Where homes are built, if there are conditions on them; None: in this process.
 
     Raises:
         ScenarioError: The file is wrong, or its base isn't a scenario.
@@ -259,13 +261,23 @@ def plan_dataset(source: str | Path | Mapping[str, Any]) -> DatasetPlan:
     with errors_as(ScenarioError, "base", of=ScenarioError):
         base = load_scenario(file.base).resolved()
     base["users"] = {}
-    homes = {
-        name: [choice for axis in split.homes for choice in axis.choices("home")]
+    draws = {
+        name: Draw(split, file.vary, file.seed, f"datasets.{name}")
         for name, split in file.splits.items()
     }
-    plan = DatasetPlan(file, Document(base), homes)
+    numbers: dict[str, Sequence[int]] = {}
+    left_out = []
+    for name, split in file.splits.items():
+        numbers[name] = range(split.runs)
+        with errors_as(ScenarioError, name):
+            finder = LifeFinder(draws[name], Document(base), crew)
+            if split.where:
+                asks_homes = draws[name].asks_homes
+                numbers[name] = finder.find(split.runs, needs_facts=asks_homes)
+        left_out.append(left_out_words(name, finder.left_out))
+    plan = DatasetPlan(file, Document(base), draws, numbers, [*filter(None, left_out)])
     plan.check()
-    _check_splits(file, homes)
+    _check_splits(file, {name: list(draw.homes) for name, draw in draws.items()})
     return plan
 
 
@@ -279,34 +291,6 @@ def _period(simulation: Mapping[str, Any]) -> timedelta:
     parts = -(-duration // MAX_PERIOD)
     is_even = duration % (parts * steps_of_bin(micros(step)) * step) == timedelta(0)
     return duration / parts if is_even else timedelta(hours=1)
-
-
-def members_of(household: Any) -> dict[str, Any]:
-    """Return the section `users` of a household: a list of personas, or users by name.
-
-    Example:
-        >>> members_of(["retired"])
-        {'ana': {'type': 'routine', 'persona': 'retired'}}
-    """
-    if isinstance(household, Mapping):
-        return dict(household)
-    if len(household) > len(NAMES):
-        raise InputError(
-            f"a household of {len(household)} personas: name its users, as in {{ana: …}}, where"
-            f" there are more than {len(NAMES)}"
-        )
-    pairs = zip(NAMES, household, strict=False)
-    return {name: {"type": "routine", "persona": persona} for name, persona in pairs}
-
-
-def personas_of(household: Any) -> list[str]:
-    """Return what tells the people of a household: their personas, logs, or types."""
-    return [
-        str(user.get("persona") or user.get("path") or user.get("type"))
-        if isinstance(user, Mapping)
-        else str(user)
-        for user in members_of(household).values()
-    ]
 
 
 def _origins(user: Any) -> set[str]:

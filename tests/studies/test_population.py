@@ -1,0 +1,234 @@
+"""Populations: lives drawn together and nested, weighted, with conditions that say what they leave
+out."""
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.scenes import flat_document
+from tests.studies.scenes import CountingExecutor, run
+from tests.studies.test_driver import CollectingObserver
+
+from fleet2d.configuration.documents import Document
+from fleet2d.errors import Fleet2DError, RunDirectoryError, ScenarioError
+from fleet2d.learning.datasets.specification import plan_dataset
+from fleet2d.studies.design import Design, build_design
+from fleet2d.studies.population import (
+    Draw,
+    DrawSettings,
+    PopulationAxis,
+    bedrooms_needed,
+    find_lives,
+    members_of,
+)
+from fleet2d.studies.specification import read_specification
+
+BASE = {"extends": "bundled:paper", "simulation": {"duration": "2 min"}}
+SYNTHETIC = [{"synthetic": 100}]
+COUPLE = {"members": {"ana": "retired", "ben": "retired"}, "couples": [["ana", "ben"]]}
+
+
+def fleet(count: int = 3, **keys: Any) -> dict[str, Any]:
+    """A study of a fleet in small synthetic homes."""
+    keys = {"homes": SYNTHETIC, "households": [["retired"], ["student", "student"]], **keys}
+    return {"base": BASE, "axes": {"robot": {"population": count, **keys}}}
+
+
+def design(**keys: Any) -> Design:
+    return build_design(read_specification(fleet(**keys)))
+
+
+def draw(**keys: Any) -> Draw:
+    return Draw(DrawSettings(**{"homes": SYNTHETIC, **keys}), {}, 0, "population")
+
+
+def table(folder: Path, text: str) -> str:
+    path = folder / "census.csv"
+    path.write_text(text)
+    return str(path)
+
+
+def test_each_life_has_its_home_its_people_and_its_seed_in_all_settings(tmp_path: Path) -> None:
+    study = fleet()
+    study["axes"]["robots.astro.speed"] = [0.3, 0.6]
+    _, found = run(study, tmp_path / "fleet")
+
+    variants = found.variants
+    assert [0, 0, 1, 1, 2, 2] == variants["robot"].to_list() == variants["seed"].to_list()
+    assert 3 == variants["home"].n_unique()
+    for row in variants.to_dicts():
+        scenario = found.scenario(row["variant"])
+        assert row["people"] == len(scenario["users"]) == len(row["household"].split(" + "))
+        assert row["seed"] == scenario["simulation"]["seed"]
+        assert row["bedrooms"] == scenario["floorplan"]["bedrooms"] >= row["people"]
+    paired = found.paired("distance.astro", {"robots.astro.speed": 0.3})
+    assert (3, 3) == paired.select("pairs", "n_robot").row(0)
+
+
+def test_a_larger_population_begins_with_the_same_lives_and_runs_only_the_others(
+    tmp_path: Path,
+) -> None:
+    run(fleet(2), tmp_path / "fleet")
+    executor = CountingExecutor()
+    counts, _ = run(fleet(3), tmp_path / "fleet", executor)
+
+    assert 3 == counts.complete
+    assert 2 in executor.ran
+    assert 0 not in executor.ran[-1:]
+
+
+def test_replicates_of_lives_have_seeds_that_no_other_life_has() -> None:
+    study = {**fleet(50, where={"people": 1}), "replicates": 3}
+    lives = build_design(read_specification(study))
+    assert 150 == len({lives.parameters(i)["seed"] for i in range(len(lives))})
+
+
+def test_rows_of_a_table_are_drawn_by_their_weights_with_all_their_columns(tmp_path: Path) -> None:
+    text = (
+        "household,bedrooms,area_m2,region,robots.astro.speed,share\n"
+        "retired,1,40..60,north,0.3,3\n"
+        "student + child,3..4,,south,0.6,1\n"
+    )
+    weighted = draw(table=table(tmp_path, text), weight="share")
+
+    lives = [weighted.life(k) for k in range(400)]
+    counts = Counter(life.labels["region"] for life in lives)
+    assert abs(counts["north"] - 300) < 4 * (400 * 0.75 * 0.25) ** 0.5
+    for life in lives:
+        changes = dict(life.changes)
+        speed = changes["robots", "astro", "speed"]
+        assert {"north": 0.3, "south": 0.6}[str(life.labels["region"])] == speed
+        assert (speed == 0.3) == ("ben" not in changes[("users",)])
+        plan = changes[("floorplan",)]
+        assert plan["bedrooms"] in ((1,) if speed == 0.3 else (3, 4))
+        assert (speed == 0.6) == ("area_m2" not in plan)
+        assert 40 <= plan.get("area_m2", 50) <= 60
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "words"),
+    [
+        ("home,weigt\n0,1\n", {"weight": "weight"}, "no column 'weight': did you mean 'weigt'"),
+        ("home,weight\n0,1\n1,NaN\n", {}, "row 2: the weight is nan"),
+        ("home,weight\n0,1\n1,\n", {}, "row 2: the weight is None"),
+        ("home,weight\n0,-1\n", {}, "row 1: the weight is -1"),
+        ("home,weight\n0,0\n1,0\n", {}, "weight of all rows is 0"),
+        ("home,weight\n", {}, "has no rows"),
+        ("home\n0\n777\n", {}, "row 2: there is no home '777'"),
+    ],
+)
+def test_a_table_that_can_not_be_drawn_from_is_refused(
+    tmp_path: Path, text: str, keys: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        draw(table=table(tmp_path, text), **keys)
+
+
+def test_conditions_count_what_they_leave_out() -> None:
+    lives = design(count=4, where={"people": 2, "rooms": "..9", "has": ["bathroom"]})
+
+    assert {2} == {*lives.labels["people"]}
+    assert max(lives.labels["rooms"]) <= 9
+    assert "people is not 2" in lives.left_out
+    assert "rooms is not ..9" in lives.left_out
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ({"rooms": "90..99"}, "0 of 40 lives that were drawn meet.*40 .rooms is not 90..99"),
+        ({"has": "ballroom"}, "40 .no ballroom"),
+        ({"rooms": "9..3"}, "range 9..3 is empty"),
+        ({"rooms": "a..3"}, "expected a range like 3..15"),
+        ({"romms": 3}, "no 'romms': did you mean 'rooms'"),
+    ],
+)
+def test_conditions_that_leave_nothing_or_make_no_sense_are_told(
+    where: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(Fleet2DError, match=words):
+        design(count=2, where=where)
+
+
+def test_all_homes_that_can_not_be_are_told_at_once_before_the_first_run() -> None:
+    homes = [{"synthetic": 9, "settings": {"area_m2": 20, "bedrooms": 8}}]
+    with pytest.raises(ScenarioError, match=r"life 0 .home = 0.: .* 4 more likewise: life 1"):
+        design(count=5, homes=homes)
+
+
+def test_a_mistake_beside_the_population_is_told_before_any_home_is_built() -> None:
+    study = fleet(homes=[{"synthetic": 9, "settings": {"area_m2": 20, "bedrooms": 8}}])
+    study["axes"]["robots.astro.sped"] = [1]
+    with pytest.raises(ScenarioError, match="unknown key 'sped'"):
+        build_design(read_specification(study))
+
+
+@pytest.mark.parametrize(
+    ("household", "needed"),
+    [
+        (["retired"], 1),
+        (["student", "student"], 2),
+        (["works_outside", "child", "child", "child"], 3),
+        ({name: {"type": "routine", "household": COUPLE} for name in ("ana", "ben")}, 1),
+    ],
+)
+def test_couples_and_pairs_of_children_share_bedrooms(household: Any, needed: int) -> None:
+    assert needed == bedrooms_needed(household)
+
+
+def test_homes_of_files_are_chosen_among_those_that_fit_the_household(tmp_path: Path) -> None:
+    document = flat_document()
+    for bedrooms in (1, 3):
+        kinds = iter(["bedroom"] * bedrooms + ["kitchen"] * 9)
+        rooms = [{**room, "type": next(kinds)} for room in document["rooms"]]
+        path = tmp_path / f"flat{bedrooms}.json"
+        path.write_text(json.dumps({**document, "rooms": rooms}))
+    axis = PopulationAxis(
+        population=12,
+        homes=[{"floorplans": str(tmp_path)}],
+        households=[["retired"], ["student", "student", "retired"]],
+    )
+
+    lives = find_lives(axis, "robot", Document({"floorplan": {"type": "bundled"}}))
+    homes = {(choice.labels["people"], choice.labels["home"]) for choice in lives}
+    assert {(1, "flat1"), (1, "flat3"), (3, "flat3")} == homes
+
+
+def test_another_fleet_in_the_same_folder_is_told_and_nothing_is_lost(tmp_path: Path) -> None:
+    run(fleet(2), tmp_path / "fleet")
+    with pytest.raises(RunDirectoryError, match="2 of scenarios that the study no longer has"):
+        run(fleet(2, seed=5), tmp_path / "fleet")
+    executor = CountingExecutor()
+    counts, _ = run(fleet(2), tmp_path / "fleet", executor)
+    assert 2 == counts.complete
+
+
+def test_what_is_left_out_is_noted_and_stored(tmp_path: Path) -> None:
+    observer = CollectingObserver()
+    _, study = run(fleet(1, where={"people": 2}), tmp_path / "fleet", observer=observer)
+    assert "people is not 2" in study.meta.notes
+
+
+def test_data_sets_draw_and_leave_out_as_studies_do(tmp_path: Path) -> None:
+    text = "household,weight\nretired,1\nstudent + student,1\n"
+    split = {
+        "runs": 4,
+        "homes": SYNTHETIC,
+        "table": table(tmp_path, text),
+        "where": {"household": "student + student", "bedrooms": "2..", "area_m2": "..150"},
+    }
+    plan = plan_dataset({"base": BASE, "splits": {"train": split}})
+
+    runs = list(plan.runs("train"))
+    assert [4, 4] == [len(runs), len({run.seed for run in runs})]
+    assert {"student + student"} == {run.labels["household"] for run in runs}
+    assert {"ana", "ben"} == {*runs[0].scenario["users"]}
+    (words,) = plan.left_out
+    assert words.startswith("train: ")
+    assert "household is not" in words
+
+
+def test_members_have_names_of_their_own() -> None:
+    assert ["ana", "ben"] == [*members_of(["retired", "student"])]
