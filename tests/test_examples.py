@@ -29,7 +29,8 @@ DATA_SETS = sorted((EXAMPLES / "datasets").glob("*.yaml"))
 SHORTER = {"duration.days=7": "duration.days=1", "range(5, 5 +": "range(1, 1 +"}
 MAY_BE_EMPTY = {"observations", "violations"}
 PAPER = set((EXAMPLES / "paper").glob("*.yaml"))
-SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - {*STUDIES, *DATA_SETS, *PAPER})
+BUILDS = sorted((EXAMPLES / "release_gate").glob("*.yaml"))
+SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - {*STUDIES, *DATA_SETS, *PAPER, *BUILDS})
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ from fleet2d.scenario.schema import schema
 EXAMPLES = sorted(
     path
     for path in (Path(__file__).parents[2] / "examples").rglob("*.yaml")
-    if path.parent.name not in ("studies", "datasets", "agents", "paper")  # other kinds of files
+    if path.parent.name
+    not in ("studies", "datasets", "agents", "paper", "release_gate")  # other kinds of files
 )
 
 

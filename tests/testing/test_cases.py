@@ -33,40 +33,44 @@ def test_what_holds_exits_with_0(fleet2d: Cli) -> None:
     assert code == 0
     assert "apart" in out
     assert "3 of 3" in out
-    assert "all held: 3 runs" in out
+    assert "the build passes: 1 of 1 expectation held, after 3 trials" in out
 
 
 @pytest.mark.slow
 def test_what_fails_is_told_kept_and_drawn(fleet2d: Cli) -> None:
     code, out, _ = fleet2d(
         "test", written(apart=HOLDS, still=FAILS), "--seeds", "2", "--junit", "out/results.xml",
-        "--pictures", "pictures", "--out", "kept",
+        "--out", "kept",
     )  # fmt: skip
 
     assert code == 1
-    assert "still is violated: never(moving" in out
-    assert "fleet2d run home.yaml --seed 5 --out home-seed-5 && fleet2d show home-seed-5" in out
-    assert Path("pictures/home-seed-4-still.png").read_bytes().startswith(b"\x89PNG")
-    assert {"home-seed-4", "home-seed-5"} == {path.name for path in Path("kept").iterdir()}
+    assert "failed in 2 of 2 trials, worst in seed 4: still is violated: never(moving" in out
+    assert "see it: fleet2d show kept/home-seed-4 --at 'step " in out
+    assert Path("kept/home-seed-4-still.png").read_bytes().startswith(b"\x89PNG")
+    assert {"home-seed-4", "home-seed-5"} == {p.name for p in Path("kept").iterdir() if p.is_dir()}
     (suite,) = ET.parse("out/results.xml").getroot()
-    assert ("4", "2", "0") == tuple(suite.get(key) for key in ("tests", "failures", "errors"))
-    failed = [test.get("name") for test in suite if test.find("failure") is not None]
-    assert ["still[seed 4]", "still[seed 5]"] == failed
+    assert ("2", "1", "0") == tuple(suite.get(key) for key in ("tests", "failures", "errors"))
+    (failed,) = [test for test in suite if test.find("failure") is not None]
+    numbers = {each.get("name"): each.get("value") for each in failed.iter("property")}
+    assert failed.get("name") == "still"
+    assert ("2", "0", "2") == (numbers["trials"], numbers["held"], numbers["failed"])
 
 
 def test_the_command_that_is_printed_shows_the_moment_again(fleet2d: Cli) -> None:
     _, out, _ = fleet2d("test", written(still=FAILS), "simulation.duration=2 min")
-    line = next(line for line in out.splitlines() if "to see it" in line)
-    run, show = line.partition(": ")[2].split(" && ")
+    line = next(line for line in out.splitlines() if "see it" in line)
+    run, show = line.partition(": ")[2].split("; ")
 
-    for command in (run, show):
-        assert fleet2d(*shlex.split(command)[1:])[0] == 0
+    assert fleet2d(*shlex.split(run)[1:])[0] == 1
+    assert fleet2d(*shlex.split(show)[1:])[0] == 0
 
 
 def test_json_has_every_verdict(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("test", written(apart=HOLDS, still=FAILS), "--json", "--seed", "9")
-    (case,) = json.loads(out)
+    gate = json.loads(out)
+    (case,) = gate["trials"]
 
+    assert "the build doesn't pass: 1 of 2 expectations fails, after 1 trial" == gate["verdict"]
     assert (code, case["seed"], case["holds"]) == (1, 9, False)
     assert case["expectations"]["apart"]["holds"]
     assert case["expectations"]["still"]["robustness"] is None
@@ -136,7 +140,7 @@ def test_one_file_runs_over_a_folder_of_homes(fleet2d: Cli) -> None:
         (plans / f"{name}.json").write_text(flat.read_text())
     code, out, _ = fleet2d("test", path, "--homes", "plans", "--seeds", "2", "--json")
 
-    cases = json.loads(out)
+    cases = json.loads(out)["trials"]
     assert code == 0
     assert [("one", 4), ("one", 5), ("other", 4), ("other", 5)] == [
         (c["home"], c["seed"]) for c in cases
@@ -158,7 +162,7 @@ def test_what_was_not_tested_is_shown_and_fails_unless_it_may(fleet2d: Cli) -> N
     (suite,) = ET.parse("results.xml").getroot()
     assert ("1", "0") == (suite.get("failures"), suite.get("skipped"))
     code, out, _ = fleet2d("test", written(waits=waits, apart=HOLDS), "--json")
-    verdict = json.loads(out)[0]["expectations"]["waits"]
+    verdict = json.loads(out)["trials"][0]["expectations"]["waits"]
     assert (None, 0) == (verdict["holds"], verdict["occasions"])
     assert verdict["untested"] == "its trigger never happened"
     path = written(waits=f"may_be_untested({waits})", apart=HOLDS)

@@ -98,9 +98,9 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     schedule_failures(state, scenario, clock, seed)
     if scenario.script:
         _schedule_script(state, scenario)
-    for name, expectation in scenario.expect.items():
+    for name, expected in scenario.expect.items():
         with _locate_errors(scenario, f"expect.{name}"):
-            state.expect(scenario, name, expectation, 0)
+            state.expect(scenario, name, expected.that, 0)
     return state
 
 

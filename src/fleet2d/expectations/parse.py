@@ -9,7 +9,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.errors import InputError, errors_as
@@ -222,17 +222,63 @@ class _Reader:
         return _OPERATORS[sign](left, right)
 
 
-def read_expectation(value: Any) -> Expectation:
-    """Read an expectation of a scenario.
+class Expected(NamedTuple):
+    """An expectation of a scenario.
+
+    Attributes:
+        that: What must hold.
+        covers: The requirements that it covers, such as "REQ-12".
+    """
+
+    that: Expectation
+    covers: tuple[str, ...] = ()
+
+    def content(self) -> Any:
+        """Return it as a scenario file has it: text, or a mapping if it covers requirements."""
+        text = str(self.that)
+        return {"that": text, "covers": list(self.covers)} if self.covers else text
+
+
+def read_expected(value: Any) -> Expected:
+    """Read an entry of the section `expect` of a scenario.
 
     Raises:
         PydanticCustomError: It can't be read, or doesn't say when it must hold.
+
+    Example:
+        >>> read_expected({"that": "never(moving(ana))", "covers": ["REQ-12"]}).covers
+        ('REQ-12',)
     """
-    if isinstance(value, Expectation):
+    covers: tuple[str, ...] = ()
+    if isinstance(value, Mapping):
+        if set(value) != {"that", "covers"}:
+            raise problem(
+                "expected two lines, such as `that: always(distance(ana, astro) > 0.5 m)` and"
+                f" `covers: [REQ-12]`, got the keys {', '.join(map(str, value)) or '(none)'};"
+                " within { } an expectation needs quotes"
+            )
+        with errors_as(problem):
+            covers = read_requirements(value["covers"])
+        value = value["that"]
+    if isinstance(value, Expected):
         return value
+    if isinstance(value, Expectation):
+        return Expected(value, covers)
     if not isinstance(value, str):
         raise problem(
             f"expected an expectation like always(distance(ana, astro) > 0.5 m), got {value!r}"
         )
     with errors_as(problem):
-        return check_judged(parse_expectation(value))
+        return Expected(check_judged(parse_expectation(value)), covers)
+
+
+def read_requirements(value: Any) -> tuple[str, ...]:
+    """Read a list of requirements.
+
+    Raises:
+        InputError: It isn't one.
+    """
+    is_list = isinstance(value, list | tuple)
+    if not is_list or not all(isinstance(text, str) and text.strip() for text in value):
+        raise InputError(f"covers: expected a list of requirements like [REQ-12], got {value!r}")
+    return tuple(dict.fromkeys(text.strip() for text in value))

@@ -53,21 +53,30 @@ from fleet2d.runtime.local_time import Zone, rules_of, span_us, zone_of
 from fleet2d.sight.camera import SightSettings
 
 
-def _read_expectation(value: Any) -> Any:
-    from fleet2d.expectations.parse import read_expectation
+def _read_expected(value: Any) -> Any:
+    from fleet2d.expectations.parse import read_expected
 
-    return read_expectation(value)
+    return read_expected(value)
 
 
 ExpectationField = Annotated[
     Any,
-    BeforeValidator(_read_expectation),
-    PlainSerializer(str, return_type=str, when_used="json"),
+    BeforeValidator(_read_expected),
+    PlainSerializer(lambda expected: expected.content(), when_used="json"),
     Field(
-        json_schema_extra={"type": "string", "examples": ["always(distance(ana, astro) > 0.5 m)"]}
+        json_schema_extra={
+            "type": ["string", "object"],
+            "properties": {
+                "that": {"type": "string"},
+                "covers": {"type": "array", "items": {"type": "string"}},
+            },
+            "required": ["that", "covers"],
+            "additionalProperties": False,
+            "examples": ["always(distance(ana, astro) > 0.5 m)"],
+        }
     ),
 ]
-"""Text in a file, an `Expectation` in Python."""
+"""Text in a file or an `Expectation` in Python, or a mapping of it and what it `covers`."""
 
 
 def _parse_local_time(value: Any) -> Any:

@@ -1,205 +1,40 @@
-"""`fleet2d test`: run scenarios with expectations; the table of verdicts and JUnit XML."""
+"""`fleet2d test`: run tests of one build, or of two on the same trials, and say what they show."""
 
 import json
-import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-from xml.etree import ElementTree as ET
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fleet2d.cli.run import Strict, report_wrong
-from fleet2d.configuration.problems import counted
-from fleet2d.errors import Fleet2DError, InputError, os_errors_as
-from fleet2d.options import file_name
-from fleet2d.storage.files import write_atomically
+from fleet2d.cli.run import Strict
+from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.options import Workers
 
 if TYPE_CHECKING:
-    from fleet2d.expectations.verdict import Verdict
-    from fleet2d.scenario.model import Scenario
+    from fleet2d.testing.gate import Gate, Tally
+    from fleet2d.testing.history import History
+    from fleet2d.testing.suite import Build, SuiteTest, TrialKey, TrialReport
 
-
-@dataclass
-class ScenarioCase:
-    """A scenario with a seed, and its results.
-
-    Attributes:
-        source: The file of the scenario, as on the command line.
-        scenario: The scenario, with the seed.
-        overrides: Changes of the scenario, as on the command line.
-        home: The name of the home, of several; empty for the scenario's own.
-        verdicts: The verdicts on expectations, by name.
-        error: The error that ended the run; empty if there is none.
-        wall_s: The wall time of the run [s].
-        files: The run directory and pictures of a failure.
-    """
-
-    source: str
-    scenario: "Scenario"
-    overrides: Sequence[str]
-    home: str = ""
-    verdicts: "Mapping[str, Verdict]" = field(default_factory=dict)
-    error: str = ""
-    wall_s: float = 0.0
-    files: list[Path] = field(default_factory=list)
-
-    @property
-    def seed(self) -> int:
-        """The seed."""
-        assert self.scenario.simulation.seed is not None
-        return self.scenario.simulation.seed
-
-    @property
-    def fails(self) -> bool:
-        """Whether the run failed or violates an expectation."""
-        return bool(self.error) or any(v.fails for v in self.verdicts.values())
-
-    @property
-    def label(self) -> str:
-        """The home, of several, and the seed."""
-        return f"home {self.home}, seed {self.seed}" if self.home else f"seed {self.seed}"
-
-    @property
-    def name(self) -> str:
-        """The name of its run directory and pictures."""
-        home = f"-{file_name(self.home)}" if self.home else ""
-        return f"{file_name(Path(self.source).stem) or 'run'}{home}-seed-{self.seed}"
-
-    def commands(self, verdict: "Verdict") -> str:
-        """Return the commands that run it and show the worst moment of a verdict."""
-        changes = " ".join(f"'{override}'" for override in self.overrides)
-        run = f"fleet2d run {self.source} {changes}".rstrip()
-        worst = verdict.worst
-        moment = f" --at 'step {worst.worst}'" if worst is not None else ""
-        return f"{run} --seed {self.seed} --out {self.name} && fleet2d show {self.name}{moment}"
-
-
-# Characters that XML 1.0 can't contain.
-_ILLEGAL = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def write_junit(path: Path, cases: "Sequence[ScenarioCase]") -> None:
-    """Write a test suite for each scenario, with a test for each expectation and seed.
-
-    Raises:
-        InputError: The file can't be written.
-    """
-    root = ET.Element("testsuites")
-    for source in dict.fromkeys(case.source for case in cases):
-        cases_of_source = [case for case in cases if case.source == source]
-        suite = ET.SubElement(root, "testsuite", name=_xml_text(source))
-        for case in cases_of_source:
-            _add_case(suite, case)
-        counts = Counter(outcome.tag for outcome in suite.iterfind("testcase/*"))
-        suite.set("tests", str(len(suite)))
-        suite.set("failures", str(counts["failure"]))
-        suite.set("errors", str(counts["error"]))
-        suite.set("skipped", str(counts["skipped"]))
-        suite.set("time", f"{sum(case.wall_s for case in cases_of_source):.3f}")
-    ET.indent(root)
-    text = ET.tostring(root, encoding="utf-8", xml_declaration=True)
-    with os_errors_as(InputError, f"--junit {path} can't be written"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, text)
-
-
-def _add_case(suite: ET.Element, case: "ScenarioCase") -> None:
-    names = list(case.verdicts) or list(case.scenario.expect)
-    for name in names:
-        test = ET.SubElement(
-            suite,
-            "testcase",
-            classname=_xml_text(Path(case.source).stem),
-            name=f"{_xml_text(name)}[{_xml_text(case.label)}]",
-            time=f"{case.wall_s / len(names):.3f}",
-        )
-        if case.error:
-            error = ET.SubElement(test, "error", message=_xml_text(case.error))
-            error.text = _xml_text(case.error)
-            return
-        verdict = case.verdicts[name]
-        if verdict.fails:
-            failure = ET.SubElement(test, "failure", message=_xml_text(str(verdict)))
-            files = "".join(f"\nstored: {path}" for path in case.files)
-            failure.text = _xml_text(f"{verdict}\nto see it: {case.commands(verdict)}{files}")
-        elif verdict.holds is None:
-            ET.SubElement(test, "skipped", message=_xml_text(str(verdict)))
-
-
-def _xml_text(text: str) -> str:
-    return _ILLEGAL.sub("?", text)
-
-
-def print_cases(cases: "Sequence[ScenarioCase]") -> None:
-    """Print a table of expectations, then the failures."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, markup=False, soft_wrap=True)
-    all_verdicts = [v for case in cases for v in case.verdicts.values()]
-    has_untested = any(v.holds is None for v in all_verdicts)
-    has_occasions = any(v.occasions is not None for v in all_verdicts)
-    columns = [*(["untested"] * has_untested), *(["occasions"] * has_occasions)]
-    table = Table("scenario", "expectation", "held", *columns, "at least by", show_edge=False)
-    for source in dict.fromkeys(case.source for case in cases):
-        cases_of_source = [case for case in cases if case.source == source]
-        for number, name in enumerate(cases_of_source[0].scenario.expect):
-            verdicts = [case.verdicts[name] for case in cases_of_source if name in case.verdicts]
-            held = f"{sum(v.holds is True for v in verdicts)} of {len(cases_of_source)}"
-            numbers = [str(sum(v.holds is None for v in verdicts) or "")] if has_untested else []
-            if has_occasions:
-                occasions = [v.occasions for v in verdicts if v.occasions is not None]
-                numbers.append(str(sum(occasions)) if occasions else "")
-            table.add_row("" if number else source, name, held, *numbers, _lowest(verdicts))
-    console.print(table, soft_wrap=False)
-    notes = dict.fromkeys(note for verdict in all_verdicts for note in verdict.notes)
-    failures = [line for case in cases for line in _failure_lines(case)]
-    failed = sum(case.fails for case in cases)
-    runs = counted(len(cases), "run")
-    end = f"{failed} of {runs} failed" if failed else f"all held: {runs}"
-    console.print(*(f"note: {note}" for note in notes), *failures, end, sep="\n")
-
-
-def _failure_lines(case: "ScenarioCase") -> list[str]:
-    prefix = f"{case.source}, {case.label}: "
-    lines = [f"{prefix}{case.error}"] if case.error else []
-    for verdict in case.verdicts.values():
-        if verdict.fails:
-            lines += [f"{prefix}{verdict}", f"  to see it: {case.commands(verdict)}"]
-    return [*lines, *(f"  stored: {path}" for path in case.files)]
-
-
-def _lowest(verdicts: "Sequence[Verdict]") -> str:
-    """Return the lowest robustness of verdicts as text, else the shortest time to spare."""
-    from math import isfinite
-
-    from fleet2d.expectations.verdict import amount
-
-    measured = [verdict for verdict in verdicts if isfinite(verdict.robustness)]
-    if measured:
-        worst = min(measured, key=lambda verdict: verdict.robustness)
-        return amount(worst.robustness, worst.unit)
-    slack = [verdict.slack_s for verdict in verdicts if verdict.slack_s is not None]
-    return f"{min(slack):g} s to spare" if slack else ""
-
-
-FIRST_SEED = 1
-MAX_STORED_SEEDS = 5
-"""Maximum number of failing seeds of one scenario that are stored or drawn."""
+MAX_STORED = 5
+"""Maximum number of failing trials of an expectation that are stored and drawn."""
+FAILURES = "failures"
+"""The folder for runs in the commands that are printed."""
 
 
 def test(  # noqa: PLR0913 - options of the command line
     arguments: Annotated[
         list[str],
         typer.Argument(
-            metavar="SCENARIO.yaml... [KEY.PATH=VALUE]...",
-            help="Scenarios with expectations, and changes to all of them.",
+            metavar="TEST... [KEY.PATH=VALUE]...",
+            help="Scenarios with expectations, Python tests, folders of these, and changes to all.",
         ),
     ],
-    seeds: Annotated[int, typer.Option(min=1, help="The number of seeds of each.")] = 1,
+    seeds: Annotated[int | None, typer.Option(min=1, help="The number of seeds of each.")] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="The first seed; left out: the scenario's own, or 1.")
     ] = None,
@@ -210,160 +45,368 @@ def test(  # noqa: PLR0913 - options of the command line
             help="Run each in so many synthetic homes, or in the floor plans of a folder.",
         ),
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="JUnit XML to write.")] = None,
-    pictures: Annotated[
-        Path | None, typer.Option(help="Folder for a picture of the worst moment of each failure.")
+    build: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE.yaml", help="The build: its name, or settings laid over each test."
+        ),
     ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE.yaml",
+            help="Compare with another build on the same trials: its settings, or its name in the"
+            " history.",
+        ),
+    ] = None,
+    requirements: Annotated[
+        Path | None, typer.Option(help="A YAML file of requirements: ids and texts.")
+    ] = None,
+    history: Annotated[
+        Path | None, typer.Option(help="An SQLite file of verdicts by build, which it adds to.")
+    ] = None,
+    budget: Annotated[
+        str | None,
+        typer.Option(metavar="N|TIME", help="Run so many trials at most, or for '10 min'."),
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="One HTML file to write, to send.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="JUnit XML to write.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the run directories of seeds that fail.")
+        Path | None, typer.Option(help="Folder for runs that fail, and pictures of the moments.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     strict: Strict = False,
+    workers: Workers = None,
 ) -> None:
-    """Run scenarios and check their expectations.
+    """Run tests, and say whether their build is fit for release.
 
-    The exit code is 1 if one is violated.
+    The exit code is 1 if an expectation is violated; with --against, if it is clearly worse than
+    with that build, or fails only now.
 
     Examples:
       fleet2d test home.yaml --seeds 20
-      fleet2d test home.yaml --homes 10 --junit results.xml --pictures failures
+      fleet2d test tests/ --build new.yaml --against old.yaml --seeds 20 --report gate.html
     """
-    files = [argument for argument in arguments if "=" not in argument]
+    from fleet2d.testing.suite import check_set_up, collect
+
+    texts = [argument for argument in arguments if "=" not in argument]
     overrides = [argument for argument in arguments if "=" in argument]
-    if not files:
+    if not texts:
         raise InputError("name the scenarios to test: fleet2d test SCENARIO.yaml…")
-    if pictures is not None:
-        import fleet2d.viewing.pictures  # noqa: F401 - an error before anything is run, if matplotlib is missing
-    cases = [
-        case
-        for file in files
-        for home, change in _homes(homes, file, overrides)
-        for case in _cases(file, [*overrides, *change], seeds, seed, home, strict=strict)
-    ]
-    failures: Counter[str] = Counter()
-    for case in cases:
-        _run(case)
-        if case.fails and not case.error and (pictures or out):
-            failures[case.source] += 1
-            if failures[case.source] <= MAX_STORED_SEEDS:
-                _store(case, pictures, out)
+    tests, notes = collect(texts, overrides, seeds, seed, homes)
+    check_set_up(tests, strict=strict)
+    suite = _Suite(tests, notes, workers, show=not as_json)
+    suite.read(build, against, history, budget, requirements)
+    suite.run()
+    gate = suite.gate()
+    with ExitStack() as stack:
+        folder = out
+        if report is not None and out is None:
+            folder = Path(stack.enter_context(TemporaryDirectory()))
+        if folder is not None:
+            suite.store(gate, folder, MAX_STORED if out is not None else 1)
+        hints = {each: suite.hint(gate, each, out) for each in [*gate.blocking, *gate.known]}
+        if report is not None:
+            from fleet2d.testing.report import write_report
+
+            write_report(report, gate, hints, suite.pictures)
     if junit is not None:
-        write_junit(junit, cases)
+        from fleet2d.testing.junit import write_junit
+
+        write_junit(junit, gate, suite.times_s, hints)
     if as_json:
-        typer.echo(json.dumps([_content(case) for case in cases]))
+        typer.echo(json.dumps({**gate.content(), "trials": suite.content()}))
     else:
-        print_cases(cases)
-    if any(case.fails for case in cases):
+        _print(gate, hints, suite.files if out is not None else {})
+    if not gate.passes:
         raise typer.Exit(1)
 
 
-def _homes(
-    homes: str | None, source: str, overrides: Sequence[str]
-) -> Iterator[tuple[str, list[str]]]:
-    """Yield the homes to run a scenario in: a name, and the change of the scenario.
+@dataclass
+class _Suite:
+    """The tests of a command, what they are run with, and what came of it."""
+
+    tests: "list[SuiteTest]"
+    notes: list[str]
+    workers: int | None
+    show: bool
+    builds: "list[Build]" = field(default_factory=list)
+    against: str = ""
+    history: "History | None" = None
+    requirements: dict[str, str] | None = None
+    numbers: dict[str, list[int]] = field(default_factory=dict)
+    keys: "dict[str, list[TrialKey]]" = field(default_factory=dict)
+    reports: "list[list[TrialReport]]" = field(default_factory=list)
+    earlier: "list[TrialReport]" = field(default_factory=list)
+    files: "dict[TrialKey, list[Path]]" = field(default_factory=dict)
+    pictures: "dict[Tally, Path]" = field(default_factory=dict)
+    prints: dict[str, str] = field(default_factory=dict)
+
+    def read(
+        self,
+        build: str | None,
+        against: str | None,
+        history: Path | None,
+        budget: str | None,
+        requirements: Path | None,
+    ) -> None:
+        """Read the options, before anything is run.
+
+        Raises:
+            InputError: One of them is wrong.
+        """
+        from fleet2d.testing.gate import read_requirement_list
+        from fleet2d.testing.history import History, fingerprints_of
+
+        if history is not None and build is None:
+            raise InputError("--history: name the build whose verdicts are added: --build NAME")
+        if requirements is not None:
+            self.requirements = read_requirement_list(requirements)
+        self.keys = {test.name: test.keys() for test in self.tests}
+        self.builds = [_build_of(build or "")]
+        if history is not None:
+            self.history = History(history)
+            self.prints = fingerprints_of(self.tests)
+        if against is not None:
+            self._read_other(against)
+        self._plan(budget)
+
+    def _read_other(self, against: str) -> None:
+        other = _build_of(against)
+        if other.overlay is None and self.history is None:
+            raise InputError(
+                f"--against {against}: expected a YAML file of settings, or the name of a build in"
+                " the --history"
+            )
+        if other.name == self.builds[0].name:
+            raise InputError(f"--against: both builds are named {other.name}: rename a file")
+        self.against = other.name
+        if other.overlay is not None:
+            self.builds.append(other)
+        elif self.history is not None:
+            self.earlier = self.history.reports(other.name, self.prints)
+
+    def _plan(self, budget: str | None) -> None:
+        """Choose the trials to run."""
+        from fleet2d.studies.executors import cores
+        from fleet2d.testing.command import parse_budget
+        from fleet2d.testing.history import plan
+
+        sizes = {name: len(keys) for name, keys in self.keys.items()}
+        counts = sizes
+        if budget is not None:
+            past = {} if self.history is None else self.history.past()
+            workers = self.workers or cores()
+            tries, seconds = parse_budget(budget)
+            counts, notes = plan(sizes, past, tries, seconds, len(self.builds), workers)
+            self.notes += notes
+        for test in self.tests:
+            order = list(range(sizes[test.name]))
+            if not test.function:  # all homes with the first seed come before any with the next
+                each = len(test.seeds)
+                order = [number for first in range(each) for number in order[first::each]]
+            self.numbers[test.name] = sorted(order[: counts[test.name]])
+
+    def run(self) -> None:
+        """Run all trials, and add them to the history."""
+        from fleet2d.testing.suite import run_suite
+
+        self.reports = run_suite(
+            self.tests, self.builds, self.keys, self.numbers, workers=self.workers, show=self.show
+        )
+        if self.history is not None:
+            for build, reports in zip(self.builds, self.reports, strict=True):
+                self.history.add(build.name, self.prints, reports)
+
+    def gate(self) -> "Gate":
+        """Return what the trials show."""
+        from fleet2d.testing.gate import Gate, compare, cover, tally
+
+        tallies = tally(self.tests, self.reports[0])
+        other = self.reports[1] if len(self.reports) > 1 else self.earlier
+        before = tally(self.tests, other) if self.against else []
+        return Gate(
+            self.builds[0].name,
+            tallies,
+            self.against,
+            before,
+            compare(tallies, before),
+            cover(tallies, self.requirements),
+            {} if self.history is None else self.history.trend(),
+            self.notes,
+        )
+
+    def store(self, gate: "Gate", folder: Path, most: int) -> None:
+        """Run the worst failing trials again, to store them and to draw their moments.
+
+        Args:
+            gate: The gate.
+            folder: Where runs and pictures are stored.
+            most: The largest number of trials of each expectation.
+        """
+        from fleet2d.testing.suite import TrialJob, TrialTask, run_name
+
+        job = TrialJob(tuple(self.tests), tuple(self.builds))
+        failing = [each for each in [*gate.blocking, *gate.known] if each.outcomes]
+        for each, key in [(t, k) for t in failing for k in _to_see(gate, t)[:most]]:
+            if key in self.files:
+                continue
+            test = next(n for n, test in enumerate(self.tests) if test.name == each.test)
+            task = TrialTask(0, 0, "", "", key, test, 0, self.keys[each.test].index(key))
+            directory = folder / run_name(key)
+            try:
+                result = job.run(task, directory)
+            except Fleet2DError as error:
+                self.notes.append(f"{directory} was not stored: {error}")
+                continue
+            self.files[key] = [directory]
+            evidence = {r.name: r.evidence for r in result.results}
+            for other in failing:
+                if key in _to_see(gate, other)[:most]:
+                    self._draw(other, key, directory, evidence.get(other.name))
+
+    def _draw(self, each: "Tally", key: "TrialKey", directory: Path, evidence: object) -> None:
+        """Draw the worst moment of a failure beside its run."""
+        from fleet2d.options import file_name
+
+        outcome = each.outcomes[key]
+        if outcome.step is None:
+            return
+        picture = directory.with_name(f"{directory.name}-{file_name(outcome.name)}.png")
+        try:
+            from fleet2d.runs.run import open_run
+            from fleet2d.viewing.figures import draw_failure
+
+            draw_failure(open_run(directory), outcome.step, picture, outcome.says, evidence)  # type: ignore[arg-type]
+        except Fleet2DError as error:  # such as that matplotlib is not installed
+            self.notes.append(f"{picture.name} was not drawn: {error}")
+            return
+        self.files[key].append(picture)
+        self.pictures.setdefault(each, picture)
+
+    def hint(self, gate: "Gate", each: "Tally", out: Path | None) -> str:
+        """Return the commands that show a failure."""
+        from fleet2d.testing.suite import run_name
+
+        key = next(iter(_to_see(gate, each)), None)
+        if key is None:
+            return ""
+        test = next(test for test in self.tests if test.name == each.test)
+        outcome = each.outcomes.get(key)
+        at = "" if outcome is None or outcome.step is None else f" --at 'step {outcome.step}'"
+        if out is not None and key in self.files:
+            return f"see it: fleet2d show {self.files[key][0]}{at}"
+        run = test.command(key, self.builds[0], FAILURES)
+        return f"see it: {run}; fleet2d show {FAILURES}/{run_name(key)}{at}"
+
+    @property
+    def times_s(self) -> Mapping[str, float]:
+        """The wall time of each test [s]."""
+        times_s: Counter[str] = Counter()
+        for report in self.reports[0]:
+            times_s[report.key.test] += report.wall_s  # type: ignore[assignment]
+        return times_s
+
+    def content(self) -> list[dict[str, object]]:
+        """Return the trials as plain JSON data."""
+        return [
+            {
+                "test": report.key.test,
+                "build": build.name,
+                "seed": report.key.seed,
+                **({"home": report.key.home} if report.key.home else {}),
+                "holds": report.holds,
+                "error": report.error or None,
+                "wall_s": report.wall_s,
+                "expectations": {o.name: o.content for o in report.outcomes},
+                "files": [str(path) for path in self.files.get(report.key, ())],
+            }
+            for build, reports in zip(self.builds, self.reports, strict=True)
+            for report in reports
+        ]
+
+
+def _build_of(text: str) -> "Build":
+    """Return the build of an option: a file of settings, or only a name.
 
     Raises:
-        InputError: There are no such floor plans.
+        InputError: There is no such file.
     """
-    from fleet2d.scenario.load import load_scenario
-    from fleet2d.studies.axes import FloorplansAxis, SyntheticAxis
+    from fleet2d.testing.suite import SUFFIXES, Build
 
-    if homes is None:
-        yield "", []
-        return
-    furnish = load_scenario(source, *overrides).resolved()["floorplan"].get("furnish")
-    settings = {"furnish": furnish} if furnish else {}
-    if homes.isdigit():
-        axis = SyntheticAxis(synthetic=int(homes), settings=settings)
-    else:
-        axis = FloorplansAxis(floorplans=(homes,), settings=settings)  # type: ignore[assignment]
-    for choice in axis.choices("home"):
-        (_, section) = choice.changes[0]
-        yield str(choice.labels["home"]), [f"floorplan={json.dumps(section)}"]
+    path = Path(text)
+    if path.suffix not in SUFFIXES:
+        return Build(text)
+    if not path.is_file():
+        raise InputError(f"there is no {path}: a build is a YAML file of settings, or a name")
+    return Build(path.stem, path)
 
 
-def _cases(
-    source: str,
-    overrides: Sequence[str],
-    seeds: int,
-    seed: int | None,
-    home: str = "",
-    *,
-    strict: bool = False,
-) -> Iterator[ScenarioCase]:
-    """Yield a scenario with each of its seeds, after a check of its set-up.
-
-    Raises:
-        InputError: The scenario or an expectation is wrong, or it has no expectations.
-    """
-    from fleet2d.engine.simulation import Simulation
-    from fleet2d.scenario.load import load_scenario
-
-    scenario = load_scenario(source, *overrides)
-    if not scenario.expect:
-        raise InputError(
-            f"{source} has no expectations: write, for example,\n"
-            "  expect: {keeps_off: 'always(distance(ana, astro) > 0.5 m)'}"
-        )
-    if seed is None:
-        seed = scenario.simulation.seed
-    first_seed = FIRST_SEED if seed is None else seed
-    if not home:  # of several homes, some may lack what it needs
-        report_wrong(Simulation(scenario), strict=strict)
-    for number in range(first_seed, first_seed + seeds):
-        simulation = scenario.simulation.model_copy(update={"seed": number})
-        yield ScenarioCase(
-            source, scenario.model_copy(update={"simulation": simulation}), overrides, home
-        )
+def _to_see(gate: "Gate", each: "Tally") -> "list[TrialKey]":
+    """Return the trials that show a failure, the worst first; those that got worse come first."""
+    change = gate.change_of.get((each.test, each.name))
+    worse = set(change.worse) if change is not None else set()
+    failed = each.failed or [report.key for report in each.errors]
+    return sorted(failed, key=lambda key: key not in worse)
 
 
-def _run(case: ScenarioCase) -> None:
-    """Run a case, and judge it."""
-    import time
+def _print(
+    gate: "Gate", hints: "Mapping[Tally, str]", files: "Mapping[TrialKey, list[Path]]"
+) -> None:
+    """Print a table of expectations, what failed or differs, and the verdict."""
+    from rich.console import Console
 
-    from fleet2d.engine.simulation import Simulation
-
-    start_s = time.perf_counter()
-    try:
-        simulation = Simulation(case.scenario)
-        simulation.run()
-        case.verdicts = simulation.verdicts()
-    except Fleet2DError as error:
-        case.error = str(error)
-    case.wall_s = time.perf_counter() - start_s
-
-
-def _store(case: ScenarioCase, pictures: Path | None, out: Path | None) -> None:
-    """Run a failed case again, to store it and to draw the worst moments."""
-    from fleet2d.engine.simulation import Simulation, evidence_of
-
-    directory = None if out is None else out / case.name
-    simulation = Simulation(case.scenario, out=directory)
-    run = simulation.run()
-    if directory is not None:
-        case.files.append(directory)
-    if pictures is None:
-        return
-    from fleet2d.viewing.figures import draw_failure
-
-    pictures.mkdir(parents=True, exist_ok=True)
-    for verdict in case.verdicts.values():
-        worst = verdict.worst
-        if worst is not None:
-            path = pictures / f"{case.name}-{file_name(verdict.name)}.png"
-            evidence = evidence_of(simulation, verdict.name)
-            draw_failure(run, worst.worst, path, str(verdict), evidence)
-            case.files.append(path)
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console.print(_table(gate), soft_wrap=False)
+    outcomes = [o for each in gate.tallies for o in each.outcomes.values()]
+    notes = dict.fromkeys(note for o in outcomes for note in o.content.get("notes", ()))
+    stored = [f"stored: {path}" for paths in files.values() for path in paths]
+    says = list(gate.sentences(hints))
+    headline = gate.headline()
+    console.print(*(f"note: {note}" for note in notes), *says, *stored, headline, sep="\n")
 
 
-def _content(case: ScenarioCase) -> dict[str, Any]:
-    return {
-        "scenario": case.source,
-        "seed": case.seed,
-        **({"home": case.home} if case.home else {}),
-        "holds": not case.fails,
-        "error": case.error or None,
-        "wall_s": case.wall_s,
-        "expectations": {name: verdict.content() for name, verdict in case.verdicts.items()},
-        "files": [str(path) for path in case.files],
-    }
+def _table(gate: "Gate") -> object:
+    from rich.table import Table
+
+    outcomes = [o for each in gate.tallies for o in each.outcomes.values()]
+    has_untested = any(o.holds is None for o in outcomes)
+    has_occasions = any(o.content.get("occasions") is not None for o in outcomes)
+    columns = [*(["untested"] * has_untested), *(["occasions"] * has_occasions)]
+    columns += ["at least by", *([f"than {gate.against}"] if gate.against else [])]
+    table = Table(show_edge=False)
+    for column in ("test", "expectation", "held", *columns):
+        table.add_column(column, overflow="fold")
+    last = ""
+    for each in gate.tallies:
+        found = list(each.outcomes.values())
+        row = ["" if each.test == last else gate.short[each.test], each.name or "(can't be run)"]
+        row.append(f"{each.held} of {len(found) + len(each.errors)}")
+        row += [str(sum(o.holds is None for o in found) or "")] if has_untested else []
+        if has_occasions:
+            numbers = [o.content.get("occasions") for o in found]
+            is_known = any(number is not None for number in numbers)
+            row.append(str(sum(filter(None, numbers))) if is_known else "")
+        row.append(_least(each))
+        if gate.against:
+            change = gate.change_of.get((each.test, each.name))
+            row.append("" if change is None else _difference(len(change.worse), len(change.better)))
+        table.add_row(*row)
+        last = each.test
+    return table
+
+
+def _difference(worse: int, better: int) -> str:
+    numbers = {"worse": worse, "better": better}
+    return ", ".join(f"{number} {word}" for word, number in numbers.items() if number) or "same"
+
+
+def _least(each: "Tally") -> str:
+    """Return the lowest margin of an expectation as text."""
+    from fleet2d.expectations.verdict import amount
+
+    margins = [(o.margin, o.unit) for o in each.outcomes.values() if o.margin is not None]
+    if not margins:
+        return ""
+    margin, unit = min(margins)
+    return f"{margin:g} s to spare" if unit == "s" else amount(margin, unit)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import lru_cache
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -368,36 +369,59 @@ def _expect_no_more(_: object) -> None:
     """Do nothing: the expectations are in the scenario. A job that has run is still pickled."""
 
 
+def claimed_tests(path: Path) -> list[str]:
+    """Return the names of the tests of a file that have a claim.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    return [name for name, value in _content(path).items() if hasattr(value, ATTRIBUTE)]
+
+
 def claimed_test(path: Path, name: str) -> tuple[Body, Claim]:
     """Return a test of a file, and its claim.
 
     Raises:
         InputError: There is no such file or test, or it has other arguments than a trial.
     """
+    tests = claimed_tests(path)
+    if name not in tests:
+        raise InputError(
+            f"{path} has no test {name!r} with a trial{suggest(name, tests, 'It has')}"
+        )
+    function = _content(path)[name]
+    others = [name for name in signature(function).parameters if name != "trial"]
+    if others or hasattr(function, "pytestmark"):
+        extra = f"other arguments ({', '.join(others)})" if others else "pytest marks"
+        raise InputError(
+            f"{path}::{name} has {extra}: outside of pytest a test has no marks, and `trial` as its"
+            " only argument"
+        )
+    return function, getattr(function, ATTRIBUTE)
+
+
+def _content(path: Path) -> Mapping[str, Any]:
+    """Return what a file of tests defines.
+
+    Raises:
+        InputError: There is no such file.
+    """
     if not path.is_file():
         raise InputError(f"there is no {path}: name a scenario, or a test as FILE.py::NAME")
+    return _loaded(path.absolute(), path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _loaded(path: Path, _: int) -> Mapping[str, Any]:
     module_name = f"fleet2d_test_{path.stem}"
     specification = importlib.util.spec_from_file_location(module_name, path)
     assert specification is not None
     assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[module_name] = module
-    sys.path.insert(0, str(path.parent.absolute()))  # as pytest does
+    sys.path.insert(0, str(path.parent))  # as pytest does
     try:
         specification.loader.exec_module(module)
     finally:
         sys.path.pop(0)
-    tests = [n for n, value in vars(module).items() if hasattr(value, ATTRIBUTE)]
-    if name not in tests:
-        raise InputError(
-            f"{path} has no test {name!r} with a trial{suggest(name, tests, 'It has')}"
-        )
-    function = getattr(module, name)
-    others = [name for name in signature(function).parameters if name != "trial"]
-    if others or hasattr(function, "pytestmark"):
-        extra = f"other arguments ({', '.join(others)})" if others else "pytest marks"
-        raise InputError(
-            f"{path}::{name} has {extra}: falsify needs a test without marks, whose only argument"
-            " is `trial`"
-        )
-    return lambda trial: function(trial=trial), getattr(function, ATTRIBUTE)
+    return vars(module)

@@ -4,7 +4,7 @@ import dis
 import inspect
 import math
 import traceback
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
@@ -15,6 +15,7 @@ from fleet2d.configuration.problems import counted
 from fleet2d.engine.simulation import Simulation, evidence_of
 from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
+from fleet2d.expectations.parse import read_requirements
 from fleet2d.expectations.temporal import after, at_end, eventually, until
 from fleet2d.expectations.verdict import Verdict, VerdictEvidence
 from fleet2d.floorplan.home import HOME_CACHE
@@ -67,6 +68,15 @@ class Trial(Simulation):
         super().__init__(scenario, out=out)
         self._without = frozenset(without)
         self.acts: list[frozenset[str]] = []
+        self._covers: dict[str, tuple[str, ...]] = {}
+
+    def expect(
+        self, expectation: Expectation | str, name: str = "", *, covers: Sequence[str] = ()
+    ) -> str:
+        """Add an expectation and the requirements that it covers; see `Simulation.expect`."""
+        name = super().expect(expectation, name)
+        self._covers[name] = read_requirements(covers)
+        return name
 
     def do(self, act: Intervention | Mapping[str, Any]) -> None:
         """Apply an intervention at the present step; see `Simulation.do`."""
@@ -101,6 +111,7 @@ class Trial(Simulation):
             replace(
                 result_of(verdict, expectations.entries[name].expectation),
                 evidence=evidence_of(self, name) if verdict.fails else None,
+                covers=self._covers.get(name, ()),
             )
             for name, verdict in self.verdicts().items()
         )
@@ -136,6 +147,8 @@ class ExpectationResult:
             about, its line for an `assert`, else empty.
         names: What it is about: names of bodies, rooms, doors and the like.
         evidence: Its signals, if it failed, for a picture.
+        verdict: The verdict; None for what is no expectation, such as an `assert`.
+        covers: The requirements that it covers.
     """
 
     name: str
@@ -147,6 +160,8 @@ class ExpectationResult:
     kind: str = ""
     names: frozenset[str] = frozenset()
     evidence: VerdictEvidence | None = None
+    verdict: Verdict | None = None
+    covers: tuple[str, ...] = ()
 
 
 def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
@@ -175,6 +190,7 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
         untested=verdict.holds is None,
         kind=kind_of(expectation),
         names=frozenset(part for name in names for part in str(name).split(".") if part),
+        verdict=verdict,
     )
 
 

@@ -1,0 +1,201 @@
+"""The page of a gate: one HTML file to send, without references to other files."""
+
+import base64
+import html
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from fleet2d.expectations.verdict import amount
+from fleet2d.testing.claim import percent
+from fleet2d.testing.gate import HELD, NOT_RUN, Gate, PairedChange, Tally, listed
+from fleet2d.viewing.page_data import POLICY, write_file
+from fleet2d.viewing.report import STYLE
+
+MAX_BUILDS = 12
+"""Builds of the history in the page: the newest."""
+LOOK = """
+.verdict { padding: .6rem 1rem; border-left: .4rem solid; font-size: 1.2rem; font-weight: 600; }
+.good { border-color: #3a7d44; background: #3a7d4422; }
+.bad { border-color: #b3261e; background: #b3261e22; }
+.odd { background: #c2850022; }
+td { vertical-align: top; }
+td.good, td.bad, td.odd { padding-left: .4rem; }
+td { overflow-wrap: anywhere; }
+td:last-child { min-width: 9rem; }
+pre { white-space: pre-wrap; }
+@media print { figure, table { break-inside: avoid; } }
+"""
+KIND_OF = {HELD: "good", NOT_RUN: "odd"}
+"""Class of a cell with a verdict; "bad" for others."""
+
+
+def write_report(
+    path: Path, gate: Gate, hints: Mapping[Tally, str], pictures: Mapping[Tally, Path]
+) -> None:
+    """Write the page of a gate.
+
+    Args:
+        path: The file; an existing one is replaced.
+        gate: The gate.
+        hints: The commands that show failures.
+        pictures: Pictures of the worst moments of failures.
+
+    Raises:
+        InputError: The file can't be written.
+    """
+    title = html.escape(gate.headline())
+    kind = "good" if gate.passes else "bad"
+    parts = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{title}</title><style>{STYLE}{LOOK}</style></head><body>",
+        f'<h1>Release gate</h1><p class="verdict {kind}">{title}.</p>',
+        *_says(gate),
+        *_coverage(gate),
+        *_comparison(gate),
+        *_failures(gate, hints, pictures),
+        *_all(gate),
+        *_trend(gate),
+        "</body></html>\n",
+    ]
+    write_file(path, "\n".join(parts).encode())
+
+
+def _says(gate: Gate) -> Iterator[str]:
+    items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in gate.summary())
+    if items:
+        yield f"<ul>{items}</ul>"
+
+
+def _coverage(gate: Gate) -> Iterator[str]:
+    """Yield the matrix of requirements and tests."""
+    if not gate.coverage:
+        return
+    tests = list(dict.fromkeys(test for row in gate.coverage for test, _ in row.verdicts))
+    rows = []
+    for row in gate.coverage:
+        cells = [_cell(row.requirement), _cell(row.text), _verdict(row.verdict)]
+        for test in tests:
+            found = {name: v for (t, name), v in row.verdicts.items() if t == test}
+            text = ", ".join(f"{name}: {verdict}" for name, verdict in found.items())
+            cells.append(_cell(text, _worst(found.values())))
+        rows.append(cells)
+    yield "<h2>Requirements</h2>"
+    names = [gate.short[test] for test in tests]
+    yield _table(["requirement", "", "verdict", *names], rows)
+
+
+def _comparison(gate: Gate) -> Iterator[str]:
+    """Yield how the two builds differ on the same trials."""
+    if not gate.against:
+        return
+    title = f"{gate.build or 'This build'} compared with {gate.against}"
+    yield f"<h2>{html.escape(title)}</h2>"
+    yield (
+        "<p>Both ran the same trials. p is the exact probability of such a difference if the builds"
+        " don't differ (McNemar; by homes where there are several), corrected by Holm's method for"
+        " all expectations.</p>"
+    )
+    rows = []
+    for change in gate.changes:
+        kind = {-1: "bad", 1: "good"}.get(change.direction, "odd" if change.worse else "")
+        rows.append(
+            [
+                _cell(gate.short[change.test]),
+                _cell(change.name),
+                _cell(f"{change.pairs}"),
+                _cell(f"{len(change.worse)}", kind if change.worse else ""),
+                _cell(f"{len(change.better)}", kind if change.better else ""),
+                _cell(f"{change.p_holm:.2g}"),
+                _cell(_shift(change), "odd" if change.is_narrower else ""),
+                _cell(listed(change.worse or change.better)),
+            ]
+        )
+    head = ["test", "expectation", "trials", "worse", "better", "p (Holm)", "margin", "which"]
+    yield _table(head, rows) if rows else "<p>No trial is the same: nothing is compared.</p>"
+
+
+def _shift(change: PairedChange) -> str:
+    if change.shift is None:
+        return ""
+    sign = "+" if change.shift > 0 else ""
+    return f"{sign}{amount(change.shift, change.unit)} (p = {change.p_shift:.2g})"
+
+
+def _failures(
+    gate: Gate, hints: Mapping[Tally, str], pictures: Mapping[Tally, Path]
+) -> Iterator[str]:
+    """Yield what failed, with pictures of the worst moments and the commands to see them."""
+    for title, tallies in (("What speaks against it", gate.blocking), ("Known", gate.known)):
+        if not tallies:
+            continue
+        yield f"<h2>{title}</h2>"
+        if tallies is gate.known:
+            yield f"<p>This fails with {html.escape(gate.against)}, too.</p>"
+        for each in tallies:
+            yield f"<h3>{html.escape(each.title)}</h3><p>{html.escape(each.sentence())}</p>"
+            if len(each.failed) > 1:
+                yield f"<p>Failed in {html.escape(listed(each.failed))}.</p>"
+            if each in hints:
+                yield f"<pre>{html.escape(hints[each])}</pre>"
+            if each in pictures:
+                data = base64.b64encode(pictures[each].read_bytes()).decode()
+                image = f'<img alt="the worst moment" src="data:image/png;base64,{data}">'
+                yield f"<figure>{image}</figure>"
+
+
+def _all(gate: Gate) -> Iterator[str]:
+    """Yield all expectations with their rates."""
+    rows = []
+    for each in gate.tallies:
+        low, high = each.rate
+        number = len(each.outcomes) + len(each.errors)
+        cells = [_cell(gate.short[each.test]), _cell(each.name), _verdict(each.verdict)]
+        cells.append(_cell(f"{each.held} of {number}"))
+        cells.append(_cell(f"{percent(low)} to {percent(high)}" if each.outcomes else ""))
+        rows.append(cells)
+    yield "<h2>All expectations</h2>"
+    yield _table(["test", "expectation", "verdict", "held", "95 % interval"], rows)
+
+
+def _trend(gate: Gate) -> Iterator[str]:
+    """Yield how often each expectation held with the builds of the history."""
+    builds = list(gate.trend)[-MAX_BUILDS:]
+    if not builds:
+        return
+    shown = {(each.test, each.name) for each in gate.tallies}
+    places = dict.fromkeys(place for build in builds for place in gate.trend[build])
+    rows = []
+    for place in places:
+        if place not in shown:
+            continue
+        cells = [_cell(gate.short[place[0]]), _cell(place[1])]
+        for build in builds:
+            held, number = gate.trend[build].get(place, (0, 0))
+            kind = "" if not number else "good" if held == number else "odd" if held else "bad"
+            cells.append(_cell(f"{held} of {number}" if number else "", kind))
+        rows.append(cells)
+    yield "<h2>History</h2><p>In how many trials each expectation held, by build.</p>"
+    yield _table(["test", "expectation", *builds], rows)
+
+
+def _verdict(verdict: str) -> str:
+    return _cell(verdict, KIND_OF.get(verdict, "bad"))
+
+
+def _worst(verdicts: Iterable[str]) -> str:
+    kinds = {KIND_OF.get(verdict, "bad") for verdict in verdicts}
+    return next((kind for kind in ("bad", "odd", "good") if kind in kinds), "")
+
+
+def _cell(text: str, kind: str = "") -> str:
+    marked = f' class="{kind}"' if kind else ""
+    return f"<td{marked}>{html.escape(text)}</td>"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
+    body = "".join(f"<tr>{''.join(cells)}</tr>" for cells in rows)
+    return f"<table><tr>{names}</tr>{body}</table>"
