@@ -60,7 +60,7 @@ def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
     path = run.path("astro", timedelta(seconds=1))
     *_, discs, _, name = stage.body_artists
     disc = discs.get_paths()[-1].get_extents()
-    assert "astro" == name.get_text()
+    assert "Astro" == name.get_text()
     assert (path.x[25_321], path.y[25_321]) == pytest.approx((disc.p0 + disc.p1) / 2)
 
 

@@ -4,10 +4,12 @@ The page and Python's pictures draw the same: the page receives symbols as shape
 a home, and the tables here as constants that `tools.contract_types` writes.
 """
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal
 
+from fleet2d.floorplan.rooms.room import Room
 from fleet2d.viewing.contract import ShapeFacts
 
 Material = Literal["planks", "carpet", "tiles", "plain"]
@@ -54,6 +56,10 @@ WALL_SHADOW = "#3c2d196b"
 DOOR = "#a9783f"
 OUTLINE_FILL = "#d9d2c6"
 OUTLINE_EDGE = "#8b857b"
+
+NIGHT = ("#283e78", 0.55)
+DUSK = ("#ffb070", 0.22)
+"""Colour and opacity of the darkest and of the reddest light, over what it falls on."""
 
 OUT = ("Out of home", "#e4e0d7")
 OTHER = ("Other", "#9aa3ad")
@@ -107,6 +113,35 @@ def constants() -> dict[str, Any]:
         "out": {"name": OUT[0], "color": OUT[1], "activities": ()},
         "other": {"name": OTHER[0], "color": OTHER[1], "activities": ()},
     }
+
+
+def body_label(name: str) -> str:
+    """Return a name as people write it: with a capital letter, and spaces for underscores.
+
+    Example:
+        >>> body_label("ana"), body_label("living_room")
+        ('Ana', 'Living room')
+    """
+    words = name.replace("_", " ")
+    return words[:1].upper() + words[1:]
+
+
+def room_labels(rooms: Sequence[Room]) -> list[str]:
+    """Return rooms as people write them: with their numbers where there are several of a type.
+
+    Example:
+        >>> import fleet2d
+        >>> room_labels(fleet2d.load_floorplan("family_home").rooms)[3:7]
+        ['Dining room', 'Kitchen', 'Bedroom 0', 'Bedroom 1']
+    """
+    counts = Counter(room.type for room in rooms)
+    labels = []
+    for room in rooms:
+        number = room.name.removeprefix(f"{room.type}_")
+        is_numbered = room.name != number and number.isdecimal()
+        is_alone = is_numbered and counts[room.type] == 1
+        labels.append(body_label(room.type if is_alone else room.name))
+    return labels
 
 
 def floor_of(kind: str, number: int = 0) -> tuple[Material, str, float]:

@@ -122,7 +122,7 @@ def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[S
     return floors
 
 
-def _starts_unlit(scenario: Mapping[str, Any]) -> bool:
+def starts_unlit(scenario: Mapping[str, Any]) -> bool:
     """Return whether people switch lights, which are off at first then."""
     return any(user.get("lights") for user in scenario.get("users", {}).values())
 
@@ -284,7 +284,7 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
         story=story_of(run),
         slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
         skies=skies_of(scenario, run.clock),
-        starts_unlit=_starts_unlit(scenario),
+        starts_unlit=starts_unlit(scenario),
         event_kinds=sorted(EventKind),
         metrics=as_json(run.metrics),
         scenario=scenario,
@@ -468,7 +468,7 @@ def live_facts(simulation: Simulation) -> RunFacts:
         story=[],
         slows=slow_floors(scenario, interventions_of(simulation), clock),
         skies=skies_of(scenario, clock),
-        starts_unlit=_starts_unlit(scenario),
+        starts_unlit=starts_unlit(scenario),
         event_kinds=sorted(EventKind),
         metrics={},
         scenario=scenario,

@@ -14,6 +14,7 @@ from matplotlib.collections import Collection, LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
@@ -26,8 +27,10 @@ from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.local_time import rules_of
 from fleet2d.viewing.contract import BodyFacts
 from fleet2d.viewing.home_facts import WallsHistory
+from fleet2d.viewing.look import body_label, room_labels
+from fleet2d.viewing.night import Light
 from fleet2d.viewing.pictures.charts import AskedTime, asked_of
-from fleet2d.viewing.pictures.floorplan import floorplan_axes
+from fleet2d.viewing.pictures.floorplan import LETTER_WIDTH, floorplan_axes, points_per_m
 from fleet2d.viewing.pictures.life import (
     HATCH_COLOR,
     QUIET_COLOR,
@@ -63,13 +66,14 @@ def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axe
     begin, end = mdates.date2num(clock.stamps(np.array([0, clock.steps]))).tolist()
     boxes: list[F64] = []
     faces: list[tuple[float, float, float]] = []
+    labels = room_labels(plan.rooms)
     for number, body in enumerate(bodies):
         for start, stop, room in _stretches(run.path(body["name"], interval), clock, end):
             low, high = number, number + ROW_PART
             boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
             if room >= 0 and stop - start > LABEL_PART * (end - begin):
-                name = plan.rooms[room].name.replace("_", " ")
+                name = labels[room]
                 style: dict[str, Any] = {"ha": "center", "va": "center", "color": TEXT_COLOR}
                 at = (start + stop) / 2
                 axes.text(at, number + 0.42, name, clip_on=True, fontsize=6.5, **style)
@@ -110,7 +114,9 @@ def _label(axes: Axes, bodies: Sequence[BodyFacts], clock: Clock) -> None:
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator, tz=zone))
     axes.xaxis.get_offset_text().set_visible(False)
-    axes.set_yticks(np.arange(len(bodies)) + ROW_PART / 2, [body["name"] for body in bodies])
+    axes.set_yticks(
+        np.arange(len(bodies)) + ROW_PART / 2, [body_label(body["name"]) for body in bodies]
+    )
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
     for label, body in zip(axes.get_yticklabels(), bodies, strict=True):
         label.set(color=body["color"], fontweight="bold")
@@ -127,6 +133,12 @@ LYING = 2.6  # length of somebody who lies, as a share of the width
 NOSE = 1.6  # length of the line of the heading [radii]
 STRIP_ROWS = 6
 ABOVE_M = 0.6  # space above the plan
+NAME_PT = 8.5
+BOLD_WIDTH = 0.72  # of a bold letter, as a share of its size
+LINE_HEIGHT = 1.2  # as a share of the size of its letters
+
+Box = tuple[float, float, float, float]
+"""Left, bottom, right and top of a text [m]."""
 
 
 @dataclass
@@ -141,6 +153,7 @@ class BodyArtists:
     radius: float
     name: Any
     views: list[F64]
+    place: tuple[float, float] = (0.0, 0.0)
     view_key: object = None
     lies: bool = False
 
@@ -193,9 +206,12 @@ class Stage:
         floorplan_axes(self._plan, self._axes, title=False)
         _, _, _, top = self._plan.bounds
         self._axes.set_ylim(top=top + ABOVE_M)
+        self._letter_m = NAME_PT / points_per_m(self._axes)
+        self._room_names = [_box_of(text, self._letter_m / NAME_PT) for text in self._axes.texts]
         facts_of_bodies = bodies_of(run.manifest["scenario"], run.manifest["entities"])
         self.bodies = [self._artists(facts) for facts in facts_of_bodies]
         self._postures = Postures(run, self._plan)
+        self._light = Light(run, self._plan, facts_of_bodies, self._axes)
         self._views = PolyCollection([], facecolors=VIEW_COLOR, alpha=0.4, zorder=2.2)
         self._edges = PolyCollection(
             [], facecolors="none", edgecolors=VIEW_EDGE, lw=0.8, zorder=3.2
@@ -221,8 +237,13 @@ class Stage:
 
     @property
     def body_artists(self) -> list[Artist]:
-        """The artists of bodies, of their paths and of their views, in the order of drawing."""
-        return [*self._collections, *(body.name for body in self.bodies)]
+        """The light, and the artists of bodies, of their paths and views, as they are drawn."""
+        return [
+            self._light.image,
+            self._light.walls,
+            *self._collections,
+            *(body.name for body in self.bodies),
+        ]
 
     @property
     def clock_artists(self) -> list[Artist]:
@@ -236,9 +257,13 @@ class Stage:
         names = [self._name(body, step) for body in self.bodies]
         poses = [self._place(body, index, step) for body in self.bodies]
         self._draw_bodies(poses)
+        self._place_names()
+        here = {body.facts["name"]: int(body.path.room[index]) for body in self.bodies}
+        self._light.show(step, here)
         views = [body.view_key for body in self.bodies]
         lines = [line.tobytes() for line in self._draw_paths(index)]
-        self._scene = (names, poses, views, lines, self._draw_sightings(step, index))
+        sightings = self._draw_sightings(step, index)
+        self._scene = (names, poses, views, lines, sightings, self._light.key)
         path = self.bodies[0].path if self.bodies else None
         if path is not None:
             time = path.time[index]
@@ -246,7 +271,7 @@ class Stage:
                 self._cursor.set_xdata([time, time])
             moment = time.astype(object)
             self._clock.set_text(f"{moment:%a} {moment.day} {moment:%b %H:%M}")
-        away = [body.facts["name"] for body in self.bodies if body.path.away[index]]
+        away = [body_label(body.facts["name"]) for body in self.bodies if body.path.away[index]]
         self._away.set_text(f"away: {', '.join(away)}" if away else "")
         return self._scene != last_scene
 
@@ -298,18 +323,21 @@ class Stage:
     def _artists(self, facts: BodyFacts) -> BodyArtists:
         interval = timedelta(microseconds=self._step_us * self.stride)
         path = self._part.path(facts["name"], interval)
-        name = self._axes.text(0, 0, facts["name"], fontsize=8.5, weight="bold")
+        name = self._axes.text(0, 0, body_label(facts["name"]), fontsize=NAME_PT, weight="bold")
         name.set(color=facts["color"], ha="center", va="bottom", zorder=5, clip_on=True)
         name.set_path_effects([withStroke(linewidth=2.0, foreground=RIM_COLOR)])
         return BodyArtists(facts, path, max(facts["radius"], MIN_RADIUS_M), name, [])
 
     def _name(self, body: BodyArtists, step: int) -> str:
         """Write what a robot asks, and what is answered, beside its name; return the text."""
-        text = name = body.facts["name"]
+        name = body.facts["name"]
+        text = body_label(name)
         for talk in self._talks:
             if talk.robot == name and talk.step <= step <= self._end_of(talk):
                 is_answered = talk.answered is not None and talk.answered <= step
-                text = f"{name}: {talk.text}{f', {talk.answer}' if is_answered else '?'}"
+                text = (
+                    f"{body_label(name)}: {talk.text}{f', {talk.answer}' if is_answered else '?'}"
+                )
         body.name.set_text(text)
         return text
 
@@ -334,10 +362,28 @@ class Stage:
         body.lies = rest is not None and rest["posture"] == "lie"
         if rest is not None:
             x, y, heading = rest["x"], rest["y"], rest["heading"]
-        body.name.set_position((x, y + 1.5 * body.radius))
+        body.place = (x, y)
         if body.facts["cameras"]:
             self._look(body, (x, y, heading), step)
         return x, y, heading
+
+    def _place_names(self) -> None:
+        """Write each name where it covers no body and no other name: above, else around it."""
+        here = [body for body in self.bodies if body.name.get_visible()]
+        taken = [*self._room_names]
+        taken += [(x - r, y - r, x + r, y + r) for (x, y), r in ((b.place, b.radius) for b in here)]
+        for body in here:
+            x, y = body.place
+            wide = BOLD_WIDTH * len(body.name.get_text()) * self._letter_m
+            tall = LINE_HEIGHT * self._letter_m
+            off = 1.4 * body.radius
+            places = [(x, y + off), (x, y - off - tall), (x + off + wide / 2, y - tall / 2)]
+            places += [(x - off - wide / 2, y - tall / 2), (x, y + off + tall)]
+            boxes = [(px - wide / 2, py, px + wide / 2, py + tall) for px, py in places]
+            free = (k for k, box in enumerate(boxes) if not any(_meet(box, t) for t in taken))
+            at = next(free, 0)
+            body.name.set_position(places[at])
+            taken.append(boxes[at])
 
     def _draw_bodies(self, poses: Sequence[tuple[float, float, float] | None]) -> None:
         """Draw bodies at their poses, and what they see; None for those who are away."""
@@ -412,6 +458,20 @@ class Stage:
         lines = [[xy[robot], place] for robot, place in sorted(seen) if robot in xy]
         self._sightings.set_segments(lines)
         return lines
+
+
+def _box_of(text: Text, point_m: float) -> Box:
+    """Return the box of a text in the middle of its place, for a size of a point [m]."""
+    x, y = text.get_position()
+    lines = text.get_text().split("\n")
+    size = float(text.get_fontsize()) * point_m
+    half_wide = LETTER_WIDTH * max(map(len, lines)) * size / 2
+    half_tall = LINE_HEIGHT * len(lines) * size / 2
+    return x - half_wide, y - half_tall, x + half_wide, y + half_tall
+
+
+def _meet(one: Box, other: Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def _observations(part: Run) -> tuple[I64, NDArray[Any], F64]:

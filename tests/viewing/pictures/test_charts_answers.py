@@ -71,10 +71,10 @@ def test_a_film_says_what_is_asked_and_answered_beside_the_robot() -> None:
 
     assert talk.answered is not None
     assert talk.end is not None
-    assert "astro" == shown(talk.step - 1)
-    assert "astro: pill ana?" == shown(talk.step) == shown(talk.answered - 1)
-    assert "astro: pill ana, accepted" == shown(talk.answered) == shown(talk.end)
-    assert "astro" == shown(talk.end + 1)
+    assert "Astro" == shown(talk.step - 1)
+    assert "Astro: pill ana?" == shown(talk.step) == shown(talk.answered - 1)
+    assert "Astro: pill ana, accepted" == shown(talk.answered) == shown(talk.end)
+    assert "Astro" == shown(talk.end + 1)
     # The film draws a new frame at each of these moments.
     moments = np.array([talk.step, talk.answered, talk.end + 1]) - (talk.step - 60)
     assert stage.changes()[moments].all()

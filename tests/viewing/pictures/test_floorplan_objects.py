@@ -63,7 +63,7 @@ def test_names_of_rooms_keep_off_the_furniture() -> None:
     plan = home(objects=[stand_furniture("workbench", (4.0, 3.0), size=(4.0, 4.0))])
 
     assert "workbench" in words(plan)
-    assert any("bedroom_0" in text for text in words(plan))
+    assert any("Bedroom" in text for text in words(plan))
 
 
 def test_check_up_is_drawn_with_numbers_and_sentences(tmp_path: Path) -> None:

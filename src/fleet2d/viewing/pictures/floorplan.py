@@ -33,6 +33,7 @@ from fleet2d.floorplan.checkup import Finding
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room
+from fleet2d.floorplan.rooms.doorways import Doorway
 from fleet2d.floorplan.rooms.room import NO_ROOM
 from fleet2d.floorplan.space import grown_cells
 from fleet2d.kernels import F64, I16, Bool, squared_distance
@@ -56,6 +57,7 @@ from fleet2d.viewing.look import (
     WALL_TOP,
     WOOD,
     floor_of,
+    room_labels,
     symbol_of,
 )
 
@@ -106,11 +108,11 @@ def _fill(polygons: Iterable[shapely.Polygon], axes: Axes, **style: Any) -> None
 
 def label_objects(plan: FloorPlan, axes: Axes) -> None:
     """Write the type of each object without a symbol on it, where it is large enough."""
-    points_per_m = _points_per_m(axes)
+    metre_pt = points_per_m(axes)
     for item in plan.objects:
         x0, y0, x1, y1 = item.footprint.bounds
         label = item.type.replace("_", " ")
-        space = (x1 - x0) * points_per_m, (y1 - y0) * points_per_m
+        space = (x1 - x0) * metre_pt, (y1 - y0) * metre_pt
         size, rotation = _fit(space, LETTER_WIDTH * len(label), 1.2, LABEL_PT[1])
         if size < LABEL_PT[0] or item.type in SYMBOLS:
             continue
@@ -119,7 +121,7 @@ def label_objects(plan: FloorPlan, axes: Axes) -> None:
         axes.text(middle.x, middle.y, label, fontsize=size, rotation=rotation, zorder=4, **style)
 
 
-def _points_per_m(axes: Axes) -> float:
+def points_per_m(axes: Axes) -> float:
     """Return the size of a metre on axes [points]."""
     axes.apply_aspect()  # needed for the transform to pixels
     pixels = axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
@@ -190,15 +192,22 @@ def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
         if not door.leaf:
             openings.append(np.stack([start, end]))
             continue
-        across = end - start
-        left = np.array([-across[1], across[0]])
-        angles = np.linspace(0, np.pi / 2, SWING)[:, None]
-        swings.append(start + across * np.cos(angles) + left * np.sin(angles))
-        leaves.append(np.stack([start, start + left]))
+        corners = _swing_of(door)
+        swings.append(corners[1:])
+        leaves.append(corners[[0, -1]])
     style: dict[str, Any] = {"color": DOOR_COLOR, "zorder": 1.7}
     axes.add_collection(LineCollection(leaves, lw=1.2, **style))
     axes.add_collection(LineCollection(swings, lw=0.4, **style))
     axes.add_collection(LineCollection(openings, lw=0.9, ls=(0, (1, 2)), **style))
+
+
+def _swing_of(door: Doorway) -> F64:
+    """Return the floor over which a door swings: its hinge, then the arc, float64 (n, 2) [m]."""
+    start, end = np.array(door.start), np.array(door.end)
+    across = end - start
+    left = np.array([-across[1], across[0]])
+    angles = np.linspace(0, np.pi / 2, SWING)[:, None]
+    return np.concatenate([[start], start + across * np.cos(angles) + left * np.sin(angles)])
 
 
 # Formats of pictures, each with the metadata that would differ from time to time.
@@ -370,8 +379,8 @@ def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bo
         _draw_entrance(plan.entrance, axes)
     if names:
         empty = _empty_floor(plan)
-        for room in plan.rooms:
-            _write_room(plan, room, empty, axes)
+        for room, label in zip(plan.rooms, room_labels(plan.rooms), strict=True):
+            _write_room(plan, room, label, empty, axes)
         label_objects(plan, axes)
     if title:
         rooms = counted(len(plan.rooms), "room")
@@ -415,11 +424,8 @@ def _draw_walls(plan: FloorPlan, axes: Axes) -> None:
     Their shadow falls into the rooms.
     """
     units = plan.lattice.units_per_m
-    thickness = WALL_M * units
     free = shapely.union_all(plan.polygons)
-    # Without steps of a few centimetres in traced outlines, which look like notches in outer walls.
-    smooth = shapely.simplify(free, thickness / 5)
-    solid = shapely.buffer(smooth, thickness, join_style="mitre")
+    solid = _with_walls(plan)
     walls = _outline(plan, shapely.get_parts(solid).tolist())
     style: dict[str, Any] = {"edgecolor": WALL_EDGE, "lw": 0.6}
     axes.add_patch(PathPatch(walls, facecolor=WALL_TOP, **style, zorder=0))
@@ -430,13 +436,31 @@ def _draw_walls(plan: FloorPlan, axes: Axes) -> None:
     if shade:
         shadow = _outline(plan, shade)
         axes.add_patch(PathPatch(shadow, facecolor=SHADOW_COLOR, edgecolor="none", zorder=1.68))
-    edges = _outline(plan, plan.polygons)
-    axes.add_patch(PathPatch(edges, facecolor="none", **style, zorder=1.69))
+    axes.add_patch(PathPatch(outline_of(plan), facecolor="none", **style, zorder=1.69))
+
+
+def _with_walls(plan: FloorPlan) -> BaseGeometry:
+    """Return the free space and the walls around it [lattice]."""
+    thickness = WALL_M * plan.lattice.units_per_m
+    # Without steps of a few centimetres in traced outlines, which look like notches in outer walls.
+    smooth = shapely.simplify(shapely.union_all(plan.polygons), thickness / 5)
+    return shapely.buffer(smooth, thickness, join_style="mitre")
+
+
+def outline_of(plan: FloorPlan) -> Outline:
+    """Return the outline of the free space [m]."""
+    return _outline(plan, plan.polygons)
+
+
+def walls_of(plan: FloorPlan) -> Outline:
+    """Return the outline of the walls [m]."""
+    walls = shapely.difference(_with_walls(plan), shapely.union_all(plan.polygons))
+    return _outline(plan, shapely.get_parts(walls).tolist())
 
 
 def _draw_rooms(plan: FloorPlan, axes: Axes) -> None:
     """Draw the floors of rooms as an image, clipped at the walls."""
-    free_space = PathPatch(_outline(plan, plan.polygons), transform=axes.transData)
+    free_space = PathPatch(outline_of(plan), transform=axes.transData)
     image = draw_cells(plan, floor_image(plan), axes, interpolation="nearest", zorder=1)
     image.set_clip_path(free_space)
 
@@ -554,15 +578,19 @@ def _draw_entrance(entrance: tuple[float, float], axes: Axes) -> None:
 
 
 def _empty_floor(plan: FloorPlan) -> I16:
-    """Return the room of each cell without an object, else -1: int16 (rows, columns)."""
+    """Return the room of each cell without an object or the swing of a door, else -1.
+
+    int16 (rows, columns).
+    """
     empty = plan.room_of_cell.copy()
-    for item in plan.objects:
-        window, covered = grown_cells(plan.lattice, item.footprint, 0.0)
+    swings = [_swing_of(door) for door in plan.doorways if door.leaf]
+    for area in (*(item.footprint for item in plan.objects), *map(shapely.Polygon, swings)):
+        window, covered = grown_cells(plan.lattice, area, 0.0)
         empty[window][covered] = NO_ROOM
     return empty
 
 
-def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
+def _write_room(plan: FloorPlan, room: Room, label: str, empty: I16, axes: Axes) -> None:
     """Write the name and area of a room in the middle of its empty floor.
 
     The text is as large as fits, and upright in narrow rooms.
@@ -572,10 +600,10 @@ def _write_room(plan: FloorPlan, room: Room, empty: I16, axes: Axes) -> None:
         inside = plan.room_of_cell == room.index
     row, column = _middle(inside)
     across, up = _clear_lengths(plan.lattice.cell, inside, row, column)
-    points_per_m = FILL * _points_per_m(axes)
-    space = across * points_per_m, up * points_per_m
-    name_and_area = f"{room.name}\n{room.area_m2:,.1f} m²"
-    for text in (name_and_area, room.name.rpartition("_")[2]):
+    metre_pt = FILL * points_per_m(axes)
+    space = across * metre_pt, up * metre_pt
+    name_and_area = f"{label}\n{room.area_m2:,.1f} m²"
+    for text in (name_and_area, label.replace(" ", "\n", 1), label.rpartition(" ")[2]):
         lines = text.split("\n")
         width, height = LETTER_WIDTH * max(map(len, lines)), 1.5 * len(lines)
         size, rotation = _fit(space, width, height, MAX_FONT_PT)
