@@ -1,13 +1,14 @@
 """Means with intervals over units such as homes and seeds, p values, and the power of a study.
 
-An interval is that of Student's t after Hall's transformation, which corrects for skewness (Hall
-1992, On the removal of skewness by transformation, Journal of the Royal Statistical Society B 54).
+Each end of an interval is the wider of two: that of Student's t, and the same after Hall's
+transformation, which corrects for skewness (Hall 1992, On the removal of skewness by
+transformation, Journal of the Royal Statistical Society B 54). The first alone misses the mean of
+skewed units too often, the second alone that of units with outliers on both sides.
 The standard error is that of a random-effects analysis of variance of crossed units, with the
 degrees of freedom of Satterthwaite (1946, Biometrics Bulletin 2).
 
-Where there are too few units to trust an interval, the estimate has a doubt; as their skewness is
-uncertain, too, each end is then the wider of those with and without the transformation. What few
-units do tell is whether most of them are above zero: by the sign test, which is exact.
+Where there are too few units to trust an interval, the estimate has a doubt. What few units do tell
+is whether most of them are above zero: by the sign test, which is exact.
 `benchmarks/intervals.py` measures how often intervals contain the true mean.
 """
 
@@ -148,11 +149,8 @@ class MeanEstimate:
         if not self.error > 0:
             return math.nan, math.nan
         quantile = student_quantile(self.freedom, level)
-        low = self.mean - self.error * _inverse(quantile, self.skewness)
-        high = self.mean - self.error * _inverse(-quantile, self.skewness)
-        if self.doubt:
-            low = min(low, self.mean - self.error * quantile)
-            high = max(high, self.mean + self.error * quantile)
+        low = self.mean - self.error * max(quantile, _inverse(quantile, self.skewness))
+        high = self.mean + self.error * max(quantile, -_inverse(-quantile, self.skewness))
         least, largest = self.limits
         return max(low, least), min(high, largest)
 
@@ -172,9 +170,7 @@ class MeanEstimate:
         with extra("study", "intervals need scipy"):
             from scipy.special import stdtr
         ratio = self.mean / self.error
-        distance = abs(_transformed(ratio, self.skewness))
-        if self.doubt:
-            distance = min(distance, abs(ratio))
+        distance = min(abs(ratio), abs(_transformed(ratio, self.skewness)))
         return float(2 * stdtr(self.freedom, -distance))
 
     @property
@@ -197,6 +193,10 @@ class MeanEstimate:
         Args:
             level: The level of the interval that would exclude zero.
         """
+        if self.error == 0:
+            # Of the sign test: so many units of the same sign are rarer by chance.
+            fewest = math.floor(2 - math.log2(1 - level))
+            return dict.fromkeys(self.spread.units, fewest) if self.mean else {}
         return {
             kind: max(count, current + 1, ENOUGH_UNITS if kind in self.signs else 0)
             for kind, current in self.spread.units.items()

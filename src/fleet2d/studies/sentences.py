@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError
 from fleet2d.runtime.clock import DAY_S, HOUR_S
-from fleet2d.studies.answers import Comparison, StudyAnswers, judged
-from fleet2d.studies.intervals import LEVEL, plural
+from fleet2d.studies.answers import MAX_P, Comparison, StudyAnswers, judged
+from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL, plural
 
 if TYPE_CHECKING:
     from fleet2d.studies.specification import PairedComparison
@@ -222,7 +222,7 @@ class StudyAnswer:
         clear_first = sorted(self.comparisons, key=lambda c: not c.is_clear)
         table = [self._row(each) for each in clear_first]
         if not study.counts.complete:
-            sentences = [self._nothing()]
+            sentences = [self._nothing(), self._cost()]
         else:
             if not self.asked:
                 table = [self._mean(metric) for metric in study.metrics[:MAX_METRICS]]
@@ -236,7 +236,7 @@ class StudyAnswer:
         why = "".join(f", most often because: {reason}" for reason, _ in reasons.most_common(1))
         return (
             f"Nothing can be told, as no variant is complete: of {counts.total} variants"
-            f" {counts.failed} failed{why}, and {counts.missing} have not run."
+            f" {counts.failed} failed{why}; {counts.missing} have not run."
         )
 
     def _findings(self) -> Iterator[str]:
@@ -284,10 +284,13 @@ class StudyAnswer:
     def _unclear(self, c: Comparison) -> str:
         if math.isnan(c.p):
             return f"{c.metric} with {self._sides(c)}: there is only one pair"
-        return (
-            f"{c.metric} with {self._sides(c)}, where the mean is {number(abs(c.difference))}"
-            f" {c.direction} (p {cell('p', {'p': c.p_holm})}): {c.needed} would show that"
-        )
+        mean = f"where the mean is {number(abs(c.difference))} {c.direction}"
+        if c.p_holm < MAX_P:
+            agreeing = c.above if c.difference > 0 else c.below
+            why = f", but only {agreeing} of {c.pairs} pairs are"
+        else:
+            why = f" (p {cell('p', {'p': c.p_holm})}): {c.needed} would show that"
+        return f"{c.metric} with {self._sides(c)}, {mean}{why}"
 
     def _for_whom(self, c: Comparison) -> str:
         """Return in which homes and other groups a difference is the other way round."""
@@ -315,21 +318,29 @@ class StudyAnswer:
         parts = []
         if counts.total > counts.complete:
             parts += [f"{counts.total - counts.complete} of {counts.total} variants have no result"]
-        for metric in dict.fromkeys(c.metric for c in self.comparisons):
-            if lacking := counts.complete - len(study.with_metric(metric)):
+        for metric in dict.fromkeys(c.metric for c in self.asked):
+            known = study.with_metric(metric) if metric in study.metrics else ()
+            if lacking := counts.complete - len(known):
                 parts.append(f"{lacking} complete variants lack {metric}")
-        only = [c for c in study.populations if study.variants[c].n_unique() == 1]
-        parts += [f"there is only one {kind}, and the answer holds for it alone" for kind in only]
+        numbers = {kind: study.variants[kind].n_unique() for kind in study.populations}
+        first = next((kind for kind, count in numbers.items() if count > 1), "")
+        few = [
+            f"{count} {plural(kind) if count > 1 else kind}"
+            for kind, count in numbers.items()
+            if count < ENOUGH_UNITS and kind != first
+        ]
+        if few:
+            parts.append(f"with {' and '.join(few)}, it holds for no others")
         text = "; ".join(parts)
         return f"{text[0].upper()}{text[1:]}." if text else ""
 
     def _cost(self) -> str:
-        complete = self._study.variants.filter(status="complete")
+        study = self._study
         simulated, wall = (
-            in_words(timedelta(seconds=float(complete[name].fill_null(0).sum())))
-            for name in ("simulated_s", "wall_s")
+            in_words(timedelta(seconds=float(frame[name].fill_null(0).sum())))
+            for frame, name in ((study.complete, "simulated_s"), (study.variants, "wall_s"))
         )
-        runs = counted(len(complete), "run")
+        runs = counted(study.counts.complete, "run")
         return f"It took {runs}: {simulated} simulated in {wall} of computing."
 
     def _row(self, c: Comparison) -> dict[str, Any]:
