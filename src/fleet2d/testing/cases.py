@@ -215,7 +215,7 @@ class _Suite:
             self.tests, self.builds, self.keys, self.numbers, workers=self.workers, show=self.show
         )
         if self.history is not None:
-            for build, reports in zip(self.builds, self.reports, strict=True):
+            for build, reports in reversed([*zip(self.builds, self.reports, strict=True)]):
                 self.history.add(build.name, self.prints, reports)
 
     def gate(self) -> "Gate":

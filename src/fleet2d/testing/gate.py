@@ -376,8 +376,10 @@ class Gate:
 
     @cached_property
     def short(self) -> Mapping[str, str]:
-        """The names of tests for tables, without folders where that isn't ambiguous."""
-        names = {each.test: Path(each.test).name for each in self.tallies}
+        """The names of tests for tables, without files and folders where they are unique."""
+        names = {
+            each.test: each.test.partition("::")[2] or Path(each.test).name for each in self.tallies
+        }
         unique = len(set(names.values())) == len(names)
         return names if unique else {test: test for test in names}
 
@@ -427,7 +429,8 @@ class Gate:
             return f"{name} doesn't pass: {' and '.join(parts)}, {after}"
         if self.against and self.changes:
             than = f"is shown to be worse than with {self.against}"
-            return f"{name} passes: none of {tests} {than}, {after}"
+            known = f", {len(self.known)} of them failing with both" if self.known else ""
+            return f"{name} passes: none of {tests} {than}{known}, {after}"
         held = sum(each.verdict == HELD for each in self.tallies)
         return f"{name} passes: {held} of {tests} held, {after}"
 
@@ -447,6 +450,11 @@ class Gate:
         yield from self.summary()
         for each in self.known:
             yield f"fails with {self.against}, too: {each.sentence()}"
+
+    def reason(self, each: Tally) -> str:
+        """Return why something speaks against a release: by the comparison, if there is one."""
+        change = self.change_of.get((each.test, each.name))
+        return each.sentence() if change is None else f"{each.title}: {change.words()}"
 
     def summary(self) -> Iterator[str]:
         """Yield what differs without speaking against a release, and what can't be told."""

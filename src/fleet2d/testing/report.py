@@ -15,12 +15,14 @@ MAX_BUILDS = 12
 """Builds of the history in the page: the newest."""
 LOOK = """
 .verdict { padding: .6rem 1rem; border-left: .4rem solid; font-size: 1.2rem; font-weight: 600; }
-.good { border-color: #3a7d44; background: #3a7d4422; }
-.bad { border-color: #b3261e; background: #b3261e22; }
+.good { background: #3a7d4422; }
+.bad { background: #b3261e22; }
+.verdict.good { border-color: #3a7d44; }
+.verdict.bad { border-color: #b3261e; }
 .odd { background: #c2850022; }
 td { vertical-align: top; }
 td.good, td.bad, td.odd { padding-left: .4rem; }
-td { overflow-wrap: anywhere; }
+td { overflow-wrap: break-word; }
 td:last-child { min-width: 9rem; }
 pre { white-space: pre-wrap; }
 @media print { figure, table { break-inside: avoid; } }
@@ -64,9 +66,10 @@ def write_report(
 
 
 def _says(gate: Gate) -> Iterator[str]:
-    items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in gate.summary())
+    against = [f"<strong>{html.escape(gate.reason(each))}</strong>" for each in gate.blocking]
+    items = [*against, *map(html.escape, gate.summary())]
     if items:
-        yield f"<ul>{items}</ul>"
+        yield f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>"
 
 
 def _coverage(gate: Gate) -> Iterator[str]:
