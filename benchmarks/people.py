@@ -1,6 +1,7 @@
 """How true the people are: simulated time use beside the American Time Use Survey.
 
     python benchmarks/people.py compare [--people 1000] [--weeks 1] [--figure FILE] [--json FILE]
+    python benchmarks/people.py held-out --data FOLDER [--people 1000]   # starts of activities
     python benchmarks/people.py measures --data FOLDER [--days 28]   # days, as those of real people
     python benchmarks/people.py visits --data FOLDER [--days 28]   # moving about, as real people
     python benchmarks/people.py rooms [--figure FILE]      # room_sampling: shares over time
@@ -9,9 +10,11 @@
 
 `compare` draws the days of that many people of each group of `population`, and prints how far the
 share of them that do each activity is from the survey's, by hour: the total variation distance, and
-the largest difference of each activity. `measures` prints fourteen measures of the days of each
-persona, with and without the part short_stays, and of the logs; then how far the days of a persona
-fitted to each log are from days held back, beside copied days and a Markov chain. `visits` prints
+the largest difference of each activity. `held-out` prints how likely the survey's hours at which
+activities begin are under such people: the table that these draw from doesn't have them. `measures`
+prints fourteen measures of the days of each persona, with and without short stays, and of the logs,
+on the first of which the rates of short stays were chosen; then how far the days of a persona
+fitted to a log are from days held back, beside copied days and a Markov chain. `visits` prints
 how often each persona visits bathrooms, goes somewhere for less than three minutes, and comes back,
 and how long it stays in which kind of room, and how its hours differ from the survey's, beside the
 real homes of CASAS and UCI ADL and the simulated one of HOMER+; it fails where a persona is outside
@@ -31,10 +34,10 @@ import statistics
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from visits import (
@@ -54,6 +57,7 @@ from visits import (
 
 import fleet2d
 import fleet2d.routines.survey as survey
+from fleet2d.kernels import F64
 from fleet2d.learning.fit.command import table
 from fleet2d.learning.fit.timeline import ks_distance, read_timeline
 from fleet2d.learning.fit.validation import validate
@@ -69,16 +73,9 @@ LOGS = {
     "UCI ADL A": "uci_adl_a",
     "HOMER+ A": "homer_plus_a",
 }
+# Logs that nothing was chosen on, and that aren't fitted.
+UNSEEN = {"Kasteren A": "kasteren/kast_houseA-ss.txt", "Kasteren C": "kasteren/kast_houseC-ss.txt"}
 REAL = ("CASAS AL", "UCI ADL A")
-# A persona whose stays are about as far from those of one real home as from those of the other.
-BETWEEN = {
-    "extends": ["retired", "short_stays"],
-    "needs": {
-        "pick_up": {
-            "every": {"quantiles": [60, 65, 70, 75, 80, 90, 100, "2 min", "3 min", "12 h", "14 h"]}
-        }
-    },
-}
 # Which group of the survey a persona is most like, and which category an activity counts for there.
 LIKE = {"works_outside": "workers", "retired": "retired", "works_from_home": "workers"}
 CATEGORY_OF = {
@@ -187,22 +184,71 @@ def written(table: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def measured(group: str, people: int, weeks: int) -> dict[str, list[Counter[str]]]:
-    """Count what people do at half past each hour, by kind of day."""
-    counts = {kind: [Counter() for _ in range(24)] for kind in ("weekday", "weekend")}
+def lived(
+    group: str, people: int, weeks: int
+) -> Iterator[tuple[str, Sequence[survey.SurveyEpisode]]]:
+    """Yield the kind of day and the episodes of each day of some people, from 4 to 4 o'clock."""
     table = survey.group(group)
     for person in range(people):
         key = stream_key(4, f"users.person_{person}", "population")
         state = survey.first_state(table, Draws(key, 0), MONDAY)
         for ordinal in range(MONDAY, MONDAY + 7 * weeks):
             blocks, state = survey.draw_episodes(table, Draws(key, ordinal), ordinal, state)
-            kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
-            k = 0
-            for hour in range(4, 28):
-                while blocks[k].end <= hour * 3600 + 1800:
-                    k += 1
-                counts[kind][hour % 24][blocks[k].category] += 1
+            yield "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday", blocks
+
+
+def measured(group: str, people: int, weeks: int) -> dict[str, list[Counter[str]]]:
+    """Count what people do at half past each hour, by kind of day."""
+    counts = {kind: [Counter() for _ in range(24)] for kind in ("weekday", "weekend")}
+    for kind, blocks in lived(group, people, weeks):
+        k = 0
+        for hour in range(4, 28):
+            while blocks[k].end <= hour * 3600 + 1800:
+                k += 1
+            counts[kind][hour % 24][blocks[k].category] += 1
     return counts
+
+
+def held_out(folder: Path, people: int) -> dict[str, list[tuple[float, float, float]]]:
+    """Score the hours at which the survey's activities begin, which the model wasn't made of.
+
+    As in the survey's table, a begin counts by the minutes of its episode.
+
+    Returns:
+        By activity, for each group of people: the negative log likelihood [nats] of a begin under
+        the simulated people, under the hours' shares of time, and under the survey itself.
+    """
+    wanted: dict[tuple[str, str], np.ndarray] = defaultdict(lambda: np.zeros(24))
+    for row in rows(folder / "time_of_day_distributions.csv"):
+        share = float(row["pct_of_category"]) / 100
+        wanted[row["stratum"], row["category"]][int(row["hour"])] = share
+    found = defaultdict(list)
+    for stratum, group in GROUPS.items():
+        begins = defaultdict(lambda: np.ones(24))  # nothing is impossible
+        for _, blocks in lived(group, people, 1):
+            for begin, block in zip([4 * 3600, *(b.end for b in blocks)], blocks, strict=False):
+                begins[block.category][begin // 3600 % 24] += (block.end - begin) / 60
+        for (of, category), shares in wanted.items():
+            if of != stratum or not shares.any():
+                continue
+            by_day = [survey.shares(group, kind) for kind in ("weekday", "weekend")]
+            weekday, weekend = ([hour[category] for hour in hours] for hours in by_day)
+            times = 5 * np.array(weekday) + 2 * np.array(weekend) + 1e-6
+            scores = [
+                -float(shares @ np.log(np.maximum(chances / chances.sum(), 1e-300)))
+                for chances in (begins[category], times, shares)
+            ]
+            found[category].append((scores[0], scores[1], scores[2]))
+    return found
+
+
+def show_held_out(folder: Path, people: int) -> None:
+    """Print the scores of `held_out`, means over the groups."""
+    found = held_out(folder, people)
+    print("nats of a begin: simulated, by shares of time, by the survey; any hour alike: 3.178")
+    means = {name: np.mean(scores, axis=0) for name, scores in sorted(found.items())}
+    for name, scores in {**means, "all": np.mean(list(means.values()), axis=0)}.items():
+        print(f"{name:12}" + "".join(f"{score:9.3f}" for score in scores))
 
 
 def compare(people: int, weeks: int) -> list[dict[str, Any]]:
@@ -295,19 +341,21 @@ def rooms_over_time(days: int, seeds: int) -> list[tuple[int, float, float]]:
 def show_measures(data: Path, days: int, seed: int) -> None:
     """Print the measures of the logs' days and of the personas', and those of fitted personas."""
     print(f"personas: {days} days from Monday, 2026-01-05, seed {seed}, bundled home, furnished")
-    print("means per day or night; medians of bathroom min and stays min; stay KS from each log")
+    print("means per day or night; medians of bathroom min and stays min")
+    print("KS of the lengths of stays from each log, and of those in living rooms")
+    homes = {name: traces_of_log(data / path) for name, path in (LOGS | UNSEEN).items()}
+    real = {name: lengths_of(homes[name]) for name in (*REAL, *UNSEEN)}
     columns = [name.replace("_", " ") for name in Measures._fields]
-    columns += ["living min", "bath < 1 min", *(f"KS {name}" for name in REAL)]
+    columns += ["living min", "bath < 1 min"]
+    columns += [f"{what} {name}" for what in ("KS", "LR") for name in real]
     print(f"{'':30}" + "".join(f"{column:>15}" for column in columns))
-    homes = {name: traces_of_log(data / path) for name, path in LOGS.items()}
-    real = {name: np.sort(measure(*homes[name]).stays_min) for name in REAL}
     for name, traces in homes.items():
         print_measures(name, traces, real)
+    calm = {"needs": {"pick_up": None, "freshen_up": None}}
     for name in bundled_names():
         print_measures(name, traces_of_persona(name, days, seed), real)
-        lively = traces_of_persona({"extends": [name, "short_stays"]}, days, seed)
-        print_measures(f"{name}, short_stays", lively, real)
-    print_measures("retired, between both homes", traces_of_persona(BETWEEN, days, seed), real)
+        plain = traces_of_persona({"extends": name, **calm}, days, seed)
+        print_measures(f"{name}, no short stays", plain, real)
     for name, path in LOGS.items():
         log = read_log(data / path)
         assert isinstance(log, ActivityLog)
@@ -315,8 +363,21 @@ def show_measures(data: Path, days: int, seed: int) -> None:
         print("\n".join(table(validate(read_timeline(log)))))
 
 
+class Lengths(NamedTuple):
+    """The sorted lengths of the stays of a home, and of those in its living room [min]."""
+
+    stays_min: F64
+    living_min: F64
+
+
+def lengths_of(traces: tuple[RoomTrace, ActivityTrace]) -> Lengths:
+    """Return the lengths of the stays of a person."""
+    living = [s.length / 60 for s in grouped_stays(traces[0]) if s.kind == "living_room"]
+    return Lengths(np.sort(measure(*traces).stays_min), np.sort(living))
+
+
 def print_measures(
-    name: str, traces: tuple[RoomTrace, ActivityTrace], real: dict[str, np.ndarray]
+    name: str, traces: tuple[RoomTrace, ActivityTrace], real: Mapping[str, Lengths]
 ) -> None:
     """Print a row of the table of measures."""
     found = measure(*traces)
@@ -324,11 +385,15 @@ def print_measures(
         float((np.median if key in MEDIANS else np.mean)(values)) if values else math.nan
         for key, values in found._asdict().items()
     ]
-    living = [s.length / 60 for s in grouped_stays(traces[0]) if s.kind == "living_room"]
+    living = lengths_of(traces).living_min
     cells += [
-        float(np.median(living)) if living else math.nan,
+        float(np.median(living)) if len(living) else math.nan,
         sum(m < 1 for m in found.bathroom_min) / len(found.bathroom_min),
-        *(ks_distance(np.sort(found.stays_min), stays_min) for stays_min in real.values()),
+        *(ks_distance(np.sort(found.stays_min), log.stays_min) for log in real.values()),
+        *(
+            ks_distance(living, log.living_min) if len(living) and len(log.living_min) else math.nan
+            for log in real.values()
+        ),
     ]
     print(f"{name:30}" + "".join(f"{cell:>15.2f}" for cell in cells))
 
@@ -481,9 +546,12 @@ def parsed() -> argparse.Namespace:
     one.add_argument("--json", type=Path, help="write the rows to this file, too")
     two = commands.add_parser("derive")
     two.add_argument("folder", type=Path)
+    six = commands.add_parser("held-out")
+    six.add_argument("--data", type=Path, required=True, help="the folder of the survey")
+    six.add_argument("--people", type=int, default=1000, help="of each group")
     for name in ("visits", "measures"):
         five = commands.add_parser(name)
-        five.add_argument("--data", type=Path, required=True, help="the folder of the three logs")
+        five.add_argument("--data", type=Path, required=True, help="the folder of the logs")
         five.add_argument("--days", type=int, default=28)
         five.add_argument("--seed", type=int, default=4)
     three = commands.add_parser("rooms")
@@ -504,6 +572,8 @@ def main() -> None:
             raise SystemExit(1)
     elif arguments.command == "measures":
         show_measures(arguments.data, arguments.days, arguments.seed)
+    elif arguments.command == "held-out":
+        show_held_out(arguments.data, arguments.people)
     elif arguments.command == "rooms":
         rooms = rooms_over_time(arguments.days, arguments.seeds)
         print("days   error of a share   to be expected")

@@ -129,7 +129,7 @@ def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(
         for name, persona in people.items()
     }
     robot = {"camera": {}, "gives_way": {}, "behaviors": [{"type": "patrol", "dwell": "1 min"}]}
-    content = scenario("6 h", users=users, robots={"astro": robot}, simulation={"seed": 1})
+    content = scenario("6 h", users=users, robots={"astro": robot}, simulation={"seed": 3})
     stored = fleet2d.run(content)
     assert len(table(stored, "events", event="reacts")["step"]) > 20
     assert len(table(stored, "events", event="gives_way")["step"]) > 20

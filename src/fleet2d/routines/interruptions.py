@@ -106,7 +106,7 @@ def usual_needs() -> dict[str, Need]:
     """Return the needs of an adult, which personas without needs of their own have.
 
     >>> sorted(usual_needs())
-    ['call', 'drink', 'toilet']
+    ['call', 'drink', 'freshen_up', 'pick_up', 'toilet']
     """
     return bundled(Need, "needs.yaml", "needs")
 

@@ -87,7 +87,6 @@ class Manners(Settings):
 
 FOLDER = Path(__file__).parent
 BUNDLED = FOLDER / "personas"
-PARTS = FOLDER / "parts"
 Dates = tuple[date | tuple[date, date], ...]
 
 
@@ -333,7 +332,8 @@ class Persona(Settings):
         leisure: The pastimes between the tasks of a day.
         needs: Needs that interrupt a day, by name; left out: those of an adult; null: none.
         errands: Short tasks between activities, by name; left out: those of an adult; null: none.
-        fetches: Whether it fetches things from other rooms during activities, as these say.
+        fetches: Whether it fetches things from other rooms during activities, as these say; left
+            out: unless it has the need `pick_up`, which takes the place of that.
         days: The kinds of days, by name.
         year: What changes its days in the course of a year, by name; a later one precedes others.
     """
@@ -345,7 +345,7 @@ class Persona(Settings):
     leisure: dict[str, AnyPastime] = Field(default_factory=lambda: {"rest": Pastime()})
     needs: dict[str, AnyNeed] = Field(default_factory=lambda: dict(usual_needs()))
     errands: dict[str, AnyErrand] = Field(default_factory=lambda: dict(usual_errands()))
-    fetches: bool = True
+    fetches: bool = False
     days: dict[str, DayTemplate] = Field(min_length=1)
     year: dict[str, YearEvent] = Field(default_factory=dict)
 
@@ -353,7 +353,10 @@ class Persona(Settings):
     @classmethod
     def _drop_deleted(cls, data: Any) -> Any:
         keys = ("leisure", "days", "activities", "needs", "errands", "year")
-        return _without_nulls(data, keys)
+        result = _without_nulls(data, keys)
+        if isinstance(result, Mapping) and isinstance(result.get("needs"), Mapping):
+            return {"fetches": "pick_up" not in result["needs"], **result}
+        return result
 
     def model_post_init(self, _: object, /) -> None:
         """Require that every activity, day and event that is named exists."""
@@ -484,7 +487,7 @@ def _without_nulls(data: Any, keys: tuple[str, ...]) -> Any:
 def read_persona(value: object) -> Any:
     """Read a persona: a bundled name, the path of a YAML file, or a mapping that may `extend` some.
 
-    Of a list, each changes those before it; a part, such as short_stays, changes any persona.
+    Of a list, each changes those before it.
 
     Raises:
         PydanticCustomError: There is no such persona, or its file can't be read.
@@ -498,16 +501,14 @@ def origins_of(value: object) -> set[str]:
     """Return the bundled personas that a valid persona is, or changes; itself if there are none.
 
     Example:
-        >>> origins_of({"extends": ["retired", "short_stays"], "pace": 0.8})
+        >>> origins_of({"extends": "retired", "pace": 0.8})
         {'retired'}
     """
     if isinstance(value, str) and value in bundled_names():
         return {value}
-    if isinstance(value, str) and value in part_names():
-        return set()
     data: Any = value
     if isinstance(value, str | Path):
-        data = read_document(_persona_file(value, is_extended=False)).data
+        data = read_document(_persona_file(value)).data
     below = data.get("extends", ()) if isinstance(data, Mapping) else ()
     names = below if isinstance(below, list | tuple) else [below]
     return {origin for name in names for origin in origins_of(name)} or {str(value)}
@@ -531,13 +532,13 @@ def _data_of(value: object, chain: tuple[str, ...], files: list[Path]) -> Any:
             f"expected a persona, got {shown(value)}: give one of {', '.join(bundled_names())}, a"
             " YAML file, or a mapping like {extends: retired, pace: 0.8}"
         )
-    path = _persona_file(value, is_extended=bool(chain))
+    path = _persona_file(value)
     if str(path.resolve()) in chain:
         raise problem(f"the persona {path.name} extends itself")
     files.append(path)
     with errors_as(problem):
         EXTENDED_FILES.check(len(files), "the persona", prefix="at least ")
-        data = _bundled_data(path) if path.parent in (BUNDLED, PARTS) else read_document(path).data
+        data = _bundled_data(path) if path.parent == BUNDLED else read_document(path).data
     return _data_of(data, (*chain, str(path.resolve())), files)
 
 
@@ -547,20 +548,15 @@ def _bundled_data(path: Path) -> Any:
 
 
 def _extended(names: Any, chain: tuple[str, ...], files: list[Path]) -> Any:
-    """Return what personas and parts, or a single one, are together, each changed by the next."""
+    """Return what personas, or a single one, are together, each changed by the next."""
     below: Any = {}
     for name in names if isinstance(names, list | tuple) else [names]:
-        above = _data_of(name, (*chain, ""), files)
-        if below and "needs" in above and "needs" not in below:
-            below = {**below, "needs": usual_needs()}  # a part adds to them
-        if isinstance(below, Mapping) and "errands" not in below and name in part_names():
-            below = {**below, "errands": usual_errands()}  # of which it takes some away
-        below = merge(below, above)
+        below = merge(below, _data_of(name, (*chain, ""), files))
     return below
 
 
-def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
-    """Return the file of a persona, or of a part of one that is extended.
+def _persona_file(value: str | Path) -> Path:
+    """Return the file of a persona.
 
     Raises:
         PydanticCustomError: There is none.
@@ -568,20 +564,10 @@ def _persona_file(value: str | Path, *, is_extended: bool) -> Path:
     name = str(value)
     if name in bundled_names():
         return BUNDLED / f"{name}.yaml"
-    if name in part_names():
-        if is_extended:
-            return PARTS / f"{name}.yaml"
-        raise problem(
-            f"{name!r} is a part of a persona: extend one with it, like"
-            f" {{extends: [retired, {name}]}}"
-        )
     path = units.named_path(value)
     if not path.is_file():
-        known = [*bundled_names(), *(part_names() if is_extended else ())]
-        raise problem(
-            f"there is no persona {name!r}{suggest(value, known)}; your own is the path of a YAML"
-            " file"
-        )
+        hint = suggest(value, bundled_names())
+        raise problem(f"there is no persona {name!r}{hint}; your own is the path of a YAML file")
     return path
 
 
@@ -618,16 +604,6 @@ def bundled_names() -> list[str]:
     ['child', 'night_shift', 'retired', 'retired_active']
     """
     return sorted(path.stem for path in BUNDLED.glob("*.yaml"))
-
-
-@cache
-def part_names() -> list[str]:
-    """Return the names of the parts that come with Fleet2D, which personas extend.
-
-    >>> part_names()
-    ['short_stays']
-    """
-    return sorted(path.stem for path in PARTS.glob("*.yaml"))
 
 
 def merge(below: Any, above: Any) -> Any:

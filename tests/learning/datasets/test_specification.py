@@ -59,7 +59,7 @@ def test_splits_that_overlap_name_what_they_share(
     test: dict[str, Any], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("mine.yaml").write_text("extends: [retired, short_stays]\n")
+    Path("mine.yaml").write_text("extends: [retired]\n")
     with pytest.raises(InputError, match=words):
         plan_dataset(file(train=split(1, 0, ["retired"]), test=test))
 

@@ -52,7 +52,8 @@ class Population(ResidentBehavior):
         errands = interruptions.usual_errands()
         self.rules = interruptions.interruption_rules(needs, errands, known)
         used |= interruptions.activities_of(needs, errands)
-        self.settle(actor, {name: known[name] for name in sorted(used)}, self.make_spots(actor))
+        doing = {name: known[name].model_copy(update={"fetches": None}) for name in sorted(used)}
+        self.settle(actor, doing, self.make_spots(actor))
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
         """Return the rooms of a typical activity of such people at the beginning of the run."""
