@@ -242,6 +242,19 @@ def test_round_walls_bulge_by_their_arc(tmp_path: Path, degrees: float) -> None:
     assert areas[0] - areas[1] == pytest.approx(segment, rel=0.06, abs=0.3)
 
 
+@pytest.mark.parametrize(("y", "moved"), [(150, True), (160, True), (260, False)])
+def test_a_door_that_a_round_wall_covers_is_moved_to_where_it_opens(
+    tmp_path: Path, y: float, moved: bool
+) -> None:
+    arc = WALLS.replace('yEnd="0" thickness', 'yEnd="0" arcExtent="-1.5708" thickness', 1)
+    plan = load_floorplan(write(tmp_path, arc, ROOMS, DOOR.replace('y="200"', f'y="{y}"')))
+
+    assert moved == any("stands in another wall, too" in note for note in plan.notes)
+    (door,) = plan.doorways
+    assert 0.9 == pytest.approx(door.width_m, abs=0.02)
+    assert 1 == fleet2d.Home(plan).space(0.2).parts
+
+
 def test_a_home_of_an_older_program_says_how_to_save_it(tmp_path: Path) -> None:
     with ZipFile(tmp_path / "old.sh3d", "w") as archive:
         archive.writestr("Home", b"\xac\xed\x00\x05")

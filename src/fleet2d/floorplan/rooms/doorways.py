@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, MultiPolygon, Polygon
+from shapely import LineString, MultiLineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
@@ -469,6 +469,12 @@ class Passage:
     def opening(self) -> Polygon:
         """The part of the wall that is opened."""
         return self._between(self.low - _OVER, self.high + _OVER)
+
+    @property
+    def thresholds(self) -> MultiLineString:
+        """The lines just before and behind the wall; both are free where nothing is in the way."""
+        a, b, c, d, _ = self.opening.exterior.coords
+        return MultiLineString([(a, b), (c, d)])
 
     @property
     def pane(self) -> Polygon:

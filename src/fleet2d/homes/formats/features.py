@@ -67,6 +67,8 @@ POINT_OBJECT_M = 0.1
 SLIVER_M2 = 0.1
 POINT_DOOR_M = 0.9
 DOOR_WIDTHS_M = (0.4, 5.0)
+# Steps in which a door that another wall covers is moved along its own.
+SLIDE_M = 0.05
 # Words in the names of front doors, in several languages, and what a door outside leads to, the
 # likeliest first; last of all where people sit outside.
 FRONT_DOORS = re.compile(
@@ -284,6 +286,11 @@ class Draft:
         for feature, passages in self._passages("door", "opening"):
             through = next((p for p in passages if p.through), None)
             name = feature.text("name") or feature.where
+            if not passages and (through := self._uncovered(feature)):
+                self.notes.append(
+                    f"the {feature.kind} {name} stands in another wall, too: it is moved to where"
+                    " it opens"
+                )
             if through:
                 self.doors.append((feature, through))
                 cuts += [through.opening] if through.halves else []
@@ -293,6 +300,23 @@ class Draft:
             else:
                 self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
         self.free = multi(shapely.union_all([self.free, *cuts]))
+
+    def _uncovered(self, door: Feature) -> Passage | None:
+        """Return the nearest passage along its wall of a door that another wall covers, if any.
+
+        It is at most the door's width away.
+        """
+        for axes in door_axes(door.shape):
+            start, end = np.array(axes[0])
+            steps = int(np.hypot(*(end - start)) / SLIDE_M)
+            for step in range(1, steps + 1):
+                for shift in (step, -step):
+                    away = (end - start) * shift / steps
+                    (x0, y0), (x1, y1) = (start + away).tolist(), (end + away).tolist()
+                    passage = find_passage(self.free, (x0, y0), (x1, y1))
+                    if passage and passage.through and self.free.covers(passage.thresholds):
+                        return passage
+        return None
 
     def _passages(self, *kinds: str) -> Iterator[tuple[Feature, list[Passage]]]:
         """Yield each door or window of some kinds, with its possible passages through a wall."""
