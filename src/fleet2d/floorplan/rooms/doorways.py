@@ -528,9 +528,13 @@ def find_passage(free: MultiPolygon, start: Point, end: Point) -> Passage | None
     if not ((last - first) ** 2).sum() > 0:
         return None
     normal = _normal(first, last)
+    # Only what is near matters, and a home may have a hundred rooms.
+    low_xy = np.minimum(first, last) - 2 * MAX_WALL_M
+    high_xy = np.maximum(first, last) + 2 * MAX_WALL_M
+    near_free = shapely.clip_by_rect(free, *low_xy, *high_xy)
     spans: list[tuple[float, float]] = []
     for share in _ALONG:
-        walls = _walls_across(free, first + share * (last - first), normal)
+        walls = _walls_across(near_free, first + share * (last - first), normal)
         near = [wall for wall in walls if max(wall[0], -wall[1]) <= NEAR_M]
         inner = [wall for wall in near if np.isfinite(wall).all()]
         if share == _ALONG[0]:
@@ -578,7 +582,7 @@ def _sides(area: MultiPolygon) -> NDArray[np.object_]:
     return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
 
 
-def _walls_across(free: MultiPolygon, at: F64, normal: F64) -> list[tuple[float, float]]:
+def _walls_across(free: BaseGeometry, at: F64, normal: F64) -> list[tuple[float, float]]:
     """Return the walls on a line across a door, from and to [m]; infinite at the line's ends."""
     across = LineString([at - MAX_WALL_M * normal, at + MAX_WALL_M * normal])
     walls = []

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 from zipfile import ZipFile
 
 import numpy as np
-from shapely import LineString, Polygon, affinity
+from shapely import LineString, Polygon
 
 from fleet2d.bounds import FILE_BYTES
 from fleet2d.configuration.units import InputPath
@@ -190,12 +190,12 @@ def _arc(ends: list[tuple[float, float]], extent: float) -> LineString:
 def _box(element: ET.Element) -> Polygon:
     """Return the box that a door or a piece of furniture covers [m]."""
     sides = (max(_number(element, key), MIN_SIDE_CM) for key in ("width", "depth"))
-    x, y = (side / CM_PER_M / 2 for side in sides)
-    box = Polygon([(-x, -y), (x, -y), (x, y), (-x, y)])
-    turned = affinity.rotate(box, -_number(element, "angle"), (0, 0), True)
-    (x, y) = _metres([(_number(element, "x"), _number(element, "y"))])[0]
-    moved = affinity.translate(turned, x, y)
-    return Polygon(np.round(np.asarray(moved.exterior.coords), 4))
+    half = np.array([side / CM_PER_M / 2 for side in sides])
+    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    turn = -_number(element, "angle")
+    cosine, sine = math.cos(turn), math.sin(turn)
+    centre = _metres([(_number(element, "x"), _number(element, "y"))])[0]
+    return Polygon(np.round(corners @ np.array([[cosine, sine], [-sine, cosine]]) + centre, 4))
 
 
 def _metres(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
