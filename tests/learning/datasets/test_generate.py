@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -17,7 +18,7 @@ from matplotlib.figure import Figure
 from tests.learning.datasets.small import SOURCE, make
 
 import fleet2d
-from fleet2d.errors import Fleet2DError, InputError
+from fleet2d.errors import Fleet2DError, InputError, ScenarioError
 from fleet2d.learning.datasets.generate import _bars
 from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.tasks import windows
@@ -95,6 +96,7 @@ def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
     (out / "dataset.json").unlink()
     parts.mkdir()
     (parts / "plan.txt").write_text(f"{data.manifest.plan} {fleet2d.__version__}")
+    (parts / "unfit").write_text("{}")
     files = data.manifest.files
     whole = {
         name: files[name].model_dump() for name in files if "train" not in name or "00001" in name
@@ -111,6 +113,41 @@ def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
     (parts / "train-00000.json").write_text("[")
 
     assert records(data) == records(make(out))
+
+
+def unfit(folder: Path) -> dict[str, Any]:
+    """The small data set with one more household, of whom no home has the room."""
+    log = folder / "sauna.txt"
+    log.write_text("2026-01-05 15:10:00 Sauna Sauna ON Relax\n")
+    people = [
+        *SOURCE["splits"]["train"]["households"],
+        {"ana": {"type": "replay", "path": str(log)}},
+    ]
+    train = {**SOURCE["splits"]["train"], "runs": 12, "households": people}
+    return {**SOURCE, "splits": {**SOURCE["splits"], "train": train}}
+
+
+def test_all_that_is_unfit_is_told_before_the_first_run_and_the_corrected_file_goes_on(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        fleet2d.dataset(unfit(tmp_path), tmp_path / "made", workers=1)
+
+    first, *reasons = str(caught.value).splitlines()
+    assert re.fullmatch(r"\d+ runs can't be simulated; `skip: unfit` leaves them out", first)
+    assert ["train, home 0", "train, home 1"] == sorted(line[:13] for line in reasons)
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.slow
+def test_unfit_runs_are_left_out_and_counted(tmp_path: Path) -> None:
+    data = fleet2d.dataset({**unfit(tmp_path), "skip": "unfit"}, tmp_path / "made", workers=1)
+
+    left_out = {int(number) for number in data.manifest.unfit}
+    assert 0 < len(left_out) < 12
+    assert {"train": 12 - len(left_out), "test": 1} == data.manifest.splits
+    assert {*range(12)} - left_out == {*data.arrow("runs", "train")["run"].to_pylist()}
+    assert "Left out: train, home" in (data.root / "README.md").read_text()
 
 
 def test_a_complete_one_is_opened_and_another_refused(data: Dataset) -> None:

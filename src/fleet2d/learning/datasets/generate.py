@@ -1,10 +1,14 @@
 """Making a data set: its runs are simulated in worker processes, and stored as shards."""
 
 import hashlib
+import itertools
 import json
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import closing
+from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -18,7 +22,8 @@ from fleet2d import __version__
 from fleet2d.algorithms.presence.belief import AWAY
 from fleet2d.artifacts.manifest import read_json, versions
 from fleet2d.bounds import FILE_BYTES, read_bytes
-from fleet2d.errors import InputError
+from fleet2d.configuration.problems import counted
+from fleet2d.errors import Fleet2DError, InputError, ScenarioError
 from fleet2d.learning.datasets.reader import (
     MANIFEST,
     Dataset,
@@ -37,8 +42,12 @@ from fleet2d.learning.datasets.specification import (
 )
 from fleet2d.learning.datasets.tables import SCHEMAS, tables_of
 from fleet2d.runtime.progress import progress_bar
+from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import FolderLock, partial_file, refuse_links, write_atomically
-from fleet2d.studies.api import map_runs, open_crew
+from fleet2d.studies.api import ExecutorName, FunctionTask, map_runs, open_crew
+from fleet2d.studies.design import home_key
+from fleet2d.studies.executors import TaskQueue, by_home, run_tasks
+from fleet2d.studies.simulator import check_setup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,6 +100,7 @@ def write_card(data: Dataset, file: DatasetFile, left_out: Sequence[str] = ()) -
                 for s, c in counts.items()
             ],
         ),
+        *(f"Left out: {text}\n" for text in dict.fromkeys(data.manifest.unfit.values())),
         "No home, household or persona is in more than one split: this is checked before the first"
         " run. No two runs have the same seed, so no two have the same days.\n",
         "## Tables\n",
@@ -214,12 +224,18 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
 
 
 PLAN = "plan.txt"
+UNFIT = "unfit"  # the runs that are left out
+MAX_REASONS = 20  # that an error lists
 # Runs that are planned at a time: they are what a data set of any size keeps in memory.
 BLOCK_RUNS = 512
 
 
 def dataset(
-    source: str | Path | Mapping[str, Any], out: str | Path, *, workers: int | None = None
+    source: str | Path | Mapping[str, Any],
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    executor: ExecutorName | Executor = "local",
 ) -> Dataset:
     """Make a data set, the rest of one that was interrupted, or files that it lacks, and open it.
 
@@ -229,6 +245,7 @@ def dataset(
         source: A YAML file, or the same as a mapping.
         out: The folder to write.
         workers: The number of worker processes; None: one per core.
+        executor: Where they run, as for `map_runs`.
 
     Raises:
         InputError: The file is wrong, its splits overlap, the folder holds something else, or
@@ -252,15 +269,18 @@ def dataset(
             raise InputError(f"{root} holds another data set: choose another folder, or delete it")
         if not made.lacking():
             return made
+        plan = replace(plan, unfit=_by_number(made.manifest.unfit))
     elif root.exists() and any(root.iterdir()) and not parts.is_dir():
         raise InputError(f"{root} is not empty, and holds no data set: choose another folder")
+    else:
+        plan = _without_unfit(plan, parts, workers, executor)
     parts.mkdir(parents=True, exist_ok=True)
     lock = FolderLock(parts, "dataset.lock")
     try:
         _check_plan(parts, plan)
         if made is not None:
             _record_shards(plan, made)
-        files = _write_shards(root, plan, workers)
+        files = _write_shards(root, plan, workers, executor)
         if made is None:
             _finish(root, plan, files)
     finally:
@@ -272,6 +292,37 @@ def dataset(
             " versions of libraries (see --verify): delete the data set, and make it again"
         )
     return open_dataset(root)
+
+
+def check_dataset(
+    source: str | Path | Mapping[str, Any],
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    executor: ExecutorName | Executor = "local",
+) -> None:
+    """Check a data set in its folder, so that `dataset` begins with its runs.
+
+    Args:
+        source: A YAML file, or the same as a mapping.
+        out: The folder.
+        workers: The number of worker processes; None: one per core.
+        executor: Where they run, as for `map_runs`.
+
+    Raises:
+        InputError: As `dataset`.
+    """
+    root = Path(out)
+    if (root / MANIFEST).is_file():
+        return
+    parts = root / PARTS
+    plan = _without_unfit(plan_dataset(source), parts, workers, executor)
+    parts.mkdir(parents=True, exist_ok=True)
+    lock = FolderLock(parts, "dataset.lock")
+    try:
+        _check_plan(parts, plan)
+    finally:
+        lock.release()
 
 
 def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
@@ -287,29 +338,102 @@ def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
         _write_record(made.root, shard, record)
 
 
+def _identity(plan: DatasetPlan) -> bytes:
+    return f"{plan.digest} {__version__}".encode()
+
+
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:
     """Refuse to continue a data set of another file or version; begin one."""
     path = parts / PLAN
-    identity = f"{plan.digest} {__version__}".encode()
-    if path.is_file() and read_bytes(path, FILE_BYTES) != identity:
+    has_runs = any(parts.glob("*.arrow")) or any(parts.glob("*-*.json"))
+    if path.is_file() and read_bytes(path, FILE_BYTES) != _identity(plan) and has_runs:
         raise InputError(
             f"{parts.parent} holds the unfinished data set of another file, or another version of"
             " Fleet2D: choose another folder, or delete it"
         )
-    write_atomically(path, identity)
+    write_atomically(parts / UNFIT, json.dumps(plan.unfit).encode())
+    write_atomically(path, _identity(plan))
 
 
-def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[str, ShardRecord]:
+def _by_number(stored: Mapping[str, str]) -> dict[int, str]:
+    return {int(number): why for number, why in stored.items()}
+
+
+def _without_unfit(
+    plan: DatasetPlan, parts: Path, workers: int | None, executor: ExecutorName | Executor
+) -> DatasetPlan:
+    """Set up each home with each of its households, before the first run and before any file.
+
+    Raises:
+        ScenarioError: People don't fit into homes, and `skip` is left out; a line for each.
+    """
+    path = parts / PLAN
+    if path.is_file() and read_bytes(path, FILE_BYTES) == _identity(plan):  # it was checked
+        return replace(plan, unfit=_by_number(read_json(read_bytes(parts / UNFIT, FILE_BYTES))))
+    first_of: dict[tuple[str, str], PlannedRun] = {}
+    same_as: dict[int, int] = {}
+    for split in plan.file.splits:
+        for run in plan.runs(split):
+            key = json.dumps([split, run.scenario["floorplan"], run.scenario["users"]], default=str)
+            same_as[run.number] = first_of.setdefault((split, key), run).number
+    reasons = _set_up(list(first_of.values()), workers, executor)
+    unfit = {number: reasons[first] for number, first in same_as.items() if first in reasons}
+    if unfit and plan.file.skip is None:
+        lines = list(dict.fromkeys(unfit.values()))
+        more = [f"… and {len(lines) - MAX_REASONS} more"] if len(lines) > MAX_REASONS else []
+        advice = f"{counted(len(unfit), 'run')} can't be simulated; `skip: unfit` leaves them out"
+        raise ScenarioError("\n".join([advice, *lines[:MAX_REASONS], *more]))
+    fit = replace(plan, unfit=unfit)
+    if empty := [split for split in plan.file.splits if not fit.count(split)]:
+        raise ScenarioError(f"no run of {empty[0]} is fit: {next(iter(unfit.values()))}")
+    return fit
+
+
+def _set_up(
+    runs: Sequence[PlannedRun], workers: int | None, executor: ExecutorName | Executor
+) -> dict[int, str]:
+    """Return why runs can't be set up, by number, with their homes and households."""
+    tasks = [
+        FunctionTask(k, k, "", home_key(run.scenario), run.scenario) for k, run in enumerate(runs)
+    ]
+    reasons = {}
+    with (
+        progress_bar(show=True) as bar,
+        open_crew(executor, workers) as crew,
+        closing(run_tasks(crew, set_up_problem, TaskQueue(by_home(tasks)))) as rounds,
+    ):
+        bar_task = bar.add_task("checking homes", total=len(tasks))
+        for end in itertools.chain.from_iterable(rounds):
+            bar.advance(bar_task)
+            if why := end.loss or end.payload:
+                run = runs[end.task.number]
+                words = f"{run.split}, home {run.labels['home']}, {run.labels['household']}"
+                reasons[run.number] = f"{words}: {why}"
+    return reasons
+
+
+def set_up_problem(task: FunctionTask) -> str:
+    """Set a run up in a worker process; return why that fails, empty if it doesn't."""
+    try:
+        check_setup(load_scenario(task.scenario))
+    except Fleet2DError as error:
+        return str(error)
+    return ""
+
+
+def _write_shards(
+    root: Path, plan: DatasetPlan, workers: int | None, executor: ExecutorName | Executor
+) -> dict[str, ShardRecord]:
     """Simulate the runs that are lacking, block by block; return the record of each file."""
     records = {shard: _record_of(root, shard) for shard in plan.shards()}
     lacking = [shard for shard, record in records.items() if not record]
     size = max(1, BLOCK_RUNS // plan.file.runs_per_shard)
-    total, left = (sum(s.end - s.first for s in shards) for shards in (records, lacking))
+    total, left = (sum(len(s.runs) for s in shards) for shards in (records, lacking))
     with progress_bar(show=True) as bar:
         task = bar.add_task("runs", total=total, completed=total - left)
         for begin in range(0, len(lacking), size):
             runs = {
-                shard: [plan.run(shard.split, k) for k in range(shard.first, shard.end)]
+                shard: [plan.run(shard.split, k) for k in shard.runs]
                 for shard in lacking[begin : begin + size]
             }
             planned = [run for own in runs.values() for run in own]
@@ -318,7 +442,13 @@ def _write_shards(root: Path, plan: DatasetPlan, workers: int | None) -> dict[st
             by_seed = {run.seed: run for run in new}
             writer = partial(write_part, root, by_seed, plan.file.labels)
             scenarios = [run.scenario for run in new]
-            map_runs(writer, scenarios, workers=workers, on_result=lambda _: bar.advance(task))
+            map_runs(
+                writer,
+                scenarios,
+                workers=workers,
+                executor=executor,
+                on_result=lambda _: bar.advance(task),
+            )
             records |= {shard: _join(root, shard, own) for shard, own in runs.items()}
     return {name: file for record in records.values() for name, file in record.items()}
 
@@ -436,7 +566,8 @@ def _finish(root: Path, plan: DatasetPlan, files: Mapping[str, ShardRecord]) -> 
         name=plan.file.name,
         plan=plan.digest,
         versions=versions(),
-        splits={name: split.runs for name, split in plan.file.splits.items()},
+        splits={name: plan.count(name) for name in plan.file.splits},
+        unfit={str(number): why for number, why in plan.unfit.items()},
         file=plan.file.model_dump(mode="json"),
         files=dict(files),
     )

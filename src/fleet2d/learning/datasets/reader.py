@@ -52,6 +52,7 @@ class DatasetManifest(Record):
         plan: The digest of all that its content depends on, but the code.
         versions: Versions of the software that made it.
         splits: The number of runs of each split.
+        unfit: Why each run was left out whose people don't fit into their home, by number.
         file: The file that it was made from, as plain data.
         files: Each file: its rows, size and digest.
     """
@@ -61,6 +62,7 @@ class DatasetManifest(Record):
     plan: Sha256
     versions: dict[str, str]
     splits: dict[Annotated[str, Field(pattern=f"^{_SPLIT}$")], Count]
+    unfit: dict[str, str] = {}
     file: dict[str, Any]
     files: Annotated[
         dict[

@@ -5,11 +5,11 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from itertools import combinations, takewhile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationError, field_validator
 
@@ -75,6 +75,8 @@ class DatasetFile(Settings):
         every: Time between stored beliefs.
         labels: Time between labels.
         runs_per_shard: The number of runs in a file.
+        skip: unfit: leave out and count runs whose people don't fit into their home; left out: they
+            are an error.
     """
 
     name: str = "data set"
@@ -88,6 +90,7 @@ class DatasetFile(Settings):
     every: PositiveDuration = timedelta(minutes=7)
     labels: PositiveDuration = timedelta(minutes=1)
     runs_per_shard: int = Field(default=16, ge=1)
+    skip: Literal["unfit"] | None = None
 
     @field_validator("splits")
     @classmethod
@@ -129,14 +132,12 @@ class Shard(NamedTuple):
     Attributes:
         split: The split.
         number: Its number in the split, from 0 on.
-        first: The number in the split of its first run.
-        end: That after its last run.
+        runs: The numbers in the split of its runs.
     """
 
     split: str
     number: int
-    first: int
-    end: int
+    runs: Sequence[int]
 
 
 @dataclass(frozen=True)
@@ -149,6 +150,7 @@ class DatasetPlan:
         draws: What the runs of each split are drawn from.
         numbers: The numbers of the lives of each split that meet its conditions.
         left_out: How many lives didn't, and why, a line for each split.
+        unfit: The runs that are left out, as they can't be set up, and why, by number.
     """
 
     file: DatasetFile
@@ -156,6 +158,7 @@ class DatasetPlan:
     draws: Mapping[str, Draw]
     numbers: Mapping[str, Sequence[int]]
     left_out: Sequence[str] = ()
+    unfit: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -170,11 +173,20 @@ class DatasetPlan:
         return (self.run(split, k) for k in range(self.file.splits[split].runs))
 
     def shards(self) -> Iterator[Shard]:
-        """Yield the shards of all splits."""
+        """Yield the shards of all splits, but those without a fit run."""
         size = self.file.runs_per_shard
         for split, settings in self.file.splits.items():
+            offset = self._first_number(split)
             for number, first in enumerate(range(0, settings.runs, size)):
-                yield Shard(split, number, first, min(first + size, settings.runs))
+                runs: Sequence[int] = range(first, min(first + size, settings.runs))
+                if self.unfit:
+                    runs = tuple(k for k in runs if offset + k not in self.unfit)
+                if runs:
+                    yield Shard(split, number, runs)
+
+    def count(self, split: str) -> int:
+        """Return the number of runs of a split, without those left out."""
+        return sum(len(shard.runs) for shard in self.shards() if shard.split == split)
 
     def run(self, split: str, k: int) -> PlannedRun:
         """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""

@@ -315,7 +315,7 @@ def _returns(data: Dataset, split: str) -> tuple[I64, F64]:
     """Return the hour of each label of somebody away, and the time until the return [min]."""
     hours = [np.zeros(0, np.int64)]
     minutes = [np.zeros(0)]
-    for labels in _with_kinds(data, split):
+    for labels in labels_by_person(data, split):
         time = labels["time"]
         step = labels["step"]
         if len(time) < 2:  # the length of a step is unknown
@@ -346,7 +346,7 @@ def _score_shares(
 ) -> Scores:
     """Score the shares of each outcome in the training: overall, and given what is known."""
     known, asked = (
-        [case for labels in _with_kinds(data, part) for case in cases(labels)]
+        [case for labels in labels_by_person(data, part) for case in cases(labels)]
         for part in (TRAIN, split)
     )
     if not known or not asked:
@@ -377,8 +377,13 @@ def _score_shares(
     }
 
 
-def _with_kinds(data: Dataset, split: str) -> Iterator[dict[str, Any]]:
-    """Yield the labels of each user of each run, with the kinds of present and next places."""
+def labels_by_person(data: Dataset, split: str) -> Iterator[dict[str, Any]]:
+    """Yield the labels of each user of each run, with the kinds of present and next places.
+
+    Args:
+        data: The data set.
+        split: The split.
+    """
     rooms = _groups(data, "rooms", split)
     for (run, _), labels in _groups(data, "labels", split, "user").items():
         own = rooms[(run,)]
