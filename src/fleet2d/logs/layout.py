@@ -226,7 +226,8 @@ def read_uci_adl(path: Path, *, sort: bool = False, zone: Zone | None = None) ->
     readings = parts["activities"]
     if parts["sensors"]:
         readings = label_by_activities(parts["sensors"], readings)
-    return ActivityLog(path, "uci_adl", first_day, tuple(readings), tuple(notes))
+    by_sensors = tuple(parts["sensors"])
+    return ActivityLog(path, "uci_adl", first_day, tuple(readings), tuple(notes), by_sensors)
 
 
 def _pair(path: Path) -> dict[str, Path]:

@@ -145,6 +145,7 @@ class ActivityLog:
         first_day: The date of its first day; None where the log has no dates.
         readings: The readings.
         notes: Anomalies in the log, and how they were resolved.
+        sensors: What sensors alone show, in a layout whose activities are written down apart.
     """
 
     path: Path
@@ -152,6 +153,7 @@ class ActivityLog:
     first_day: date | None
     readings: tuple[Reading, ...]
     notes: tuple[str, ...] = ()
+    sensors: tuple[Reading, ...] = ()
 
     @property
     def days(self) -> int:

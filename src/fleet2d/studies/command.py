@@ -83,7 +83,7 @@ def run(  # noqa: PLR0913 - options of the command line
     location = out or default_location(specification.name)
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     with (
-        _interruptible(location),
+        interruptible(location),
         observing(quiet=quiet) as observer,
         open_crew(executor, workers) as crew,
     ):
@@ -319,7 +319,7 @@ def _row_of(study: "Study", variant: str) -> dict[str, Any]:
 
 
 @contextmanager
-def _interruptible(location: str | Path) -> Iterator[None]:
+def interruptible(location: str | Path) -> Iterator[None]:
     """End at SIGTERM as at Ctrl-C: workers end, finished results are kept, and a message says so.
 
     Raises:
@@ -361,7 +361,7 @@ def tune(
     specification = read_specification(source)
     folder = out or Path(default_location(f"{specification.name}-tune"))
     with (
-        _interruptible(folder),
+        interruptible(folder),
         observing_trials(show=not quiet) as bar,
         open_crew(executor, workers) as crew,
     ):

@@ -26,7 +26,7 @@ from fleet2d.studies.directory import (
     MetricFacts,
     StudyDirectory,
 )
-from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerTask, run_tasks
+from fleet2d.studies.executors import Crew, TaskEnd, TaskQueue, WorkerJob, WorkerTask, run_tasks
 from fleet2d.studies.plan import (
     Changed,
     KnownNames,
@@ -49,6 +49,7 @@ from fleet2d.studies.results import (
 )
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
 from fleet2d.studies.specification import Specification, read_specification
+from fleet2d.studies.storage import Storage
 
 if TYPE_CHECKING:
     import polars as pl
@@ -237,14 +238,15 @@ def run_study(
             observer.on_note(problem)
         results = read_results(directory.storage, columns=(VARIANT, "status"))
         finished = results[VARIANT]
-        plan = reconcile(checked.plan, directory, finished, changed, observer.on_note)
+        variants = reconcile(checked.plan.variants, directory, finished, changed, observer.on_note)
+        plan = StudyPlan(checked.plan.design, variants)
         _write_plan(directory, checked, plan)
         complete = results.filter(status=COMPLETE)[VARIANT]
         run = _StudyRun(checked, plan, directory, crew, observer, fail_fast)
         run.run_missing(complete)
-        variants = _write_variants(directory)
-    checked.note_missing(variants, observer)
-    return Counts.of(variants)
+        found = write_variants(directory)
+    checked.note_missing(found, observer)
+    return Counts.of(found)
 
 
 def presence(variants: "pl.DataFrame") -> "pl.DataFrame":
@@ -254,7 +256,7 @@ def presence(variants: "pl.DataFrame") -> "pl.DataFrame":
     return variants.select("status", pl.exclude("status").is_not_null())
 
 
-def _write_variants(directory: StudyDirectory) -> "pl.DataFrame":
+def write_variants(directory: StudyDirectory) -> "pl.DataFrame":
     """Write the data set of the variants; return their `presence`."""
     import polars as pl
 
@@ -289,7 +291,10 @@ class _StudyRun:
         missing = self.plan.variants.filter(~is_complete)
         self.observer.on_start(Counts(total, total - len(missing), 0), self.crew.workers)
         is_checked = False
-        with closing(self._results(self.plan.queue(missing))) as found:
+        results = stored_results(
+            self.directory.storage, self.crew, self.checked.job, self.plan.queue(missing)
+        )
+        with closing(results) as found:
             for result in found:
                 self.observer.on_result(result)
                 if result.is_complete and not is_checked:
@@ -299,18 +304,28 @@ class _StudyRun:
                 if self.fail_fast and not result.is_complete:
                     return
 
-    def _results(self, queue: TaskQueue) -> Generator[VariantResult]:
-        """Run the tasks of a queue; yield and store their results."""
-        writer = ResultWriter(self.directory.storage)
-        try:
-            with closing(run_tasks(self.crew, self.checked.job, queue)) as steps:
-                for ends in steps:
-                    for result in map(_result, ends):
-                        writer.add(result)
-                        yield result
-                    writer.flush()
-        finally:
-            writer.flush(now=True)
+
+def stored_results(
+    storage: Storage, crew: Crew, job: WorkerJob, queue: TaskQueue
+) -> Generator[VariantResult]:
+    """Run the tasks of a queue; yield and store their results.
+
+    Args:
+        storage: The files of a study.
+        crew: Where tasks run.
+        job: Returns the `VariantResult` of a task.
+        queue: The tasks.
+    """
+    writer = ResultWriter(storage)
+    try:
+        with closing(run_tasks(crew, job, queue)) as steps:
+            for ends in steps:
+                for result in map(_result, ends):
+                    writer.add(result)
+                    yield result
+                writer.flush()
+    finally:
+        writer.flush(now=True)
 
 
 def _result(end: TaskEnd) -> VariantResult:

@@ -351,16 +351,16 @@ class ScenarioFile:
 
 
 def reconcile(
-    plan: StudyPlan,
+    planned: "pl.DataFrame",
     directory: StudyDirectory,
     finished: "pl.Series",
     changed: Changed | None,
     on_note: Callable[[str], None],
-) -> StudyPlan:
-    """Number the variants of a plan as in the stored study; new variants get new numbers.
+) -> "pl.DataFrame":
+    """Number planned variants as in the stored study; new variants get new numbers.
 
     Args:
-        plan: The current plan.
+        planned: The current variants, with the columns of `StudyPlan.variants`.
         directory: The study.
         finished: The numbers of variants that have results.
         changed: What to do with results of other code, inputs or scenarios.
@@ -377,17 +377,17 @@ def reconcile(
                 f"{directory.location}/{PLAN} is missing, and with it the variants of the results:"
                 " choose another --out"
             )
-        return plan
+        return planned
     stored = directory.plan((VARIANT, "identity").__contains__)
-    if stored["identity"].equals(plan.variants["identity"]):  # it takes less memory than joins
-        return StudyPlan(plan.design, plan.variants.with_columns(stored[VARIANT]))
+    if stored["identity"].equals(planned["identity"]):  # it takes less memory than joins
+        return planned.with_columns(stored[VARIANT])
     stored = directory.plan((VARIANT, "identity", "template", SEED).__contains__)
     numbers = stored.select("identity", stored=VARIANT).unique("identity", keep="last")
     stale = stored.filter(pl.col(VARIANT).is_in(finished.implode()))
-    stale = stale.join(plan.variants, on="identity", how="anti")
+    stale = stale.join(planned, on="identity", how="anti")
     same = ["template", SEED]
     others = stale.select(*same, other=VARIANT, old="identity").unique(same, keep="last")
-    variants = plan.variants.join(numbers, on="identity", how="left", maintain_order="left")
+    variants = planned.join(numbers, on="identity", how="left", maintain_order="left")
     variants = variants.join(others, on=same, how="left", maintain_order="left")
     is_recomputed = pl.col("stored").is_null() & pl.col("other").is_not_null()
     recomputed = len(variants.filter(is_recomputed))
@@ -408,7 +408,7 @@ def reconcile(
     if len(stale) > reused:
         on_note(f"{len(stale) - reused} results no longer belong to the study: set aside")
     variants = variants.with_columns(number.cast(pl.Int32).alias(VARIANT))
-    return StudyPlan(plan.design, variants.drop("stored", "other", "old"))
+    return variants.drop("stored", "other", "old")
 
 
 def _refusal(location: str, recomputed: int, stale: int) -> str:

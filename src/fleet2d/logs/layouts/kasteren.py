@@ -62,7 +62,7 @@ def read_kasteren(path: Path, *, sort: bool = False, zone: Zone | None = None) -
     labelled = label_by_activities(sensors, activities)
     idle = [reading for reading in labelled if not reading.activity and reading.room != AWAY]
     readings = sorted([*activities, *idle], key=lambda reading: reading.begin_us)
-    return ActivityLog(path, "kasteren", first_day, tuple(readings), tuple(notes))
+    return ActivityLog(path, "kasteren", first_day, tuple(readings), tuple(notes), tuple(sensors))
 
 
 def _switches(rows: list[Reading]) -> list[Reading]:
