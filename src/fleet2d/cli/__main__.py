@@ -33,7 +33,7 @@ GROUPS = {
     "Run": ("run", "demo", "resume", "live", "mcp"),
     "Look": ("view", "show", "export"),
     "Test": ("test", "falsify", "verify"),
-    "Experiment": ("study",),
+    "Experiment": ("study", "transfer"),
     "Learn": ("fit", "dataset", "train"),
     "Homes and files": ("validate", "convert", "components"),
 }

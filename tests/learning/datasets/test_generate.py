@@ -120,7 +120,7 @@ def unfit(folder: Path) -> dict[str, Any]:
     log = folder / "sauna.txt"
     log.write_text("2026-01-05 15:10:00 Sauna Sauna ON Relax\n")
     people = [
-        *SOURCE["splits"]["train"]["households"],
+        ["retired"],
         {"ana": {"type": "replay", "path": str(log)}},
     ]
     train = {**SOURCE["splits"]["train"], "runs": 12, "households": people}

@@ -257,7 +257,7 @@ def dataset(
         >>> people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
         >>> made = fleet2d.dataset({"splits": {"train": people}}, "small")  # doctest: +SKIP
     """
-    with open_crew("local", workers) as crew:
+    with open_crew(executor, workers) as crew:
         plan = plan_dataset(source, crew)
     root = Path(out)
     parts = root / PARTS
@@ -316,7 +316,9 @@ def check_dataset(
     if (root / MANIFEST).is_file():
         return
     parts = root / PARTS
-    plan = _without_unfit(plan_dataset(source), parts, workers, executor)
+    with open_crew(executor, workers) as crew:
+        plan = plan_dataset(source, crew)
+    plan = _without_unfit(plan, parts, workers, executor)
     parts.mkdir(parents=True, exist_ok=True)
     lock = FolderLock(parts, "dataset.lock")
     try:

@@ -1,0 +1,75 @@
+"""Real-time presence: networks trained on windows of simulated robots, scored on replayed logs."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fleet2d.kernels import I64
+from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, predict, train
+from fleet2d.learning.datasets.windows import PRIOR, Windows
+from fleet2d.learning.transfer.learners import Forecast
+from fleet2d.learning.transfer.sources import Sources
+from fleet2d.learning.transfer.specification import Cell
+from fleet2d.metrics.rtp_score import log_loss, top_k
+from fleet2d.runtime.clock import DAY_S
+
+SETTINGS = TrainingSettings(hidden=16, epochs=6, trust=1.0)
+OWN_REPEATS = 3  # of a home's own windows among others
+
+
+def chosen(part: Windows, which: Any) -> Windows:
+    """Return some windows of a person: a mask, or a slice."""
+    return part._replace(
+        features=part.features[which],
+        truth=part.truth[which],
+        step=part.step[which],
+        beliefs={name: belief[which] for name, belief in part.beliefs.items()},
+    )
+
+
+def of_days(parts: Sequence[Windows], days: I64) -> list[Windows]:
+    """Return the windows of some days of a log whose replay began at midnight, in steps of 1 s."""
+    return [chosen(part, np.isin(part.step // DAY_S, days)) for part in parts]
+
+
+def thinned(parts: Sequence[Windows], rows: int) -> list[Windows]:
+    """Return every n-th window, so that they are about so many."""
+    every = max(1, -(-sum(len(part.truth) for part in parts) // rows))
+    return [chosen(part, slice(None, None, every)) for part in parts]
+
+
+def presence_forecast(sources: Sources, cell: Cell) -> Forecast:
+    """Train the network of a cell, and score it on the days of its home that are tested on."""
+    rows = sources.file.rows
+    log = sources.windows_of(f"log-{cell.home}")
+    own = of_days(log, sources.homes[cell.home].own(cell.days)) if cell.days else []
+    used = [name for name in sources.needed(cell) if name != f"log-{cell.home}"]
+    real = [part for name in used if name.startswith("log-") for part in sources.windows_of(name)]
+    made = [
+        part for name in used if not name.startswith("log-") for part in sources.windows_of(name)
+    ]
+    known = [*thinned(real, rows), *thinned(made, rows)]
+    if cell.arm == "own":
+        known = own
+    elif cell.arm in ("real", "both"):
+        known += own * OWN_REPEATS
+    weights = train(known, settings=SETTINGS)
+    if cell.arm == "tuned":
+        weights = fine_tune(weights, own)
+    asked = of_days(log, sources.tested[cell.home])
+    beliefs = [predict(weights, part) for part in asked]
+    return Forecast(
+        np.concatenate([log_loss(b, p.truth) for b, p in zip(beliefs, asked, strict=True)]),
+        np.concatenate([top_k(b, p.truth, 1) for b, p in zip(beliefs, asked, strict=True)]),
+        np.concatenate([part.step // DAY_S for part in asked]),
+        {
+            "unseen": 0.0,
+            "naive_accuracy": float(
+                np.concatenate([top_k(p.beliefs[PRIOR], p.truth, 1) for p in asked]).mean()
+            ),
+            "naive_log_loss": float(
+                np.concatenate([log_loss(p.beliefs[PRIOR], p.truth) for p in asked]).mean()
+            ),
+        },
+    )

@@ -1,0 +1,115 @@
+"""A whole experiment: resumable cell by cell, the same for any number of workers, and told in the end."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from tests.learning.transfer.homes import write_home
+from tests.scenes import Cli
+
+from fleet2d.errors import RunDirectoryError
+from fleet2d.learning.transfer import driver
+from fleet2d.learning.transfer.driver import COLUMNS, run_transfer
+from fleet2d.learning.transfer.report import compared
+from fleet2d.learning.transfer.specification import read_plan
+from fleet2d.studies.api import open_crew
+from fleet2d.studies.reader import Study, open_study
+
+pytestmark = pytest.mark.slow
+SETTINGS: dict[str, Any] = {
+    "days": [0, 3],
+    "tasks": ["room in 60 min", "activity"],
+    "arms": ["real", "own", "both", "fitted", "markov"],
+    "learners": ["usual"],
+    "personas": ["retired"],
+    "plans": [{"synthetic": 1, "settings": {"furnish": True}}],
+    "lived_days": 2,
+    "rows": 300,
+}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("sklearn", reason="needs the extra transfer")
+    folder = tmp_path_factory.mktemp("transfer")
+    homes = {
+        name: {"path": str(write_home(folder / f"{name}.txt", 8, shift_min=shift))}
+        for name, shift in (("one", 0), ("two", 5))
+    }
+    (folder / "homes.yaml").write_text(yaml.safe_dump({**SETTINGS, "homes": homes}))
+    return folder / "homes.yaml"
+
+
+@pytest.fixture(scope="module")
+def made(file: Path) -> Study:
+    with open_crew("serial") as crew:
+        counts = run_transfer(read_plan(file), file.parent / "made", crew)
+    assert (counts.total, counts.complete) == (28, 28)
+    return open_study(file.parent / "made")
+
+
+def scores(study: Study) -> list[tuple[Any, ...]]:
+    frame = study.variants.sort(COLUMNS)
+    return frame.select(*COLUMNS, "log_loss", "accuracy", "cases").rows()
+
+
+class Killed(BaseException):
+    """As a signal would end the process."""
+
+
+def test_a_kill_loses_only_the_cell_under_way_and_results_are_the_same(
+    file: Path, made: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trained: list[Any] = []
+    score = driver.forecast
+
+    def dies_at_the_fourth(*arguments: Any) -> Any:
+        trained.append(arguments)
+        if len(trained) == 4:
+            raise Killed
+        return score(*arguments)
+
+    monkeypatch.setattr(driver, "forecast", dies_at_the_fourth)
+    with open_crew("serial") as crew:
+        with pytest.raises(Killed):
+            run_transfer(read_plan(file), tmp_path / "out", crew)
+        counts = run_transfer(read_plan(file), tmp_path / "out", crew)
+    assert 28 == counts.complete
+    assert len(trained) == 4 + 28 - 3
+    assert scores(made) == scores(open_study(tmp_path / "out"))
+
+
+def test_results_of_other_settings_are_refused_until_they_may_go(
+    file: Path, made: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = file.with_name("other.yaml")
+    other.write_text(file.read_text().replace("rows: 300", "rows: 301"))
+    with open_crew("serial") as crew, pytest.raises(RunDirectoryError, match="--changed redo"):
+        run_transfer(read_plan(other), Path(made.location), crew)
+
+
+def test_differences_are_paired_by_home_and_by_day(made: Study) -> None:
+    rows = compared(made, "room in 60 min", "real").filter(arm="both", days=3).to_dicts()
+    (row,) = rows
+    assert 2 == row["pairs"]
+    own = made.variants.filter(task="room in 60 min", days=3)
+    means = {arm: own.filter(arm=arm)["log_loss"].mean() for arm in ("both", "real")}
+    assert row["difference"] == pytest.approx(means["both"] - means["real"])
+    days = made.polars("days").filter().collect()
+    assert {3, 4, 5, 6, 7} == {*days.filter(home="one")["day"].to_list()}
+
+
+def test_the_command_prints_sentences_and_writes_a_table_and_a_figure_for_each_task(
+    file: Path, made: Study, fleet2d: Cli
+) -> None:
+    code, out, err = fleet2d("transfer", file, "--out", made.location)
+    assert (0, "") == (code, err)
+    *sentences, last = out.splitlines()
+    assert 2 <= len(sentences) <= 4
+    assert last.startswith("28 of 28 cells, 0 left out")
+    page = (Path(made.location) / "report.md").read_text()
+    for picture in ("room_in_60_min.png", "activity.png"):
+        assert f"]({picture})" in page
+        assert (Path(made.location) / picture).stat().st_size > 10_000
+    assert page.count("| usual | 3 | fitted | 2 |") == 2
