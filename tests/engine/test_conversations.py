@@ -4,12 +4,15 @@ from typing import Any
 
 import pytest
 from tests.entities.robots.test_interact import PILL, Scripted, ana, events_of, home
-from tests.scenes import digests, table
+from tests.scenes import digests, scenario, table
 
 import fleet2d
 from fleet2d.errors import ScenarioError
 
 PARCEL = {**PILL, "do": "deliver", "fetch_from": "ben"}
+CALM: dict[str, Any] = {
+    "robots": {"astro": {"behaviors": [{"type": "interact"}, {"type": "patrol"}]}}
+}
 
 
 def told(run: fleet2d.Run, *kinds: str) -> list[tuple[str, str]]:
@@ -110,6 +113,41 @@ def test_annoyed_people_send_robots_away_that_asked_nothing() -> None:
     for step in sent:
         assert "kitchen_0" in rooms_of(run, "astro")[step]
         assert "kitchen_0" not in rooms_of(run, "astro")[step + 20 : step + 300]
+
+
+def test_who_has_had_enough_switches_the_robot_off_for_good() -> None:
+    person = person_who(complaints=1000)
+    person["answers"] |= {"sends_away_at": -1, "away_for": "5 s", "off_for": "5 min"}
+    robots = {"astro": {"behaviors": [{"type": "patrol"}]}}
+    content = home("8 h", users={"ana": person}, interactions={}, robots=robots)
+    run = fleet2d.run(content)
+    ((given_up, _),) = events_of(run, "given_up")
+    ends = ("given_up", "power_on", "sent_away", "switched_off")
+    # Each time costs 3 % of trust, from a half down to a tenth.
+    assert 50 < len(events_of(run, "sent_away")) < 60
+    assert ["given_up", "switched_off"] == sorted(e for e, _ in told(run, *ends[:2], ends[3]))
+    assert max(step for kind in ends for step, _ in events_of(run, kind)) == given_up
+
+    person["answers"] |= {"gives_up_below": 0}
+    assert not events_of(fleet2d.run(content), "given_up")
+
+
+@pytest.mark.slow
+def test_a_life_with_a_pushy_robot_ends_in_days_rather_than_in_a_thousand_quarrels() -> None:
+    """One who `leaves` switched it off 42 times in 60 days; another sent it away 893 times."""
+    pushy = {
+        "medicine": {"do": "remind", "to": "ana", "at": ["08:00"], "within": "2 h", "worth": 5},
+        "music": {"do": "offer", "to": "ana", "every": "1 h", "within": "1 h"},
+    }
+    for kind in ("leaving", "fading"):
+        answers = {"months": {"type": kind}}
+        users = {"ana": {"type": "routine", "persona": "retired", "answers": answers}}
+        run = fleet2d.run(scenario("30 d", **CALM, users=users, interactions=pushy))
+        ((given_up, _),) = events_of(run, "given_up")
+        assert given_up < 14 * 86400
+        assert len(events_of(run, "switched_off")) <= 5
+        assert len(events_of(run, "sent_away")) <= 100
+        assert not [step for step, _ in events_of(run, "asks") if step > given_up]
 
 
 @pytest.mark.parametrize("max_span", [1, 7])

@@ -11,6 +11,7 @@ from fleet2d.interactions.interaction import Interaction, Outcome
 
 MORNING = datetime(2026, 1, 5, 8)
 PILL = Interaction(do="remind", to="ana", at=("08:00",), worth=2)
+IDLE = Interaction(do="offer", to="ana", every="1 h", worth=0)
 NEAR = Circumstances(
     time=MORNING,
     name="pill",
@@ -72,7 +73,8 @@ def test_each_circumstance_changes_its_stage(
 
 
 def test_annoyance_makes_people_refuse() -> None:
-    assert chances(state=ANNOYED)[2] < chances(state=AttitudeState(MORNING))[2] - 0.05
+    offered = NEAR._replace(interaction=IDLE)
+    assert chances(offered, ANNOYED)[2] < chances(offered, AttitudeState(MORNING))[2] - 0.05
 
 
 def test_a_sleeper_is_never_available() -> None:
@@ -128,10 +130,31 @@ def test_outcomes_come_as_often_as_their_chances_say() -> None:
 )
 def test_a_bad_line_ends_in_consequences(annoyance: float, room: str, outcome: Outcome) -> None:
     state = AttitudeState(MORNING, novelty=0.0, annoyance=annoyance)
-    outcomes = set(answers_of(200, NEAR._replace(room=room), state))
+    outcomes = set(answers_of(200, NEAR._replace(room=room, interaction=IDLE), state))
 
     assert outcomes <= {"", Outcome.ACCEPTED, outcome}
     assert outcome in outcomes
+
+
+def test_annoyance_and_burden_hardly_count_for_what_is_urgent() -> None:
+    fed_up = AttitudeState(MORNING, novelty=0.0, annoyance=6.0, burden=17.0, trust=0.2)
+    medicine = NEAR._replace(interaction=PILL.model_copy(update={"worth": 5.0}))
+
+    assert chances(medicine, fed_up)[2] > 0.5 > 0.1 > chances(NEAR, fed_up)[2]
+    assert Outcome.SENT_AWAY not in answers_of(200, medicine, fed_up)
+    assert Outcome.SENT_AWAY in answers_of(200, NEAR._replace(interaction=IDLE), fed_up)
+
+
+@pytest.mark.parametrize(("below", "outcome"), [(0.1, "switched_off"), (0.0, "sent_away")])
+def test_who_trusts_it_no_more_switches_it_off_instead_of_sending_it_away(
+    below: float, outcome: str
+) -> None:
+    state = AttitudeState(MORNING, annoyance=3.5, trust=0.05)
+    answers = Answers(gives_up_below=below)
+
+    assert outcome == answers.complaint(state, "living_room")
+    assert (below > 0) == answers.has_enough(state)
+    assert answers.complaint(AttitudeState(MORNING, annoyance=2.5, trust=0), "bedroom") is None
 
 
 def test_the_same_draw_answers_at_the_same_step_whatever_else_differs() -> None:

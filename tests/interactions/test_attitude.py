@@ -56,6 +56,22 @@ def test_trust_rises_with_what_is_useful_and_falls_with_mistakes() -> None:
     assert useful > 0.75 > 0.5 > useless > mistaken
 
 
+@pytest.mark.parametrize(
+    ("outcome", "left"),
+    [("accepted", 1.05), ("deferred", 1), ("ignored", 1), ("declined", 0.97), ("sent_away", 0.97),
+     ("banned", 0.97), ("switched_off", 0.7), ("mistaken", 0.7)],
+)  # fmt: skip
+def test_each_answer_leaves_as_much_trust_as_the_docs_say(outcome: str, left: float) -> None:
+    assert 0.5 * left == pytest.approx(lived(Attitude(), 1, Outcome(outcome)).trust)
+
+
+def test_lost_trust_recovers_to_what_it_was_at_first_and_gained_trust_stays() -> None:
+    lost, gained = AttitudeState(START, trust=0.1), AttitudeState(START, trust=0.8)
+    for state in (lost, gained):
+        Attitude().pass_time(state, START + 30 * DAY)
+    assert (0.3, 0.8) == pytest.approx((lost.trust, gained.trust))
+
+
 def test_a_habit_forms_at_a_time_of_day_and_holds_there_only() -> None:
     state = lived(Attitude(), 20, Outcome.ACCEPTED)
     window = timedelta(minutes=30)

@@ -37,6 +37,13 @@ def test_what_is_declined_is_answered_and_missed() -> None:
     }
 
 
+@pytest.mark.parametrize("outcome", ["sent_away", "banned", "switched_off"])
+def test_being_sent_away_is_no_answer(outcome: str) -> None:
+    numbers, _ = measured(users={"ana": ana("bedroom", (outcome,))})
+
+    assert (0.0, 1) == (numbers["answered"], numbers[outcome])
+
+
 def test_who_is_not_reached_is_missed() -> None:
     numbers, _ = measured(robots={"astro": {"behaviors": [{"type": "interact", "seek": False}]}})
 

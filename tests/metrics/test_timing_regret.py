@@ -70,7 +70,7 @@ def test_the_same_life_asked_at_the_best_time_has_no_regret() -> None:
 
 
 def test_prompts_for_other_requests_count_but_not_those_for_the_same() -> None:
-    months = {"months": {"annoyed_by": 30}, "attitude": {"annoyance": -10}}
+    months = {"months": {"annoyed_by": 30}, "attitude": {"annoyance": -50}}
     patient = {"sends_away_at": 1e6}
     answers = {**ANSWERS, **months, **patient}
     person = {"type": "schedule", "days": [{"on": "daily", "items": ITEMS}], "answers": answers}

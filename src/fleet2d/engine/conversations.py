@@ -341,15 +341,15 @@ class Conversations(Watcher):
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
         user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])
-        event = self._obey(row, user, reply.outcome, text, step, bodies)
+        events = self._obey(row, user, reply.outcome, text, step, bodies)
         asked = queue.interactions.get(text.rpartition(" ")[0])
         if reply.outcome != Outcome.ACCEPTED or asked is None or asked.do != "ask":
-            return [event]
+            return events
         about = next((a.row for a in self.actors[: self.users] if a.name == asked.about), None)
         if about is None:
-            return [event]
+            return events
         where = f"{asked.about} {self._whereabouts(about, user, bodies.block(step, step + 1))}"
-        return [event, Event(step, event.entity, EventKind.TOLD, where)]
+        return [*events, Event(step, self.actors[row].name, EventKind.TOLD, where)]
 
     def _whereabouts(self, about: int, user: int, block: PoseBlock) -> str:
         """Return the whereabouts of one person to another: away, their common room, or home."""
@@ -362,10 +362,12 @@ class Conversations(Watcher):
 
     def _obey(
         self, row: int, user: int, outcome: Outcome, text: str, step: int, bodies: Bodies
-    ) -> Event:
-        """Let a robot obey a person's answer at a step; return the event."""
+    ) -> list[Event]:
+        """Let a robot obey a person's answer at a step; return the events."""
         robot = self.actors[row]
+        person = self.actors[user]
         answers = self.answers[user]
+        events = []
         room = self._room(row, bodies.block(step, step + 1))
         lasts = {Outcome.SENT_AWAY: answers.away_for, Outcome.BANNED: answers.bans_for}.get(outcome)
         if lasts is not None and room is not None:
@@ -374,11 +376,16 @@ class Conversations(Watcher):
             self._bans.append((until, row, room))
             text = f"{text} {robot.home.rooms[room].name}"
         if outcome == Outcome.SWITCHED_OFF:
-            self._switch_off(robot, answers.off_for, step + 1, f"users.{self.actors[user].name}")
-        return Event(step, robot.name, str(outcome), text)
+            for_good = answers.has_enough(self.attitudes[user, row])
+            lasts = None if for_good else answers.off_for
+            self._switch_off(robot, lasts, step + 1, f"users.{person.name}")
+            events += [Event(step, robot.name, EventKind.GIVEN_UP, person.name)] * for_good
+        return [Event(step, robot.name, str(outcome), text), *events]
 
-    def _switch_off(self, robot: DecidingActor, lasts: timedelta, step: int, by: str) -> None:
-        """Switch a robot off from a step on."""
+    def _switch_off(
+        self, robot: DecidingActor, lasts: timedelta | None, step: int, by: str
+    ) -> None:
+        """Switch a robot off from a step on; None: for good."""
         from fleet2d.interventions.robots import SetPower  # few robots are switched off
 
         off = SetPower(entity=robot.name, state="off", duration=lasts)
@@ -441,38 +448,42 @@ class Conversations(Watcher):
             self._starts.sort()
         due = [start for start in self._starts if start[0] <= step]
         self._starts = self._starts[len(due) :]
-        events = (self._turn_to(user, row, kind, step, bodies) for _, user, row, kind in due)
-        return [event for event in events if event is not None]
+        return [
+            event
+            for _, user, row, kind in due
+            for event in self._turn_to(user, row, kind, step, bodies)
+        ]
 
-    def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> Event | None:
-        """Let a person call a robot, ask it something, or complain; None: it doesn't happen."""
+    def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> list[Event]:
+        """Let a person call a robot, ask it something, or complain; return what happens."""
         person = self.actors[user]
         robot = self.actors[row]
         block = bodies.block(step, step + 1)
         if robot.is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
-            return None
+            return []
         lattice = robot.home.plan.lattice
         point = (int(block.x[user, 0]), int(block.y[user, 0]))
         if kind == "call":
             near = robot.space.nearest(*point, robot.part) or (robot.state.x, robot.state.y)
             robot.receive(Command("come", place=lattice.xy_of(*near)), step + 1)
-            return Event(step, robot.name, EventKind.CALLED, f"come {person.name}")
+            return [Event(step, robot.name, EventKind.CALLED, f"come {person.name}")]
         if kind == "question":
             reach = EARSHOT_M * lattice.units_per_m
             away2 = (int(block.x[row, 0]) - point[0]) ** 2 + (int(block.y[row, 0]) - point[1]) ** 2
             if away2 > reach**2:
-                return None
+                return []
             asked = SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(*point))
             self._last.append((row, asked))
-            return Event(step, robot.name, EventKind.QUESTION, person.name)
+            return [Event(step, robot.name, EventKind.QUESTION, person.name)]
         room = self._room(user, block)
         state = self.attitudes[user, row]
         if room is None or room != self._room(row, block):
-            return None
+            return []
         self.answers[user].months.pass_time(state, self._clock.time(step))
         outcome = self.answers[user].complaint(state, person.home.rooms[room].type)
         if outcome is None:
-            return None
+            return []
+        self.answers[user].months.let_down(state, outcome)
         return self._obey(row, user, outcome, person.name, step, bodies)
 
 

@@ -203,6 +203,15 @@ KIND_LOGITS: Mapping[str, float] = {
 HALF_WORTH = 2.0
 
 
+def urgency(interaction: Interaction) -> float:
+    """Return how little burden and annoyance count for an interaction: from 0 to 1, by its value.
+
+    >>> [urgency(Interaction(do="remind", to="ana", every="1 d", worth=w)) for w in (0, 2, 6)]
+    [0.0, 0.5, 0.9]
+    """
+    return interaction.worth**2 / (interaction.worth**2 + HALF_WORTH**2)
+
+
 class ImportancePart(AnswerPart):
     """Its kind, and its value to the person.
 
@@ -278,8 +287,9 @@ class BurdenPart(AnswerPart):
     each: float = -0.35
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add the burden beyond what is tolerated."""
-        return self.each * max(0.0, state.burden - self.tolerance)
+        """Add the burden beyond what is tolerated, less for what is urgent."""
+        burden = max(0.0, state.burden - self.tolerance)
+        return self.each * burden * (1 - urgency(now.interaction))
 
 
 class AttitudePart(AnswerPart):
@@ -289,7 +299,7 @@ class AttitudePart(AnswerPart):
         novelty: Added while the robot is new.
         habit: Added if the interaction is expected at this time of day, within half an hour.
         trust: Added at full trust; as much is taken off without any.
-        annoyance: Added for each unit of annoyance.
+        annoyance: Added for each unit of annoyance, less for what is urgent.
     """
 
     novelty: float = 0.7
@@ -303,7 +313,7 @@ class AttitudePart(AnswerPart):
             self.novelty * state.novelty
             + self.habit * state.expects(now.name, now.time, timedelta(minutes=30))
             + self.trust * (2 * state.trust - 1)
-            + self.annoyance * state.annoyance
+            + self.annoyance * state.annoyance * (1 - urgency(now.interaction))
         )
 
 
@@ -439,7 +449,10 @@ class Answers(Component):
         defers: Probability that a person who isn't available asks for it later.
         later: Least and greatest time after which it may come again.
         sends_away_at: Annoyance from which on the robot is sent away from the room; two more, and
-            it is banned from a bedroom or bathroom; five more, and it is switched off.
+            it is banned from a bedroom or bathroom; five more, and it is switched off. What is
+            urgent annoys less.
+        gives_up_below: Trust below which a person who would do any of this switches it off for
+            good; 0: never.
         away_for: For how long it is sent away.
         bans_for: For how long it is banned.
         off_for: For how long it is switched off.
@@ -461,6 +474,7 @@ class Answers(Component):
     defers: Share = 0.3
     later: tuple[Duration, Duration] = (timedelta(minutes=15), timedelta(hours=1))
     sends_away_at: float = 3.0
+    gives_up_below: Share = 0.1
     away_for: PositiveDuration = timedelta(minutes=30)
     bans_for: PositiveDuration = timedelta(days=7)
     off_for: PositiveDuration = timedelta(hours=24)
@@ -505,19 +519,32 @@ class Answers(Component):
         woke = now.activity in ASLEEP
         if available < willingness and accepts < self.chance("accept", now, state):
             return Reply(Outcome.ACCEPTED, delay, willingness=willingness)
-        if (outcome := self.complaint(state, now.room)) is None:
+        if (outcome := self.complaint(state, now.room, urgency(now.interaction))) is None:
             mild = Outcome.DEFERRED if defers < self.defers and not woke else Outcome.IGNORED
             outcome = Outcome.DECLINED if available < willingness else mild
         later = _between(self.later, late)
         return Reply(outcome, delay, later, willingness, woke)
 
-    def complaint(self, state: AttitudeState, room: str) -> Outcome | None:
-        """Return how a person who is annoyed enough gets rid of a robot in a type of room."""
-        if state.annoyance >= self.sends_away_at + OFF_AFTER:
+    def complaint(self, state: AttitudeState, room: str, urgent: float = 0.0) -> Outcome | None:
+        """Return how a person who is annoyed enough gets rid of a robot.
+
+        Args:
+            state: The person's attitude.
+            room: The type of the room.
+            urgent: The urgency of what the robot wants.
+        """
+        annoyance = state.annoyance * (1 - urgent)
+        if annoyance < self.sends_away_at:
+            return None
+        if annoyance >= self.sends_away_at + OFF_AFTER or self.has_enough(state):
             return Outcome.SWITCHED_OFF
-        if state.annoyance >= self.sends_away_at + BAN_AFTER and room in PRIVATE_ROOMS:
-            return Outcome.BANNED
-        return Outcome.SENT_AWAY if state.annoyance >= self.sends_away_at else None
+        is_private = room in PRIVATE_ROOMS
+        is_banned = is_private and annoyance >= self.sends_away_at + BAN_AFTER
+        return Outcome.BANNED if is_banned else Outcome.SENT_AWAY
+
+    def has_enough(self, state: AttitudeState) -> bool:
+        """Return whether a person who switches the robot off does so for good."""
+        return state.trust < self.gives_up_below
 
 
 def _between(limits: tuple[timedelta, timedelta], share: float) -> timedelta:

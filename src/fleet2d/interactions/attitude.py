@@ -20,8 +20,11 @@ from fleet2d.runtime.local_time import written
 BURDEN_OVER = timedelta(days=7)
 # Part of the distance to full trust that an accepted interaction gains.
 GAINS = 0.05
-# Part of the trust that a mistake costs; a prompt for nothing costs a tenth of it.
-LOSES = 0.3
+# Part of the trust that is lost by a mistake, and by what was for nothing.
+MISTAKE = 0.3
+FOR_NOTHING = 0.03
+# Half-life of what trust has lost, while nothing else happens.
+TRUST_RECOVERS = timedelta(days=30)
 # Part of the distance to a full habit that an accepted interaction gains.
 HABIT_FORMS = 0.15
 
@@ -62,7 +65,7 @@ class Attitude(Component):
     Attributes:
         novelty_lasts: Half-life of the novelty.
         annoyance_lasts: Half-life of annoyance.
-        trust: Trust at first.
+        trust: Trust at first, and what it recovers to.
         annoyed_by: What a prompt adds to annoyance at the worst moment; at a good one nothing.
     """
 
@@ -78,11 +81,13 @@ class Attitude(Component):
         return AttitudeState(start, trust=self.trust)
 
     def pass_time(self, state: AttitudeState, time: datetime) -> None:
-        """Let novelty, annoyance and the memory of prompts fade until a time."""
+        """Let novelty, annoyance and the memory of prompts fade until a time; trust recovers."""
         passed = time - state.time
         state.novelty *= exp2(-(passed / self.novelty_lasts))
         state.annoyance *= exp2(-(passed / self.annoyance_lasts))
         state.burden *= exp2(-(passed / BURDEN_OVER) * 1.4426950408889634)
+        lost = max(0.0, self.trust - state.trust)
+        state.trust += lost * (1 - exp2(-(passed / TRUST_RECOVERS)))
         state.time = time
 
     def addressed(
@@ -98,11 +103,8 @@ class Attitude(Component):
         """
         state.last = state.time
         state.burden += DAY / BURDEN_OVER
-        if outcome == Outcome.MISTAKEN:
-            state.trust *= 1 - LOSES
-            state.annoyance += self.annoyed_by
-            return
-        state.annoyance += self.annoyed_by * (1 - willingness)
+        is_mistaken = outcome == Outcome.MISTAKEN
+        state.annoyance += self.annoyed_by * (1 if is_mistaken else 1 - willingness)
         if outcome == Outcome.ACCEPTED:
             state.trust += GAINS * (1 - state.trust)
             strength, usual_s = state.habits.get(name, (0.0, 0.0))
@@ -111,12 +113,13 @@ class Attitude(Component):
             usual_s = usual_s + 0.3 * (time_s - usual_s) if is_usual else time_s
             strength = strength if is_usual else 0.0
             state.habits[name] = (strength + HABIT_FORMS * (1 - strength), usual_s)
-        elif outcome in (Outcome.DECLINED, Outcome.SENT_AWAY):
-            state.trust *= 1 - LOSES / 10
+        elif outcome not in (Outcome.DEFERRED, Outcome.IGNORED):
+            self.let_down(state, outcome)
 
-    def let_down(self, state: AttitudeState) -> None:
-        """Learn from a robot that goes off in the middle of an interaction: all was for nothing."""
-        state.trust *= 1 - LOSES / 10
+    def let_down(self, state: AttitudeState, outcome: Outcome = Outcome.DECLINED) -> None:
+        """Lose trust by what was for nothing, or worse."""
+        is_worse = outcome in (Outcome.MISTAKEN, Outcome.SWITCHED_OFF)
+        state.trust *= 1 - (MISTAKE if is_worse else FOR_NOTHING)
 
 
 class SteadyAttitude(Attitude):

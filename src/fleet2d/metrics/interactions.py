@@ -22,9 +22,11 @@ from fleet2d.runtime.events import Event, EventKind
 TOLD = frozenset(
     {
         EventKind.CALLED, EventKind.QUESTION, EventKind.REPLIES, EventKind.SENT_AWAY,
-        EventKind.BANNED, EventKind.SWITCHED_OFF, EventKind.BROKEN_OFF,
+        EventKind.BANNED, EventKind.SWITCHED_OFF, EventKind.GIVEN_UP, EventKind.BROKEN_OFF,
     }
 )  # fmt: skip
+# A person who answers says one of these, rather than nothing or that the robot has to go.
+ANSWERS = (Outcome.ACCEPTED, Outcome.DECLINED, Outcome.DEFERRED, Outcome.MISTAKEN)
 
 
 class Interactions(Metric):
@@ -33,14 +35,15 @@ class Interactions(Metric):
     For each robot and person:
 
     - `wanted`: requests that came up; `asked`: times that the person was addressed for them;
-    - `answered`, `accepted`: shares of `asked`; `kept`: share of `wanted` accepted in time;
+    - `answered`, `accepted`: shares of `asked`, of which being sent away is no answer; `kept`:
+      share of `wanted` accepted in time;
     - `value`: value of what was accepted, without what the robot broke off as it went off;
       `missed`: the worth of all requests minus that;
     - `wait_s`: mean time to an answer; `woke`: times that it woke the person;
     - `interrupted`: how often each activity was interrupted at a bad time: the probability of being
       available was below a half;
-    - `called`, `question`, `replies`, `sent_away`, `banned`, `switched_off`, `broken_off`: how
-      often each of them happened, if ever, whoever began;
+    - `called`, `question`, `replies`, `sent_away`, `banned`, `switched_off`, `given_up`,
+      `broken_off`: how often each of them happened, if ever, whoever began;
     - `annoyance`, `trust`: at the end, and `mean_annoyance`, over the times of being addressed.
 
     Its table has a row for each time that a person was addressed, with the truth of it.
@@ -118,7 +121,7 @@ def _person(text: str) -> str:
 
 def _summary(records: list[AnswerRecord], wanted: int, worth: float) -> dict[str, Any]:
     """Return the numbers of one robot and one person."""
-    answered = [r for r in records if r.outcome not in ("", Outcome.IGNORED)]
+    answered = [record for record in records if record.outcome in ANSWERS]
     accepted = [record for record in records if record.outcome == Outcome.ACCEPTED]
     value = sum_in_order(record.value for record in accepted)
     numbers: dict[str, Any] = {

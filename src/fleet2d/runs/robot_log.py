@@ -37,7 +37,8 @@ SOURCES: Mapping[str, frozenset[str]] = {
             EventKind.ACCEPTED, EventKind.ALLOWED, EventKind.APPROACHES, EventKind.ASKS,
             EventKind.BANNED, EventKind.BROKEN_OFF, EventKind.CALLED, EventKind.COLLECTS,
             EventKind.DECLINED, EventKind.DEFERRED, EventKind.DELIVERED, EventKind.DUE,
-            EventKind.EXPIRED, EventKind.IGNORED, EventKind.INTERACTION_OVER, EventKind.INTERACTS,
+            EventKind.EXPIRED, EventKind.GIVEN_UP, EventKind.IGNORED,
+            EventKind.INTERACTION_OVER, EventKind.INTERACTS,
             EventKind.MISTAKEN, EventKind.OPPORTUNITY, EventKind.QUESTION, EventKind.REPLIES,
             EventKind.SENT_AWAY, EventKind.SWITCHED_OFF, EventKind.TOLD, EventKind.WITHDRAWS,
         }
@@ -50,7 +51,8 @@ _LEVELS = {
     **dict.fromkeys((EventKind.LOCALIZATION_LOST, EventKind.BROKEN_OFF), ERROR),
     **dict.fromkeys(
         (
-            EventKind.EXPIRED, EventKind.GAVE_UP, EventKind.GIVES_UP, EventKind.IGNORED,
+            EventKind.EXPIRED, EventKind.GAVE_UP, EventKind.GIVEN_UP, EventKind.GIVES_UP,
+            EventKind.IGNORED,
             EventKind.LOST, EventKind.MISTAKEN, EventKind.POWER_OFF, EventKind.SENT_AWAY,
             EventKind.SWITCHED_OFF, EventKind.WAY_BLOCKED,
         ),

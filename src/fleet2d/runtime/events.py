@@ -55,6 +55,7 @@ class EventKind(StrEnum):
     FOLLOWS = "follows"
     FOUND = "found"
     GAVE_UP = "gave_up"
+    GIVEN_UP = "given_up"
     GIVES_UP = "gives_up"
     GIVES_WAY = "gives_way"
     IGNORED = "ignored"
