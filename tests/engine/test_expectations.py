@@ -394,3 +394,38 @@ def test_wrong_expectations_are_refused_with_their_line(
 def test_what_is_no_text_is_refused_with_an_example(wrong: Any) -> None:
     with pytest.raises(ScenarioError, match=r"expect\.wrong: expected an expectation like always"):
         fleet2d.Simulation(home(expect={"wrong": wrong}))
+
+
+@pytest.mark.parametrize("takes_the_guest_for_her", [True, False])
+def test_who_is_found_is_told_apart_from_whom_the_robot_believes_to_have_found(
+    takes_the_guest_for_her: bool,
+) -> None:
+    taken = {"taken_for": {"users": {"gina": {"rate": 1, "others": {"ana": 1}}}}}
+    still = {
+        name: {
+            "type": "schedule",
+            "rest": room,
+            "days": [{"items": [{"at": "00:00", "place": room}]}],
+        }
+        for name, room in (("ana", "bathroom"), ("gina", "living_room"))
+    }
+    content = scenario(
+        "10 min",
+        users=still,
+        robots={
+            "astro": {
+                "behaviors": [{"type": "find", "user": "ana"}],
+                "camera": {"range": [0.2, 6], "angle_deg": 300},
+                "perception": {"errors": taken if takes_the_guest_for_her else {}},
+            }
+        },
+        script=[{"at": "1 min", "call": "astro", "find": "ana"}],
+        expect={
+            "believes": "eventually(events(found, astro, detail=ana))",
+            "finds": "eventually(found(ana, by=astro))",
+            "is_there": "after(events(found, astro), in_view(ana, by=astro))",
+        },
+    )
+    said = {name: v["holds"] for name, v in fleet2d.run(content).manifest["expectations"].items()}
+    is_true = not takes_the_guest_for_her
+    assert {"believes": True, "finds": is_true, "is_there": is_true} == said

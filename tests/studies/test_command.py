@@ -1,6 +1,7 @@
 """The commands: what they print, write and return."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -44,7 +45,9 @@ def test_a_dry_run_prints_axes_and_variants_and_writes_nothing(fleet2d: Cli) -> 
     assert 0 == code
     assert f"{SPEED}: 0.3, 0.6" in out
     assert f"variant 3 ({SPEED} = 0.6, seed = 1)" in out
-    assert out.endswith("\n4 variants, 1 home, 8.0 min of simulated time\n")
+    assert "\n4 variants, 1 home, 8.0 min of simulated time\n\nWhat can speeds tell?\n" in out
+    assert "By a pilot of 4 runs, its 4 runs take" in out
+    assert re.search(r"a difference of \S+ \[share of time at home] in sightings.ana between", out)
     assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
 
 

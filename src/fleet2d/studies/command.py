@@ -53,7 +53,8 @@ def run(  # noqa: PLR0913 - options of the command line
     workers: Workers = None,
     executor: ExecutorName = "local",
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check all, and print the variants.")
+        bool,
+        typer.Option("--dry-run", help="Check all, and say what it can tell: by a minute's pilot."),
     ] = False,
     fail_fast: Annotated[
         bool, typer.Option("--fail-fast", help="End with the first variant that fails.")
@@ -268,7 +269,8 @@ def _print_size(count: int) -> None:
 
 
 def _print_plan(checked: "CheckedStudy", crew: "Crew") -> None:
-    """Print the axes, the first variants, and how much all of them are."""
+    """Print the axes, the first variants, how much all of them are, and what they can tell."""
+    from fleet2d.studies.pilot import Pilot
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.sentences import in_words
 
@@ -286,7 +288,10 @@ def _print_plan(checked: "CheckedStudy", crew: "Crew") -> None:
     simulated = in_words(timedelta(seconds=plan.variants["simulated_s"].sum()))
     variants = counted(len(plan.variants), "variant")
     homes = counted(plan.variants["home_key"].n_unique(), "home")
-    _print(f"\n{variants}, {homes}, {simulated} of simulated time")
+    _print(f"\n{variants}, {homes}, {simulated} of simulated time\n")
+    pilot = Pilot(checked)
+    pilot.run(crew)
+    _print(pilot.answer(crew.workers))
 
 
 def _print_failures(location: str) -> None:

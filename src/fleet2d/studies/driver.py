@@ -320,7 +320,7 @@ def stored_results(
     try:
         with closing(run_tasks(crew, job, queue)) as steps:
             for ends in steps:
-                for result in map(_result, ends):
+                for result in map(result_of_end, ends):
                     writer.add(result)
                     yield result
                 writer.flush()
@@ -328,7 +328,8 @@ def stored_results(
         writer.flush(now=True)
 
 
-def _result(end: TaskEnd) -> VariantResult:
+def result_of_end(end: TaskEnd) -> VariantResult:
+    """Return the result of a task that has ended; a lost one has failed."""
     if end.loss is not None:
         result = result_of(end.task, VariantOutcome("failed", error=end.loss))
     else:
@@ -338,12 +339,17 @@ def _result(end: TaskEnd) -> VariantResult:
 
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
     """Write the description of the study; its `study.json` last, which makes the folder a study."""
-    file = checked.specification.file
-    source = checked.specification.source
     directory.storage.delete(VARIANTS)  # it may belong to another plan
     checked.scenarios.write(directory)
     write_plan(directory, plan)
-    meta = Meta(
+    directory.write_meta(describe(checked))
+
+
+def describe(checked: CheckedStudy) -> Meta:
+    """Return the description of a study."""
+    file = checked.specification.file
+    source = checked.specification.source
+    return Meta(
         name=checked.specification.name,
         description=file.description,
         code=code_version(),
@@ -357,4 +363,3 @@ def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPla
         notes="\n".join(filter(None, (file.notes, checked.plan.design.left_out))),
         fleet=file.fleet,
     )
-    directory.write_meta(meta)
