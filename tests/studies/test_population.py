@@ -80,9 +80,9 @@ def test_a_larger_population_begins_with_the_same_lives_and_runs_only_the_others
 
 
 def test_replicates_of_lives_have_seeds_that_no_other_life_has() -> None:
-    study = {**fleet(50, where={"people": 1}), "replicates": 3}
+    study = {**fleet(10), "replicates": 3}
     lives = build_design(read_specification(study))
-    assert 150 == len({lives.parameters(i)["seed"] for i in range(len(lives))})
+    assert 30 == len({lives.parameters(i)["seed"] for i in range(len(lives))})
 
 
 def test_rows_of_a_table_are_drawn_by_their_weights_with_all_their_columns(tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ def test_conditions_count_what_they_leave_out() -> None:
     lives = design(count=4, where={"people": 2, "rooms": "..9", "has": ["bathroom"]})
 
     assert {2} == {*lives.labels["people"]}
-    assert max(lives.labels["rooms"]) <= 9
+    assert {*lives.labels["rooms"]} <= {*range(10)}
     assert "people is not 2" in lives.left_out
     assert "rooms is not ..9" in lives.left_out
 
@@ -138,8 +138,8 @@ def test_conditions_count_what_they_leave_out() -> None:
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ({"rooms": "90..99"}, "0 of 40 lives that were drawn meet.*40 .rooms is not 90..99"),
-        ({"has": "ballroom"}, "40 .no ballroom"),
+        ({"rooms": "90..99"}, "0 of 20 lives that were drawn meet.*20 .rooms is not 90..99"),
+        ({"has": "ballroom"}, "20 .no ballroom"),
         ({"rooms": "9..3"}, "range 9..3 is empty"),
         ({"rooms": "a..3"}, "expected a range like 3..15"),
         ({"romms": 3}, "no 'romms': did you mean 'rooms'"),
@@ -149,7 +149,7 @@ def test_conditions_that_leave_nothing_or_make_no_sense_are_told(
     where: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(Fleet2DError, match=words):
-        design(count=2, where=where)
+        design(count=1, where=where)
 
 
 def test_all_homes_that_can_not_be_are_told_at_once_before_the_first_run() -> None:

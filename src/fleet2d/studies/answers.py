@@ -319,7 +319,8 @@ class StudyAnswers:
         frame = self.with_metric(metric)
         values = frame[metric]
         total = float(((values - values.mean()) ** 2).sum()) if len(values) else 0.0
-        varying = [c for c in self.columns if frame[c].n_unique() > 1]
+        drawn = [c for c in self.meta.features if c not in self.populations]
+        varying = [c for c in self.columns if c not in drawn and frame[c].n_unique() > 1]
         rows: list[tuple[str, float]] = []
         if total > 0:
             squares = {column: _between(frame, metric, column) for column in varying}

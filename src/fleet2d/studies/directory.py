@@ -102,6 +102,7 @@ class Meta(BaseModel):
         tags: Words to find the study by.
         notes: Remarks of its author, and how many lives of a population are left out.
         fleet: The column with the numbers of the lives of a population; empty without one.
+        features: The columns of what was drawn for each life.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -118,6 +119,7 @@ class Meta(BaseModel):
     tags: tuple[str, ...] = ()
     notes: str = ""
     fleet: str = ""
+    features: tuple[str, ...] = ()
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric such as `ltp_error.ana.tv`; empty if unknown."""

@@ -362,4 +362,5 @@ def describe(checked: CheckedStudy) -> Meta:
         tags=file.tags,
         notes="\n".join(filter(None, (file.notes, checked.plan.design.left_out))),
         fleet=file.fleet,
+        features=file.axes[file.fleet].columns(file.fleet)[1:] if file.fleet else (),
     )

@@ -373,7 +373,7 @@ class Draw:
         if self._rows:
             place = bisect_right(self._ends, draws.uniform() * self._ends[-1])
             row = self._rows[place]
-        household = None
+        household: Any = None
         if row.get(HOUSEHOLD):
             household = [name.strip() for name in str(row[HOUSEHOLD]).split("+")]
         elif self._settings.households:
@@ -406,7 +406,7 @@ class Draw:
                 if place not in self.facts
                 or (
                     self.facts[place].bedrooms >= needed
-                    and all(_is_like(getattr(self.facts[place], c), v) for c, v in asked.items())
+                    and all(_is_like(c, getattr(self.facts[place], c), v) for c, v in asked.items())
                 )
             ]
             if not self._eligible[key]:
@@ -434,15 +434,18 @@ class Draw:
         return ""
 
 
-def _is_like(fact: Any, asked: Any) -> bool:
+def _is_like(column: str, fact: Any, asked: Any) -> bool:
     """Return whether a home is as a row of the table says; a single area is rounded too finely."""
     condition = _condition(asked)
-    return asked is None or fulfils(fact, condition) or isinstance(condition, float)
+    is_area = column == AREA and not isinstance(condition, Range)
+    return asked is None or is_area or fulfils(fact, condition)
 
 
 def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) -> Choice:
     """Return a synthetic home with the bedrooms and the area of its row, or for its household."""
-    ((keys, plan), *others) = home.changes or (((), None),)
+    if not home.changes:
+        return home
+    (keys, plan), *others = home.changes
     if keys != ("floorplan",) or plan.get("type") != "synthetic":
         return home
     new: dict[str, Any] = {}

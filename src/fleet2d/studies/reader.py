@@ -1,11 +1,13 @@
 """Reading a study: its variants and its tables as one data set that needn't fit into memory."""
 
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ArtifactError
+from fleet2d.studies import fleet
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, StudyDirectory
 from fleet2d.studies.results import TABLES, VARIANT, part_names, table_files
@@ -50,7 +52,7 @@ class Study(StudyAnswers):
     @property
     def answer(self) -> Answer:
         """What the study found, in sentences and a table; `print` shows it, and so do notebooks."""
-        return StudyAnswer(self).answer()
+        return fleet.with_fleet(self, StudyAnswer(self).answer())
 
     def _repr_html_(self) -> str:
         return self.answer._repr_html_()
@@ -123,6 +125,18 @@ class Study(StudyAnswers):
     def pandas(self) -> "pd.DataFrame":
         """Return the variants as a pandas data frame."""
         return self.variants.to_pandas()
+
+    def percentiles(self, metric: str) -> "pl.DataFrame":
+        """Return percentiles of a metric over the robots of a fleet; see `fleet.percentiles`."""
+        return fleet.percentiles(self, metric)
+
+    def worst(self, metric: str, share: float = fleet.WORST_SHARE) -> "pl.DataFrame":
+        """Return the worst robots of a fleet, with their runs; see `fleet.worst`."""
+        return fleet.worst(self, metric, share)
+
+    def groups(self, metric: str, against: Mapping[str, Any] | None = None) -> "pl.DataFrame":
+        """Return groups of robots that differ; see `fleet.groups`."""
+        return fleet.groups(self, metric, against)
 
     def scenario(self, variant: int) -> dict[str, Any]:
         """Return the scenario of a variant, with its seed, as `fleet2d.run` takes it.

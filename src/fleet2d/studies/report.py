@@ -101,7 +101,9 @@ class _Page:
         self.counts = {column: len(values) for column, values in labels.items()}
         self.units = tuple(c for c in self.meta.populations if self.counts[c] > 1)
         self.axes = tuple(
-            c for c in study.columns if c not in self.meta.populations and self.counts[c] > 1
+            c
+            for c in study.columns
+            if c not in (*self.meta.populations, *self.meta.features) and self.counts[c] > 1
         )
         self.names = {c: short_names(labels[c]) for c in self.meta.populations}
 
@@ -110,6 +112,8 @@ class _Page:
         yield from self._head()
         for number, comparison in enumerate(self.answer.asked):
             yield from self._comparison(number, comparison)
+        if self.meta.fleet:
+            yield from self._fleet()
         yield from self._numbers()
         yield from self._methods()
         yield from self._failures()
@@ -119,7 +123,7 @@ class _Page:
     def _head(self) -> Iterator[str]:
         counts = self.study.counts
         meta = self.meta
-        yield f"<h1>{html.escape(meta.name)}</h1>{self.answer.answer()._repr_html_()}"
+        yield f"<h1>{html.escape(meta.name)}</h1>{self.study.answer._repr_html_()}"
         if meta.notes:
             yield f"<p>{html.escape(meta.notes)}</p>"
         if meta.tags:
@@ -281,6 +285,24 @@ class _Page:
             if rows:
                 yield f"<h3>names of {html.escape(column)}</h3>"
                 yield html_table(["in this report", "name"], rows, text=(0, 1))
+
+    def _fleet(self) -> Iterator[str]:
+        """Yield percentiles, the worst robots and groups, by what is compared or can be judged."""
+        asked = {c.metric: c.against for c in reversed(self.answer.asked)}
+        judged = [name for name in self.study.metrics if self.study.better(name)]
+        for metric in [*asked, *(name for name in judged if name not in asked)][:MAX_METRICS]:
+            name = f"fleet_{_file_name(metric)}"
+            yield f"<h2>{html.escape(self._label(metric))} over robots</h2>"
+            yield self._frame(self.study.percentiles(metric), f"{name}_percentiles")
+            found = self.study.groups(metric, asked.get(metric))
+            if len(found):
+                yield f"<h3>groups{' of differences' if metric in asked else ''}</h3>"
+                yield self._frame(found, f"{name}_groups", ("group",))
+            if self.study.better(metric):
+                yield "<h3>the worst 1 %</h3>"
+                rows = self.study.worst(metric)
+                texts = [c for c, kind in rows.schema.items() if str(kind) == "String"]
+                yield self._frame(rows, f"{name}_worst", texts)
 
     def _failures(self) -> Iterator[str]:
         failures = self.study.failures

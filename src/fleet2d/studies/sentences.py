@@ -197,6 +197,8 @@ class StudyAnswer:
         judged_numbers = [name for name in study.metrics if study.better(name)]
         for metric in (judged_numbers or study.metrics)[:MAX_METRICS]:
             for axis in self._varying(metric, populations=False):
+                if axis in study.meta.features:
+                    continue  # no two robots differ by one of them alone
                 values = study.with_metric(metric)[axis].drop_nulls()
                 yield PairedComparison(metric=metric, against={axis: values[0]})
 

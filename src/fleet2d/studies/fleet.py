@@ -1,0 +1,405 @@
+"""What a study says of a fleet: percentiles over robots, the worst of them, and groups that differ.
+
+Groups are found by a shallow tree on half of the homes, and tested on the others, which didn't
+choose them: so their intervals hold, and a split is told only if the others show it, too.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fleet2d.configuration.problems import counted
+from fleet2d.errors import InputError, extra
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.studies.answers import StudyAnswers, holm
+from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL, MeanEstimate, estimate
+from fleet2d.studies.results import VARIANT
+from fleet2d.studies.sentences import Answer, StudyAnswer, number
+
+if TYPE_CHECKING:
+    import polars as pl
+
+PERCENTS = (1, 5, 25, 50, 75, 95, 99)
+WORST_SHARE = 0.01
+DEPTH = 2
+CUTS = 15  # places at which a number may be cut
+SMALLEST_SHARE = 0.05  # of the robots, in a group
+MAX_NAMED = 3  # runs that a sentence names
+
+
+def features_of(study: StudyAnswers) -> list[str]:
+    """Return the columns of what was drawn for each robot, that differ."""
+    varying = [c for c in study.meta.features if study.complete[c].drop_nulls().n_unique() > 1]
+    return [c for c in varying if c not in study.populations]
+
+
+def by_robot(
+    study: StudyAnswers, metric: str, against: Mapping[str, Any] | None = None
+) -> "pl.DataFrame":
+    """Return the mean of a metric for each robot, or its mean difference to a reference.
+
+    Returns:
+        A row for each robot: its number, home, features, `value`, and the `variant` of one run.
+
+    Raises:
+        InputError: The study has no fleet, or no such metric or axis.
+    """
+    import polars as pl
+
+    fleet = study.meta.fleet
+    if not fleet:
+        raise InputError(f"{study.location} has no fleet: an axis with the key `population`")
+    if against is None:
+        values = study.with_metric(metric).select(fleet, value=metric)
+    else:
+        values = study.differences(metric, against, fleet).select(fleet, value="difference")
+    means = values.group_by(fleet, maintain_order=True).agg(pl.col("value").mean())
+    keys = dict.fromkeys((fleet, *study.populations, *study.meta.features, VARIANT))
+    robots = study.complete.select(*keys).unique(fleet, keep="first", maintain_order=True)
+    return robots.join(means, on=fleet, how="inner", maintain_order="left")
+
+
+def percentiles(study: StudyAnswers, metric: str) -> "pl.DataFrame":
+    """Return percentiles of a metric over robots, with intervals from the binomial distribution.
+
+    Returns:
+        A row for each of `PERCENTS`: percent, value, low and high (95 %; null where there are too
+        few robots to tell), doubt.
+
+    Raises:
+        InputError: The study has no fleet, or no such metric.
+    """
+    import polars as pl
+
+    values = np.sort(by_robot(study, metric)["value"].to_numpy())
+    rows = []
+    for percent in PERCENTS:
+        low, high = quantile_ranks(len(values), percent / 100)
+        value = float(np.quantile(values, percent / 100, method="inverted_cdf"))
+        ends = [float(values[i]) if i is not None else None for i in (low, high)]
+        doubt = f"{len(values)} robots are too few" if None in ends else ""
+        row = {"percent": percent, "value": value, "low": ends[0], "high": ends[1]}
+        rows.append({**row, "doubt": doubt})
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def quantile_ranks(count: int, share: float) -> tuple[int | None, int | None]:
+    """Return the ranks, from 0 on, of the ends of the interval of a quantile; None: too few values.
+
+    >>> quantile_ranks(2000, 0.01), quantile_ranks(100, 0.01)
+    ((11, 28), (None, 3))
+    """
+    with extra("study", "intervals need scipy"):
+        from scipy.special import bdtr
+    tail = (1 - LEVEL) / 2
+    below = [i for i in range(count + 1) if bdtr(i, count, share) > tail]
+    low = below[0] - 1  # as many values or fewer are below the quantile with a tail's probability
+    high = next((i for i in range(count + 1) if bdtr(i, count, share) >= 1 - tail), count)
+    return (low if low >= 0 else None), (high if high < count else None)
+
+
+def worst(study: StudyAnswers, metric: str, share: float = WORST_SHARE) -> "pl.DataFrame":
+    """Return the worst robots by a metric, the worst first, and how to run each again.
+
+    Args:
+        study: The study.
+        metric: A metric of which one direction is better.
+        share: The share of all robots; one robot at least.
+
+    Returns:
+        Number, home, features, `value`, `variant`, and `command`, which runs it again.
+
+    Raises:
+        InputError: The study has no fleet or metric, or neither direction of it is better.
+    """
+    import polars as pl
+
+    better = study.better(metric)
+    if not better:
+        raise InputError(f"no value of {metric} is better than another: its metric doesn't say so")
+    robots = by_robot(study, metric).sort(
+        "value", descending=better == "lower", maintain_order=True
+    )
+    count = max(1, math.ceil(share * len(robots)))
+    command = pl.format(
+        f"fleet2d study rerun {study.location} {{}} --out worst{{}}", VARIANT, VARIANT
+    )
+    return robots.head(count).with_columns(command=command)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition on a feature of a robot.
+
+    Attributes:
+        feature: The feature.
+        value: The value, or the limit of a number.
+        is_number: Whether it is one.
+        is_met: Whether the condition is to be met.
+    """
+
+    feature: str
+    value: Any
+    is_number: bool
+    is_met: bool = True
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        if self.is_number:
+            return f"{self.feature} {'≤' if self.is_met else '>'} {number(float(self.value))}"
+        return f"{self.feature} {'is' if self.is_met else 'is not'} {self.value}"
+
+    def holds(self, columns: Mapping[str, Sequence[Any]]) -> Bool:
+        """Return for each robot whether it holds: bool (robots,)."""
+        values = columns[self.feature]
+        if self.is_number:
+            numbers = np.array([math.nan if v is None else v for v in values], np.float64)
+            met = numbers <= self.value
+        else:
+            met = np.array([value == self.value for value in values], np.bool_)
+        return met if self.is_met else ~met
+
+
+@dataclass(frozen=True)
+class Group:
+    """Robots that differ from others, found on half of the homes and tested on the others.
+
+    Attributes:
+        conditions: What they have in common.
+        robots: Their number in the half that tests.
+        estimate: Their mean there.
+        p: The p value of the split that made it, corrected for all splits.
+        low: The lower end of the interval of the mean, simultaneous over all groups.
+        high: Its upper end.
+    """
+
+    conditions: tuple[Condition, ...]
+    robots: int
+    estimate: MeanEstimate
+    p: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+def find_groups(
+    values: F64, columns: Mapping[str, Sequence[Any]], homes: Sequence[Any]
+) -> list[Group]:
+    """Return groups of robots whose means differ; none if the other half of homes shows none.
+
+    Args:
+        values: One for each robot: float64 (robots,).
+        columns: The features of robots, numbers or texts, by name.
+        homes: The home of each robot.
+
+    Example:
+        >>> people = [1, 2, 3] * 200
+        >>> values = np.array([float(p > 1) for p in people]) + np.arange(600) % 7
+        >>> found = find_groups(values, {"people": people}, range(600))
+        >>> [str(group.conditions[0]) for group in found]
+        ['people ≤ 1', 'people > 1']
+    """
+    places = {home: place for place, home in enumerate(dict.fromkeys(homes))}
+    numbers = np.array([places[home] for home in homes], np.int64)
+    finds = numbers % 2 == 0
+    smallest = max(ENOUGH_UNITS, math.ceil(SMALLEST_SHARE * finds.sum()))
+    splits: list[tuple[tuple[Condition, ...], Condition, float]] = []
+    leaves: list[tuple[Condition, ...]] = []
+
+    def grow(path: tuple[Condition, ...], inside: Bool) -> None:
+        split = None if len(path) == DEPTH else _best(values, columns, inside & finds, smallest)
+        if split is None:
+            leaves.append(path)
+            return
+        met = split.holds(columns)
+        tests = inside & ~finds
+        splits.append((path, split, _p_of_split(values[tests], met[tests], numbers[tests])))
+        for is_met, side in ((True, met), (False, ~met)):
+            grow((*path, replace(split, is_met=is_met)), inside & side)
+
+    grow((), np.ones(len(values), np.bool_))
+    corrected = holm([p for *_, p in splits])
+    clear = {path: p for (path, _, _), p in zip(splits, corrected, strict=True) if p < 1 - LEVEL}
+    kept = list(dict.fromkeys(_pruned(path, clear) for path in leaves))
+    if kept == [()]:
+        return []
+    groups = []
+    for path in kept:
+        inside = np.logical_and.reduce([~finds, *(c.holds(columns) for c in path)])
+        labels = [home for home, is_in in zip(homes, inside, strict=True) if is_in]
+        found = estimate(values[inside], {"home": labels})
+        low, high = found.interval(1 - (1 - LEVEL) / len(kept))
+        groups.append(Group(path, int(inside.sum()), found, clear[path[:-1]], low, high))
+    return groups
+
+
+def _pruned(path: tuple[Condition, ...], clear: Mapping[Any, float]) -> tuple[Condition, ...]:
+    """Return the start of a path up to the first split that isn't clear."""
+    for depth in range(len(path)):
+        if path[:depth] not in clear:
+            return path[:depth]
+    return path
+
+
+def _best(
+    values: F64, columns: Mapping[str, Sequence[Any]], inside: Bool, smallest: int
+) -> Condition | None:
+    """Return the condition that divides robots best: with the largest sum of squares between."""
+    best: tuple[float, Condition] | None = None
+    own = values[inside]
+    mean = own.mean() if len(own) else 0.0
+    for condition in _candidates(columns, inside):
+        met = condition.holds(columns)[inside]
+        count = int(met.sum())
+        if not smallest <= count <= len(own) - smallest:
+            continue
+        square = count * (own[met].mean() - mean) ** 2
+        square += (len(own) - count) * (own[~met].mean() - mean) ** 2
+        if square > 0 and (best is None or square > best[0]):
+            best = float(square), condition
+    return best[1] if best else None
+
+
+def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[Condition]:
+    """Return all conditions that may divide robots, at most so many of each feature."""
+    found = []
+    for feature, values in columns.items():
+        known = [v for v, is_in in zip(values, inside, strict=True) if is_in and v is not None]
+        kinds = {type(value) for value in known}
+        if known and kinds <= {int, float}:
+            shares = np.linspace(0, 1, CUTS + 2)[1:-1]
+            cuts = np.unique(np.quantile(known, shares, method="inverted_cdf"))
+            found += [Condition(feature, cut.item(), True) for cut in cuts if cut < max(known)]
+        else:
+            found += [Condition(feature, value, False) for value in dict.fromkeys(known)]
+    return found
+
+
+def _p_of_split(values: F64, met: Bool, homes: I64) -> float:
+    """Return the p value of a difference of means between robots, some of which share a home.
+
+    The standard error is that over homes; NaN if the difference can't be told.
+
+    Args:
+        values: float64 (robots,).
+        met: Whether each is on the first side: bool (robots,).
+        homes: The number of the home of each: int64 (robots,).
+    """
+    sides = [len(np.unique(homes[side])) for side in (met, ~met)]
+    if min(sides) < 2:
+        return math.nan
+    with extra("study", "intervals need scipy"):
+        from scipy.special import stdtr
+    means = [values[side].mean() for side in (met, ~met)]
+    shares = np.where(met, (values - means[0]) / met.sum(), -(values - means[1]) / (~met).sum())
+    of_homes = np.bincount(homes, shares)
+    count = len(np.unique(homes))
+    variance = float((of_homes**2).sum()) * count / (count - 1)
+    if not variance > 0:
+        return math.nan
+    ratio = abs(float(means[0] - means[1])) / math.sqrt(variance)
+    return float(2 * stdtr(min(sides) - 1, -ratio))
+
+
+def groups(
+    study: StudyAnswers, metric: str, against: Mapping[str, Any] | None = None
+) -> "pl.DataFrame":
+    """Return the groups of robots that differ by a metric, or by its difference to a reference.
+
+    Returns:
+        A row for each group: group (its conditions), robots (that tested it), mean, low and high
+        (95 % for all groups together), doubt, p (of its split, after Holm). No rows if none differ.
+
+    Raises:
+        InputError: The study has no fleet, or no such metric or axis.
+    """
+    import polars as pl
+
+    robots = by_robot(study, metric, against)
+    columns = {name: robots[name].to_list() for name in features_of(study)}
+    homes = robots[study.populations[0]].to_list()
+    rows = [
+        {
+            "group": " and ".join(map(str, group.conditions)),
+            "robots": group.robots,
+            "mean": group.estimate.mean,
+            "low": group.low,
+            "high": group.high,
+            "doubt": group.estimate.doubt,
+            "p": group.p,
+        }
+        for group in find_groups(robots["value"].to_numpy(), columns, homes)
+    ]
+    kinds = dict.fromkeys(("mean", "low", "high", "p"), pl.Float64)
+    schema = {"group": pl.String, "robots": pl.Int64, **kinds, "doubt": pl.String}
+    return pl.DataFrame(rows, schema=schema)
+
+
+def with_fleet(study: StudyAnswers, answer: Answer) -> Answer:
+    """Return the answer of a study with what it says of its fleet."""
+    if not study.meta.fleet or not study.counts.complete:
+        return answer
+    compared = next(iter(StudyAnswer(study).asked), None)
+    if compared is None and not study.metrics:
+        return answer
+    judged = [name for name in study.metrics if study.better(name)] or list(study.metrics)
+    metric = compared.metric if compared else judged[0]
+    against = compared.against if compared else None
+    sentences = [*answer.sentences[:-1], _groups(study, metric, against), _spread(study, metric)]
+    if study.better(metric):
+        sentences.append(_worst(study, metric))
+    table = answer.table
+    if compared is None:
+        table = tuple(_percentile_row(study, name) for name in study.metrics[: len(answer.table)])
+    return replace(answer, sentences=(*sentences, *answer.sentences[-1:]), table=table)
+
+
+def _percentile_row(study: StudyAnswers, metric: str) -> dict[str, Any]:
+    unit = study.meta.unit(metric)
+    mean = study.summary(metric, []).select("mean", "low", "high", "doubt").to_dicts()[0]
+    rows = percentiles(study, metric).to_dicts()
+    shares = {f"p{row['percent']}": row["value"] for row in rows}
+    return {"number": f"{metric} [{unit}]" if unit else metric, **mean, **shares}
+
+
+def _spread(study: StudyAnswers, metric: str) -> str:
+    rows = {row["percent"]: row for row in percentiles(study, metric).to_dicts()}
+    robots = len(by_robot(study, metric))
+    unit = f" [{study.meta.unit(metric)}]" if study.meta.unit(metric) else ""
+    ends = rows[1], rows[99]
+    bounds = [f"{number(row['value'])} ({_end(row['low'])} to {_end(row['high'])})" for row in ends]
+    return (
+        f"Of {robots:,} robots half have a {metric} up to {number(rows[50]['value'])}{unit}; one in"
+        f" a hundred has up to {bounds[0]}, and one in a hundred from {bounds[1]} on."
+    )
+
+
+def _end(value: float | None) -> str:
+    return "?" if value is None else number(value)
+
+
+def _worst(study: StudyAnswers, metric: str) -> str:
+    rows = worst(study, metric)
+    names = ", ".join(map(str, rows[VARIANT].head(MAX_NAMED)))
+    more = ", …" if len(rows) > MAX_NAMED else ""
+    return (
+        f"The worst 1 % ({counted(len(rows), 'robot')}) are variants {names}{more}: run the first"
+        f" again by `{rows['command'][0]}`, and open it by `fleet2d view worst{rows[VARIANT][0]}`."
+    )
+
+
+def _groups(study: StudyAnswers, metric: str, against: Mapping[str, Any] | None) -> str:
+    of = f"its difference to {next(iter(against.values()))}" if against else "it"
+    found = groups(study, metric, against).sort("mean").to_dicts()
+    if not found:
+        return f"No group of homes or people was found in which {of} differs."
+    parts = []
+    for row in (found[0], found[-1]):
+        interval = "" if row["doubt"] else f" ({number(row['low'])} to {number(row['high'])})"
+        parts.append(f"{number(row['mean'])}{interval} where {row['group']}")
+    return (
+        f"Groups found on half of the homes, and tested on the others: {of} is least, {parts[0]},"
+        f" and most, {parts[1]}."
+    )
