@@ -117,6 +117,11 @@ class Learners:
             if isinstance(learner.component, Metric) and learner.since == step
         }
 
+    def results(self) -> dict[str, Any]:
+        """Return the results of all metrics up to the end of their last period, by name."""
+        metrics = (each for each in self.all if isinstance(each.component, Metric))
+        return {each.name: check_result(each.component.result()) for each in metrics}
+
     def _show_outputs(self) -> None:
         """Set the outputs that behaviors read, after some have changed."""
         self.readable_outputs = Outputs(self._as_read(self.outputs), self.known)

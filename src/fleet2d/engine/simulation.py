@@ -1090,6 +1090,11 @@ def measured(simulation: Simulation, metric: str) -> dict[str, Any]:
     return result
 
 
+def results_so_far(simulation: Simulation) -> dict[str, Any]:
+    """Return the results of all metrics up to the end of their last period; it changes no run."""
+    return simulation._state.learners.results()
+
+
 def evidence_of(simulation: Simulation, name: str) -> "VerdictEvidence":
     """Return the signals of an expectation so far, and its subjects, for pictures."""
     assert simulation._state.expectations is not None

@@ -3,8 +3,9 @@
 from datetime import timedelta
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, TypeAdapter
 
+from fleet2d.configuration.components import OneOf
 from fleet2d.configuration.problems import check_known, suggest, validating
 from fleet2d.configuration.units import AngleDeg, PositiveDuration
 from fleet2d.entities.behavior import Actor, Behavior
@@ -17,6 +18,8 @@ from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.interventions.intervention import Intervention, World, body, user
 from fleet2d.kernels import TURN
+
+_BEHAVIOR: TypeAdapter[Behavior] = TypeAdapter(OneOf[Behavior])
 
 
 class BodyIntervention(Intervention):
@@ -196,7 +199,8 @@ class Configure(BodyIntervention):
 
     Attributes:
         behavior: The behavior, by its type.
-        keys: The keys that change, with their values, as in the scenario.
+        keys: The keys that change, with their values, as in the scenario. With `type` another
+            behavior takes its place, with these keys alone.
 
     Example:
         >>> Configure("astro", "hangout", {"tau": "10 min"}).keys
@@ -225,6 +229,8 @@ class Configure(BodyIntervention):
         behavior = actor.behaviors[behavior_number(actor, self.behavior)]
         present = behavior.model_dump(mode="json", exclude_defaults=True)
         with validating(f"behavior {self.behavior} of {self.entity}"):
+            if "type" in self.keys:
+                return _BEHAVIOR.validate_python(self.keys)
             return type(behavior).model_validate({**present, **self.keys})
 
 

@@ -72,6 +72,14 @@ class StudyAnswers:
         """The comparisons that the study file asks for."""
         raise NotImplementedError
 
+    def polars(self, table: str) -> "pl.LazyFrame":
+        """Return a table of all variants with their parameters as a lazy frame."""
+        raise NotImplementedError
+
+    def scenario(self, variant: int) -> dict[str, Any]:
+        """Return the scenario of a variant, with its seed."""
+        raise NotImplementedError
+
     @property
     def counts(self) -> Counts:
         """The numbers of complete, failed and missing variants."""

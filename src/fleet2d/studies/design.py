@@ -31,7 +31,7 @@ from fleet2d.studies.population import (
     first_life,
 )
 from fleet2d.studies.simulator import input_files
-from fleet2d.studies.specification import SEED, Specification
+from fleet2d.studies.specification import NEVER, ROLLOUT, SEED, STAGE, Rollout, Specification
 
 DIGITS = 32  # hexadecimal digits of a hash
 # Packages that run, show or evaluate simulations without changing their results: those above the
@@ -124,6 +124,8 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 NOT_APPLICABLE = -1
 MAX_VARIANTS = 1_000_000
+WITH, WITHOUT = "with", "without"
+"""Labels of runs of a rollout: with the change from its stage on, and without it."""
 TRIED_FIRST = 100  # combinations of the first life of a population
 SEEDS_APART = 1_048_583  # between replicates of a life, so that no other life has one of its seeds
 SWITCHES = ("key_frames", "observations", "events", "decisions")
@@ -204,6 +206,7 @@ class Design:
         rules: Conditional changes.
         exclude: Conditions on columns; combinations that fulfil one are left out.
         seeds: The seeds of each combination.
+        rollout: A change that some lives have from a day on.
     """
 
     base: Document
@@ -212,6 +215,7 @@ class Design:
     rules: tuple[RulePlan, ...]
     exclude: tuple[Mapping[str, Any], ...]
     seeds: tuple[int, ...]
+    rollout: Rollout | None = None
 
     @cached_property
     def combinations(self) -> I32:
@@ -281,7 +285,12 @@ class Design:
         changes += [rule.change for rule in self.rules if matches(rule.when, labels)]
         changes.append(assignment(("simulation", "seed"), seed, f"seed {seed}"))
         with errors_as(None, self.describe(index)):
-            return scenario_of(apply_changes(self.base, changes), self.folder)
+            document = apply_changes(self.base, changes)
+            if labels.get(ROLLOUT) == WITH and self.rollout is not None:
+                times = [{"at": f"{labels[STAGE]}T00:00", **act} for act in self.rollout.change]
+                script = [*(document.data.get("script") or ()), *times]
+                document = merge(document, assignment(("script",), script, "rollout.change"))
+            return scenario_of(document, self.folder)
 
     def describe(self, index: int) -> str:
         """Return a variant as messages call it: 'variant 3 (speed = 0.3, seed = 1)'."""
@@ -311,6 +320,8 @@ class Design:
     ) -> Iterator[tuple[int, ...]]:
         """Yield the combinations that start with a prefix, the last axis changing fastest."""
         if len(prefix) == len(self.axes):
+            if labels.get(ROLLOUT) == WITH and labels.get(STAGE) == NEVER:
+                return
             if not any(matches(condition, labels) for condition in self.exclude):
                 yield prefix
             return
@@ -378,8 +389,11 @@ def build_design(
     if isinstance(fleet, PopulationAxis):
         _check_first_life(replace(design, axes=tuple(axes.values())))
         lives = find_lives(fleet, file.fleet, base, crew, on_progress)
-        axes[file.fleet] = _with_lives(axes[file.fleet], lives)
-    design = replace(design, axes=tuple(axes.values()))
+        axes[file.fleet] = _with_lives(axes[file.fleet], lives, file.rollout)
+    if file.rollout is not None:
+        choices = tuple(Choice({ROLLOUT: label}) for label in (WITHOUT, WITH))
+        axes[ROLLOUT] = AxisPlan(ROLLOUT, (ROLLOUT,), {}, choices, (Document(), Document()))
+    design = replace(design, axes=tuple(axes.values()), rollout=file.rollout)
     _check_size(specification.name, design)
     _check_conditions(specification, design)
     if not len(design.combinations):
@@ -417,11 +431,17 @@ def _check_first_life(design: Design) -> None:
         design.scenario(index)
 
 
-def _with_lives(axis: AxisPlan, lives: Lives) -> AxisPlan:
-    """Return the axis of a population with its lives."""
+def _with_lives(axis: AxisPlan, lives: Lives, rollout: Rollout | None) -> AxisPlan:
+    """Return the axis of a population with its lives, and the stage of each in a rollout."""
     changes = axis.changes
     assert isinstance(changes, LifeChanges)
-    return axis._replace(choices=lives, changes=LifeChanges(lives, changes.place))
+    columns = axis.columns
+    if rollout is not None:
+        stages = [rollout.stage_of(lives.draw.share_of(int(k))) for k in lives.numbers]
+        lives = replace(lives, features={**lives.features, STAGE: np.array(stages)})
+        columns = (*columns, STAGE)
+    changes = LifeChanges(lives, changes.place)
+    return axis._replace(columns=columns, choices=lives, changes=changes)
 
 
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:

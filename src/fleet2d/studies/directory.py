@@ -103,6 +103,7 @@ class Meta(BaseModel):
         notes: Remarks of its author, and how many lives of a population are left out.
         fleet: The column with the numbers of the lives of a population; empty without one.
         features: The columns of what was drawn for each life.
+        rollout: The rollout, as `Rollout` takes it; None without one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -120,6 +121,7 @@ class Meta(BaseModel):
     notes: str = ""
     fleet: str = ""
     features: tuple[str, ...] = ()
+    rollout: dict[str, Any] | None = None
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric such as `ltp_error.ana.tv`; empty if unknown."""

@@ -70,11 +70,13 @@ class StudyJob:
         design: The design.
         metrics: Patterns of the numbers to keep.
         tables: Names of the tables to keep.
+        daily: Numbers to keep of each day.
     """
 
     design: Design
     metrics: tuple[str, ...]
     tables: tuple[str, ...]
+    daily: tuple[str, ...] = ()
 
     def __call__(self, task: WorkerTask) -> VariantResult:
         """Run a variant; return its results, with the error if it fails."""
@@ -83,7 +85,7 @@ class StudyJob:
         except Fleet2DError as error:  # a file changed after the study was planned
             outcome = VariantOutcome("failed", error=describe_error(error))
         else:
-            outcome = execute(scenario, self.metrics, self.tables)
+            outcome = execute(scenario, self.metrics, self.tables, self.daily)
         return result_of(task, outcome)
 
     def scenario(self, task: WorkerTask) -> Scenario:
@@ -162,8 +164,9 @@ class CheckedStudy:
     @property
     def job(self) -> StudyJob:
         """The job for the workers."""
-        keep = self.specification.file.keep
-        return StudyJob(self.plan.design, keep.metrics, keep.tables)
+        file = self.specification.file
+        daily = file.rollout.metrics if file.rollout else ()
+        return StudyJob(self.plan.design, file.keep.metrics, file.keep.tables, daily)
 
 
 def check_study(
@@ -337,6 +340,13 @@ def result_of_end(end: TaskEnd) -> VariantResult:
     return VariantResult({**result.row, "attempts": end.attempts}, result.tables)
 
 
+def _features(checked: CheckedStudy) -> tuple[str, ...]:
+    """Return the columns of what was drawn for each life of a population."""
+    fleet = checked.specification.file.fleet
+    axes = (axis for axis in checked.plan.design.axes if axis.name == fleet)
+    return tuple(column for axis in axes for column in axis.columns[1:])
+
+
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
     """Write the description of the study; its `study.json` last, which makes the folder a study."""
     directory.storage.delete(VARIANTS)  # it may belong to another plan
@@ -362,5 +372,6 @@ def describe(checked: CheckedStudy) -> Meta:
         tags=file.tags,
         notes="\n".join(filter(None, (file.notes, checked.plan.design.left_out))),
         fleet=file.fleet,
-        features=file.axes[file.fleet].columns(file.fleet)[1:] if file.fleet else (),
+        features=_features(checked),
+        rollout=file.rollout.model_dump(mode="json") if file.rollout else None,
     )

@@ -365,6 +365,11 @@ class Draw:
         """Return the seed of a life."""
         return (self._seed * SEED_STEP + number) % MAX_SEED
 
+    def share_of(self, number: int) -> float:
+        """Return a random number from 0 to 1 of a life, by which it joins a rollout."""
+        key = stream_key(self._seed, "population", "rollout")
+        return Draws(np.uint64(key), number).uniform()
+
     def life(self, number: int) -> Life:
         """Draw a life; without a reason for another one, homes are taken in turn."""
         draws = Draws(np.uint64(self._key), number)
@@ -673,8 +678,7 @@ class Lives(Sequence[Choice]):
         life = self.draw.life(number)
         people = None if life.household is None else len(members_of(life.household))
         features = {name: values[index].item() for name, values in self.features.items()}
-        area = {AREA: round(features.pop(AREA), 1)}
-        labels = {self.column: number, **life.labels, "people": people, **features, **area}
+        labels = {self.column: number, **life.labels, "people": people, **features}
         return Choice(labels, life.changes, self.draw.seed_of(number))
 
     @property

@@ -11,6 +11,7 @@ from fleet2d.studies import fleet
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, StudyDirectory
 from fleet2d.studies.results import TABLES, VARIANT, part_names, table_files
+from fleet2d.studies.rollout import with_rollout
 from fleet2d.studies.sentences import Answer, StudyAnswer
 from fleet2d.studies.storage import damaged
 
@@ -52,7 +53,8 @@ class Study(StudyAnswers):
     @property
     def answer(self) -> Answer:
         """What the study found, in sentences and a table; `print` shows it, and so do notebooks."""
-        return fleet.with_fleet(self, StudyAnswer(self).answer())
+        answer = fleet.with_fleet(self, StudyAnswer(self).answer())
+        return with_rollout(self, answer)
 
     def _repr_html_(self) -> str:
         return self.answer._repr_html_()

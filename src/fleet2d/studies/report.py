@@ -15,6 +15,7 @@ from fleet2d.errors import ArtifactError, InputError, os_errors_as
 from fleet2d.studies.answers import NOISE, RESIDUAL, Comparison
 from fleet2d.studies.figures import over_time
 from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL
+from fleet2d.studies.rollout import RolloutAnswer
 from fleet2d.studies.sentences import (
     INTERVAL,
     MAX_METRICS,
@@ -112,6 +113,8 @@ class _Page:
         yield from self._head()
         for number, comparison in enumerate(self.answer.asked):
             yield from self._comparison(number, comparison)
+        if self.meta.rollout is not None:
+            yield from self._rollout()
         if self.meta.fleet:
             yield from self._fleet()
         yield from self._numbers()
@@ -285,6 +288,16 @@ class _Page:
             if rows:
                 yield f"<h3>names of {html.escape(column)}</h3>"
                 yield html_table(["in this report", "name"], rows, text=(0, 1))
+
+    def _rollout(self) -> Iterator[str]:
+        """Yield what a rollout shows day by day."""
+        try:
+            found = RolloutAnswer(self.study)
+        except InputError:
+            return  # the answer says why
+        yield "<h2>The rollout day by day</h2>"
+        yield self._figure(found.figure(), "rollout")
+        yield self._frame(found.table, "rollout", ("date",))
 
     def _fleet(self) -> Iterator[str]:
         """Yield percentiles, the worst robots and groups, by what is compared or can be judged."""

@@ -2,23 +2,28 @@
 
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, Literal
 
 from fleet2d.engine.basis import input_files as input_files
-from fleet2d.engine.simulation import Simulation, run
+from fleet2d.engine.simulation import Simulation, results_so_far, run
 from fleet2d.errors import ComponentError
+from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.memory import peak_memory_mb
 from fleet2d.scenario.model import Scenario
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from fleet2d.runs.run import Run
+
 
 Status = Literal["complete", "failed"]
 SEPARATOR = "."
+DAILY = "daily"
+"""The table of the numbers that a rollout follows, at the end of each day of a run."""
 run_scenario = run
 """The function that runs a scenario, for the other modules."""
 
@@ -58,17 +63,24 @@ def check_setup(scenario: Scenario) -> None:
     Simulation(scenario)
 
 
-def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -> VariantOutcome:
+def execute(
+    scenario: Scenario, metrics: Iterable[str], tables: Iterable[str], daily: Sequence[str] = ()
+) -> VariantOutcome:
     """Run a scenario; return the results to keep, or the error if it fails.
 
     Args:
         scenario: The scenario, with its seed.
         metrics: Patterns of the numbers to keep.
         tables: Names of the tables to keep.
+        daily: Numbers to keep at the end of each day, in the table `daily`.
     """
     start_s = time.perf_counter()
+    days: dict[str, pa.Table] = {}
     try:
-        finished = run(scenario)
+        if daily:
+            finished, days[DAILY] = _run_by_day(scenario, daily)
+        else:
+            finished = run(scenario)
     except Exception as error:  # noqa: BLE001 - a component may raise anything; it is reported
         seconds = {"total": time.perf_counter() - start_s}
         return VariantOutcome(
@@ -84,10 +96,28 @@ def execute(scenario: Scenario, metrics: Iterable[str], tables: Iterable[str]) -
         "complete",
         finished.digest,
         {name: value for name, value in flat_numbers(finished.metrics) if is_kept(name, patterns)},
-        {name: finished.tables[name] for name in tables if name in finished.tables},
+        {name: finished.tables[name] for name in tables if name in finished.tables} | days,
         wall_s,
         peak_memory_mb() or 0.0,
     )
+
+
+def _run_by_day(scenario: Scenario, metrics: Sequence[str]) -> "tuple[Run, pa.Table]":
+    """Run a scenario; return also some numbers at the end of each day, as metrics last had them."""
+    import pyarrow as pa
+
+    simulation = Simulation(scenario)
+    steps_of_day = DAY_US // simulation.clock.step_us
+    rows: list[tuple[int, str, float]] = []
+    day = 0
+    while simulation.step + steps_of_day <= simulation.clock.steps:
+        simulation.advance(steps_of_day)
+        numbers = dict(flat_numbers(results_so_far(simulation)))
+        rows += [(day, name, numbers[name]) for name in metrics if name in numbers]
+        day += 1
+    days, names, values = zip(*rows, strict=True) if rows else ((), (), ())
+    columns = {"day": pa.array(days, pa.int32()), "metric": pa.array(names, pa.string())}
+    return simulation.run(), pa.table({**columns, "value": pa.array(values, pa.float64())})
 
 
 def is_kept(metric: str, patterns: Iterable[str]) -> bool:

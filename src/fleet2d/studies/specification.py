@@ -1,5 +1,6 @@
 """The study file: its sections as typed settings, and how it is read."""
 
+import datetime as dt
 import os.path
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from fleet2d.bounds import one_line
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Document, read_document
 from fleet2d.configuration.problems import Location, problem, problem_at, suggest
-from fleet2d.configuration.units import folder_of
+from fleet2d.configuration.units import Share, folder_of
 from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.scenario.compose import compose
 from fleet2d.scenario.load import explain
@@ -113,6 +114,76 @@ class PairedComparison(Settings):
         return self
 
 
+ROLLOUT = "rollout"
+STAGE = "stage"
+NEVER = "never"
+
+
+class Bounds(Settings):
+    """How much a number of robots with a change may differ from that of robots without it.
+
+    Attributes:
+        least: The least difference.
+        most: The largest difference.
+    """
+
+    least: float | None = None
+    most: float | None = None
+
+
+def _share(value: Any) -> Any:
+    return 1.0 if value == "all" else value
+
+
+def _several(value: Any) -> Any:
+    return [value] if isinstance(value, Mapping) else value
+
+
+class Rollout(Settings):
+    """A change that reaches a fleet in stages.
+
+    Attributes:
+        change: The interventions that make it, as a script has them, without a time.
+        stages: The share of robots that have it from each date on; `all`: all of them.
+        watch: The metrics that it is made for.
+        guards: Metrics that stop it, with how much they may differ.
+    """
+
+    change: Annotated[tuple[dict[str, Any], ...], BeforeValidator(_several), Field(min_length=1)]
+    stages: dict[dt.date, Annotated[Share, BeforeValidator(_share)]] = Field(min_length=1)
+    watch: tuple[str, ...] = ()
+    guards: dict[str, Bounds] = Field(default={})
+
+    def model_post_init(self, _: object, /) -> None:
+        """Require stages that grow, bounds, and something to look at."""
+        ordered = [self.stages[day] for day in sorted(self.stages)]
+        if ordered != sorted(set(ordered)) or not ordered[0] > 0:
+            raise problem("each stage must reach more robots than the one before")
+        for metric, bounds in self.guards.items():
+            if bounds.least is None and bounds.most is None:
+                raise problem_at(("guards", metric), "give least or most, or both")
+        if not self.metrics:
+            raise problem("give metrics to watch, or guards")
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """All metrics that it follows."""
+        return tuple(dict.fromkeys((*self.watch, *self.guards)))
+
+    def stage_of(self, share: float) -> str:
+        """Return the date from which a robot has the change, by its random share; or `never`.
+
+        >>> from datetime import date
+        >>> change = {"dismiss": "astro"}
+        >>> stages = {date(2026, 1, 5): 0.01, date(2026, 1, 9): 0.1}
+        >>> rollout = Rollout(change=change, stages=stages, watch=("sightings.ana",))
+        >>> rollout.stage_of(0.05), rollout.stage_of(0.5)
+        ('2026-01-09', 'never')
+        """
+        days = (day for day in sorted(self.stages) if share < self.stages[day])
+        return str(next(days, NEVER))
+
+
 def _numbers_or_count(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
         if value < 1:
@@ -137,6 +208,7 @@ class StudyFile(Settings):
         keep: The metrics and tables to keep of each run.
         compare: The comparisons that the report shows.
         tune: The search of `fleet2d study tune`.
+        rollout: A change that reaches the lives of a population in stages.
     """
 
     name: str | None = None
@@ -153,6 +225,7 @@ class StudyFile(Settings):
     keep: Keep = Keep()
     compare: tuple[PairedComparison, ...] = ()
     tune: TuneSettings | None = None
+    rollout: Rollout | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -168,11 +241,14 @@ class StudyFile(Settings):
         names = [name for name, axis in self.axes.items() if isinstance(axis, PopulationAxis)]
         if len(names) > 1:
             raise problem_at(("axes", names[1]), f"there is a population already: {names[0]}")
+        if self.rollout is not None and not names:
+            raise problem_at((ROLLOUT,), "it needs a fleet: an axis with the key `population`")
         return self
 
     @model_validator(mode="after")
     def _columns_differ(self) -> Self:
-        owners = dict.fromkeys((SEED, *RESERVED), "")
+        own = (ROLLOUT, STAGE) if self.rollout is not None else ()
+        owners = dict.fromkeys((SEED, *RESERVED, *own), "")
         for name, axis in self.axes.items():
             for column in axis.columns(name):
                 if owner := owners.get(column):
@@ -193,6 +269,8 @@ class StudyFile(Settings):
         for name, axis in self.axes.items():
             _check_columns(axis.when, known, ("axes", name, "when"), "axes before it")
             known += axis.columns(name)
+        if self.rollout is not None:
+            known += [ROLLOUT, STAGE]
         for location, condition in self.conditions():
             _check_columns(condition, [*known, SEED], location, "axes")
         for i, comparison in enumerate(self.compare):
@@ -215,6 +293,9 @@ class StudyFile(Settings):
         yield from ((("keep", "metrics", i), each) for i, each in enumerate(self.keep.metrics))
         if self.tune is not None:
             yield ("tune", "objective", self.tune.metric), self.tune.metric
+        if self.rollout is not None:
+            yield from (((ROLLOUT, "watch", i), m) for i, m in enumerate(self.rollout.watch))
+            yield from (((ROLLOUT, "guards", metric), metric) for metric in self.rollout.guards)
 
     @property
     def populations(self) -> tuple[str, ...]:

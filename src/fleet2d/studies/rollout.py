@@ -1,0 +1,355 @@
+"""Rollouts: a change that reaches a fleet in stages, and what can be said of it on each day.
+
+On each day robots with the change are compared with those without it yet, as in the field: stages
+are drawn at random. Intervals hold on all days and for all metrics together, however often one
+looks: the level is divided among them, which no dependence between days can break, and costs little
+for some weeks. The simulator also knows what the robots with the change would have done without.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date, datetime, timedelta
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fleet2d.errors import InputError
+from fleet2d.kernels import F64, I64, Bool
+from fleet2d.studies.answers import StudyAnswers
+from fleet2d.studies.design import WITH
+from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL, two_sample_interval
+from fleet2d.studies.sentences import Answer, number
+from fleet2d.studies.simulator import DAILY
+from fleet2d.studies.specification import NEVER, ROLLOUT, STAGE, Bounds, Rollout
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.figure import Figure
+
+DAY_S = 86_400
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is known of a metric at the end of a day.
+
+    Attributes:
+        day: The number of days since the start of the runs.
+        treated: The number of robots with the change.
+        others: The number of robots without it.
+        difference: The mean of robots with it minus that of those without; NaN if there are none.
+        low: The lower end of the interval; NaN if there are too few robots.
+        high: Its upper end.
+        truth: What the change did to the robots with it: the mean difference to their own runs
+            without it.
+        without: The mean of the robots with it, had they not had it.
+    """
+
+    day: int
+    treated: int
+    others: int
+    difference: float
+    low: float
+    high: float
+    truth: float
+    without: float
+
+    def breaks(self, bounds: Bounds) -> bool:
+        """Whether the whole interval is beyond what is allowed."""
+        above = bounds.most is not None and self.low > bounds.most
+        return above or (bounds.least is not None and self.high < bounds.least)
+
+
+def looks_of(
+    without: F64, treated: F64, begins: I64, level: float, days: Sequence[int]
+) -> list[Look]:
+    """Return what is known of a metric on each of some days.
+
+    Args:
+        without: The metric at the end of each day without the change: float64 (robots, days).
+        treated: The same with the change, from its stage on: float64 (robots, days).
+        begins: The first day with the change, from 0 on; a large number: never. int64 (robots,)
+        level: The share of single intervals that contain the true difference.
+        days: The days, from 0 on.
+    """
+    first = int(begins.min())
+    before = without[:, first - 1] if first > 0 else np.zeros(len(without))
+    looks = []
+    for day in days:
+        has: Bool = begins <= day
+        seen = np.where(has, treated[:, day], without[:, day])
+        known = np.isfinite(seen) & np.isfinite(without[:, day]) & np.isfinite(before)
+        own, others = seen[has & known], seen[~has & known]
+        truth = own - without[:, day][has & known]
+        difference = low = high = math.nan
+        if len(own) and len(others):
+            slope = _slope(seen[known], before[known], has[known])
+            sides = [own - slope * before[has & known], others - slope * before[~has & known]]
+            difference = float(sides[0].mean() - sides[1].mean())
+            if min(len(own), len(others)) >= ENOUGH_UNITS:
+                low, high = two_sample_interval(*sides, level)
+        with_it = len(own) > 0
+        looks.append(
+            Look(
+                day + 1,
+                len(own),
+                len(others),
+                difference,
+                low,
+                high,
+                float(truth.mean()) if with_it else math.nan,
+                float(without[:, day][has & known].mean()) if with_it else math.nan,
+            )
+        )
+    return looks
+
+
+def _slope(values: F64, before: F64, has: Bool) -> float:
+    """Return how much of a difference before the rollout is left, by which values are adjusted."""
+    centred = before - np.where(has, before[has].mean(), before[~has].mean())
+    square = float((centred**2).sum())
+    return float((centred * values).sum()) / square if square > 0 else 0.0
+
+
+class RolloutAnswer:
+    """What a rollout says.
+
+    Attributes:
+        settings: The rollout.
+        start: When the runs begin.
+        days: The days on which robots with the change and without it are compared, from 0 on.
+    """
+
+    def __init__(self, study: StudyAnswers) -> None:
+        """Read the daily numbers.
+
+        Raises:
+            InputError: The study has no rollout, or no robot has complete runs.
+        """
+        if study.meta.rollout is None:
+            raise InputError(f"{study.location} has no rollout")
+        self._study = study
+        self.settings = Rollout.model_validate(study.meta.rollout)
+        self.metrics = self.settings.metrics
+        self._rows = self._robots()
+        if not len(self._rows):
+            raise InputError(f"{study.location}: no robot is complete, with the change and without")
+        scenario = study.scenario(int(self._rows["variant"][0]))
+        self.start = datetime.fromisoformat(str(scenario["simulation"]["start"]))
+        stages = self._rows[STAGE].to_list()
+        self._begins = np.array([self._first_day(stage) for stage in stages], np.int64)
+        self._values = {metric: self._days_of(metric) for metric in self.metrics}
+        last = min(values[0].shape[1] for values in self._values.values())
+        first = int(self._begins.min())
+        waiting = [day for day in range(first, last) if (self._begins > day).any()]
+        self.days = waiting or [*range(first, last)]
+
+    def _robots(self) -> "pl.DataFrame":
+        """Return robots that are complete: number, stage, and the variants without and with it."""
+        import polars as pl
+
+        study = self._study
+        fleet = study.meta.fleet
+        frame = study.complete.select(fleet, STAGE, "variant", ROLLOUT)
+        without = frame.filter(pl.col(ROLLOUT) != WITH).drop(ROLLOUT)
+        with_it = frame.filter(pl.col(ROLLOUT) == WITH).select(fleet, treated="variant")
+        joined = without.group_by(fleet, maintain_order=True).first()
+        both = joined.join(
+            with_it.group_by(fleet).first(), on=fleet, how="left", maintain_order="left"
+        )
+        is_whole = pl.col("treated").is_not_null() | (pl.col(STAGE) == NEVER)
+        return both.filter(is_whole)
+
+    def _first_day(self, stage: str) -> int:
+        if stage == NEVER:
+            return 1 << 40
+        return max(
+            0, math.floor((datetime.fromisoformat(stage) - self.start).total_seconds() / DAY_S)
+        )
+
+    def _days_of(self, metric: str) -> tuple[F64, F64]:
+        """Return a metric without the change and with it: float64 (robots, days) each."""
+        import polars as pl
+
+        rows = self._study.polars(DAILY).filter(metric=metric).select("variant", "day", "value")
+        frame = rows.collect()
+        if not len(frame):
+            raise InputError(f"no run has a number {metric} on any day")
+        count = int(frame["day"].max()) + 1  # type: ignore[arg-type]
+        sides = []
+        for column in ("variant", "treated"):
+            places = self._rows.select(
+                pl.col(column).alias("variant"), robot=pl.int_range(pl.len())
+            )
+            own = frame.join(places.drop_nulls("variant"), on="variant", how="inner")
+            values = np.full((len(self._rows), count), np.nan)
+            values[own["robot"].to_numpy(), own["day"].to_numpy()] = own["value"].to_numpy()
+            sides.append(values)
+        without, treated = sides
+        return without, np.where(np.isnan(treated), without, treated)
+
+    @cached_property
+    def looks(self) -> dict[str, list[Look]]:
+        """What is known of each metric on each day."""
+        level = 1 - (1 - LEVEL) / (len(self.days) * len(self.metrics))
+        return {
+            metric: looks_of(*self._values[metric], self._begins, level, self.days)
+            for metric in self.metrics
+        }
+
+    @cached_property
+    def stop(self) -> tuple[str, Look] | None:
+        """The guard that stops the rollout first, and what was known then; None if none does."""
+        breaks = [
+            (look.day, metric, look)
+            for metric, bounds in self.settings.guards.items()
+            for look in self.looks[metric]
+            if look.breaks(bounds)
+        ]
+        return min(breaks, key=lambda each: each[:2])[1:] if breaks else None
+
+    def date_of(self, day: int) -> date:
+        """Return the date of a day, from 1 on."""
+        return (self.start + timedelta(days=day - 1)).date()
+
+    @property
+    def sentences(self) -> list[str]:
+        """What happened, when it stopped and why, and what the simulator knows."""
+        begins = [self._first_day(stage) for stage in self._rows[STAGE].unique().to_list()]
+        stages = [
+            f"{int((self._begins == day).sum()):,} from {self.date_of(day + 1)} on"
+            for day in sorted(day for day in begins if day < len(self.days) + max(self.days) + 1)
+        ]
+        texts = [f"The change reaches {', '.join(stages)}, of {len(self._rows):,} robots."]
+        if self.stop is not None:
+            metric, look = self.stop
+            texts.append(
+                f"It is stopped after {self.date_of(look.day)} by the guard of {metric}: with the"
+                f" change it is {self._known(look)} than without, and {self._allowed(metric)} is"
+                " allowed."
+            )
+        elif self.settings.guards:
+            texts.append(self._not_stopped())
+        last = self.stop[1].day if self.stop else self.days[-1] + 1
+        for metric in self.settings.watch:
+            look = next(each for each in self.looks[metric] if each.day == last)
+            true = f"{number(abs(look.truth))} {_side(look.truth)}"
+            texts.append(
+                f"On {self.date_of(last)} {metric} is {self._known(look)} for the"
+                f" {look.treated:,} robots with the change than for the {look.others:,} without."
+                f" The simulator knows that it is {true} by the change: without it these robots"
+                f" would have {number(look.without)}."
+            )
+        return texts
+
+    def _not_stopped(self) -> str:
+        """Return which guards didn't stop the rollout, and which never could have."""
+        guards = self.settings.guards
+        blind = [m for m in guards if all(math.isnan(look.low) for look in self.looks[m])]
+        parts = []
+        if seen := [metric for metric in guards if metric not in blind]:
+            parts.append(f"No guard stops it: {', '.join(seen)}.")
+        if blind:
+            parts.append(
+                f"The guard of {', '.join(blind)} can't be told on any day: there are never"
+                f" {ENOUGH_UNITS} robots on both sides that differ."
+            )
+        return " ".join(parts)
+
+    def _known(self, look: Look) -> str:
+        size = f"{number(abs(look.difference))} {_side(look.difference)}"
+        if math.isnan(look.low):
+            return f"{size} (how much in all robots can't be told from so few)"
+        return f"{size} (difference {look.low:.3g} to {look.high:.3g}, on any day)"
+
+    def _allowed(self, metric: str) -> str:
+        bounds = self.settings.guards[metric]
+        parts = []
+        if bounds.most is not None:
+            parts.append(f"at most {bounds.most:+g}")
+        if bounds.least is not None:
+            parts.append(f"at least {bounds.least:+g}")
+        return " and ".join(parts)
+
+    @property
+    def table(self) -> "pl.DataFrame":
+        """All looks: a row for each number and day.
+
+        The intervals hold on any day, for all numbers together. `truth` is what the change did to
+        the robots with it, and `mean without it` what they would have had otherwise.
+        """
+        import polars as pl
+
+        rows = [
+            {
+                "number": metric,
+                "date": str(self.date_of(look.day)),
+                "with": look.treated,
+                "without": look.others,
+                "difference": look.difference,
+                "low": look.low,
+                "high": look.high,
+                "doubt": "" if math.isfinite(look.low) else "too few robots",
+                "truth": look.truth,
+                "mean without it": look.without,
+            }
+            for metric, looks in self.looks.items()
+            for look in looks
+        ]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def figure(self) -> "Figure":
+        """Draw each number over the days: what was known, what was true, and what is allowed."""
+        import matplotlib.pyplot as plt
+
+        names = list(self.looks)
+        figure, axes = plt.subplots(
+            len(names), 1, sharex=True, figsize=(7, 2.6 * len(names)), squeeze=False
+        )
+        for axis, metric in zip(axes[:, 0], names, strict=True):
+            looks = self.looks[metric]
+            days = [look.day for look in looks]
+            axis.fill_between(
+                days,
+                [k.low for k in looks],
+                [k.high for k in looks],
+                alpha=0.25,
+                lw=0,
+                label="known, on any day",
+            )
+            axis.plot(days, [k.difference for k in looks], lw=1)
+            axis.plot(days, [k.truth for k in looks], "k--", lw=1, label="true")
+            for day in sorted({int(day) for day in self._begins if day <= self.days[-1]}):
+                axis.axvline(day + 1, color="grey", lw=0.6)
+            bounds = self.settings.guards.get(metric, Bounds())
+            for end in (bounds.least, bounds.most):
+                if end is not None:
+                    axis.axhline(end, color="tab:red", lw=1, label="allowed")
+            if self.stop is not None and self.stop[0] == metric:
+                axis.axvline(self.stop[1].day, color="tab:red", lw=1.5)
+            axis.axhline(0, color="grey", lw=0.4)
+            unit = self._study.meta.unit(metric)
+            axis.set_ylabel(f"{metric}\n[{unit}]" if unit else metric)
+        axes[0, 0].legend(frameon=False, fontsize="small")
+        axes[-1, 0].set_xlabel(f"day, from {self.start.date()} on")
+        return figure
+
+
+def _side(difference: float) -> str:
+    return "lower" if difference < 0 else "higher"
+
+
+def with_rollout(study: StudyAnswers, answer: Answer) -> Answer:
+    """Return the answer of a study with what it says of its rollout."""
+    if study.meta.rollout is None or not study.counts.complete:
+        return answer
+    try:
+        found = RolloutAnswer(study)
+    except InputError as error:
+        return Answer(answer.question, (*answer.sentences, f"{error}."), answer.table)
+    day = found.stop[1].day if found.stop else found.days[-1] + 1
+    rows = found.table.filter(date=str(found.date_of(day))).to_dicts()
+    end = [s for s in answer.sentences if s.startswith(("Clear", "No difference", "It took"))]
+    return Answer(answer.question, (*found.sentences, *end), tuple(rows))
