@@ -42,9 +42,23 @@ def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
     assert loaded.run().digest == run.run().digest
 
 
+def test_another_type_takes_the_place_of_a_behavior_with_its_own_keys_alone(tmp_path: Path) -> None:
+    run = simulation()
+    run.advance(3600)
+    run.do(Configure("astro", "hangout", {"type": "patrol", "dwell": "3 min"}))
+    run.advance()
+    run.save(tmp_path / "saved")
+    loaded = fleet2d.Simulation.load(tmp_path / "saved")
+    assert ["patrol", "patrol"] == [b.type_name for b in loaded.actors["astro"].behaviors[:2]]
+    assert timedelta(minutes=3) == loaded.actors["astro"].behaviors[1].dwell  # type: ignore[attr-defined]
+    assert loaded.run().digest == run.run().digest
+
+
 @pytest.mark.parametrize(
     ("behavior", "keys", "error", "words"),
     [
+        ("hangout", {"type": "patrl"}, ScenarioError, "did you mean 'patrol'"),
+        ("hangout", {"type": "patrol", "tau": "3 s"}, ScenarioError, "unknown key 'tau'"),
         ("hangot", {"tau": "3 s"}, ScenarioError, "did you mean 'hangout'"),
         ("hangout", {"tao": 3}, ScenarioError, "did you mean 'tau'"),
         ("hangout", {"source": "lpt"}, ScenarioError, "did you mean 'ltp'"),

@@ -11,7 +11,6 @@ from fleet2d.studies import fleet
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, StudyDirectory
 from fleet2d.studies.results import TABLES, VARIANT, part_names, table_files
-from fleet2d.studies.rollout import with_rollout
 from fleet2d.studies.sentences import Answer, StudyAnswer
 from fleet2d.studies.storage import damaged
 
@@ -54,6 +53,10 @@ class Study(StudyAnswers):
     def answer(self) -> Answer:
         """What the study found, in sentences and a table; `print` shows it, and so do notebooks."""
         answer = fleet.with_fleet(self, StudyAnswer(self).answer())
+        if self.meta.rollout is None:
+            return answer
+        from fleet2d.studies.rollout import with_rollout  # few studies have one
+
         return with_rollout(self, answer)
 
     def _repr_html_(self) -> str:

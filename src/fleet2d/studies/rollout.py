@@ -89,7 +89,7 @@ def looks_of(
             sides = [own - slope * before[has & known], others - slope * before[~has & known]]
             difference = float(sides[0].mean() - sides[1].mean())
             if min(len(own), len(others)) >= ENOUGH_UNITS:
-                low, high = two_sample_interval(*sides, level)
+                low, high = two_sample_interval(sides[0], sides[1], level)
         with_it = len(own) > 0
         looks.append(
             Look(
@@ -177,7 +177,7 @@ class RolloutAnswer:
         frame = rows.collect()
         if not len(frame):
             raise InputError(f"no run has a number {metric} on any day")
-        count = int(frame["day"].max()) + 1  # type: ignore[arg-type]
+        count = int(frame["day"].max()) + 1
         sides = []
         for column in ("variant", "treated"):
             places = self._rows.select(
@@ -343,7 +343,7 @@ def _side(difference: float) -> str:
 
 def with_rollout(study: StudyAnswers, answer: Answer) -> Answer:
     """Return the answer of a study with what it says of its rollout."""
-    if study.meta.rollout is None or not study.counts.complete:
+    if not study.counts.complete:
         return answer
     try:
         found = RolloutAnswer(study)
