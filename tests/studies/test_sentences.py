@@ -107,8 +107,8 @@ ODD: dict[str, tuple[MadeUp, str]] = {
         made_up({"old": [range(8)], "new": [[s + 1 + s % 2 for s in range(8)]]}),
         "new against old, in 8 of 8 seeds; by how much can't be told",
     ),
-    "one home, said": (made_up({"old": [[1, 2]], "new": [[2, 4]]}), "With 1 home, it holds for no others"),
-    "one seed": (of_homes(old=[1, 2, 3], new=[1, 3, 2]), "With 1 seed, it holds for no others"),
+    "one home, said": (made_up({"old": [[1, 2]], "new": [[2, 4]]}), "It holds for 1 home only"),
+    "one seed": (of_homes(old=[1, 2, 3], new=[1, 3, 2]), "It holds for 1 seed only"),
     "one pair": (made_up({"old": [[1]], "new": [[2]]}), "new against old: there is only one pair"),
     "no variance": (
         of_homes(old=[0] * 8, new=[0.5] * 8),

@@ -26,6 +26,10 @@ class Metric(Component):
     Like an algorithm it is updated after every full `period`, or `on` events, also those of users;
     the return value of `update` is stored. Unlike an algorithm it may read the poses of users.
 
+    What readers and answers of studies need to know is declared by class attributes: `unit`, the
+    range `least` to `largest`, and which values are `better`; see `docs/how-to/studies.md` for an
+    example.
+
     Attributes:
         period: How often it is updated.
         on: Events that update it, instead of the period: those of the events table, and sensor.

@@ -250,7 +250,8 @@ class StudyAnswer:
         if clear:
             corrected = f" (corrected for {many} comparisons)" if many > 1 else ""
             yield f"Clear{corrected}: {listed([self._finding(c) for c in clear], 'difference')}."
-            yield self._for_whom(clear[0])
+            subject = "The first" if len(clear) > 1 else "It"
+            yield self._for_whom(clear[0], subject)
         elif many:
             yield f"No difference is clear, of {counted(many, 'comparison')}."
         same = [c for c in self.comparisons if c.is_same]
@@ -294,7 +295,7 @@ class StudyAnswer:
             why = f" (p {cell('p', {'p': c.p_holm})}): {c.needed} would show that"
         return f"{c.metric} with {self._sides(c)}, {mean}{why}"
 
-    def _for_whom(self, c: Comparison) -> str:
+    def _for_whom(self, c: Comparison, subject: str) -> str:
         """Return in which homes and other groups a difference is the other way round."""
         study = self._study
         (axis, _), *within = c.labels.items()
@@ -312,7 +313,7 @@ class StudyAnswer:
             names = f" ({', '.join(map(text_of, other))})" if len(other) <= MAX_NAMED else ""
             text = f"{len(other) or 'none'} of {len(rows)} {plural(kind)}{names if other else ''}"
             parts.append(text)
-        return f"It is the other way round in {' and '.join(parts)}." if parts else ""
+        return f"{subject} is the other way round in {' and '.join(parts)}." if parts else ""
 
     def _left_out(self) -> str:
         study = self._study
@@ -332,7 +333,7 @@ class StudyAnswer:
             if count < ENOUGH_UNITS and kind != first
         ]
         if few:
-            parts.append(f"with {' and '.join(few)}, it holds for no others")
+            parts.append(f"it holds for {' and '.join(few)} only")
         text = "; ".join(parts)
         return f"{text[0].upper()}{text[1:]}." if text else ""
 
