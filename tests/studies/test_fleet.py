@@ -117,7 +117,7 @@ def test_a_metric_without_a_better_side_has_no_worst(small_fleet: Study) -> None
 
 def test_one_home_is_a_fleet_whose_answer_says_so(tmp_path: Path) -> None:
     _, study = run(fleet(1), tmp_path / "fleet")
-    assert "With 1 home and 1 robot, it holds for no others." in str(study.answer)
+    assert "It holds for 1 home and 1 robot only." in str(study.answer)
     (median,) = study.percentiles("distance.astro").filter(percent=50).to_dicts()
     assert (None, None, "1 robots are too few") == (median["low"], median["high"], median["doubt"])
 

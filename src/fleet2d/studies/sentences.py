@@ -307,6 +307,8 @@ class StudyAnswer:
         for kind in (each for each in kinds if each not in c.labels):
             columns = [column for column, _ in within]
             rows = study.differences(c.metric, {axis: c.reference}, kind, columns).drop_nulls(kind)
+            if kind in study.meta.features and rows[kind].n_unique() > MAX_ROWS:
+                continue  # a number, such as an area
             for column, label in c.labels.items():
                 rows = rows.filter(rows[column].eq_missing(label))
             other = rows.filter(rows["difference"] * sign < 0)[kind].to_list()
