@@ -1,51 +1,13 @@
 #include "meetings.hpp"
 
 #include <algorithm>
-#include <limits>
 
 namespace fleet2d {
 namespace {
 
-constexpr i64 ENDLESS = std::numeric_limits<i64>::max();
 constexpr i64 ROUNDED = 8;  // more than all coordinates that a distance depends on are rounded by [lattice units]
 
 std::size_t number_of(i64 i) { return static_cast<std::size_t>(i); }
-
-// A straight stretch of a way, from one moment to another.
-struct Straight {
-    i64 begin, end;   // us; the part of it that counts
-    i64 from, whole;  // us; when it began, and how long it takes in all; 0 at rest
-    Point at;         // where it began
-    i64 dx, dy;
-    bool away;
-
-    Point where(i64 moment) const {
-        if (whole == 0) return at;
-        const i64 elapsed = moment - from;
-        return {at.x + floor_div(2 * dx * elapsed + whole, 2 * whole),
-                at.y + floor_div(2 * dy * elapsed + whole, 2 * whole)};
-    }
-};
-
-// The way of a body, and the smallest box around it.
-struct Way {
-    std::vector<Straight> straights;
-    i64 x0 = ENDLESS, y0 = ENDLESS, x1 = -ENDLESS, y1 = -ENDLESS;
-
-    void add(const Straight& straight) {
-        if (straight.begin >= straight.end) return;
-        straights.push_back(straight);
-        if (straight.away) return;
-        x0 = std::min({x0, straight.at.x, straight.at.x + straight.dx});
-        y0 = std::min({y0, straight.at.y, straight.at.y + straight.dy});
-        x1 = std::max({x1, straight.at.x, straight.at.x + straight.dx});
-        y1 = std::max({y1, straight.at.y, straight.at.y + straight.dy});
-    }
-    bool is_near(const Way& other, i64 distance) const {
-        return x0 <= x1 && other.x0 <= other.x1 && x0 - distance <= other.x1 && other.x0 - distance <= x1 &&
-               y0 - distance <= other.y1 && other.y0 - distance <= y1;
-    }
-};
 
 void add_track(const TrackPiece& track, i64 begin, i64 end, Way& way) {
     const auto after = std::upper_bound(track.time.begin(), track.time.end(), begin);
@@ -192,6 +154,15 @@ std::vector<Way> ways_of(Timelines& timelines, i64 first, i64 end) {
 
 }  // namespace
 
+KnownWays::KnownWays(Timelines& timelines, i64 first, i64 end)
+    : first_(first), end_(end), step_us_(timelines.step_us()), ways_(ways_of(timelines, first, end)) {}
+
+std::optional<Meeting> KnownWays::meeting(i64 row, const TrackPiece& track, const Distances& distances) const {
+    Way way;
+    add_track(track, first_ * step_us_, end_ * step_us_, way);
+    return first_meeting(ways_, way, row, 0, distances, first_, end_, step_us_);
+}
+
 std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
                               i64 end) {
     const std::vector<Way> ways = ways_of(timelines, first, end + longest_lead(distances));
@@ -203,15 +174,6 @@ std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const 
         if (found) result.push_back(*found);
     }
     return result;
-}
-
-std::optional<Meeting> meeting_on(Timelines& timelines, i64 row, const TrackPiece& track, const Distances& distances,
-                                  i64 first, i64 end) {
-    const i64 until = end + longest_lead(distances);
-    const std::vector<Way> ways = ways_of(timelines, first, until);
-    Way way;
-    add_track(track, first * timelines.step_us(), until * timelines.step_us(), way);
-    return first_meeting(ways, way, row, 0, distances, first, end, timelines.step_us());
 }
 
 }  // namespace fleet2d

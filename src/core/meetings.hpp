@@ -4,6 +4,7 @@
 // meet when the distance of their middles falls below a limit while they approach, or when they overlap and don't part.
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "timelines.hpp"
@@ -38,9 +39,56 @@ struct Distances {
 std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
                               i64 end);
 
-// The first meeting in the steps first to end - 1 of a body that follows a track from step `first` on. All distances
-// are those of row 0.
-std::optional<Meeting> meeting_on(Timelines& timelines, i64 row, const TrackPiece& track, const Distances& distances,
-                                  i64 first, i64 end);
+// A straight stretch of a way, from one moment to another.
+struct Straight {
+    i64 begin, end;   // us; the part of it that counts
+    i64 from, whole;  // us; when it began, and how long it takes in all; 0 at rest
+    Point at;         // where it began
+    i64 dx, dy;
+    bool away;
+
+    Point where(i64 moment) const {
+        if (whole == 0) return at;
+        const i64 elapsed = moment - from;
+        return {at.x + floor_div(2 * dx * elapsed + whole, 2 * whole),
+                at.y + floor_div(2 * dy * elapsed + whole, 2 * whole)};
+    }
+};
+
+// The way of a body, and the smallest box around it.
+struct Way {
+    static constexpr i64 ENDLESS = std::numeric_limits<i64>::max();
+
+    std::vector<Straight> straights;
+    i64 x0 = ENDLESS, y0 = ENDLESS, x1 = -ENDLESS, y1 = -ENDLESS;
+
+    void add(const Straight& straight) {
+        if (straight.begin >= straight.end) return;
+        straights.push_back(straight);
+        if (straight.away) return;
+        x0 = std::min({x0, straight.at.x, straight.at.x + straight.dx});
+        y0 = std::min({y0, straight.at.y, straight.at.y + straight.dy});
+        x1 = std::max({x1, straight.at.x, straight.at.x + straight.dx});
+        y1 = std::max({y1, straight.at.y, straight.at.y + straight.dy});
+    }
+    bool is_near(const Way& other, i64 distance) const {
+        return x0 <= x1 && other.x0 <= other.x1 && x0 - distance <= other.x1 && other.x0 - distance <= x1 &&
+               y0 - distance <= other.y1 && other.y0 - distance <= y1;
+    }
+};
+
+// The ways of all bodies over some steps, as far as they are known.
+class KnownWays {
+public:
+    KnownWays(Timelines& timelines, i64 first, i64 end);
+
+    // Whom a body would meet first if it followed a track from the first step on. All distances are those of row 0, and
+    // no lead is above 0.
+    std::optional<Meeting> meeting(i64 row, const TrackPiece& track, const Distances& distances) const;
+
+private:
+    i64 first_, end_, step_us_;
+    std::vector<Way> ways_;
+};
 
 }  // namespace fleet2d

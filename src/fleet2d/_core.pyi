@@ -1509,6 +1509,66 @@ class Timelines:
             The step in which they meet and the other body; -1 and -1 if it meets nobody.
         """
 
+    def meeting_at_rest(self, row: int, distances: tuple[Any, ...], first: int, end: int) -> tuple[int, int]:
+        """
+        Return the first meeting of a body if it stood still from step `first` on; as `meeting_on`.
+        """
+
+    def rests(self, body: int, first: int, end: int) -> bool:
+        """
+        Return whether a body doesn't leave its place in the steps from `first` to `end` - 1.
+        """
+
+    def way_after_a_wait(self, row: int, step: int, waits: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], int, int, int] | None:
+        """
+        Return how a body goes on after the first wait that lets it.
+
+        Args:
+            row: The body.
+            step: The present step.
+            waits: int64 (n,), steps for which it stands.
+            distances: What it keeps from all bodies, (1, bodies) each.
+            end: One past the last step in which it must meet nobody.
+
+        Returns:
+            Breakpoints from now on, int64 (n, 5); the moment that those after the wait continue, by how much they are
+            later, and the moment at which a rest begins that is shortened by that [us]. None if it is free after no wait.
+        """
+
+    def way_by_a_place(self, body: tuple[Any, ...], step: int, met: int, places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], rests: int, distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], int, int, int] | None:
+        """
+        Return how a body goes on by the first place that lets it.
+
+        Args:
+            body: Its row, how it goes there, and how it can stand: see `Yielder`.
+            step: The present step.
+            met: The step in which somebody would be in its way; it goes on with its next stop after that.
+            places: int64 (n, 2), places to try [lattice].
+            waits: int64 (m,), steps for which it stays at a place.
+            rests: Steps for which it stays where it could stay until `end`, but go on after none of the waits; 0: it
+                needn't be able to stay, and doesn't.
+            distances: What it keeps from all bodies, (1, bodies) each.
+            end: One past the last step in which it must meet nobody.
+
+        Returns:
+            As `way_after_a_wait`.
+        """
+
+    def places_aside(self, row: int, step: int, end: int, part_of_cell: numpy.typing.NDArray[numpy.int32], part: int, from_: tuple[int, int], search: tuple[int, int, int], reach: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Return places that a body can step aside to, the nearest first: int64 (n, 2) [lattice].
+
+        Args:
+            row: The body.
+            step: The present step.
+            end: The last step at which nobody else may come near.
+            part_of_cell: int32 (rows, columns), the part of its space of each cell.
+            part: Its part.
+            from_: x and y from where it goes [lattice].
+            search: How many cells to each side it looks, at every so many of them, and for how many places.
+            reach: int64 (bodies,), how near the others may come to a place [lattice].
+        """
+
     def window(self, first: int, end: int) -> Window:
         """
         Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.
@@ -1528,6 +1588,13 @@ class Timelines:
     def __getstate__(self) -> tuple[Any, ...]: ...
 
     def __setstate__(self, state: tuple[Any, ...]) -> None: ...
+
+def next_stop(space: Mesh, track: tuple[Any, ...], moment: int) -> int:
+    """
+    Return the breakpoint at which a body next stands still after a moment [us]; -1 for none.
+
+    A turn at a corner, on the border of its space, is no stop.
+    """
 
 def distances_between(window: Window, body: int, other: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
     """

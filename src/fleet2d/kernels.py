@@ -56,6 +56,7 @@ are the same everywhere.
 """
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -64,7 +65,7 @@ from numpy.typing import NDArray
 
 # All names of the core are names of this module; those below are used here, too.
 from fleet2d._core import *  # noqa: F403 - its stub lists them
-from fleet2d._core import NEVER, QUARTER, SINES, TURN, UNIT, About, Mesh, SightingColumn
+from fleet2d._core import NEVER, QUARTER, SINES, TURN, UNIT, About, Mesh, Routes, SightingColumn
 
 Bool = NDArray[np.bool_]
 F32 = NDArray[np.float32]
@@ -398,6 +399,32 @@ class Distances(NamedTuple):
     near: I64  # distance of the middles below which they mustn't approach [lattice]
     hard: I64  # distance below which they overlap, and must part [lattice]; 0: they needn't
     counts: U8  # whose motion counts: 0 that of both, 1 its own, 2 that of the other one
+
+
+class Yielder(NamedTuple):
+    """A body that gives way, and how it goes somewhere.
+
+    Attributes:
+        row: Its number.
+        space: Where its middle may be.
+        routes: The shortest ways in it; None if it takes others.
+        speed: How fast it goes [lattice units per second].
+        turn_rate: How fast it turns [1/4096 turn per second].
+        walk: Called with time [us], x, y, heading, and the x and y of a goal to which no route
+            leads; returns the breakpoints of a way there, int64 (n, 5), or None.
+    """
+
+    row: int
+    space: Mesh
+    routes: Routes | None
+    speed: float
+    turn_rate: float
+    walk: Callable[..., I64 | None]
+
+
+Continued = tuple[I64, int, int, int]
+"""Breakpoints from now on, int64 (n, 5), that continue a track from a moment on; by how much later
+they are, and up to which moment [us]: a rest that begins then is shortened by that."""
 
 
 class Poses(NamedTuple):

@@ -385,7 +385,7 @@ def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(
     cells = np.argwhere(space.part_of_cell >= 0)
     away = ((cells[:, ::-1] * 64 + 33 - [x, y]) ** 2).sum(axis=1)
 
-    found = space._by_distance(x, y, most)
+    found = space.by_distance(x, y, most)
 
     assert cells[np.argsort(away, kind="stable")[:most]].tolist() == found.tolist()
 

@@ -783,6 +783,32 @@ CALLS: dict[str, Args] = {
     "Timelines.forget": lambda: (timelines(), 3),
     "Timelines.meetings": lambda: (timelines(), np.array([0, 1]), kept(2), 3, 9),
     "Timelines.meeting_on": lambda: (timelines(), 0, track(), kept(1), 3, 9),
+    "Timelines.meeting_at_rest": lambda: (timelines(), 0, kept(1), 3, 9),
+    "Timelines.rests": lambda: (timelines(), 0, 3, 9),
+    "Timelines.way_after_a_wait": lambda: (timelines(), 0, 3, np.array([1, 2]), kept(1), 9),
+    "Timelines.way_by_a_place": lambda: (
+        timelines(),
+        (0, MESH, None, 1000.0, 500.0, lambda *_: None),
+        3,
+        4,
+        POINTS[:2].copy(),
+        np.array([1, 2]),
+        2,
+        kept(1),
+        9,
+    ),
+    "Timelines.places_aside": lambda: (
+        timelines(),
+        0,
+        3,
+        9,
+        np.zeros((20, 20), np.int32),
+        0,
+        (100, 100),
+        (5, 2, 3),
+        np.array([0, 300]),
+    ),
+    "next_stop": lambda: (MESH, track(), 5),
 }
 """A call of every function, constructor and method of the core that takes anything."""
 

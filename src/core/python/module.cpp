@@ -35,6 +35,7 @@ NB_MODULE(_core, m) {
     bind_traces(m);
     bind_smoothing(m);
     bind_timelines(m);
+    bind_giving_way(m);
     bind_signals(m);
     bind_flows(m);
     bind_interruptions(m);

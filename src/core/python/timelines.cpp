@@ -1,8 +1,11 @@
 #include "timelines.hpp"
 
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/vector.h>
 
-#include "../meetings.hpp"
+#include "../grid.hpp"
+#include "giving_way.hpp"
+#include "legs.hpp"
 #include "mesh.hpp"
 #include "motion.hpp"
 #include "subjects.hpp"
@@ -18,6 +21,19 @@ template <class T>
 std::vector<T> copied(View<const T> values) {
     return {values.begin(), values.end()};
 }
+
+}  // namespace
+
+TrackPiece piece_of(const Breakpoints& track) {
+    const i64 count = track.size();
+    require(count > 0 && track.x.size() == count && track.y.size() == count && track.heading.size() == count &&
+                track.away.size() == count,
+            "all arrays of a track must have one length, 1 or more");
+    require(is_traceable(track), "a track's times must ascend, and its legs be short and its coordinates small");
+    return {copied(track.time), copied(track.x), copied(track.y), copied(track.heading), copied(track.away), {}, {0}};
+}
+
+namespace {
 
 constexpr i64 FAR = i64{1} << 29;  // where a random walk is, and its headings, are nearer to 0
 constexpr const char* NO_STATE = "this is no state of timelines";
@@ -115,8 +131,69 @@ public:
     std::tuple<i64, i64> meeting_on(i64 row, const Breakpoints& track, const Distances& distances, i64 first, i64 end) {
         check_meetings(1, distances, first, end);
         check(row, first);
-        const auto found = fleet2d::meeting_on(timelines_, row, piece_of(track), distances, first, end);
+        const auto found = KnownWays(timelines_, first, end).meeting(row, piece_of(track), distances);
         return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
+    }
+
+    std::tuple<i64, i64> meeting_at_rest(i64 row, const Distances& distances, i64 first, i64 end) {
+        check_meetings(1, distances, first, end);
+        check(row, first);
+        const BodyPose at = timelines_.pose(row, first);
+        const TrackPiece rest{{first * timelines_.step_us()}, {at.x}, {at.y}, {at.heading},
+                              {static_cast<u8>(at.away)},     {},     {0}};
+        const auto found = KnownWays(timelines_, first, end).meeting(row, rest, distances);
+        return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
+    }
+
+    // Rows (n, 5) from the present one on; the moment that they continue, how much later, and up to when.
+    using DetourFields = std::optional<std::tuple<Array<i64, 2>, i64, i64, i64>>;
+    static DetourFields fields_of(const std::optional<Detour>& detour) {
+        if (!detour) return {};
+        const auto& [legs, delay] = *detour;
+        return std::tuple(legs.rows(), delay.since, delay.later, delay.edge);
+    }
+
+    DetourFields way_after_a_wait(i64 row, i64 step, View<const i64> waits, const Distances& distances, i64 end) {
+        check_detour(row, step, waits, distances, end);
+        return fields_of(fleet2d::way_after_a_wait(timelines_, row, step, waits, distances, end));
+    }
+
+    DetourFields way_by_a_place(const YielderFields& body, i64 step, i64 met, View<const i64, 2> places,
+                                View<const i64> waits, i64 rests, const Distances& distances, i64 end) {
+        const i64 row = std::get<0>(body);
+        check_detour(row, step, waits, distances, end);
+        check(row, met + 1);
+        require(0 <= rests && rests < FAR, "rests must be 0 or more steps");
+        require(places.shape[1] == 2 && all_in_range(places, -FARTHEST_POSE + 1, FARTHEST_POSE),
+                "places must be (n, 2), within 2**29 of 0");
+        const Yielder yielder = yielder_of(body);
+        return fields_of(fleet2d::way_by_a_place(timelines_, yielder, step, met, places, waits, rests, distances, end));
+    }
+
+    Array<i64, 2> places_aside(i64 row, i64 step, i64 end, View<const i32, 2> part_of_cell, i64 part,
+                               std::pair<i64, i64> from, std::tuple<i64, i64, i64> search, View<const i64> reach) {
+        require(step <= end && end - step <= FAR, "end must not be before step");
+        require(reach.size() == timelines_.bodies() && all_in_range(reach, 0, FAR),
+                "reach must be (bodies,), and small");
+        check(row, step);
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            check_known(body, step);
+            check(body, end);
+        }
+        const auto [within, spacing, most] = search;
+        require(0 <= within && within < FAR && 0 < spacing && spacing < FAR, "within and spacing must be small");
+        const Point at{from.first, from.second};
+        require(is_inside(part_of_cell.shape, {floor_div(at.y, SUB), floor_div(at.x, SUB)}), "from must be in a cell");
+        const auto places =
+            fleet2d::places_aside(timelines_, row, step, end, {part_of_cell, part}, at, {within, spacing, most}, reach);
+        return Array<i64, 2>::copy_of(rows_of(places));
+    }
+
+    bool rests(i64 body, i64 first, i64 end) {
+        require(first < end, "end must be after first");
+        check_known(body, first);
+        check(body, end);
+        return fleet2d::rests(timelines_, body, first, end);
     }
 
     OwnedWindow window(i64 first, i64 end) { return window_of(0, timelines_.bodies(), first, end); }
@@ -165,14 +242,11 @@ public:
     }
 
 private:
-    static TrackPiece piece_of(const Breakpoints& track) {
-        const i64 count = track.size();
-        require(count > 0 && track.x.size() == count && track.y.size() == count && track.heading.size() == count &&
-                    track.away.size() == count,
-                "all arrays of a track must have one length, 1 or more");
-        require(is_traceable(track), "a track's times must ascend, and its legs be short and its coordinates small");
-        return {
-            copied(track.time), copied(track.x), copied(track.y), copied(track.heading), copied(track.away), {}, {0}};
+    void check_detour(i64 row, i64 step, View<const i64> waits, const Distances& distances, i64 end) const {
+        check_meetings(1, distances, step, end);
+        check(row, step);
+        require(timelines_.pieces(row).back().first <= step, "the body begins another motion later");
+        require(all_in_range(waits, 0, FAR), "waits must be 0 or more steps, and short");
     }
     void check_meetings(i64 rows, const Distances& distances, i64 first, i64 end) const {
         require(first <= end && end - first <= FAR, "end must not be before first");
@@ -497,6 +571,58 @@ Args:
 
 Returns:
     The step in which they meet and the other body; -1 and -1 if it meets nobody.)")
+        .def("meeting_at_rest", &OwnedTimelines::meeting_at_rest, "row"_a, "distances"_a, "first"_a, "end"_a,
+             "Return the first meeting of a body if it stood still from step `first` on; as `meeting_on`.")
+        .def("rests", &OwnedTimelines::rests, "body"_a, "first"_a, "end"_a,
+             "Return whether a body doesn't leave its place in the steps from `first` to `end` - 1.")
+        .def("way_after_a_wait", &OwnedTimelines::way_after_a_wait, "row"_a, "step"_a, "waits"_a, "distances"_a,
+             "end"_a,
+             R"(Return how a body goes on after the first wait that lets it.
+
+Args:
+    row: The body.
+    step: The present step.
+    waits: int64 (n,), steps for which it stands.
+    distances: What it keeps from all bodies, (1, bodies) each.
+    end: One past the last step in which it must meet nobody.
+
+Returns:
+    Breakpoints from now on, int64 (n, 5); the moment that those after the wait continue, by how much they are
+    later, and the moment at which a rest begins that is shortened by that [us]. None if it is free after no wait.)")
+        .def("way_by_a_place", &OwnedTimelines::way_by_a_place, "body"_a, "step"_a, "met"_a, "places"_a, "waits"_a,
+             "rests"_a, "distances"_a, "end"_a,
+             nb::sig("def way_by_a_place(self, body: tuple[typing.Any, ...], step: int, met: int, "
+                     "places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], "
+                     "rests: int, distances: tuple[typing.Any, ...], end: int) "
+                     "-> tuple[numpy.typing.NDArray[numpy.int64], int, int, int] | None"),
+             R"(Return how a body goes on by the first place that lets it.
+
+Args:
+    body: Its row, how it goes there, and how it can stand: see `Yielder`.
+    step: The present step.
+    met: The step in which somebody would be in its way; it goes on with its next stop after that.
+    places: int64 (n, 2), places to try [lattice].
+    waits: int64 (m,), steps for which it stays at a place.
+    rests: Steps for which it stays where it could stay until `end`, but go on after none of the waits; 0: it
+        needn't be able to stay, and doesn't.
+    distances: What it keeps from all bodies, (1, bodies) each.
+    end: One past the last step in which it must meet nobody.
+
+Returns:
+    As `way_after_a_wait`.)")
+        .def("places_aside", &OwnedTimelines::places_aside, "row"_a, "step"_a, "end"_a, "part_of_cell"_a, "part"_a,
+             "from_"_a, "search"_a, "reach"_a,
+             R"(Return places that a body can step aside to, the nearest first: int64 (n, 2) [lattice].
+
+Args:
+    row: The body.
+    step: The present step.
+    end: The last step at which nobody else may come near.
+    part_of_cell: int32 (rows, columns), the part of its space of each cell.
+    part: Its part.
+    from_: x and y from where it goes [lattice].
+    search: How many cells to each side it looks, at every so many of them, and for how many places.
+    reach: int64 (bodies,), how near the others may come to a place [lattice].)")
         .def("window", &OwnedTimelines::window, "first"_a, "end"_a,
              "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")
         .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a,

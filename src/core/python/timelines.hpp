@@ -4,6 +4,13 @@
 #include "../timelines.hpp"
 #include "arrays.hpp"
 
+namespace fleet2d {
+
+// A track as a piece of timelines. Raises ValueError: it can't be followed.
+TrackPiece piece_of(const Breakpoints& track);
+
+}  // namespace fleet2d
+
 namespace nanobind::detail {
 
 template <>

@@ -12,14 +12,12 @@ can't get out of the way, the two overlap, with an event.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis, Watcher
@@ -27,12 +25,11 @@ from fleet2d.entities import giving_way
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.giving_way import plan_after, plan_around, plan_aside
+from fleet2d.entities.giving_way import plan_after, plan_along, plan_around, plan_here, yielder
 from fleet2d.entities.place import is_point, points_at_distance
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.errors import NoWayError
 from fleet2d.floorplan.lattice import LatticePoint
-from fleet2d.kernels import I64, SUB, Bool, Breakpoints, Distances, walking_distance
+from fleet2d.kernels import I64, SUB, Bool, Distances
 from fleet2d.runtime.events import EventKind
 
 EndPlan = Callable[[int, int], None]
@@ -52,6 +49,8 @@ SWAPPED_FOR = timedelta(seconds=30)
 # A wait that begins this soon after another one, and this near, continues it.
 SAME_WAIT = timedelta(seconds=15)
 SAME_PLACE_M = 1.5
+# How long it stands at most before it looks again.
+LONGEST_PAUSE = timedelta(minutes=10)
 # How long it waits in vain before it skips its stop.
 GIVES_UP = timedelta(minutes=2)
 # Gap at which bodies pass, and gap at which a robot with the right of way stops [m].
@@ -66,6 +65,10 @@ ASIDE_TRIES = 12
 VIAS = 8
 
 
+# How many steps it looks for meetings at once.
+FORESIGHT = 600
+NO_WAIT = np.zeros(1, np.int64)
+
 # Whose motion counts.
 OWN = 1
 OTHERS = 2
@@ -79,12 +82,14 @@ class GivenWay(NamedTuple):
         last: The last step at which it had to wait.
         place: Where it began [lattice].
         swaps: How often it has ended a deadlock meanwhile.
+        pause: For how many steps it stood when it last found nothing better.
     """
 
     since: int
     last: int
     place: LatticePoint
     swaps: int = 0
+    pause: int = 0
 
 
 @dataclass
@@ -94,11 +99,13 @@ class Patience:
     Attributes:
         until: The step before which it lasts.
         planned_at: The step at which the other one began its plan; another plan ends it.
+        other: The row of the other one.
         ignores: Whether it ignores the other one, with whom it overlaps; else it only stops.
     """
 
     until: int
     planned_at: int
+    other: int
     ignores: bool = False
 
 
@@ -118,13 +125,19 @@ class Yielding(Watcher):
         self._rows = np.array(self.rows, np.int64)
         self._step_us = basis.clock.step_us
         self._ahead = self._steps(AHEAD)
+        self._tries = np.array([self._steps(wait) for wait in WAITS], np.int64)
+        self._tries_aside = np.array([self._steps(wait) for wait in WAITS_ASIDE], np.int64)
         self._waits: dict[int, GivenWay] = {}
-        self._looked_round: dict[int, int] = {}  # when it last found no way round
+        self._looked_round: dict[
+            int, tuple[int, object]
+        ] = {}  # when, and where, there was no way round
         self._told: dict[tuple[int, int], int] = {}
         self._patience: dict[tuple[int, int], Patience] = {}
+        self._pauses: dict[int, Patience] = {}  # of robots that stand as they found nothing better
         self._swapped: dict[tuple[int, int], int] = {}
         self._stuck: tuple[bool, ...] = ()
         self._distances: Distances | None = None
+        self._foreseen = (-1, 0, 0)  # at a step: nobody reacts before another one, or the end
         self.overlaps: dict[tuple[str, str], int] = {}
         if self.rows:
             self._set_up()
@@ -149,17 +162,39 @@ class Yielding(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a robot has to react: not the first of the span."""
-        first = self.next_step + 1
+        step, due, until = self._foreseen
+        if step != self.next_step:
+            due = until = self.next_step + 1
+        if due < until or end <= until:
+            return min(due, end)
+        return self._next_due(until, end)
+
+    def _next_due(self, first: int, end: int) -> int:
+        """Return the first step at which a robot has to react to somebody; `end` for none."""
+        step = self.next_step
+        while first < end:
+            changes = list(self._changes())
+            until = min([end, *(change for change in changes if change > first)])
+            is_same = all(not step < change <= first for change in changes)
+            kept = self._present(step) if is_same else self._kept(first)
+            found = self._meetings(kept, first, until)
+            if found:
+                return min(due for _, due, _, _ in found)
+            first = until
+        return end
+
+    def _changes(self) -> Iterator[int]:
+        """Yield the steps at which robots begin to mind others again."""
         for patience in self._patience.values():
-            if first <= patience.until < end:
-                end = patience.until
-        for until in self._swapped.values():
-            if first <= until < end:
-                end = until
-        if first >= end:
-            return end
-        found = bodies.meetings(self._rows, self._present(self.next_step), first, end)
-        return min((due for _, due, _, _ in found), default=end)
+            yield patience.until
+        for pause in self._pauses.values():
+            yield pause.until
+        yield from self._swapped.values()
+
+    def _meetings(
+        self, distances: Distances, first: int, end: int
+    ) -> list[tuple[int, int, int, int]]:
+        return self._bodies.timelines.meetings(self._rows, distances, first, end)
 
     def answer(
         self, step: int, outputs: Mapping[str, Any], begun: set[int], end_plan: EndPlan
@@ -173,14 +208,19 @@ class Yielding(Watcher):
             end_plan: Called with a row and the step before its plan is replaced.
         """
         self._refresh(step)
-        found = self._bodies.meetings(self._rows, self._present(step), step, step + 1)
+        decides = self._bodies.next_decision()
+        until = max(min([step + FORESIGHT, decides, *self._changes()]), step + 1)
+        found = self._meetings(self._present(step), step, until)
+        first = min((due for _, due, _, _ in found), default=until)
+        self._foreseen = (step if first > step else -1, first, until)
+        found = [meeting for meeting in found if meeting[1] == step]
         for row, _, at, other in found:
             now = Situation(self._actors[row], step, (), outputs)
             for each, plan in self._plans(now, at, other):
                 self._follow(each, plan, begun, end_plan)
         # Who would still drive into somebody within this step stops, then who drives into those.
         while found:
-            found = self._bodies.meetings(self._rows, self._strict(step), step, step + 1)
+            found = self._meetings(self._strict(step), step, step + 1)
             for row, *_ in found:
                 now = Situation(self._actors[row], step, (), outputs)
                 self._follow(now, self._stop(now), begun, end_plan)
@@ -221,13 +261,23 @@ class Yielding(Watcher):
             if gives_way is not None:  # `Clearance` lets it mind people that stand
                 self._counts[number, : self._users] = OTHERS
                 polite[number, : self._users] = lattice(gives_way.distance)[number, : self._users]
-        self._passing = Distances(self._nothing, self._near, self._nothing, both)
-        self._politely = Distances(self._nothing, polite, self._nothing, both)
-        self._everybody = Distances(self._nothing, self._near, self._hard, both)
+        self._polite = polite
+        self._passing = self._each(self._near, self._nothing)
+        self._politely = self._each(polite, self._nothing)
+        self._everybody = self._each(self._near, self._hard)
         self._same_place = SAME_PLACE_M * units
         self._order()
         for row in self.rows:
             self._begin_apart(actors[row])
+
+    def _each(self, near: I64, hard: I64) -> dict[int, Distances]:
+        """Return what each robot keeps from all bodies, whoever moves, by its row."""
+        nothing = self._nothing[:1]
+        counts = np.zeros_like(self._counts[:1])
+        return {
+            row: Distances(nothing, near[i : i + 1], hard[i : i + 1], counts)
+            for row, i in self._number.items()
+        }
 
     def _order(self) -> None:
         """Ask the rule which robots go first; bool (robots, bodies)."""
@@ -250,33 +300,37 @@ class Yielding(Watcher):
 
     def _present(self, step: int) -> Distances:
         """Return what the robots keep from all bodies at a step."""
-        for pair, patience in list(self._patience.items()):
-            if patience.until <= step or self._actors[pair[1]].planned_at > patience.planned_at:
-                del self._patience[pair]
-                self._distances = None
+        lasting: tuple[dict[Any, Patience], ...] = self._patience, self._pauses
+        for patiences in lasting:
+            for key, patience in list(patiences.items()):
+                begun = self._actors[patience.other].planned_at
+                if patience.until <= step or begun > patience.planned_at:
+                    del patiences[key]
+                    self._distances = None
         for pair, until in list(self._swapped.items()):
             if until <= step:
                 del self._swapped[pair]
                 self._distances = None
         if self._distances is None:
-            self._distances = self._now_kept()
+            self._distances = self._kept(step)
         return self._distances
 
-    def _now_kept(self) -> Distances:
-        first = self._first.copy()
-        for one, other in self._swapped:
-            row = self._number[one]
-            first[row, other] = not first[row, other]
-            row = self._number[other]
-            first[row, one] = not first[row, one]
-        for number, is_stuck in enumerate(self._stuck):
-            if is_stuck:
-                first[:, self.rows[number]] = False
+    def _kept(self, step: int) -> Distances:
+        """Return what the robots keep from all bodies at a step, if nobody decides before it."""
+        first = self._first_now(step)
         lead = np.where(first, 0, self._ahead)
         near = np.where(first, self._least, self._near)
         hard = np.where(first, 0, self._hard)
         counts = np.where(first, OWN, self._counts).astype(np.uint8)
+        for row in [row for row, pause in self._pauses.items() if pause.until > step]:
+            i = self._number[row]
+            lead[i, self._rows] = 0
+            near[i, self._rows] = self._least[i, self._rows]
+            hard[i, self._rows] = 0
+            counts[i, self._rows] = OWN
         for (row, other), patience in self._patience.items():
+            if patience.until <= step:
+                continue
             i = self._number[row]
             lead[i, other] = -1 if patience.ignores else 0
             near[i, other] = self._least[i, other]
@@ -286,6 +340,19 @@ class Yielding(Watcher):
             if is_stuck:
                 lead[number] = -1
         return Distances(lead, near, hard, counts)
+
+    def _first_now(self, step: int) -> Bool:
+        """Return which robots go before others at a step, bool (robots, bodies)."""
+        first = self._first.copy()
+        for one, other in [pair for pair, until in self._swapped.items() if until > step]:
+            row = self._number[one]
+            first[row, other] = not first[row, other]
+            row = self._number[other]
+            first[row, one] = not first[row, one]
+        for number, is_stuck in enumerate(self._stuck):
+            if is_stuck:
+                first[:, self.rows[number]] = False
+        return first
 
     def _strict(self, step: int) -> Distances:
         """Return the distances at which robots stop at the last moment."""
@@ -302,7 +369,7 @@ class Yielding(Watcher):
     ) -> None:
         """Let a robot not react to another body for some steps."""
         planned_at = self._actors[other].planned_at
-        patience = Patience(now.step + steps, planned_at, ignores)
+        patience = Patience(now.step + steps, planned_at, other, ignores)
         self._patience[now.actor.row, other] = patience
         self._distances = None
 
@@ -315,6 +382,7 @@ class Yielding(Watcher):
             self._swapped[pair] = step + self._steps(SWAPPED_FOR)
         for key in ((row, other), (other, row)):
             self._patience.pop(key, None)
+            self._pauses.pop(key[0], None)
         self._distances = None
 
     # Plans
@@ -324,7 +392,7 @@ class Yielding(Watcher):
         row = now.actor.row
         if self._goes_first(row, other, now.step):
             return [(now, self._blocked(now, at, other, self._stop(now)))]
-        stays = self._met(now, now.plan().stay(), self._everybody)
+        stays = self._hit_at_rest(now, self._everybody[row])
         if stays is None:
             plan = self._by_waiting(now, at, other)
         elif self._keeps_its_place(now, at, other):
@@ -332,9 +400,9 @@ class Yielding(Watcher):
         elif (passing := self._passed(now, at, other)) is not None:
             return [passing]
         else:
-            plan = next(self._asides(now, at, politely=True), None)
+            plan = self._aside(now, at, self._politely[row])
             if plan is None and self._is_polite(row):
-                plan = next(self._asides(now, at, politely=False), None)
+                plan = self._aside(now, at, self._passing[row])
         if plan is None:
             plan = self._in_vain(now, at, other, stays)
         else:
@@ -345,33 +413,45 @@ class Yielding(Watcher):
         self, now: Situation, at: int, other: int, stays: tuple[int, int] | None
     ) -> Plan | None:
         """Return what a robot does that found nothing better than to stop; None to go on."""
+        actor = self._actors[now.actor.row]
         pause = self._pause(now)
-        self._have_patience(now, other, pause)
+        if self._queues(actor, other, now.step, at):
+            pause = max(pause, self._rest_of(other, now.step))
         is_hit = stays is not None and stays[0] <= at and other not in self._number
-        if is_hit and at > now.step:
-            return None  # it is hit as early if it stops
+        if is_hit and at > now.step:  # it is hit as early if it stops
+            self._have_patience(now, other, max(pause, at - now.step))
+            return None
         if is_hit:
             return self._overlapping(now, pause)
-        return self._blocked(now, at, other, self._stop(now, pause))
+        self._have_patience(now, other, pause)
+        self._pauses[actor.row] = Patience(now.step + pause, self._actors[other].planned_at, other)
+        plan = self._blocked(now, at, other, self._stop(now, pause))
+        if actor.row in self._waits:
+            self._waits[actor.row] = self._waits[actor.row]._replace(pause=pause)
+        return plan
 
     def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
         """Return a plan that goes on later, or round bodies that stand; None if none is free."""
         actor = self._actors[now.actor.row]
-        for wait in () if self._rests(other, now.step) else WAITS:
-            until = now.step + self._steps(wait)
-            if self._is_free_after(now, until):
-                return plan_after(now, actor.plan, until)
+        if not self._rests(other, now.step):
+            row = actor.row
+            continued = self._bodies.timelines.way_after_a_wait(
+                row, now.step, self._tries, self._politely[row], self._far(now)
+            )
+            if continued is not None:
+                return plan_along(now, actor.plan, continued)
         plan = self._by_via(now, at, other)
         if plan is not None:
             return plan
-        last = self._looked_round.get(actor.row)
-        if last is not None and now.step - last < self._ahead:
+        standing = self._standing(now)
+        seen = actor.state, actor.arrangement, self._stop_of(actor, at), standing.tobytes()
+        last, where = self._looked_round.get(actor.row, (None, None))
+        if last is not None and (now.step - last < self._ahead or where == seen):
             return None
-        charger = None if actor.charge is None else actor.charge.charger
-        around = plan_around(now, actor.plan, self._standing(now), at, charger)
+        around = plan_around(now, actor.plan, standing, at, _charger(actor))
         if around is not None and self._is_free(now, around):
             return around
-        self._looked_round[actor.row] = now.step
+        self._looked_round[actor.row] = now.step, None if around is not None else seen
         return None
 
     def _by_via(self, now: Situation, at: int, other: int) -> Plan | None:
@@ -379,11 +459,18 @@ class Yielding(Watcher):
         actor = self._actors[now.actor.row]
         if self._is_taken(actor, other, now.step, at):
             return None
-        for via in self._beside(actor, other):
-            plan = plan_aside(now, actor.plan, via, now.step, at)
-            if plan is not None and self._is_free(now, plan):
-                return plan
-        return None
+        kept = self._politely[actor.row]
+        return self._by_places(now, at, self._beside(actor, other), NO_WAIT, 0, kept)
+
+    def _by_places(
+        self, now: Situation, at: int, places: I64, waits: I64, rests: int, kept: Distances
+    ) -> Plan | None:
+        """Return a plan to go on by one of some places: see `Timelines.way_by_a_place`."""
+        actor = self._actors[now.actor.row]
+        continued = self._bodies.timelines.way_by_a_place(
+            yielder(actor), now.step, at, places, waits, rests, kept, self._far(now)
+        )
+        return None if continued is None else plan_along(now, actor.plan, continued)
 
     def _passed(self, now: Situation, at: int, other: int) -> tuple[Situation, Plan] | None:
         """Return how a robot with the right of way passes one that stands; None if it can't."""
@@ -398,35 +485,34 @@ class Yielding(Watcher):
         """Return whether a robot keeps clear of people that stand by its own `gives_way`."""
         return getattr(self._actors[row].entity, "gives_way", None) is not None
 
-    def _beside(self, actor: DecidingActor, other: int) -> list[LatticePoint]:
-        """Return points by which a robot may pass a body that stands, the nearest two."""
-        near = 3 * int(self._politely.near[self._number[actor.row], other]) // 2
+    def _beside(self, actor: DecidingActor, other: int) -> I64:
+        """Return points by which a robot may pass a body that stands, the nearest but one first."""
+        near = 3 * int(self._polite[self._number[actor.row], other]) // 2
         middle = self._actors[other].state.position
         points = points_at_distance(actor, middle, near, VIAS)
-        return sorted(points, key=lambda at: math.dist(at, actor.state.position))[1:4]
+        nearest = sorted(points, key=lambda at: math.dist(at, actor.state.position))
+        return np.array(nearest[1:4], np.int64).reshape(-1, 2)
 
-    def _asides(self, now: Situation, at: int, *, politely: bool) -> Iterator[Plan]:
-        """Yield plans to step aside and come back, the nearest place first."""
+    def _aside(self, now: Situation, at: int, kept: Distances) -> Plan | None:
+        """Return a plan to step aside and come back, by the nearest place; None without one.
+
+        Where nothing lets it come back, it waits for as long as is known, and then looks again.
+        """
         actor = self._actors[now.actor.row]
-        places = chain.from_iterable(
-            self._places_aside(actor, now.step, metres) for metres in (NEAR_M, FAR_M)
-        )
-        for place in places:
-            try:
-                plan = now.plan().go_to_point(*place)
-            except NoWayError:
-                continue
-            if not self._is_free(now, plan, politely=politely):
-                continue
-            arrives = actor.clock.step_at_or_after(plan.time_us)
-            for wait in WAITS_ASIDE:
-                back = plan_aside(now, actor.plan, place, arrives + self._steps(wait), at)
-                if back is not None and self._is_free(now, back, politely=politely):
-                    yield back
-            # It waits aside for as long as is known, and then looks again.
-            later = plan_aside(now, actor.plan, place, arrives + self._steps(FREE_FOR), at)
-            if later is not None:
-                yield later
+        cell = actor.home.plan.lattice.cell
+        rests = self._steps(FREE_FOR)
+        reach = self._near[self._number[actor.row]] + SUB
+        for metres in (NEAR_M, FAR_M):
+            search = int(metres / cell), ASIDE_CELLS, ASIDE_TRIES
+            place = self._inside(actor)
+            grid = actor.space.part_of_cell, actor.part
+            places = self._bodies.timelines.places_aside(
+                actor.row, now.step, now.step + rests, *grid, place, search, reach
+            )
+            plan = self._by_places(now, at, places, self._tries_aside, rests, kept)
+            if plan is not None:
+                return plan
+        return None
 
     def _stop(self, now: Situation, steps: int = 0) -> Plan:
         """Return a plan to stop for a moment, and then to go on."""
@@ -434,10 +520,10 @@ class Yielding(Watcher):
         return plan_after(now, self._actors[now.actor.row].plan, until)
 
     def _pause(self, now: Situation) -> int:
-        """Return for how many steps a robot waits before it looks again: longer and longer."""
+        """Return for how many steps a robot stands before it looks again: longer and longer."""
         wait = self._waits.get(now.actor.row)
-        waited = 0 if wait is None or not self._goes_on(wait, now) else now.step - wait.since
-        return min(max(self._steps(PAUSE), waited // 2), self._steps(DEADLOCK))
+        last = 0 if wait is None or not self._goes_on(wait, now) else wait.pause
+        return min(max(self._steps(PAUSE), 2 * last), self._steps(LONGEST_PAUSE))
 
     def _overlapping(self, now: Situation, pause: int) -> Plan | None:
         """Write once who walks into a robot now; it goes on as before, and minds them no more."""
@@ -445,7 +531,8 @@ class Yielding(Watcher):
         robot = self._actors[row]
         notes = []
         for other in self._hits(now):
-            self._have_patience(now, other, pause, ignores=True)
+            stays = self._steps(GIVES_UP) if self._rests(other, now.step) else pause
+            self._have_patience(now, other, stays, ignores=True)
             told = self._told.get((row, other))
             self._told[row, other] = now.step
             if told is not None and now.step - told <= self._steps(SAME_WAIT):
@@ -461,12 +548,12 @@ class Yielding(Watcher):
 
     def _hits(self, now: Situation) -> list[int]:
         """Return the rows of those who don't yield and walk into a robot at this step."""
-        lead, near, hard, counts = self._everybody
         hits = []
+        kept = self._everybody[now.actor.row]
         for other in range(len(self._actors)):
-            only = np.full_like(lead, -1)
+            only = np.full_like(kept.lead, -1)
             only[:, other] = 0
-            met = self._met(now, now.plan().stay(), Distances(only, near, hard, counts))
+            met = self._hit_at_rest(now, kept._replace(lead=only))
             if other not in self._number and met is not None and met[0] == now.step:
                 hits.append(other)
         return hits
@@ -485,24 +572,27 @@ class Yielding(Watcher):
 
     def _goes_on(self, wait: GivenWay, now: Situation) -> bool:
         """Return whether a robot that has to wait now does so still."""
-        is_soon = now.step - wait.last <= self._steps(SAME_WAIT)
+        is_soon = now.step - wait.last <= self._steps(SAME_WAIT) + wait.pause
         return is_soon and math.dist(wait.place, now.actor.state.position) <= self._same_place
 
     def _blocked(self, now: Situation, at: int, other: int, plan: Plan) -> Plan:
         """Return what a robot does for which nothing is free: it waits, or skips its stop."""
         row = now.actor.row
         actor = self._actors[row]
+        taken = self._is_taken(actor, other, now.step, at)
+        queues = self._queues(actor, other, now.step, at)
+        here = plan_here(now, actor.plan, at) if taken and not queues else None
+        if here is not None:
+            return self._noted(now, other, here)
         self._noted(now, other, plan)
+        if queues:
+            return plan
         wait = self._waits[row]
         waited = now.step - wait.since
         name = self._actors[other].name
-        taken = self._is_taken(actor, other, now.step, at)
-        charger = None if actor.charge is None else actor.charge.charger
-        if taken and self._stop_of(actor, at) == charger:
-            return plan  # it queues
         patience = DEADLOCK if taken else GIVES_UP
         if waited >= self._steps(patience) and _goes_somewhere(actor):
-            self._waits.pop(row)
+            self._waits[row] = wait._replace(since=now.step, swaps=0)
             return self._without_stop(now, name)
         if other in self._number and waited >= (wait.swaps + 1) * self._steps(DEADLOCK):
             self._waits[row] = wait._replace(swaps=wait.swaps + 1)
@@ -524,51 +614,29 @@ class Yielding(Watcher):
 
     # What is free
 
-    def _met(self, now: Situation, plan: Plan, distances: Distances) -> tuple[int, int] | None:
-        """Return the step at which a plan would meet somebody first, and whom."""
+    def _far(self, now: Situation) -> int:
+        """Return the step up to which a plan has to be free."""
+        return now.step + self._steps(FREE_FOR)
+
+    def _hit_at_rest(self, now: Situation, kept: Distances) -> tuple[int, int] | None:
+        """Return the step at which somebody would come too near if it stood still, and who."""
+        row = now.actor.row
+        met = self._bodies.timelines.meeting_at_rest(row, kept, now.step, self._far(now))
+        return None if met[0] < 0 else met
+
+    def _is_free(self, now: Situation, plan: Plan) -> bool:
+        """Return whether a plan brings a robot too near to nobody, as far as is known."""
         motion = plan.finish()
         if not isinstance(motion, Track):
-            return None
-        return self._meets(now, motion.breakpoints, distances)
-
-    def _meets(
-        self, now: Situation, track: Breakpoints, distances: Distances
-    ) -> tuple[int, int] | None:
-        row = now.actor.row
-        number = self._number[row]
-        lead, near, hard, counts = distances
-        mine = slice(number, number + 1)
-        kept = Distances(lead[mine], near[mine], hard[mine], counts[mine])
-        end = now.step + self._steps(FREE_FOR)
-        step, other = self._bodies.meeting_on(row, track, kept, now.step, end)
-        return None if step < 0 else (step, other)
-
-    def _is_free_after(self, now: Situation, step: int) -> bool:
-        """Return whether a robot may stand until a step, and then go on as it planned."""
-        motion = self._actors[now.actor.row].plan.finish()
-        if not isinstance(motion, Track):
             return True
-        track = motion.breakpoints
-        now_us = now.step * self._step_us
-        first = int(np.searchsorted(track.time, now_us, side="right"))
-        begins = np.array([now_us, step * self._step_us], np.int64)
-        pose = now.actor.state
-        columns: Sequence[NDArray[Any]] = track[1:]
-        later = np.concatenate([begins, track.time[first:] + (begins[1] - begins[0])])
-        delayed = [
-            np.concatenate([np.full(2, value, column.dtype), column[first:]])
-            for value, column in zip(pose, columns, strict=True)
-        ]
-        return self._meets(now, Breakpoints(later, *delayed), self._politely) is None
-
-    def _is_free(self, now: Situation, plan: Plan, *, politely: bool = True) -> bool:
-        """Return whether a plan brings a robot too near to nobody, as far as is known."""
-        return self._met(now, plan, self._politely if politely else self._passing) is None
+        row = now.actor.row
+        on = motion.breakpoints
+        kept = self._politely[row]
+        return self._bodies.timelines.meeting_on(row, on, kept, now.step, self._far(now))[0] < 0
 
     def _rests(self, row: int, step: int) -> bool:
         """Return whether a body stays where it is for a while, as far as is known."""
-        runs = self._bodies.runs(row, step, step + self._steps(FREE_FOR))
-        return bool((runs.x == runs.x[0]).all() and (runs.y == runs.y[0]).all())
+        return self._bodies.timelines.rests(row, step, step + self._steps(FREE_FOR))
 
     def _standing(self, now: Situation) -> I64:
         """Return where others stand, or will have stopped; and the distances to keep, (n, 3)."""
@@ -603,6 +671,20 @@ class Yielding(Watcher):
         near = int(self._near[self._number[actor.row], other])
         return math.dist(stop, self._actors[other].state.position) < near
 
+    def _queues(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
+        """Return whether another body stays at the charger that a robot wants to get to."""
+        return self._is_taken(actor, other, step, at) and self._stop_of(actor, at) == _charger(
+            actor
+        )
+
+    def _rest_of(self, row: int, step: int) -> int:
+        """Return for how many steps a body surely stays where it is: a power of two of them."""
+        steps = self._steps(FREE_FOR)
+        rests = self._bodies.timelines.rests
+        while steps < self._steps(LONGEST_PAUSE) and rests(row, step, step + 2 * steps):
+            steps *= 2
+        return steps
+
     def _keeps_its_place(self, now: Situation, at: int, other: int) -> bool:
         """Let a robot that wants to stop where this one stands yield; return whether it does."""
         row = now.actor.row
@@ -612,47 +694,6 @@ class Yielding(Watcher):
             return False
         self._swap(row, other, now.step)
         return True
-
-    def _places_aside(
-        self, actor: DecidingActor, step: int, within_m: float
-    ) -> Iterator[LatticePoint]:
-        """Return places that nobody else comes near to on the ways known, by their distance."""
-        lattice = actor.home.plan.lattice
-        x, y = self._inside(actor)
-        reach = int(within_m / lattice.cell)
-        row0, column0 = max(y // SUB - reach, 0), max(x // SUB - reach, 0)
-        window = (slice(row0, y // SUB + reach + 1), slice(column0, x // SUB + reach + 1))
-        mask = actor.space.part_of_cell[window] == actor.part
-        here = np.array([[y // SUB - row0, x // SUB - column0]], np.int64)
-        steps = walking_distance(mask, here)
-        cells = np.argwhere(steps[::ASIDE_CELLS, ::ASIDE_CELLS] > 0) * ASIDE_CELLS
-        steps = steps[cells[:, 0], cells[:, 1]]
-        xs, ys = lattice.centre_axes()
-        places = np.stack([xs[cells[:, 1] + column0], ys[cells[:, 0] + row0]], axis=-1)
-        free = self._clear_of_ways(actor, step, places)
-        order = np.argsort(steps[free], kind="stable")[:ASIDE_TRIES]
-        yield from map(tuple, places[free][order].tolist())
-
-    def _clear_of_ways(self, actor: DecidingActor, step: int, places: I64) -> Bool:
-        """Return near which of some places, int64 (n, 2), nobody else comes on the ways known."""
-        lattice = actor.home.plan.lattice
-        reach = self._near[self._number[actor.row]] + int(lattice.units_per_m * lattice.cell)
-        poses = self._bodies.poses(np.arange(step, step + self._steps(FREE_FOR) + 1))
-        free = np.ones(len(places), np.bool_)
-        if not len(places):
-            return free
-        low, high = places.min(axis=0), places.max(axis=0)
-        for other in range(len(self._actors)):
-            ways = poses[:, other]
-            ways = ways[ways[:, 3] == 0][:, :2]
-            near = ((ways > low - reach[other]) & (ways < high + reach[other])).all(axis=1)
-            if other == actor.row or not near.any():
-                continue
-            ways = ways[near]
-            dx = places[:, 0, None] - ways[:, 0]
-            dy = places[:, 1, None] - ways[:, 1]
-            free &= (dx * dx + dy * dy > reach[other] ** 2).all(axis=1)
-        return free
 
     def _inside(self, actor: DecidingActor) -> LatticePoint:
         """Return where a robot is, or the nearest place in its space."""
@@ -684,6 +725,10 @@ class Yielding(Watcher):
 
 def _is_stuck(actor: DecidingActor) -> bool:
     return actor.is_stuck or (actor.charge is not None and actor.charge.is_empty)
+
+
+def _charger(actor: DecidingActor) -> LatticePoint | None:
+    return None if actor.charge is None else actor.charge.charger
 
 
 def _goes_somewhere(actor: DecidingActor) -> bool:

@@ -39,7 +39,6 @@ from fleet2d.kernels import (
     I64,
     TURN,
     Breakpoints,
-    Distances,
     PoseBlock,
     Poses,
     Timelines,
@@ -212,6 +211,7 @@ class Bodies:
         step: The present step: decisions are made at it, poses beyond it may still change.
         ask_at: int64 (bodies,), the step at which each body decides next; NEVER for never.
         users: Number of users among the bodies.
+        timelines: The motion of all bodies.
     """
 
     def __init__(self, users: int, robots: int, step_us: int) -> None:
@@ -219,7 +219,7 @@ class Bodies:
         self.users = users
         self.ask_at = np.zeros(users + robots, np.int64)
         self._step_us = step_us
-        self._timelines = Timelines(users + robots, step_us)
+        self.timelines = Timelines(users + robots, step_us)
         self._window: Window | None = None
         self._block: tuple[int, int, PoseBlock] | None = None
 
@@ -233,11 +233,11 @@ class Bodies:
 
     def pose_at(self, row: int, step: int) -> Pose:
         """Return the pose of a body at a step that isn't forgotten."""
-        return new_pose(self._timelines.pose(row, step))
+        return new_pose(self.timelines.pose(row, step))
 
     def poses(self, steps: I64) -> I64:
         """Return x, y, heading and away of all bodies at some steps: int64 (steps, bodies, 4)."""
-        return self._timelines.poses(steps)
+        return self.timelines.poses(steps)
 
     def follow(self, row: int, motion: Motion, begin: Pose, postures: tuple[I64, I8]) -> None:
         """Let a body move from the present step on.
@@ -249,9 +249,9 @@ class Bodies:
             postures: When its posture changes [us], int64 (n,), and the postures, int8 (n + 1,).
         """
         if isinstance(motion, RandomWalk):
-            self._timelines.walk(row, self.step, motion.walls, motion.space, motion.rule, begin[:3])
+            self.timelines.walk(row, self.step, motion.walls, motion.space, motion.rule, begin[:3])
         else:
-            self._timelines.follow(row, self.step, motion.breakpoints, *postures)
+            self.timelines.follow(row, self.step, motion.breakpoints, *postures)
         self._window = self._block = None
 
     def hold(self, row: int, pose: Pose) -> None:
@@ -259,31 +259,19 @@ class Bodies:
         moment = np.array([self.step * self._step_us], np.int64)
         x, y, heading = (np.array([value], np.int64) for value in pose[:3])
         track = Breakpoints(moment, x, y, heading, np.array([pose.away], np.uint8))
-        self._timelines.follow(row, self.step, track, *STANDING)
+        self.timelines.follow(row, self.step, track, *STANDING)
         self._window = self._block = None
 
     def window(self, first: int, end: int) -> Window:
         """Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1."""
         window = self._window
         if window is None or (window.first, window.end) != (first, end):
-            window = self._window = self._timelines.window(first, end)
+            window = self._window = self.timelines.window(first, end)
         return window
-
-    def meetings(
-        self, rows: I64, distances: Distances, first: int, end: int
-    ) -> list[tuple[int, int, int, int]]:
-        """Return to whom bodies have to react in some steps: see `Timelines.meetings`."""
-        return self._timelines.meetings(rows, distances, first, end)
-
-    def meeting_on(
-        self, row: int, track: Breakpoints, distances: Distances, first: int, end: int
-    ) -> tuple[int, int]:
-        """Return whom a body would meet on a track: see `Timelines.meeting_on`."""
-        return self._timelines.meeting_on(row, track, distances, first, end)
 
     def runs(self, row: int, first: int, end: int) -> Window:
         """Return the runs of equal pose of one body in the steps from `first` to `end` - 1."""
-        return self._timelines.runs(row, first, end)
+        return self.timelines.runs(row, first, end)
 
     def block(self, first: int, end: int) -> PoseBlock:
         """Return the poses of all bodies at each of the steps from `first` to `end` - 1."""
@@ -308,7 +296,7 @@ class Bodies:
 
     def forget(self, before: int) -> None:
         """Drop the poses at steps earlier than `before`."""
-        self._timelines.forget(before)
+        self.timelines.forget(before)
 
 
 class PlaceAt(NamedTuple):

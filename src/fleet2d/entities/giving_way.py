@@ -8,11 +8,13 @@ is by then.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from fleet2d import kernels
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.units import Length, PositiveDuration, micros
 from fleet2d.entities.behavior import Actor, Situation
@@ -21,9 +23,24 @@ from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
 from fleet2d.floorplan.lattice import LatticePoint
-from fleet2d.kernels import I64, SUB, TURN, Breakpoints, turn_between
+from fleet2d.kernels import (
+    I32,
+    I64,
+    SUB,
+    TURN,
+    Bool,
+    Breakpoints,
+    Continued,
+    Legs,
+    Yielder,
+    turn_between,
+)
 from fleet2d.runtime.events import EventKind
 
+# So many cells nearest to a place are tried first; of those that are farther by so many cells at
+# most, it takes the one nearest to the body.
+NEAREST_CELLS = 400
+NEARLY_CELLS = 3
 Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
 
 
@@ -96,16 +113,8 @@ def _rest(
 
 def next_stop(body: Body, track: Breakpoints, interrupted_us: int) -> int | None:
     """Return the index of the breakpoint at which the body next stands still, or None."""
-    x = track.x
-    y = track.y
-    time = track.time
-    at = max(int(np.searchsorted(time, interrupted_us, side="right")) - 1, 0)
-    for i in range(at, len(time) - 1):
-        still = x[i] == x[i + 1] and y[i] == y[i + 1] and time[i + 1] > interrupted_us
-        # A turn at a corner, on the border of the space, is not a stop.
-        if still and body.space.part_at(int(x[i]), int(y[i])) == body.part:
-            return i
-    return None
+    stop = kernels.next_stop(body.space.mesh, track, interrupted_us)
+    return None if stop < 0 else stop
 
 
 def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
@@ -272,29 +281,49 @@ class WaitForPeople:
 class RoutesAround:
     """Routes that keep clear of people, or of other bodies, that stand in the way.
 
-    Attributes:
-        cost: int32 (rows, columns), CLOSED near them.
-
     Args:
         body: The body that goes there.
         people: x and y of each of them, and the distance to keep [lattice], int64 (n, 3).
     """
 
     def __init__(self, body: Body, people: I64) -> None:
-        self._space = body.space
-        xs, ys = body.home.plan.lattice.centre_axes()
-        self.cost = np.zeros(body.space.part_of_cell.shape, np.int32)
-        for x, y, reach in people.tolist():
+        self._body = body
+        self._people = people
+
+    def clear(self, points: I64) -> Bool:
+        """Return which of some points, int64 (n, 2), are far enough from all of them."""
+        away = points[:, None] - self._people[:, :2]
+        return ((away * away).sum(axis=2) > self._people[:, 2] ** 2).all(axis=1)
+
+    @cached_property
+    def cost(self) -> I32:
+        """int32 (rows, columns), CLOSED near them."""
+        xs, ys = self._body.home.plan.lattice.centre_axes()
+        cost = np.zeros(self._body.space.part_of_cell.shape, np.int32)
+        for x, y, reach in self._people.tolist():
             rows, columns = (
                 slice(*np.searchsorted(axis, [middle - reach, middle + reach + 1]).tolist())
                 for axis, middle in ((ys, y), (xs, x))
             )
             away = (xs[columns] - x) ** 2 + (ys[rows, None] - y) ** 2
-            self.cost[rows, columns][away <= reach * reach] = CLOSED
+            cost[rows, columns][away <= reach * reach] = CLOSED
+        return cost
 
     def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
-        return route_by_cost(self._space, self.cost, start, goal)
+        space = self._body.space
+        shortest = None if self._body.entity.minds_costs else space.route(start, goal)
+        if shortest is not None and self._is_clear(shortest):
+            return shortest
+        return route_by_cost(space, self.cost, start, goal)
+
+    def _is_clear(self, route: I64) -> bool:
+        """Return whether all legs of a route are far enough from all of them."""
+        begin, legs = route[:-1, None], np.diff(route, axis=0)[:, None].astype(np.float64)
+        to = self._people[:, :2] - begin
+        along = (to * legs).sum(axis=2) / np.maximum((legs * legs).sum(axis=2), 1)
+        away = to - np.clip(along, 0, 1)[..., None] * legs
+        return bool(((away * away).sum(axis=2) > self._people[:, 2] ** 2).all())
 
 
 def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Note] = ()) -> Plan:
@@ -318,39 +347,33 @@ def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Not
     return plan
 
 
-def plan_aside(
-    now: Situation, interrupted: Plan, place: LatticePoint, step: int, met_at: int
-) -> Plan | None:
-    """Return a plan that steps aside to a place until a step, and then continues the present one.
+def yielder(actor: Actor) -> Yielder:
+    """Return how a robot goes somewhere to give way, for the core."""
+    space = actor.space
+    routes = None if actor.drive is not None or actor.slows else space.shortest
+    walk = partial(_way, actor)
+    return Yielder(actor.row, space.mesh, routes, actor.speed, actor.turn_rate, walk)
 
-    After a random walk, the behavior is asked again.
 
-    Args:
-        now: The situation.
-        interrupted: The present plan.
-        place: Where it steps.
-        step: The step until which it stays there.
-        met_at: The step in which somebody is in the way: it goes on with the stop after that.
-
-    Returns:
-        The plan; None if no way leads there, or on from there.
-    """
-    motion = interrupted.finish()
-    begin_us = now.step * interrupted.step_us
+def _way(actor: Actor, time_us: int, x: int, y: int, heading: int, *goal: int) -> I64 | None:
+    """Return the breakpoints of a way by its drive, or from the border of its space, or None."""
+    plan = Plan(actor, time_us // actor.clock.step_us)
+    plan.time_us, plan.x, plan.y, plan.heading, plan.away = time_us, x, y, heading, 0
+    plan.legs = Legs()
     try:
-        plan = now.plan().go_to_point(*place).stay_until(step * interrupted.step_us)
-        if not isinstance(motion, Track):
-            return plan
-        rows = _rows(motion.breakpoints)
-        stop = next_stop(now.actor, motion.breakpoints, (met_at + 1) * interrupted.step_us)
-        stop = len(rows) - 1 if stop is None else stop
-        plan.go_to_point(int(rows[stop, 1]), int(rows[stop, 2]))
+        return plan.go_to_point(*goal).legs.rows()
     except NoWayError:
         return None
-    since_us = max(int(rows[stop, 0]), begin_us)
-    if stop < len(rows) - 1:
-        plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
-    return _continue(plan, interrupted, begin_us, since_us, rows[stop + 1 :])
+
+
+def plan_along(now: Situation, interrupted: Plan, continued: Continued) -> Plan:
+    """Return a plan that goes on as the core found: it continues the present one, later."""
+    rows, since_us, later_us, edge_us = continued
+    plan = now.plan().follow(rows[1:])
+    if isinstance(interrupted.finish(), Track):
+        begin_us = now.step * plan.step_us
+        _take_over(plan, interrupted, begin_us, since_us, later_us, edge_us)
+    return plan
 
 
 def plan_around(
@@ -387,7 +410,7 @@ def plan_around(
     rows = _rows(motion.breakpoints)
     detour = RoutesAround(actor, bodies)
     goal = (int(rows[stop, 1]), int(rows[stop, 2]))
-    is_taken = detour.cost[goal[1] // SUB, goal[0] // SUB] < 0
+    is_taken = not detour.clear(np.array([goal])).all()
     if is_taken:
         free = None if goal == waits_for or interrupted.postures else beside(actor, goal, detour)
         if free is None:
@@ -404,6 +427,36 @@ def plan_around(
     if not is_taken:
         return _continue(plan, interrupted, begin_us, since_us, rest)
     return _continue_beside(plan, interrupted, begin_us, since_us, stop, rows)
+
+
+def plan_here(now: Situation, interrupted: Plan, met_at: int) -> Plan | None:
+    """Return the rest of the present plan, with its next stop where the body is.
+
+    Args:
+        now: The situation.
+        interrupted: The present plan.
+        met_at: The step in which somebody stands in the way to that stop.
+
+    Returns:
+        The plan; None if that stop is in another room.
+    """
+    motion = interrupted.finish()
+    plan = now.plan()
+    if not isinstance(motion, Track):
+        return None
+    track = motion.breakpoints
+    stop = next_stop(now.actor, track, (met_at + 1) * plan.step_us)
+    rows = _rows(track)
+    number = len(rows) - 1 if stop is None else stop
+    home = now.actor.home.plan
+    if home.room_of_point(*plan.position) != home.room_of_point(*rows[number, 1:3].tolist()):
+        return None
+    begin_us = now.step * plan.step_us
+    since_us = max(int(rows[number, 0]), begin_us)
+    if stop is not None:
+        plan.turn_to(heading_at(track, stop, since_us))
+    plan.stay_until(since_us)
+    return _continue_beside(plan, interrupted, begin_us, since_us, number, rows)
 
 
 def _continue_beside(
@@ -471,19 +524,30 @@ def _continue(
     rows = np.concatenate([row, rest])
     rests = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1) & (np.diff(rows[:, 0]) >= later)
     edge = int(rows[np.argmax(rests) if hurries and rests.any() else -1, 0])
+    times = rest[:, 0]
+    rest[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
+    plan.follow(rest)
+    return _take_over(plan, interrupted, begin_us, since_us, later, edge)
+
+
+def _take_over(
+    plan: Plan, interrupted: Plan, begin_us: int, since_us: int, later: int, edge: int
+) -> Plan:
+    """Let a plan have what another one would have done after a moment, delayed, and return it.
+
+    Up to `edge` all is delayed by `later`; what comes then is at `edge + later` at the earliest.
+    """
 
     def delayed(time_us: int) -> int:
         return time_us + later if time_us <= edge else max(time_us, edge + later)
 
-    times = rest[:, 0]
-    rest[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     notes = (note for note in interrupted.notes if note.time_us > begin_us)
     plan.notes += [Note(delayed(max(at, since_us)), event, detail) for at, event, detail in notes]
     postures = ((at, code) for at, code in interrupted.postures if at > begin_us)
     plan.postures += [(delayed(max(at, since_us)), code) for at, code in postures]
     if interrupted.postures:
         plan.posture = interrupted.posture
-    plan.follow(rest).endless = interrupted.endless
+    plan.endless = interrupted.endless
     plan.asks_us = interrupted.asks_us
     plan.root = interrupted.root
     return plan
@@ -497,16 +561,22 @@ def _rows(track: Breakpoints) -> I64:
 def beside(
     actor: Actor, goal: LatticePoint, detour: RoutesAround, *, in_room: bool = True
 ) -> LatticePoint | None:
-    """Return the free place nearest to an occupied one, in its room; None if there is none."""
+    """Return a free place nearest to an occupied one, in its room; None if there is none.
+
+    Of several that are about as near, it is the one nearest to the body.
+    """
     plan = actor.home.plan
-    space = actor.space
-    free = (space.part_of_cell == actor.part) & (detour.cost != CLOSED)
-    if in_room:
-        free &= plan.room_of_cell == plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]
-    cells = np.argwhere(free)
-    if not len(cells):
-        return None
     xs, ys = plan.lattice.centre_axes()
-    away = (xs[cells[:, 1]] - goal[0]) ** 2 + (ys[cells[:, 0]] - goal[1]) ** 2
-    row, column = cells[int(np.argmin(away))].tolist()
-    return plan.lattice.cell_centre(row, column)
+    room = int(plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]) if in_room else None
+    for most in (NEAREST_CELLS, actor.space.part_of_cell.size):
+        cells = actor.space.by_distance(*goal, most, actor.part, room)
+        places = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], axis=-1)
+        places = places[detour.clear(places)]
+        if len(places):
+            away = np.hypot(*(places - goal).T)
+            near = places[away <= away[0] + NEARLY_CELLS * SUB]
+            x, y = near[np.argmin(((near - actor.state.position) ** 2).sum(axis=1))].tolist()
+            return x, y
+        if len(cells) < most:
+            return None
+    return None

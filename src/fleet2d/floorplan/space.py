@@ -172,7 +172,7 @@ class Space:
         self, x: int, y: int, part: int | None = None, room: int | None = None
     ) -> LatticePoint | None:
         """Return the centre of the free cell nearest to a point; ties: lowest row, column."""
-        cells = self._by_distance(x, y, 1, part, room)
+        cells = self.by_distance(x, y, 1, part, room)
         return self.plan.lattice.cell_centre(*cells[0].tolist()) if len(cells) else None
 
     def _find_route(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
@@ -224,13 +224,13 @@ class Space:
     def _way_in(self, x: int, y: int) -> LatticePoint | None:
         walls = self.walls
         triangle = locate(walls, x, y)
-        for row, column in self._by_distance(x, y, ESCAPE_ATTEMPTS).tolist():
+        for row, column in self.by_distance(x, y, ESCAPE_ATTEMPTS).tolist():
             target = self.plan.lattice.cell_centre(row, column)
             if triangle >= 0 and line_of_sight(walls, x, y, triangle, *target):
                 return target
         return None
 
-    def _by_distance(
+    def by_distance(
         self, x: int, y: int, most: int, part: int | None = None, room: int | None = None
     ) -> I64:
         """Return the free cells (row, column) nearest to a point, at most so many, in order."""

@@ -1,0 +1,209 @@
+#include "giving_way.hpp"
+
+#include <algorithm>
+
+#include "fields.hpp"
+#include "grid.hpp"
+
+namespace fleet2d {
+namespace {
+
+std::size_t nth(i64 i) { return static_cast<std::size_t>(i); }
+
+i64 length_of(const TrackPiece& track) { return static_cast<i64>(track.time.size()); }
+
+Moment row_of(const TrackPiece& track, i64 i) {
+    return {track.time[nth(i)], track.x[nth(i)], track.y[nth(i)], track.heading[nth(i)], track.away[nth(i)]};
+}
+
+bool is_same_pose(const Moment& a, const Moment& b) {
+    return a.x == b.x && a.y == b.y && a.heading == b.heading && a.away == b.away;
+}
+
+TrackPiece track_of(const Legs& legs) {
+    TrackPiece track;
+    const auto copy = [&](std::size_t number, auto& column) {
+        const auto values = legs.column<typename std::decay_t<decltype(column)>::value_type>(number);
+        column.assign(values.data(), values.data() + values.size());
+    };
+    copy(0, track.time), copy(1, track.x), copy(2, track.y), copy(3, track.heading), copy(4, track.away);
+    track.postures = {0};
+    return track;
+}
+
+void stay_until(Legs& legs, Moment& now, i64 time) {
+    if (time <= now.time) return;
+    now.time = time;
+    legs.mark(now);
+}
+
+// Add the breakpoints of a track from number `first` on, of which the body is at `now` what it would have been at
+// `since`.
+Delay go_on(Legs& legs, const Moment& now, const TrackPiece& track, i64 since, i64 first) {
+    Delay delay{since, now.time - since, since};
+    Moment last = now;
+    last.time = since;
+    for (i64 i = first; i < length_of(track); ++i) {
+        const Moment row = row_of(track, i);
+        delay.edge = last.time;
+        if (is_same_pose(last, row) && row.time - last.time >= delay.later) break;
+        delay.edge = row.time;
+        last = row;
+    }
+    for (i64 i = first; i < length_of(track); ++i) {
+        Moment row = row_of(track, i);
+        row.time = delay.of(row.time);
+        legs.mark(row);
+    }
+    return delay;
+}
+
+i64 heading_at(const TrackPiece& track, i64 stop, i64 moment) {
+    const i64 begin = track.time[nth(stop)], end = track.time[nth(stop + 1)];
+    const i64 turn = turn_between(track.heading[nth(stop)], track.heading[nth(stop + 1)]);
+    return (track.heading[nth(stop)] + floor_div(turn * (moment - begin), std::max<i64>(end - begin, 1))) & (TURN - 1);
+}
+
+// The track that a body follows; none while it walks at random.
+const TrackPiece* followed(const Timelines& timelines, i64 row) { return timelines.pieces(row).back().track.get(); }
+
+Moment moment_of(Timelines& timelines, i64 row, i64 step) {
+    const BodyPose pose = timelines.pose(row, step);
+    return {step * timelines.step_us(), pose.x, pose.y, pose.heading, pose.away};
+}
+
+// From a place to which a body stepped aside, go on with the first stop after a moment.
+std::optional<Delay> come_back(Legs& legs, Moment now, const TrackPiece* track, const Yielder& body, i64 begin,
+                               i64 met) {
+    if (!track) return Delay{begin, 0, begin};
+    const i64 next = next_stop(*track, met, body.can_stand), last = length_of(*track) - 1;
+    const i64 stop = next < 0 ? last : next;
+    const Moment goal = row_of(*track, stop);
+    const auto there = body.go(legs, now, {goal.x, goal.y});
+    if (!there) return {};
+    now = *there;
+    const i64 since = std::max(goal.time, begin);
+    if (stop < last) {
+        now = legs.turn(now, turn_between(now.heading, heading_at(*track, stop, since)), body.turn_rate);
+        stay_until(legs, now, since);
+    }
+    return go_on(legs, now, *track, since, stop + 1);
+}
+
+}  // namespace
+
+i64 next_stop(const TrackPiece& track, i64 moment, const std::function<bool(Point)>& can_stand) {
+    const auto after = std::upper_bound(track.time.begin(), track.time.end(), moment);
+    for (i64 i = std::max<i64>(after - track.time.begin() - 1, 0); i < length_of(track) - 1; ++i) {
+        const Moment row = row_of(track, i), next = row_of(track, i + 1);
+        if (row.x == next.x && row.y == next.y && next.time > moment && can_stand({row.x, row.y})) return i;
+    }
+    return -1;
+}
+
+std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, View<const i64> waits,
+                                       const Distances& distances, i64 end) {
+    const KnownWays ways(timelines, step, end);
+    const Moment now = moment_of(timelines, row, step);
+    const TrackPiece* track = followed(timelines, row);
+    for (const i64 wait : waits) {
+        Detour detour{{}, {now.time, 0, now.time}};
+        Moment then = now;
+        detour.legs.mark(now);
+        stay_until(detour.legs, then, now.time + wait * timelines.step_us());
+        if (track) {
+            const auto after = std::upper_bound(track->time.begin(), track->time.end(), now.time);
+            detour.delay = go_on(detour.legs, then, *track, now.time, after - track->time.begin());
+        }
+        if (!ways.meeting(row, track_of(detour.legs), distances)) return detour;
+    }
+    return {};
+}
+
+std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, i64 step, i64 met,
+                                     View<const i64, 2> places, View<const i64> waits, i64 rests,
+                                     const Distances& distances, i64 end) {
+    const KnownWays ways(timelines, step, end);
+    const i64 step_us = timelines.step_us();
+    const Moment now = moment_of(timelines, body.row, step);
+    const TrackPiece* track = followed(timelines, body.row);
+    const auto is_free = [&](const Legs& legs) { return !ways.meeting(body.row, track_of(legs), distances); };
+    for (i64 i = 0; i < places.size(); ++i) {
+        Legs there;
+        there.mark(now);
+        const auto arrived = body.go(there, now, {places(i, 0), places(i, 1)});
+        if (!arrived || (rests > 0 && !is_free(there))) continue;
+        const i64 arrives = -floor_div(-arrived->time, step_us);
+        const auto goes_on_after = [&](i64 wait) -> std::optional<Detour> {
+            Detour detour{there, {}};
+            Moment then = *arrived;
+            stay_until(detour.legs, then, (arrives + wait) * step_us);
+            const auto delay = come_back(detour.legs, then, track, body, now.time, (met + 1) * step_us);
+            if (!delay) return {};
+            detour.delay = *delay;
+            return detour;
+        };
+        for (const i64 wait : waits) {
+            auto detour = goes_on_after(wait);
+            if (detour && is_free(detour->legs)) return detour;
+        }
+        if (rests == 0) continue;
+        if (auto detour = goes_on_after(rests)) return detour;
+    }
+    return {};
+}
+
+std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,
+                                const Search& search, View<const i64> reach) {
+    const auto shape = cells.part_of_cell.shape;
+    const GridCell here{floor_div(from.y, SUB), floor_div(from.x, SUB)};
+    const GridCell low{std::max<i64>(here.row - search.within, 0), std::max<i64>(here.column - search.within, 0)};
+    const GridCell high{std::min(here.row + search.within + 1, shape[0]),
+                        std::min(here.column + search.within + 1, shape[1])};
+    auto open =
+        Array<bool, 2>::empty({std::max<i64>(high.row - low.row, 0), std::max<i64>(high.column - low.column, 0)});
+    for (i64 r = low.row; r < high.row; ++r) {
+        for (i64 c = low.column; c < high.column; ++c)
+            open(r - low.row, c - low.column) = cells.part_of_cell(r, c) == cells.part;
+    }
+    const i64 goal[] = {here.row - low.row, here.column - low.column};
+    const auto steps = walking_distance(open, {goal, {1, 2}});
+    std::vector<std::pair<i32, GridCell>> found;
+    const auto first_from = [&](i64 number) { return -floor_div(-number, search.spacing) * search.spacing; };
+    for (i64 r = first_from(low.row); r < high.row; r += search.spacing) {
+        for (i64 c = first_from(low.column); c < high.column; c += search.spacing) {
+            const i32 away = steps.view()(r - low.row, c - low.column);
+            if (away > 0) found.push_back({away, {r, c}});
+        }
+    }
+    std::ranges::stable_sort(found, {}, [](const auto& place) { return place.first; });
+    std::vector<std::pair<Point, i64>> others;  // where somebody will be, and how near they may come
+    for (i64 body = 0; body < timelines.bodies(); ++body) {
+        for (i64 at = step; body != row && at <= end; ++at) {
+            const BodyPose pose = timelines.pose(body, at);
+            const std::pair other{Point{pose.x, pose.y}, reach[body]};
+            if (pose.away == 0 && (others.empty() || others.back() != other)) others.push_back(other);
+        }
+    }
+    std::vector<Point> places;
+    for (const auto& [away, cell] : found) {
+        if (static_cast<i64>(places.size()) == search.most) break;
+        const Point place{cell.column * SUB + CELL_CENTRE, cell.row * SUB + CELL_CENTRE};
+        const bool is_clear = std::ranges::all_of(others, [&](const auto& other) {
+            const i64 dx = place.x - other.first.x, dy = place.y - other.first.y;
+            return dx * dx + dy * dy > other.second * other.second;
+        });
+        if (is_clear) places.push_back(place);
+    }
+    return places;
+}
+
+bool rests(Timelines& timelines, i64 body, i64 step, i64 end) {
+    const OwnedWindow window = timelines.window(body, body + 1, step, end);
+    const auto stays = [](const std::vector<i64>& values) {
+        return std::ranges::all_of(values, [&](i64 value) { return value == values.front(); });
+    };
+    return stays(window.x) && stays(window.y);
+}
+
+}  // namespace fleet2d

@@ -1,0 +1,77 @@
+// Giving way: other tracks for a body that would come too near to somebody.
+//
+// Each of them leads the body out of the way, by waiting or by a place beside, and then continues what it was doing,
+// later. Only a track that meets nobody on the ways that are known is taken.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "legs.hpp"
+#include "meetings.hpp"
+
+namespace fleet2d {
+
+// A body that gives way, and how it goes somewhere.
+struct Yielder {
+    i64 row;
+    f64 turn_rate;  // headings per second
+    // Walks to a point, at home: adds breakpoints and returns the end; nothing if no way leads there.
+    std::function<std::optional<Moment>(Legs&, const Moment&, Point)> go;
+    std::function<bool(Point)> can_stand;  // a turn at a corner, on the border of its space, is no stop
+};
+
+// What follows a moment of a track is later.
+struct Delay {
+    i64 since;  // us; that moment
+    i64 later;  // us; by so much, but
+    i64 edge;   // us; a rest that begins then is shortened, so that the body is on time again after it
+
+    i64 of(i64 time) const { return time <= edge ? time + later : std::max(time, edge + later); }
+};
+
+// Another track of a body from now on, and how much later it continues the one before.
+struct Detour {
+    Legs legs;
+    Delay delay;
+};
+
+// The breakpoint at which a body next stands still after a moment; -1 for none.
+i64 next_stop(const TrackPiece& track, i64 moment, const std::function<bool(Point)>& can_stand);
+
+// The first of some waits after which a body may go on as it planned.
+//
+// It stands from step `step` on for so many steps, and meets nobody in the steps up to `end` - 1. All distances are
+// those of row 0.
+std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, View<const i64> waits,
+                                       const Distances& distances, i64 end);
+
+// The way by the first of some places from which a body may go on.
+//
+// It goes there, stays for the first of `waits` that lets it go on, and goes on with the first stop after the step
+// `met` in which somebody would be in its way. Where it could stay until `end`, but is free after none of the waits, it
+// stays for `rests` steps; 0: it doesn't, and looks at the whole way only.
+std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, i64 step, i64 met,
+                                     View<const i64, 2> places, View<const i64> waits, i64 rests,
+                                     const Distances& distances, i64 end);
+
+// A part of the cells in which a body can be.
+struct Cells {
+    View<const i32, 2> part_of_cell;
+    i64 part;
+};
+
+// Where it looks for places: so many cells to each side, every so many cells, and how many.
+struct Search {
+    i64 within, spacing, most;
+};
+
+// The centres of cells that a body can step aside to, the nearest by walking distance first: nobody else comes as near
+// as `reach` (bodies,) to them in the steps from `step` to `end`.
+std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,
+                                const Search& search, View<const i64> reach);
+
+// Whether a body doesn't leave its place in the steps from `step` to `end` - 1.
+bool rests(Timelines& timelines, i64 body, i64 step, i64 end);
+
+}  // namespace fleet2d

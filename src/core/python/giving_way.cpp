@@ -1,0 +1,59 @@
+#include "giving_way.hpp"
+
+#include "legs.hpp"
+#include "motion.hpp"
+#include "subjects.hpp"
+#include "timelines.hpp"
+
+namespace fleet2d {
+namespace {
+
+// Add what a function of Python returns for a way that no shortest route leads.
+std::optional<Moment> add_way(const nb::callable& walk, Legs& legs, const Moment& now, Point to) {
+    const nb::object rows = walk(now.time, now.x, now.y, now.heading, to.x, to.y);
+    if (rows.is_none()) return {};
+    View<const i64, 2> breakpoints;
+    nb::object copy;
+    require(border::view_of(rows, breakpoints, copy) && breakpoints.shape[1] == 5, "walk must return rows (n, 5)");
+    Moment end = now;
+    for (i64 i = 0; i < breakpoints.size(); ++i) {
+        require(breakpoints(i, 0) >= end.time, "walk must return rows in order of time");
+        end = checked(breakpoints(i, 0), breakpoints(i, 1), breakpoints(i, 2), breakpoints(i, 3), breakpoints(i, 4));
+        legs.mark(end);
+    }
+    return end;
+}
+
+}  // namespace
+
+Yielder yielder_of(const YielderFields& fields) {
+    const auto& [row, space, routes, speed, turn_rate, walk] = fields;
+    Routes* shortest = nullptr;
+    require(routes.is_none() || nb::try_cast(routes, shortest), "routes must be Routes or None");
+    check_rates(speed, turn_rate);
+    const auto go = [shortest, &fields](Legs& legs, const Moment& now, Point to) -> std::optional<Moment> {
+        const auto& [row, space, routes, speed, turn_rate, walk] = fields;
+        if (shortest) {
+            const auto route = shortest->find({now.x, now.y}, to);
+            if (!route.empty()) return legs.walk(now, rows_of(route), speed, turn_rate);
+        }
+        return add_way(walk, legs, now, to);
+    };
+    const auto can_stand = [&fields](Point at) { return strictly_inside(std::get<1>(fields), at.x, at.y); };
+    return {row, turn_rate, go, can_stand};
+}
+
+void bind_giving_way(nb::module_& m) {
+    m.def(
+        "next_stop",
+        [](const Mesh& space, const Breakpoints& track, i64 moment) {
+            const auto can_stand = [&](Point at) { return strictly_inside(space, at.x, at.y); };
+            return next_stop(piece_of(track), moment, can_stand);
+        },
+        "space"_a, "track"_a, "moment"_a,
+        R"(Return the breakpoint at which a body next stands still after a moment [us]; -1 for none.
+
+A turn at a corner, on the border of its space, is no stop.)");
+}
+
+}  // namespace fleet2d

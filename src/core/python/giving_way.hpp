@@ -1,0 +1,16 @@
+// Bodies that give way, as they come from Python.
+#pragma once
+
+#include "../giving_way.hpp"
+#include "routes.hpp"
+
+namespace fleet2d {
+
+// Row, space, routes or None, speed, turn rate, and a function that leads where the routes don't: see `Yielder` of
+// `fleet2d.kernels`.
+using YielderFields = std::tuple<i64, Mesh, nb::object, f64, f64, nb::callable>;
+
+// The body of a call: its fields outlive it.
+Yielder yielder_of(const YielderFields& fields);
+
+}  // namespace fleet2d

@@ -1,0 +1,168 @@
+"""The ways by which a body gets round others, against trying one after the other."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shapely import box
+from tests.meshed_homes import home_of
+from tests.reference import giving_way as slow
+
+from fleet2d.kernels import I64, Breakpoints, Distances, Timelines, Yielder, next_stop
+
+SECOND = 10**6
+NEAR = 300
+END = 30
+MESH = home_of([box(0, 0, 4096, 4096)]).mesh
+WAITS = np.array([1, 4])
+
+
+def breakpoints(rows: I64) -> Breakpoints:
+    time, x, y, heading, away = np.ascontiguousarray(rows.T)
+    return Breakpoints(time, x, y, heading, away.astype(np.uint8))
+
+
+def random_rows(random: np.random.Generator) -> I64:
+    """A body that drives and stands, in a square of 4000 units."""
+    times = np.sort(random.choice(END, 7, replace=False)) * SECOND
+    points = random.integers(100, 4000, (7, 2))
+    points[[2, 3, 5]] = points[[1, 1, 4]]
+    zeros = np.zeros(7, np.int64)
+    return np.column_stack([times, points, zeros, zeros])
+
+
+def kept(bodies: int) -> Distances:
+    whole = np.ones((1, bodies), np.int64)
+    return Distances(whole * 0, whole * NEAR, whole * 0, np.zeros((1, bodies), np.uint8))
+
+
+def straight(time: int, x: int, y: int, heading: int, to_x: int, to_y: int) -> I64 | None:
+    """Drive there at 1000 units a second, facing one way; the right border can't be reached."""
+    if to_x > 3000:
+        return None
+    takes = int(np.hypot(to_x - x, to_y - y) * SECOND / 1000)
+    return np.array([[time + takes, to_x, to_y, heading, 0]])
+
+
+def scenes(count: int) -> Any:
+    """Timelines of three bodies with random tracks, and the rows of the first one."""
+    random = np.random.default_rng(51)
+    for _ in range(count):
+        tracks = [random_rows(random) for _ in range(3)]
+        timelines = Timelines(3, SECOND)
+        for row, rows in enumerate(tracks):
+            timelines.follow(row, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
+        step = int(random.integers(0, 20))
+        yield random, timelines, tracks, step
+
+
+def free_in(timelines: Timelines, step: int) -> Any:
+    return lambda rows: timelines.meeting_on(0, breakpoints(rows), kept(3), step, END) == (-1, -1)
+
+
+def test_a_body_goes_on_after_the_first_wait_that_lets_it() -> None:
+    found = 0
+    for _, timelines, (rows, *_), step in scenes(120):
+        now = step * SECOND
+        pose = list(timelines.pose(0, step))
+        rest = [row for row in rows.tolist() if row[0] > now]
+        tracks = []
+        for wait in WAITS.tolist():
+            later = wait * SECOND
+            tracks.append([[now, *pose], [now + later, *pose], *slow.delayed(rest, now, pose, later)[0]])  # fmt: skip
+        expected = slow.first_free(tracks, free_in(timelines, step))
+        way = timelines.way_after_a_wait(0, step, WAITS, kept(3), END)
+        assert (expected is None) == (way is None)
+        if way is not None and expected is not None:
+            found += 1
+            assert way[0].tolist() == expected
+            later = (expected[1][0] - expected[0][0]) if len(expected) > 1 else 0
+            assert way[1:] == (now, later, slow.delayed(rest, now, pose, later)[1])
+    assert 10 < found < 110
+
+
+@pytest.mark.parametrize("rests", [0, 6])
+def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
+    found = 0
+    for random, timelines, (rows, *_), step in scenes(120):
+        now, met = step * SECOND, step + 2
+        pose = list(timelines.pose(0, step))
+        places = random.integers(100, 4000, (3, 2))
+        is_free = free_in(timelines, step)
+        stop = slow.next_stop(rows.tolist(), (met + 1) * SECOND)
+        goal = rows[stop].tolist()
+        expected = None
+        for place in places.tolist():
+            there = straight(now, *pose[:3], *place)
+            if expected is not None or there is None:
+                continue
+            out = [[now, *pose], *there.tolist()]
+            if rests and not is_free(np.array(out)):
+                continue
+            tracks = []
+            for wait in [*WAITS.tolist(), *([rests] if rests else [])]:
+                until = (-(-out[-1][0] // SECOND) + wait) * SECOND
+                track = [*out, [until, *out[-1][1:]]] if until > out[-1][0] else list(out)
+                back = straight(*track[-1][:4], *goal[1:3])
+                if back is None:
+                    continue
+                track += back.tolist()
+                since = max(goal[0], now)
+                if stop >= 0 and track[-1][0] < since:
+                    track.append([since, *track[-1][1:]])
+                rest = rows[stop + 1 :].tolist() if stop >= 0 else []
+                later = track[-1][0] - since
+                track += slow.delayed(rest, since, track[-1][1:], later)[0]
+                tracks.append(track)
+            expected = slow.first_free(tracks, is_free)
+            if expected is None and rests and tracks:
+                expected = tracks[-1]
+        body = Yielder(0, MESH, None, 1000.0, 1000.0, straight)
+        way = timelines.way_by_a_place(body, step, met, places, WAITS, rests, kept(3), END)
+        assert (expected is None) == (way is None)
+        if way is not None:
+            found += 1
+            assert way[0].tolist() == expected
+    assert 10 < found < 115
+
+
+def test_a_body_at_rest_meets_whom_it_would_meet_on_a_track_that_rests() -> None:
+    met = 0
+    for _, timelines, _, step in scenes(60):
+        rest = np.array([[step * SECOND, *timelines.pose(0, step)]])
+        expected = timelines.meeting_on(0, breakpoints(rest), kept(3), step, END)
+        assert timelines.meeting_at_rest(0, kept(3), step, END) == expected
+        met += expected[0] >= 0
+    assert 3 < met < 57
+
+
+def test_a_body_rests_while_its_place_stays_the_same() -> None:
+    rested = 0
+    for _, timelines, _, step in scenes(60):
+        places = {timelines.pose(1, at)[:2] for at in range(step, step + 3)}
+        assert timelines.rests(1, step, step + 3) == (len(places) == 1)
+        rested += len(places) == 1
+    assert 5 < rested < 55
+
+
+def test_the_next_stop_is_where_it_stands_next_and_can_stand() -> None:
+    for _, _, (rows, *_), step in scenes(60):
+        moment = step * SECOND
+        assert next_stop(MESH, breakpoints(rows), moment) == slow.next_stop(rows.tolist(), moment)
+    corner = np.array([[0, 0, 0, 0, 0], [5, 0, 0, 9, 0], [9, 70, 70, 9, 0]])
+    assert next_stop(MESH, breakpoints(corner), 0) == -1, "on the border it only turns"
+
+
+def test_places_aside_are_the_nearest_that_nobody_comes_near_to() -> None:
+    found = 0
+    for random, timelines, _, step in scenes(40):
+        parts = random.integers(0, 8, (64, 64)).clip(0, 1).astype(np.int32)
+        start = tuple(random.integers(700, 3000, 2).tolist())
+        search = int(random.integers(3, 20)), 2, 5
+        reach = np.array([0, 900, 1500])
+        poses = timelines.poses(np.arange(step, step + 6))
+        ways = [(poses[:, body, :2], int(reach[body])) for body in (1, 2)]
+        places = timelines.places_aside(0, step, step + 5, parts, 1, start, search, reach)
+        assert [tuple(place) for place in places.tolist()] == slow.places_aside(parts, 1, start, search, ways)  # fmt: skip
+        found += len(places) > 0
+    assert 10 < found
