@@ -3,6 +3,8 @@
     python benchmarks/studies.py                    # all but the next two
     python benchmarks/studies.py months --workers 2 # the paper's 10 x 10 x 10 runs of 30 days
     python benchmarks/studies.py driver --variants 10000000
+    python benchmarks/studies.py fleet              # the driver of 100,000 robots, each in a home
+    python benchmarks/studies.py lives --robots 1000
 
 Run it on a machine that does nothing else.
 """
@@ -20,13 +22,16 @@ from typing import Any
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.runtime.memory import free_memory_of_polars
+from fleet2d.studies.api import open_crew
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor, WorkerTask
+from fleet2d.studies.population import HomeFacts
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import VariantResult, result_of
 from fleet2d.studies.simulator import VariantOutcome
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "studies"
+HOUSEHOLDS = [["works_outside"], ["retired"], ["works_outside", "works_from_home", "child"]]
 HOUR = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
 
 
@@ -42,6 +47,9 @@ class InstantExecutor(SerialExecutor):
     def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Return a result for each task, or that its set-up has no problem."""
         content, tasks, *_ = args
+        if b"FactsJob" in content:
+            facts = HomeFacts(7, 3, 120.0, frozenset({"bedroom"}))
+            return super().submit(lambda: [facts] * len(tasks))
         if b"StudyJob" not in content:
             return super().submit(lambda: [""] * len(tasks))
         own = ({"variant": task.number, "identity": task.identity} for task in tasks)
@@ -95,6 +103,45 @@ def driver(folder: Path, variants: int = 100_000) -> None:
         )
     sizes = [path.stat().st_size for path in (folder / "many").rglob("*") if path.is_file()]
     print(f"  {len(sizes)} files of {sum(sizes) / 1e6:.0f} MB")
+
+
+def fleet(folder: Path, robots: int = 100_000) -> None:
+    """Print time and memory of a driver of a fleet, each robot in a home of its own."""
+    free_memory_of_polars()
+    homes = [{"synthetic": robots, "settings": {"furnish": True}}]
+    lives = {"population": robots, "homes": homes, "households": HOUSEHOLDS}
+    study = {"base": HOUR, "axes": {"robot": lives}}
+    start_core_s = time.process_time()
+    crew = Crew(InstantExecutor(), 1)
+    run_study(check_study(study, crew=crew), folder / "fleet", crew)
+    core_s = time.process_time() - start_core_s
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(
+        f"driver of {robots:,} robots in as many homes: {core_s:.0f} s of a core,"
+        f" {1000 * core_s / robots:.1f} ms each, {peak:.0f} MB at most",
+        flush=True,
+    )
+
+
+def lives(folder: Path, robots: int = 1000, days: int = 30) -> None:
+    """Print what a month of a robot in a furnished home of its own costs, all included."""
+    homes = [{"synthetic": 10 * robots, "settings": {"furnish": True}}]
+    axis = {"population": robots, "homes": homes, "households": HOUSEHOLDS}
+    base = {**HOUR, "simulation": {"duration": {"days": days}}}
+    study = {"base": base, "axes": {"robot": axis}}
+    begin = _core_s()
+    with open_crew("serial") as crew:
+        run_study(check_study(study, crew=crew), folder / "lives", crew)
+    core_s = (_core_s() - begin) / robots
+    print(
+        f"{robots:,} robots, {days} days, each in a furnished home: {core_s:.2f} s of a core each,"
+        f" {core_s * 100_000 / 3600:.1f} core-hours for 100,000"
+    )
+
+
+def _core_s() -> float:
+    """Return the processor time of this process and of children that have ended [s]."""
+    return sum(os.times()[:4])
 
 
 def reading(folder: Path) -> None:
@@ -154,8 +201,9 @@ def months(folder: Path, workers: int, *, small: bool = False) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parts = ("overhead", "speedup", "driver", "reading", "months")
-    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:-1])
+    parts = ("overhead", "speedup", "driver", "reading", "months", "fleet", "lives")
+    parser.add_argument("what", nargs="*", metavar="|".join(parts), default=parts[:4])
+    parser.add_argument("--robots", type=int, help="of a fleet")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--variants", type=int, default=100_000, help="of the driver")
     parser.add_argument("--small", action="store_true", help="few variants: does it work?")
@@ -174,6 +222,10 @@ def main() -> None:
                 speedup(folder_of, 1 if arguments.small else 5, 1 if arguments.small else 40)
             elif name == "driver":
                 driver(folder_of, 1_000 if arguments.small else arguments.variants)
+            elif name == "fleet":
+                fleet(folder_of, arguments.robots or 100_000)
+            elif name == "lives":
+                lives(folder_of, arguments.robots or 1000)
             else:
                 reading(folder_of)
 

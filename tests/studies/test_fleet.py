@@ -1,5 +1,6 @@
 """Fleets: percentiles with intervals that hold, the worst robots, and groups found and tested."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -92,15 +93,23 @@ def test_the_worst_robot_is_told_with_the_command_that_runs_it_again(small_fleet
     (row,) = small_fleet.worst("sightings.ana").to_dicts()
     assert row["value"] == pytest.approx(robots["sightings.ana"].min())
     assert row["command"].startswith(f"fleet2d study rerun {small_fleet.location} {row['variant']}")
-    assert "worst 1 % (1 robot) are variants" in str(small_fleet.answer)
 
 
 def test_the_answer_of_a_fleet_compares_settings_and_not_what_was_drawn(small_fleet: Study) -> None:
     text = str(small_fleet.answer)
     assert "robots.astro.speed = 0.6 against 0.3" in text
     assert "household =" not in text
-    assert "Of 6 robots half have" in text
-    assert "No group" in text
+    assert "Percentiles and groups take 116 robots or more." in text
+
+
+def test_a_fleet_of_many_robots_is_told_by_percentiles_groups_and_its_worst(
+    small_fleet: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fleet2d.studies.fleet.FEWEST", 6)
+    text = " ".join(small_fleet.answer.sentences)
+    assert "Of 6 robots half have a sightings.ana up to" in text
+    assert "No group of homes or people was found" in text
+    assert re.search(r"The worst 1 % \(1 robot\): variant \d+. `fleet2d study rerun", text)
 
 
 def test_the_report_has_percentiles_and_the_worst(small_fleet: Study, tmp_path: Path) -> None:

@@ -138,7 +138,10 @@ def test_conditions_count_what_they_leave_out() -> None:
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ({"rooms": "90..99"}, "0 of 20 lives that were drawn meet.*20 .rooms is not 90..99"),
+        (
+            {"rooms": "90..99"},
+            "robot: of 20 lives that were drawn 0 meet the conditions.*20 .rooms is not 90..99",
+        ),
         ({"has": "ballroom"}, "20 .no ballroom"),
         ({"rooms": "9..3"}, "range 9..3 is empty"),
         ({"rooms": "a..3"}, "expected a range like 3..15"),

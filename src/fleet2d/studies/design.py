@@ -388,7 +388,9 @@ def build_design(
     axes = {name: _axis_plan(specification, name) for name in file.axes}
     if isinstance(fleet, PopulationAxis):
         _check_first_life(replace(design, axes=tuple(axes.values())))
-        lives = find_lives(fleet, file.fleet, base, crew, on_progress)
+        place = specification.places.named(("axes", file.fleet))
+        with errors_as(ScenarioError, place, of=ScenarioError):
+            lives = find_lives(fleet, file.fleet, base, crew, on_progress)
         axes[file.fleet] = _with_lives(axes[file.fleet], lives, file.rollout)
     if file.rollout is not None:
         choices = tuple(Choice({ROLLOUT: label}) for label in (WITHOUT, WITH))

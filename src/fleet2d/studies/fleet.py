@@ -5,6 +5,7 @@ choose them: so their intervals hold, and a split is told only if the others sho
 """
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ DEPTH = 2
 CUTS = 15  # places at which a number may be cut
 SMALLEST_SHARE = 0.05  # of the robots, in a group
 MAX_NAMED = 3  # runs that a sentence names
+FEWEST = 4 * ENOUGH_UNITS  # robots: two groups in each half of the homes
 
 
 def features_of(study: StudyAnswers) -> list[str]:
@@ -124,10 +126,10 @@ def worst(study: StudyAnswers, metric: str, share: float = WORST_SHARE) -> "pl.D
         "value", descending=better == "lower", maintain_order=True
     )
     count = max(1, math.ceil(share * len(robots)))
-    command = pl.format(
-        f"fleet2d study rerun {study.location} {{}} --out worst{{}}", VARIANT, VARIANT
-    )
-    return robots.head(count).with_columns(command=command)
+    found = robots.head(count)
+    rerun = f"fleet2d study rerun {shlex.quote(study.location)}"
+    commands = [f"{rerun} {variant} --out worst{variant}" for variant in found[VARIANT]]
+    return found.with_columns(pl.Series("command", commands))
 
 
 @dataclass(frozen=True)
@@ -347,9 +349,14 @@ def with_fleet(study: StudyAnswers, answer: Answer) -> Answer:
     judged = [name for name in study.metrics if study.better(name)] or list(study.metrics)
     metric = compared.metric if compared else judged[0]
     against = compared.against if compared else None
-    sentences = [*answer.sentences[:-1], _groups(study, metric, against), _spread(study, metric)]
-    if study.better(metric):
-        sentences.append(_worst(study, metric))
+    robots = len(by_robot(study, metric))
+    sentences = list(answer.sentences[:-1])
+    if robots >= FEWEST:
+        sentences += [_groups(study, metric, against), _spread(study, metric)]
+        if study.better(metric):
+            sentences.append(_worst(study, metric))
+    else:
+        sentences.append(f"Percentiles and groups take {FEWEST} robots or more.")
     table = answer.table
     if compared is None:
         table = tuple(_percentile_row(study, name) for name in study.metrics[: len(answer.table)])
@@ -385,8 +392,9 @@ def _worst(study: StudyAnswers, metric: str) -> str:
     names = ", ".join(map(str, rows[VARIANT].head(MAX_NAMED)))
     more = ", …" if len(rows) > MAX_NAMED else ""
     return (
-        f"The worst 1 % ({counted(len(rows), 'robot')}) are variants {names}{more}: run the first"
-        f" again by `{rows['command'][0]}`, and open it by `fleet2d view worst{rows[VARIANT][0]}`."
+        f"The worst 1 % ({counted(len(rows), 'robot')}): variant {names}{more}."
+        f" `{rows['command'][0]}` runs the first again, and `fleet2d view worst{rows[VARIANT][0]}`"
+        " opens it."
     )
 
 

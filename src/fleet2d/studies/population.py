@@ -766,8 +766,8 @@ class LifeFinder:
         while len(kept) < count:
             if drawn >= MAX_DRAWS * count:
                 raise ScenarioError(
-                    f"{len(kept):,} of {drawn:,} lives that were drawn meet the conditions, and"
-                    f" {count:,} are asked for; {left_out_words('where', self.left_out)}"
+                    f"of {drawn:,} lives that were drawn {len(kept):,} meet the conditions, too few"
+                    f" for {count:,}; {left_out_words('where', self.left_out)}"
                 )
             lives = [self._draw.life(drawn + i) for i in range(count - len(kept))]
             drawn += len(lives)
