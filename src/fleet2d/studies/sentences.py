@@ -190,12 +190,18 @@ class StudyAnswer:
         ]
 
     def _default(self) -> "Iterator[PairedComparison]":
-        """Yield the comparisons of a study that names none: by the numbers that can be judged."""
+        """Yield the comparisons of a study that names none: by a number of each metric.
+
+        It is the first that can be judged. Of all numbers, chance would make some differ.
+        """
         from fleet2d.studies.specification import PairedComparison
 
         study = self._study
         judged_numbers = [name for name in study.metrics if study.better(name)]
-        for metric in (judged_numbers or study.metrics)[:MAX_METRICS]:
+        firsts: dict[str, str] = {}
+        for name in judged_numbers or study.metrics:
+            firsts.setdefault(name.partition(".")[0], name)
+        for metric in list(firsts.values())[:MAX_METRICS]:
             for axis in self._varying(metric, populations=False):
                 if axis in study.meta.features:
                     continue  # no two robots differ by one of them alone

@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import time
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -60,6 +62,7 @@ def falsify(
       fleet2d falsify test_robot.py::test_keeps_off --over axes.yaml
     """
     from fleet2d.studies.api import open_crew
+    from fleet2d.studies.sentences import in_words
     from fleet2d.testing.search import FailureSearch, parse_over, read_space
 
     for path in (out, out.with_suffix("")):  # the scenario, and the folder of its run
@@ -76,9 +79,12 @@ def falsify(
             narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
             bar.update(task, completed=search.tries, description=f"{search.tries} runs{narrowest}")
 
+        begin_s = time.monotonic()
         search.run(crew, seconds, update)
+        took = in_words(timedelta(seconds=time.monotonic() - begin_s))
+    answer = search.answer(f"When does {target} fail?", took)
     if search.failure is None:
-        _print_no_failure(search, job)
+        typer.echo(answer)
         return
     lines: list[str] = []
     described: set[str] = set()
@@ -88,22 +94,9 @@ def falsify(
         shrink = 0 if failure.what in described else SHRINK_TRIES
         described.add(failure.what)
         lines += [*describe_failure(failure, job, target, path, shrink), ""]
-    if finds > 1:
-        lines += summary(search)
-    for line in [] if quiet else lines:
+    for line in [] if quiet else [*lines, str(answer)]:
         typer.echo(line)
     raise typer.Exit(FAILURE_FOUND)
-
-
-def summary(search: "FailureSearch") -> list[str]:
-    """Return what failed, told apart, and which values never did."""
-    tries: dict[str, list[str]] = {}
-    for failure in search.failures:
-        tries.setdefault(failure.what, []).append(str(failure.number))
-    lines = [f"{len(search.failures)} of {search.tries} runs failed:"]
-    lines += [f"  {what}: at try {', '.join(numbers)}" for what, numbers in tries.items()]
-    never = search.never_failed()
-    return [*lines, "never failed:", *(f"  {line}" for line in never)] if never else lines
 
 
 def parse_budget(text: str) -> tuple[int, float | None]:
@@ -202,12 +195,3 @@ def _scenario_text(
     plain = json.loads(json.dumps(data, default=str))  # YAML refuses subclasses of its types
     body = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
     return f"# This scenario fails, according to fleet2d falsify {target}: {reason}\n{body}"
-
-
-def _print_no_failure(search: "FailureSearch", job: "TryJob") -> None:
-    typer.echo(f"nothing fails in {search.tries} runs")
-    if search.narrowest is not None:
-        margin, point = search.narrowest
-        typer.echo(f"narrowest: margin {margin:.3g} at {job.space.text(point)}")
-    for error, number in search.errors.items():
-        typer.echo(f"{number} could not be run: {error}", err=True)

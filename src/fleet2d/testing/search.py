@@ -6,7 +6,7 @@ import math
 import random
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -18,13 +18,14 @@ from pydantic import TypeAdapter
 
 from fleet2d.bounds import one_line
 from fleet2d.configuration.documents import Document, Keys, parse_yaml, read_document
-from fleet2d.configuration.problems import did_you_mean, suggest, validating
+from fleet2d.configuration.problems import counted, did_you_mean, suggest, validating
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.load import scenario_of
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
 from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, run_tasks
+from fleet2d.studies.sentences import Answer
 from fleet2d.studies.simulator import describe_error
 from fleet2d.studies.tuning import suggested
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
@@ -304,6 +305,49 @@ class FailureSearch(TaskQueue):
             texts = [choices[number].words for number in sorted(tried)]
             lines += [", ".join(texts)] if texts else []
         return lines
+
+    def answer(self, question: str, took: str) -> Answer:
+        """Return what failed, told apart, and which values never did; or how rare failures are.
+
+        Args:
+            question: What the search was for.
+            took: How long it took, in words.
+        """
+        words = self._found() if self.failures else self._missed()
+        lost = [f"{n} runs could not be done: {error}." for error, n in self.errors.items()]
+        cost = f"It took {counted(self.tries, 'run')} in {took}."
+        table = [
+            {
+                "try": failure.number,
+                "fails": failure.what,
+                "case": self._job.space.text(failure.point),
+                "seed": failure.seed,
+                "margin": failure.margin,
+            }
+            for failure in self.failures
+        ]
+        return Answer(question, (*words, *lost, cost), tuple(table))
+
+    def _found(self) -> Iterator[str]:
+        tries: dict[str, list[str]] = {}
+        for failure in self.failures:
+            tries.setdefault(failure.what, []).append(str(failure.number))
+        parts = [f"{what} at try {', '.join(numbers)}" for what, numbers in tries.items()]
+        yield f"{len(self.failures)} of {counted(self.tries, 'run')} failed: {'; '.join(parts)}."
+        if never := self.never_failed():
+            yield f"Never failed: {'; '.join(never)}."
+
+    def _missed(self) -> Iterator[str]:
+        yield f"Nothing fails in {counted(self.tries, 'run')}."
+        lost = sum(self.errors.values())
+        blind = min(self._random, self.tries) - lost
+        if blind > 0:
+            # With a larger share of failing cases, so many random ones would miss it in 5 %.
+            most = 100 * (1 - 0.05 ** (1 / blind))
+            yield f"The first {blind} were random, so at most {most:.3g} % of cases fail (95 %)."
+        if self.narrowest is not None:
+            margin, point = self.narrowest
+            yield f"The narrowest margin is {margin:.3g}: {self._job.space.text(point)}."
 
     def run(
         self,
