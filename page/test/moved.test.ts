@@ -33,7 +33,9 @@ beforeAll(async () => {
 test("a robot keeps out of rooms by name and by kind, and of areas", () => {
   const { rooms } = run.facts.home;
   const area = [[0, 0], [1, 0], [1, 1]];
-  run.facts.scenario.robots = { astro: { keep_out: [rooms[0]!.name, "bathroom", area, "cellar"] } };
+  const named = (room: string) => ({ room, area: null, during: [], passing: false, while: null });
+  const keep_out = [named(rooms[0]!.name), named("bathroom"), { ...named(""), room: null, area }, named("cellar")];
+  run.facts.scenario.robots = { astro: { keep_out } };
   const kept = keptOut(run, "astro");
   expect(kept.areas).toEqual([area]);
   expect(kept.rooms).toEqual([...rooms.keys()].filter((i) => i === 0 || rooms[i]!.type === "bathroom"));

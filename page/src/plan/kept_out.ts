@@ -15,19 +15,22 @@ interface KeptOut {
   areas: Area[];
 }
 
-/** What a robot's scenario says it keeps out of. */
-export function keptOut(run: Run, name: string): KeptOut {
-  const robots = run.facts.scenario.robots as Record<string, { keep_out?: readonly unknown[] } | undefined> | undefined;
-  const entries = robots?.[name]?.keep_out ?? [];
-  const { rooms } = run.facts.home;
-  return {
-    rooms: [...rooms.keys()].filter((i) => entries.includes(rooms[i]!.name) || entries.includes(rooms[i]!.type)),
-    areas: entries.filter(isArea),
-  };
+/** An entry of `keep_out`, as a run's scenario has it. */
+interface Entry {
+  room: string | null;
+  area: Area | null;
 }
 
-function isArea(entry: unknown): entry is Area {
-  return Array.isArray(entry) && entry.length >= 3 && entry.every((point) => Array.isArray(point) && point.length === 2);
+/** What a robot's scenario says it keeps out of, at some hours or always. */
+export function keptOut(run: Run, name: string): KeptOut {
+  const robots = run.facts.scenario.robots as Record<string, { keep_out?: readonly Entry[] } | undefined> | undefined;
+  const entries = robots?.[name]?.keep_out ?? [];
+  const names = entries.map((entry) => entry.room);
+  const { rooms } = run.facts.home;
+  return {
+    rooms: [...rooms.keys()].filter((i) => names.includes(rooms[i]!.name) || names.includes(rooms[i]!.type)),
+    areas: entries.flatMap((entry) => (entry.area ? [entry.area] : [])),
+  };
 }
 
 export function drawKeptOut(context: Context, run: Run, selected: string, frame: Frame, colors: Colors): void {

@@ -25,6 +25,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from matplotlib.patches import Polygon
 from matplotlib.text import Text
 
 from fleet2d.palette import deep_color
@@ -194,6 +195,20 @@ def test_colour_that_is_given_is_used(tmp_path: Path) -> None:
     assert astro is not None
     assert "teal" == ana.color
     assert astro.color.startswith("#")
+
+
+def test_areas_that_a_robot_keeps_out_of_are_hatched_and_named() -> None:
+    corners = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]
+    run = base(f"robots.astro.keep_out=[{{area: {corners}, during: '22:00-07:00'}}]")
+    hatched = [
+        patch.get_xy().tolist()[:3]
+        for axes in run_figure(run).axes
+        for patch in axes.patches
+        if isinstance(patch, Polygon) and patch.get_hatch()
+    ]
+    assert corners in hatched
+    assert "astro keeps out" in words_of(run)
+    assert "keeps out" not in words_of(base())
 
 
 def test_actogram_has_the_rooms_of_every_minute() -> None:

@@ -1,6 +1,6 @@
 """Life in a home: traces of bodies, fields of view, and text and legends over a figure."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
@@ -139,8 +139,9 @@ class Overlay:
                 corner = (x + (0.1 + 0.3 * bar) * side, low)
                 box = Rectangle(corner, 0.2 * side, share * side, facecolor=TEXT_COLOR, lw=0)
                 axes.add_patch(box)
-        if chip.kind == "away":
-            style: dict[str, Any] = {"facecolor": "white", "edgecolor": HATCH_COLOR, "lw": 0.5}
+        if chip.kind in ("away", "area"):
+            color = chip.color or HATCH_COLOR
+            style: dict[str, Any] = {"facecolor": "white", "edgecolor": color, "lw": 0.5}
             axes.add_patch(Rectangle((x, low), side, side, hatch="////////", **style))
         if chip.kind == "spot":
             for part, alpha in ((0.62, 0.2), (0.42, 0.35), (0.24, 0.8)):
@@ -460,6 +461,13 @@ def draw_robot(xy: F64, heading: float, radius: float, color: str, axes: Axes) -
     axes.add_patch(Circle((x, y), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3))
     nose = [[x, x + radius * np.cos(heading)], [y, y + radius * np.sin(heading)]]
     axes.plot(*nose, color="white", lw=1.1, zorder=4.4, solid_capstyle="butt")
+
+
+def draw_kept_out(areas: Iterable[Any], color: str, axes: Axes) -> None:
+    """Hatch the areas that a robot keeps out of; of each its corners [m]."""
+    style: dict[str, Any] = {"facecolor": "none", "edgecolor": color, "hatch": "////", "lw": 0.8}
+    for corners in areas:
+        axes.add_patch(Polygon(corners, linestyle="--", alpha=0.6, zorder=2.5, **style))
 
 
 def clear_names(plan: FloorPlan, views: Sequence[CameraView], axes: Axes) -> None:

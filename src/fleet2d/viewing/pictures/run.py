@@ -40,6 +40,7 @@ from fleet2d.viewing.pictures.life import (
     Overlay,
     best_view,
     clear_names,
+    draw_kept_out,
     draw_paths,
     draw_presence,
     draw_sightings,
@@ -399,6 +400,8 @@ class _Picture:
         left, right, low, high = self.limits
         axes.set(xlim=(left, right), ylim=(low, high))
         clear_names(self.plan, self.views, axes)
+        for robot in self.robots:
+            draw_kept_out(self._kept_out(robot.name), robot.color, axes)
         for trace in (*self.robots, *self.users):
             draw_paths(trace, axes)
         for trace in self.users:
@@ -410,6 +413,11 @@ class _Picture:
             draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
         self.overlay.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
 
+    def _kept_out(self, robot: str) -> list[Any]:
+        """Return the corners of the areas that a robot keeps out of, at some hours or always."""
+        entries = self._body("robots", robot).get("keep_out", [])
+        return [entry["area"] for entry in entries if entry["area"] is not None]
+
     def _life_chips(self) -> Iterator[Chip]:
         for user in self.users:
             yield Chip("spot", user.color, user.name)
@@ -420,6 +428,8 @@ class _Picture:
         for robot in self.robots:
             facts = filter(None, [robot.name, self._covers(robot.name)])
             yield Chip("way", robot.color, SEPARATOR.join(facts))
+            if self._kept_out(robot.name):
+                yield Chip("area", robot.color, f"{robot.name} keeps out")
         if self.rings:
             yield Chip("ring", self.robots[0].color, "seen here by a robot")
         for view in self.views:
