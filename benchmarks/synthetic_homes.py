@@ -2,6 +2,7 @@
 
     python benchmarks/synthetic_homes.py PLANS [--edition 1 2] [--variety 1] [--homes N] [--plans N]
         [--check] [--figure P] [--json J]
+    python benchmarks/synthetic_homes.py faults [--edition 1 2] [--homes 60] [--first SEED]
 
 PLANS is a folder of plans, of which the first 1,000 by name are read. Where it has an INDEX.tsv, as
 that of HouseExpo has, the kinds `empty` (no rooms), `tiny` (one room of a few metres) and `big` (no
@@ -10,6 +11,8 @@ from 0. Compared like with like: wall corners after the outline is simplified to
 HouseExpo's outlines are traced from pixels; doorways, and the graph of rooms that they make, as
 each floor plan has them: those of its file, where that records doors, else those found in walls.
 The last rows compare the outlines of small and large homes.
+
+`faults` counts what an architect would refuse, by kind, and the processor time of furnished homes.
 """
 
 import argparse
@@ -17,12 +20,15 @@ import csv
 import json
 import statistics
 import time
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
 
 from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.load import load_floorplan
@@ -37,11 +43,24 @@ CORRIDORS = {"hallway", "hall", "entryway", "lobby", "corridor"}
 OUTLINES = ("longest side [m]", "aspect ratio", "share of box")
 SIZES_OF = ("living_room", "kitchen", "dining_room", "bedroom", "bathroom", "office", "garage")
 
+# The way from the front door to the living room leads through no others.
+WAYS = {"entryway", "hallway", "living_room", "dining_room", "kitchen"}
+HALL_M = (1.0, 1.6)
+BATHROOM_M2 = (3.0, 9.0)
+WINDOW_M = 0.8
+ROUNDING = 0.051  # of lengths and areas on cells of 5 cm
+
 Values = dict[str, list[float]]
+PAD = 8  # cells around a home
+CELL_M = 0.05
 
 
 def main() -> None:
     arguments = _arguments()
+    if arguments.plans_folder == Path("faults"):
+        for edition in arguments.edition:
+            count_faults(edition, range(arguments.first, arguments.first + arguments.homes))
+        return
     real = measures(_plans(arguments.plans_folder, arguments.plans))
     editions = {
         edition: _compare(real, {"edition": edition, "variety": arguments.variety}, arguments)
@@ -130,6 +149,62 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
         found["wall corners"].append(_corners(plan, outer=False))
         found["outline corners"].append(_corners(plan, outer=True))
     return {name: values for name, values in found.items() if values}
+
+
+def count_faults(edition: int, seeds: Sequence[int]) -> None:
+    """Print how many homes have which fault, and the processor time of a furnished home."""
+    counts: Counter[str] = Counter()
+    seconds = []
+    faulty = 0
+    for seed in seeds:
+        start = time.process_time()
+        plan = Synthetic(seed=seed, edition=edition, furnish=True).plan()
+        seconds.append(time.process_time() - start)
+        found = set(faults(plan))
+        counts.update(found)
+        faulty += bool(found)
+    print(f"edition {edition}: {faulty} of {len(seeds)} homes have faults")
+    for fault, number in counts.most_common():
+        print(f"  {number:3} {fault}")
+    print(f"  {1e3 * statistics.median(seconds):.0f} ms of processor time for a furnished home")
+
+
+def faults(plan: FloorPlan) -> Iterator[str]:
+    """Yield the faults of a home."""
+    kinds = [room.type for room in plan.rooms]
+    living = [room.index for room in plan.rooms if "living_room" in room.labels]
+    front = plan.room_at(*plan.entrance) if plan.entrance else None
+    reached = {front.index} if front is not None else set()
+    for _ in plan.rooms:
+        pairs = [door.rooms for door in plan.doorways if reached & set(door.rooms)]
+        reached |= {i for pair in pairs for i in pair if kinds[i] in WAYS}
+    if not reached & set(living):
+        yield "the way to the living room leads through a garage, storage or private room"
+    outside = outside_of(plan)
+    for room in plan.rooms:
+        cells = plan.room_of_cell == room.index
+        if {"kitchen", "dining_room"} & set(room.labels):
+            lit = (ndimage.binary_dilation(np.pad(cells, PAD), iterations=3) & outside).sum()
+            if lit * CELL_M < WINDOW_M:
+                yield f"a {room.type} at no outer wall"
+        if room.type == "hallway":
+            width = 2 * CELL_M * float(ndimage.distance_transform_edt(np.pad(cells, 1)).max())
+            if not HALL_M[0] - 2 * ROUNDING <= width <= HALL_M[1] + 2 * ROUNDING:
+                yield f"a hall outside of {HALL_M[0]} to {HALL_M[1]} m"
+        if room.type == "bathroom" and not BATHROOM_M2[0] <= room.area_m2 <= BATHROOM_M2[1]:
+            yield f"a bathroom outside of {BATHROOM_M2[0]:g} to {BATHROOM_M2[1]:g} m2"
+    others = [room.area_m2 for room in plan.rooms if room.type != "garage"]
+    if max(plan.rooms[i].area_m2 for i in living) < max(others):
+        yield "a room larger than the living room"
+
+
+def outside_of(plan: FloorPlan) -> NDArray[np.bool_]:
+    """Return the cells outside of a home, whose inner walls and doors are closed."""
+    free = np.pad(plan.room_of_cell >= 0, PAD)
+    closed = ndimage.binary_closing(free, iterations=3)
+    parts, _ = ndimage.label(~closed)
+    outside: NDArray[np.bool_] = parts == parts[0, 0]
+    return outside
 
 
 def convexity(plan: FloorPlan, room: int) -> float:
@@ -236,11 +311,14 @@ def _plans(folder: Path, most: int) -> list[FloorPlan]:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("plans_folder", type=Path, metavar="PLANS", help="folder of plans")
+    parser.add_argument(
+        "plans_folder", type=Path, metavar="PLANS", help="folder of plans; or faults"
+    )
     parser.add_argument("--edition", type=int, choices=(1, 2), nargs="+", default=[1])
     parser.add_argument("--variety", type=float, default=0.0)
     parser.add_argument("--plans", type=int, default=1000, help="the most real plans to read")
     parser.add_argument("--homes", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="the first seed for faults")
     parser.add_argument("--check", action="store_true", help="give each home a check-up, too")
     parser.add_argument("--figure", type=Path, help="PNG to draw the distributions to")
     parser.add_argument("--json", type=Path, help="file to write the table to")

@@ -131,16 +131,27 @@ def test_small_flats_of_edition_2_rarely_have_the_same_rooms_and_links() -> None
 
 
 @pytest.mark.slow
-def test_large_homes_of_edition_2_are_more_compact() -> None:
-    def longest(plan: FloorPlan) -> float:
-        x0, y0, x1, y1 = plan.bounds
-        return max(x1 - x0, y1 - y0)
+def test_large_homes_of_edition_2_are_no_longer_than_28_m() -> None:
+    for seed in range(6):
+        x0, y0, x1, y1 = second(seed, area_m2=250).bounds
+        assert max(x1 - x0, y1 - y0) < 28
 
-    usual = [longest(Synthetic(seed=seed, area_m2=250).load()) for seed in range(6)]
-    compact = [longest(second(seed, area_m2=250)) for seed in range(6)]
 
-    assert sum(compact) < 0.93 * sum(usual)
-    assert max(compact) < 28
+@pytest.mark.parametrize("seed", SECOND)
+def test_home_of_edition_2_has_rooms_that_an_architect_would_draw(seed: int) -> None:
+    plan = second(seed)
+    kinds = [room.type for room in plan.rooms]
+    ways = {"entryway", "hallway", "living_room", "dining_room", "kitchen"}
+    reached = {plan.room_at(*plan.entrance).index}
+    for _ in plan.rooms:
+        pairs = [door.rooms for door in plan.doorways if reached & set(door.rooms)]
+        reached |= {i for pair in pairs for i in pair if kinds[i] in ways}
+
+    assert kinds.index("living_room") in reached
+    others = [room.area_m2 for room in plan.rooms if room.type != "garage"]
+    assert max(others) == plan.room("living_room_0").area_m2
+    baths = [room.area_m2 for room in plan.rooms if room.type == "bathroom"]
+    assert all(3 <= area <= 9 for area in baths)
 
 
 def test_rooms_of_edition_2_are_not_all_rectangles_and_many_homes_have_no_corridor() -> None:
@@ -159,7 +170,7 @@ def area_of(bounds: tuple[float, float, float, float]) -> float:
 
 @pytest.mark.parametrize(
     ("seed", "digest"),
-    [(0, "ea8f0f5bf0708c55"), (7, "e8acd52fc9a622d5"), (133, "dc367acb73d12441")],
+    [(0, "20997c74fa4995d1"), (7, "53ba6a2fb92b623f"), (133, "6cc30f653a5a6117")],
 )
 def test_seed_of_edition_2_gives_the_home_that_it_gives_on_every_machine(
     seed: int, digest: str

@@ -11,6 +11,7 @@ import shapely
 from fleet2d.errors import FloorPlanError
 from fleet2d.homes.synthetic.plans import RoomLayout, draw_layout
 from fleet2d.homes.synthetic.program import (
+    MAX_ROOMS_PER_TYPE,
     SIZES,
     WIDE_FROM_M2,
     Brief,
@@ -22,6 +23,7 @@ from fleet2d.homes.synthetic.program import (
 )
 from fleet2d.homes.synthetic.slicing import (
     UNITS_PER_M,
+    UNITS_PER_M2,
     WALL,
     Box,
     LayoutRequest,
@@ -92,8 +94,10 @@ _RARE_PAIRS = {
     ("bedroom", "kitchen"): 2.5,
 }
 COSTS: Prices = _PAIRS | {(b, a): cost for (a, b), cost in _PAIRS.items()}
-# Rooms through which the way to other rooms may lead.
+# Rooms through which the way to other rooms may lead; in edition 2, through those of service only
+# to others of service.
 _PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
+_SERVICE = ("laundry", "garage", "storage", "gym")
 # Between these a passage needs no jambs: a corridor of 1 m may end in a door of 0.9 m.
 _WITHOUT_JAMBS = {"hallway", "entryway", "living_room", "dining_room", "kitchen"}
 _SOCIAL = ("living_room", "dining_room", "kitchen")
@@ -131,7 +135,7 @@ RoomLinks = dict[tuple[int, int], tuple[float, Wall]]
 """The cost of a passage between two rooms, and the wall that it is in, by their indices."""
 
 
-def link_rooms(layout: RoomLayout, best: RoomLinks) -> tuple[list[Wall], float]:
+def link_rooms(layout: RoomLayout, best: RoomLinks, edition: int = 1) -> tuple[list[Wall], float]:
     """Return the tree of links that joins all rooms at the lowest cost, and that cost.
 
     Prim's algorithm from the entryway, else the living room. Nobody has to pass through a private
@@ -150,7 +154,7 @@ def link_rooms(layout: RoomLayout, best: RoomLinks) -> tuple[list[Wall], float]:
             (price, pair, wall)
             for pair, (price, wall) in best.items()
             if (pair[0] in reached) != (pair[1] in reached)
-            and _passable(layout.briefs, *(pair if pair[0] in reached else pair[::-1]))
+            and _passable(layout.briefs, *(pair if pair[0] in reached else pair[::-1]), edition)
         ]
         if not candidates:
             raise MisfitError
@@ -161,8 +165,10 @@ def link_rooms(layout: RoomLayout, best: RoomLinks) -> tuple[list[Wall], float]:
     return links, cost
 
 
-def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
+def _passable(briefs: Sequence[Brief], through: int, to: int, edition: int) -> bool:
     """Return whether the way to a room may lead through another."""
+    if edition == 2 and briefs[through].kind in _SERVICE:
+        return briefs[through].kind in _PASSABLE and briefs[to].kind in _SERVICE
     if briefs[to].kind in ("kitchen", "dining_room"):  # these belong to the living space
         return briefs[through].kind in _SOCIAL
     return briefs[through].kind in _PASSABLE or briefs[to].partner == through
@@ -274,6 +280,8 @@ COSTLY_CORRIDOR_SHARE = {1: 0.06, 2: 0.25}
 # A longer corridor, as in a hotel, costs points; the longest is refused [units].
 LONG_CORRIDOR = 150
 MAX_CORRIDOR = 300
+# Smallest and largest bathroom of edition 2 [m²].
+BATHROOM_M2 = (3.05, 8.8)
 # Narrower open air between two parts of a home is a crack, not a court [units].
 MIN_COURT = 28
 # Largest ratio of the home's length to its width.
@@ -327,11 +335,11 @@ def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float:
     return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE[edition], 0.0)
 
 
-def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float:
+def light_cost(layout: RoomLayout, outer: Sequence[Wall], edition: int = 1) -> float:
     """Return how badly rooms lack windows.
 
     Raises:
-        MisfitError: A bedroom or the living room has none.
+        MisfitError: A bedroom or the living room has none; in edition 2, any room that needs one.
     """
     lit = set()
     for wall in outer:
@@ -339,9 +347,38 @@ def light_cost(layout: RoomLayout, outer: Sequence[Wall]) -> float:
         if wall.length >= _LIT.get(layout.briefs[room].kind, 0):
             lit.add(room)
     dark = [b.kind for room, b in enumerate(layout.briefs) if b.kind in _LIT and room not in lit]
-    if "bedroom" in dark or "living_room" in dark:
+    if "bedroom" in dark or "living_room" in dark or (dark and edition == 2):
         raise MisfitError
     return 1.5 * len(dark)
+
+
+def check_sizes(layout: RoomLayout) -> None:
+    """Refuse what an architect would: bathrooms like halls, and rooms above the living room.
+
+    Raises:
+        MisfitError: There is such a room.
+    """
+    areas = room_areas(layout)
+    living = _living_area(layout, areas)
+    for area, brief in zip(areas, layout.briefs, strict=True):
+        kind = brief.kind
+        if kind == "bathroom" and not BATHROOM_M2[0] <= area / UNITS_PER_M2 <= BATHROOM_M2[1]:
+            raise MisfitError
+        if kind != "garage" and area > living:
+            raise MisfitError
+
+
+def room_areas(layout: RoomLayout) -> list[int]:
+    """Return the clear areas of rooms [units²], without what joins boxes of one room."""
+    areas = [0] * len(layout.briefs)
+    for box in layout.boxes:
+        areas[box.room] += box.clear_area
+    return areas
+
+
+def _living_area(layout: RoomLayout, areas: Sequence[int]) -> int:
+    kinds = [brief.kind for brief in layout.briefs]
+    return areas[kinds.index("living_room")]
 
 
 def outline_corners(boxes: Sequence[Box]) -> list[bool]:
@@ -388,13 +425,16 @@ ENOUGH_LAYOUTS = 4
 # Ducts of edition 2: range of the sides [units], probability in a rectangle of a room [%], least
 # side of that, and the least distance from passages [units].
 SHAFT_SIDE = (6, 16)
-SHAFT_PERCENT = 48
+SHAFT_PERCENT = 24
 SHAFT_ROOM_SIDE = 34
 SHAFT_CLEARANCE = 12
 # Ranges of the width of corridors [units] of edition 2, and their weights.
-CORRIDORS = (((20, 28), 25), ((28, 44), 35), ((44, 66), 40))
+CORRIDORS = (((20, 24), 40), ((25, 28), 40), ((29, 32), 20))
 # … and at most this many.
 MAX_LAYOUTS = 480
+# By how many bedrooms lists of homes from `LARGE_M2` on differ from the first, by quarters of them.
+OTHER_BEDROOMS = (0, 1, -1, 0)
+LARGE_M2 = 150.0
 # Layouts drawn in vain before a new list of rooms is drawn.
 PATIENCE = 20
 FRONT_DOOR = 19  # 0.95 m
@@ -454,14 +494,13 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
     briefs: list[Brief] = []
+    beds = decided.bedrooms or 0
     for number in range(MAX_LAYOUTS):
         if number % PATIENCE == 0 and not candidates:
             if number >= MAX_LAYOUTS // 4 and wishes.garage is None:
                 decided = replace(decided, garage=False)
-            if number >= MAX_LAYOUTS // 4 and style.edition == 2 and wishes.bedrooms is None:
-                beds = decided.bedrooms or 0
-                baths = decided.bathrooms or 1
-                decided = replace(decided, bedrooms=min(beds, max(beds - 1, baths, 1)))
+            if style.edition == 2 and wishes.bedrooms is None and beds:
+                decided = replace(decided, bedrooms=_other_bedrooms(decided, beds, number))
             choices = Choices(seed, f"rooms {number // PATIENCE}")
             if number >= MAX_LAYOUTS * 3 // 4:  # rare rooms fit into no layout
                 less = style.variety // 2 if style.edition == 2 else 0
@@ -487,6 +526,14 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         with suppress(MisfitError):
             return _finish(best, Choices(seed, "doors"), style)
     raise FloorPlanError(_failure(decided, style))
+
+
+def _other_bedrooms(decided: Wishes, beds: int, number: int) -> int:
+    """Return a number of bedrooms near `beds` that may fit where layouts were drawn in vain."""
+    if (decided.area_m2 or 0.0) >= LARGE_M2:
+        return min(max(beds + OTHER_BEDROOMS[4 * number // MAX_LAYOUTS], 1), MAX_ROOMS_PER_TYPE)
+    fewer = max(number - MAX_LAYOUTS // 4 + PATIENCE, 0) // PATIENCE
+    return min(beds, max(beds - fewer, decided.bathrooms or 1))
 
 
 def _tastes(choices: Choices, style: Style) -> Prices:
@@ -525,13 +572,15 @@ def _judge(
     shape = shape_cost(layout, ease, request.edition)
     if boxes_overlap(layout.boxes):
         raise MisfitError
+    if request.edition == 2:
+        check_sizes(layout)
     walls = inner_walls(layout.boxes)
     possible = _best_links(layout, walls, widths)
-    links, access = link_rooms(layout, possible)
+    links, access = link_rooms(layout, possible, request.edition)
     if access > limit:
         raise MisfitError
     outer = outer_walls(layout.boxes, walls)
-    light = light_cost(layout, outer)
+    light = light_cost(layout, outer, request.edition)
     rank, _ = _front_wall(layout, outer)
     corners = outline_corners(layout.boxes)
     if not corners or (request.outline and outline_kind(corners) != request.outline):
@@ -566,12 +615,16 @@ def _finish(best: _Candidate, choices: Choices, style: Style) -> House:
 # Probability [%] that a room of edition 2 is part of one that it opens to: an alcove, or a living
 # room with a passage.
 _MERGED = {
-    ("hallway", "living_room"): 68, ("entryway", "living_room"): 65, ("entryway", "hallway"): 50,
+    ("hallway", "living_room"): 55, ("entryway", "living_room"): 65, ("hallway", "entryway"): 35,
     ("dining_room", "living_room"): 25, ("dining_room", "kitchen"): 25,
     ("kitchen", "living_room"): 12, ("wardrobe", "bedroom"): 70, ("storage", "kitchen"): 40,
-    ("storage", "hallway"): 30, ("laundry", "kitchen"): 35, ("laundry", "bathroom"): 50,
+    ("laundry", "kitchen"): 35, ("laundry", "bathroom"): 50,
     ("office", "living_room"): 20,
 }  # fmt: skip
+
+
+# Largest area of a room with what is merged into it [units²]; of others that of the living room.
+MOST_MERGED = {"bathroom": int(BATHROOM_M2[1] * UNITS_PER_M2), "entryway": 14 * UNITS_PER_M2}
 
 
 def merge_rooms(
@@ -579,12 +632,17 @@ def merge_rooms(
 ) -> RoomLayout:
     """Draw which rooms are one with another that they open to, so that not all are rectangles."""
     room_of = [box.room for box in layout.boxes]
+    areas = room_areas(layout)
+    living = _living_area(layout, areas)
     for wall in links:
         pair = room_of[wall.first], room_of[wall.second]
         for part, whole in (pair, pair[::-1]):
             kinds = layout.briefs[part].kind, layout.briefs[whole].kind
             percent = _MERGED.get(kinds, 0) * (100 - variety * 3 // 4) // 100
-            if part != whole and choices.chance(percent):
+            most = MOST_MERGED.get(kinds[1], living)
+            fits = kinds[1] == "living_room" or areas[part] + areas[whole] <= most
+            if part != whole and choices.chance(percent) and fits:
+                areas[whole] += areas[part]
                 room_of = [whole if room == part else room for room in room_of]
                 break
     kept = sorted(set(room_of))

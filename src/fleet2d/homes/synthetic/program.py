@@ -111,9 +111,12 @@ DEFAULT_SPREAD = (78, 130)
 # Of edition 2, whose bedrooms are either small or large, as those of real plans.
 WIDE_SPREAD: dict[str, tuple[int, int]] = {
     "kitchen": (60, 240),
-    "bathroom": (45, 190),
-    "living_room": (50, 125),
+    "bathroom": (50, 120),
+    "living_room": (60, 150),
 }
+# Of edition 2: the largest bathroom [m²], and the largest room in percent of the living room.
+MAX_BATHROOM_M2 = 8.6
+MAX_OF_LIVING_ROOM = 90
 WIDE_FROM_M2 = 60.0  # in smaller flats hardly any rooms would fit beside a large one
 SMALL_BEDROOM = (46, 72)
 LARGE_BEDROOM = (95, 145)
@@ -376,6 +379,14 @@ def scale_areas(
     # People live in the living room, not in the kitchen.
     usual[at["kitchen"]] = min(usual[at["kitchen"]], 0.9 * usual[at["living_room"]])
     sizes = [SIZES[brief.kind] for brief in briefs]
+    if edition == 2:
+        most = MAX_OF_LIVING_ROOM / 100 * usual[at["living_room"]]
+        usual = [
+            area if brief.kind in ("living_room", "garage") else min(area, most)
+            for area, brief in zip(usual, briefs, strict=True)
+        ]
+        baths = SIZES["bathroom"]._replace(max_area=MAX_BATHROOM_M2)
+        sizes = [baths if brief.kind == "bathroom" else SIZES[brief.kind] for brief in briefs]
 
     def areas(factor: float) -> list[float]:
         return [
