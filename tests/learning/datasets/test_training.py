@@ -9,7 +9,13 @@ import yaml
 from tests.learning.datasets.small import SOURCE
 from tests.scenes import Cli
 
-from fleet2d.algorithms.presence.learned import PLACE_FEATURES, Weights, shipped_weights
+from fleet2d.algorithms.presence.learned import (
+    GAP,
+    PLACE_FEATURES,
+    TRUSTS,
+    Weights,
+    shipped_weights,
+)
 from fleet2d.errors import InputError
 from fleet2d.kernels import TRACE_FEATURES
 from fleet2d.learning.datasets import training
@@ -38,9 +44,10 @@ def loss(weights: Weights, windows: Windows) -> float:
 def test_gradients_equal_differences() -> None:
     random = np.random.default_rng(1)
     [batch] = training._batches([random_windows(1, count=7)], 7)
-    batch = training.WindowBatch(*(np.asarray(part, float) for part in batch[:2]), batch.truth)
+    batch = training.WindowBatch(*(np.asarray(part, float) for part in batch[:2]), *batch[2:])
+    trust = random.uniform(size=TRUSTS)
     values = {k: random.normal(size=v.shape) for k, v in training._initial(random, 3).items()}
-    _, gradient = training._gradient(values, batch)
+    _, gradient = training._gradient(values, batch, trust)
 
     for name, value in values.items():
         for at in [tuple(random.integers(0, n) for n in value.shape) for _ in range(5)]:
@@ -48,13 +55,13 @@ def test_gradients_equal_differences() -> None:
             for shift in (-1e-6, 1e-6):
                 moved = {k: v.copy() for k, v in values.items()}
                 moved[name][at] += shift
-                near.append(training._gradient(moved, batch)[0])
+                near.append(training._gradient(moved, batch, trust)[0])
             assert gradient[name][at] == pytest.approx((near[1] - near[0]) / 2e-6, abs=1e-5)
 
 
 def test_what_can_be_learned_is_learned() -> None:
     seen, unseen = random_windows(1), random_windows(2)
-    settings = TrainingSettings(hidden=8, epochs=30, batch=64, trust=1.0)
+    settings = TrainingSettings(hidden=8, epochs=30, batch=64, trust=(1.0,) * TRUSTS)
 
     weights = train([seen, random_windows(3, places=7)], [unseen], settings)
 
@@ -84,6 +91,19 @@ def test_fine_tuning_helps_and_stays_near() -> None:
     assert loss(tuned, home) < loss(start, home)
     change = np.abs(tuned.network.second - start.network.second).mean()
     assert change < 0.1 * np.abs(start.network.second).mean()
+
+
+def test_the_correction_counts_by_the_gap_as_far_as_it_is_trusted() -> None:
+    """Trusted for short gaps only: longer ones keep the belief that is corrected."""
+    windows = random_windows(1)
+    windows.features[:, :, GAP] = np.where(np.arange(300) < 150, 0.0, 6.0)[:, None]
+    settings = TrainingSettings(hidden=8, epochs=10, batch=64, trust=(1.0, *[0.0] * (TRUSTS - 1)))
+    weights = train([windows], settings=settings)
+
+    change = np.abs(predict(weights, windows) - windows.beliefs["routine"]).max(axis=1)
+
+    assert change[:150].max() > 0.1
+    assert change[150:].max() < 1e-6
 
 
 def test_nothing_to_train_on_is_an_error() -> None:

@@ -20,6 +20,7 @@ from fleet2d.errors import ComponentError, InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import (
     F64,
+    I64,
     TRACE_FEATURES,
     PlaceNetwork,
     TracedEvidence,
@@ -32,7 +33,7 @@ from fleet2d.storage.archives import read_arrays
 from fleet2d.storage.files import partial_file
 
 WEIGHTS = Path(__file__).with_name("learned.npz")
-FORMAT = "fleet2d presence network 1"  # changes with the features, and with the network
+FORMAT = "fleet2d presence network 2"  # changes with the features, and with the network
 INPUTS = ("features", "places")
 """The names of the inputs of a model in a file."""
 MAX_HIDDEN = 256
@@ -49,6 +50,10 @@ GROUPS = (
 )
 GROUP_OF_KIND = {kind: number for number, kinds in enumerate(GROUPS) for kind in kinds}
 PLACE_FEATURES = len(GROUPS) + 5
+GAP = 18  # the feature that is ln(1 + minutes since the newest sighting)
+# Ends of the classes of gaps that are trusted differently: gaps are whole minutes where bins are.
+TRUST_ENDS = natural_log(1 + np.array([1.5, 5.5, 15.5, 60.5, 240.5]))
+TRUSTS = len(TRUST_ENDS) + 1
 
 
 class PlaceFacts(NamedTuple):
@@ -98,11 +103,15 @@ class Weights(NamedTuple):
     Attributes:
         places: float64 (PLACE_FEATURES, hidden), the part of the first layer for `PlaceFacts`.
         start: float64 (hidden,), the bias of the first layer.
+        trust: float64 (TRUSTS,), by the gap since the newest sighting: how much of the network's
+            correction counts. The longer the gap, the more it depends on habits, and people differ
+            from those of the training.
         network: The rest.
     """
 
     places: F64
     start: F64
+    trust: F64
     network: PlaceNetwork
 
     @classmethod
@@ -130,6 +139,7 @@ class Weights(NamedTuple):
         shapes = {
             "places": (PLACE_FEATURES, hidden),
             "start": (hidden,),
+            "trust": (TRUSTS,),
             "first": (TRACE_FEATURES, hidden),
             "second": (hidden, hidden),
             "context": (hidden, hidden),
@@ -148,11 +158,13 @@ class Weights(NamedTuple):
         values = {name: arrays[name].astype(np.float64) for name in shapes}
         places = values.pop("places")
         start = values.pop("start")
-        return cls(places, start, PlaceNetwork(**values))
+        trust = values.pop("trust")
+        return cls(places, start, trust, PlaceNetwork(**values))
 
     def save(self, path: Path) -> None:
         """Write the weights to a .npz file, as float32."""
-        arrays = {"places": self.places, "start": self.start, **self.network._asdict()}
+        arrays = {**self._asdict(), **self.network._asdict()}
+        del arrays["network"]
         with partial_file(path) as partial, partial.open("wb") as file:
             np.savez(
                 file,
@@ -166,6 +178,25 @@ class Weights(NamedTuple):
         for k, row in enumerate(self.places):  # in order: the same on every machine
             total += features[:, k, np.newaxis] * row
         return total
+
+    def probabilities(self, places: F64, features: F64) -> F64:
+        """Return the probability of each place in each bin: float64 (bins, places).
+
+        Args:
+            places: What `of_places` returned.
+            features: float64 (bins, places, TRACE_FEATURES).
+        """
+        gap = trust_class(features)
+        made = np.zeros(features.shape[:2])
+        for k in np.unique(gap).tolist():
+            trusted = self.network._replace(score=self.network.score * self.trust[k])
+            made[gap == k] = place_probabilities(trusted, places, features[gap == k])
+        return made
+
+
+def trust_class(features: Any) -> I64:
+    """Return the class of each bin's gap, which the trust depends on: int64 (bins,)."""
+    return np.searchsorted(TRUST_ENDS, features[:, -1, GAP])
 
 
 @cache
@@ -253,12 +284,12 @@ class LearnedModel(CorrectedRoutine):
     def begin(self, home: Home, users: Sequence[str], start: datetime) -> None:
         """Prepare for a run."""
         super().begin(home, users, start)
-        read = self._read()
-        self.network, self.places = read.network, read.of_places(self.facts.features)
+        self.trained = self._read()
+        self.places = self.trained.of_places(self.facts.features)
 
     def correct(self, features: F64) -> F64:
         """Return the probability of each place by the network."""
-        return place_probabilities(self.network, self.places, features)
+        return self.trained.probabilities(self.places, features)
 
 
 def traced(evidence: Evidence, person: int, belief: F64) -> TracedEvidence:

@@ -220,8 +220,9 @@ def _print_scores(entries: "Sequence[LeaderboardEntry]", split: str) -> None:
     from fleet2d.learning.datasets.tasks import LOWER_END, UPPER_END
 
     def cell(entry: "LeaderboardEntry", metric: str) -> str:
-        ends = [entry.scores.get(f"{metric}{end}") for end in (LOWER_END, UPPER_END)]
-        interval = "" if None in ends else " ({:.3f} to {:.3f})".format(*ends)
+        names = [f"{metric}{end}" for end in (LOWER_END, UPPER_END)]
+        ends = [f"{entry.scores[name]:.3f}" for name in names if name in entry.scores]
+        interval = f" ({' to '.join(ends)})" if ends else ""
         return f"{entry.scores[metric]:.3f}{interval}"
 
     for name in dict.fromkeys(entry.task for entry in entries):

@@ -248,7 +248,10 @@ def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
 
 def measures_by_gap(made: SplitForecasts) -> GapMeasures:
     """Return accuracy and log loss of each model in each class of gaps, as means over homes."""
-    measures = {"accuracy": partial(top_k, k=1), "log loss [nats]": log_loss}
+    measures: dict[str, Callable[[F64, I64], F64]] = {
+        "accuracy": partial(top_k, k=1),
+        "log loss [nats]": log_loss,
+    }
     return {
         measure: {
             name: {

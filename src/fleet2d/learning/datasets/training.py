@@ -6,14 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.algorithms.presence.learned import PLACE_FEATURES, Weights
+from fleet2d.algorithms.presence.learned import PLACE_FEATURES, TRUSTS, Weights, trust_class
 from fleet2d.errors import InputError
-from fleet2d.kernels import TRACE_FEATURES, PlaceNetwork, place_probabilities
+from fleet2d.kernels import TRACE_FEATURES, PlaceNetwork
 from fleet2d.learning.datasets.windows import Windows, joined
 
 FLOOR = 1e-6
 FACTORS = tuple(k / 10 for k in range(16))  # of the correction, of which fine-tuning tries each
 CAUTION = 0.05  # log loss that a factor of 0 or of 2 must gain
+TRUST = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 # of Adam
 BETA_1 = 0.9
 BETA_2 = 0.999
@@ -30,8 +31,9 @@ class TrainingSettings:
         rate: The largest learning rate, which rises for a tenth of the steps and falls to 0.
         decay: Weight decay; with `start`, the pull back to the weights at the beginning.
         seed: Of the initial weights, and of the order of the windows.
-        trust: The share of the learned correction that is used in the end. People differ from
-            those of the training: with unknown personas the log loss is lowest at 0.7 to 0.85.
+        trust: The share of the learned correction that is used in the end, by the gap since the
+            newest sighting. People differ from those of the training: these are best for personas
+            that were left out of it.
     """
 
     hidden: int = 32
@@ -40,15 +42,23 @@ class TrainingSettings:
     rate: float = 4e-3
     decay: float = 1e-3
     seed: int = 0
-    trust: float = 0.7
+    trust: tuple[float, ...] = TRUST
 
 
 class WindowBatch(NamedTuple):
-    """Windows with the same number of places: features, (n, places, features), and the truth."""
+    """Windows with the same number of places.
+
+    Attributes:
+        inputs: float32 (n, places, features).
+        prior: float32 (n, places), the logarithm of the belief that is corrected.
+        truth: int64 (n,).
+        gap: int64 (n,), the class of the gap since the newest sighting.
+    """
 
     inputs: Any
     prior: Any
     truth: Any
+    gap: Any
 
 
 Parameters = dict[str, Any]
@@ -85,6 +95,7 @@ def train(
     random = np.random.default_rng(settings.seed)
     values = _initial(random, settings.hidden) if start is None else _unfolded(start, mean, scale)
     anchor = {k: np.zeros_like(v) if start is None else v.copy() for k, v in values.items()}
+    trust = np.ones(TRUSTS, np.float32) if start is None else start.trust.astype(np.float32)
     moments = {name: [np.zeros_like(v), np.zeros_like(v)] for name, v in values.items()}
     best = values
     best_loss = np.inf
@@ -93,18 +104,20 @@ def train(
     for epoch in range(settings.epochs):
         losses = []
         for k in random.permutation(len(batches)):
-            loss, gradient = _gradient(values, batches[k])
+            loss, gradient = _gradient(values, batches[k], trust)
             losses.append(loss)
             step += 1
             rate = settings.rate * min(10 * step / total, 1) * (1 - step / total)
             values = _adam(values, gradient, moments, step, rate, settings.decay, anchor)
         loss = float(np.mean(losses))
-        checked = _loss(values, checks) if checks else loss
+        checked = _loss(values, checks, trust) if checks else loss
         if not checks or checked < best_loss:
             best, best_loss = values, checked
         if on_epoch is not None:
             on_epoch(epoch, loss, checked)
-    return _with_scores(_folded(best, mean, scale), settings.trust)
+    return _folded(best, mean, scale)._replace(
+        trust=np.array(settings.trust) if start is None else start.trust
+    )
 
 
 def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
@@ -116,25 +129,20 @@ def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
     days = list(windows)
 
     def loss(factor: float) -> float:
-        scaled = _with_scores(weights, factor)
+        scaled = weights._replace(trust=weights.trust * factor)
         chances = [predict(scaled, part)[np.arange(len(part.truth)), part.truth] for part in days]
         every = np.concatenate(chances or [np.ones(1)])
         return float(-np.log(np.maximum(every, FLOOR)).mean()) + CAUTION * (factor - 1) ** 2
 
     factor = min(FACTORS, key=loss)
-    settings = TrainingSettings(epochs=10, batch=128, rate=5e-4, decay=0.3, trust=factor)
-    return train(days, settings=settings, start=weights)
-
-
-def _with_scores(weights: Weights, factor: float) -> Weights:
-    network = weights.network
-    return weights._replace(network=network._replace(score=network.score * factor))
+    settings = TrainingSettings(epochs=10, batch=128, rate=5e-4, decay=0.3)
+    return train(days, settings=settings, start=weights._replace(trust=weights.trust * factor))
 
 
 def predict(weights: Weights, windows: Windows) -> Any:
     """Return the belief of a network in each window: float64 (windows, places), away last."""
     places = weights.of_places(windows.places)
-    return place_probabilities(weights.network, places, windows.features.astype(np.float64))
+    return weights.probabilities(places, windows.features.astype(np.float64))
 
 
 def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
@@ -147,9 +155,10 @@ def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
             inputs_of_homes.append(np.concatenate([facts, w.features], axis=2))
         inputs = np.concatenate(inputs_of_homes)
         truth = np.concatenate([w.truth for w in group])
+        gap = trust_class(inputs[..., PLACE_FEATURES:])
         order = np.random.default_rng(places).permutation(len(truth))
         batches += [
-            WindowBatch(inputs[rows], inputs[rows, :, -1], truth[rows])
+            WindowBatch(inputs[rows], inputs[rows, :, -1], truth[rows], gap[rows])
             for rows in np.array_split(order, -(-len(order) // size))
         ]
     return batches
@@ -178,24 +187,24 @@ def _initial(random: np.random.Generator, hidden: int) -> Parameters:
     }
 
 
-def _forward(values: Parameters, batch: WindowBatch) -> tuple[Any, Any, Any, Any]:
+def _forward(values: Parameters, batch: WindowBatch, trust: Any) -> tuple[Any, Any, Any, Any]:
     inner = np.maximum(batch.inputs @ values["first"] + values["start"], 0)
     mean = inner.mean(axis=1)
     outer = inner @ values["second"] + (mean @ values["context"] + values["bias"])[:, None]
     outer = np.maximum(outer, 0)
-    score = outer @ values["score"] + batch.prior
+    score = outer @ values["score"] * trust[batch.gap, None] + batch.prior
     score = np.exp(score - score.max(axis=1, keepdims=True))
     return inner, mean, outer, score / score.sum(axis=1, keepdims=True)
 
 
-def _gradient(values: Parameters, batch: WindowBatch) -> tuple[float, Parameters]:
-    inner, mean, outer, belief = _forward(values, batch)
+def _gradient(values: Parameters, batch: WindowBatch, trust: Any) -> tuple[float, Parameters]:
+    inner, mean, outer, belief = _forward(values, batch, trust)
     count, places, hidden = inner.shape
     rows = np.arange(count)
     loss = -float(np.log(np.maximum(belief[rows, batch.truth], FLOOR)).mean())
     error = belief.copy()
     error[rows, batch.truth] -= 1
-    error /= count
+    error *= trust[batch.gap, None] / count
     to_outer = error[..., None] * values["score"] * (outer > 0)
     to_mean = to_outer.sum(axis=1)
     to_inner = to_outer @ values["second"].T + (to_mean @ values["context"].T)[:, None] / places
@@ -231,10 +240,10 @@ def _adam(
     return made
 
 
-def _loss(values: Parameters, batches: list[WindowBatch]) -> float:
+def _loss(values: Parameters, batches: list[WindowBatch], trust: Any) -> float:
     total = count = 0.0
     for batch in batches:
-        belief = _forward(values, batch)[3][np.arange(len(batch.truth)), batch.truth]
+        belief = _forward(values, batch, trust)[3][np.arange(len(batch.truth)), batch.truth]
         total -= float(np.log(np.maximum(belief, FLOOR)).sum())
         count += len(batch.truth)
     return total / count
@@ -247,7 +256,8 @@ def _folded(values: Parameters, mean: Any, scale: Any) -> Weights:
     network = PlaceNetwork(
         first[PLACE_FEATURES:], wide["second"], wide["context"], wide["bias"], wide["score"]
     )
-    return Weights(first[:PLACE_FEATURES], wide["start"] - mean @ first, network)
+    start = wide["start"] - mean @ first
+    return Weights(first[:PLACE_FEATURES], start, np.ones(TRUSTS), network)
 
 
 def _unfolded(weights: Weights, mean: Any, scale: Any) -> Parameters:

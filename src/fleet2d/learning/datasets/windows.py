@@ -10,7 +10,7 @@ import pyarrow as pa
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.estimator import natural_log
-from fleet2d.algorithms.presence.learned import PlaceFacts
+from fleet2d.algorithms.presence.learned import GAP, PlaceFacts
 from fleet2d.bounds import ENTRIES, TABLE_BYTES
 from fleet2d.errors import InputError
 from fleet2d.kernels import F64, I64, TRACE_FEATURES, TracedEvidence, trace_evidence, trace_size
@@ -25,7 +25,6 @@ MIN_BELIEF = 1e-6
 PRIOR = "routine"  # the model whose belief is corrected
 FIRST_DAY = np.datetime64("0001-01-01", "D")
 MICROSECOND = np.timedelta64(1, "us")
-GAP = 18  # the feature that is ln(1 + minutes since the newest sighting)
 
 
 class Windows(NamedTuple):
