@@ -11,6 +11,7 @@ from fleet2d.learning.datasets.tasks import (
     LOWER_END,
     UPPER_END,
     LeaderboardEntry,
+    Networks,
     SplitForecasts,
     _difference,
     leaderboard,
@@ -60,6 +61,24 @@ def test_the_table_has_a_column_for_each_model_and_intervals_in_its_cells(
         ["log_loss", "0.500", "0.250"],
         ["gain", "-1.000 (-2.000 to 0.000)", "-3.000"],
     ]
+
+
+@pytest.mark.slow
+def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_path: Path) -> None:
+    people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
+    base = {"extends": "bundled:paper", "simulation": {"duration": "2 d"}}
+    source = {"base": base, "splits": {"test": people}, "beliefs": ["routine"], "every": "1 h"}
+    data = fleet2d.dataset(source, tmp_path / "made", workers=1)
+
+    entries = leaderboard(data, networks=Networks(tune=1))
+
+    assert [(e.model, e.cases) for e in entries] == [
+        ("routine", 24),
+        ("learned", 24),
+        ("learned, tuned", 24),
+    ]
+    assert entries[1].scores != entries[2].scores
+    assert leaderboard(data, networks=Networks(tune=2)) == []
 
 
 def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path: Path) -> None:

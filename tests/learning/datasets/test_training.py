@@ -33,7 +33,9 @@ def random_windows(seed: int, places: int = 4, count: int = 300) -> Windows:
     belief = {"routine": np.full((count, places), 1 / places)}
     facts = np.zeros((places, PLACE_FEATURES))  # say nothing of a place
     steps = np.arange(count)
-    return Windows(seed, "home", "people", "ana", facts, features, truth, steps, belief)
+    return Windows(
+        seed, "home", "people", "ana", facts, features, truth, steps, steps // 60, belief
+    )
 
 
 def loss(weights: Weights, windows: Windows) -> float:

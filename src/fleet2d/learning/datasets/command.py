@@ -111,6 +111,7 @@ def rtp(
     """
     from fleet2d.algorithms.presence.learned import Weights, shipped_weights
     from fleet2d.learning.datasets.reader import MANIFEST, open_dataset
+    from fleet2d.learning.datasets.tasks import Networks
     from fleet2d.learning.datasets.tasks import leaderboard as score
     from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, train
 
@@ -133,7 +134,7 @@ def rtp(
     count = sum(len(part.truth) for part in train_on)
     typer.echo(f"{out}: {count:,} windows, {time.process_time() - began:.0f} s")
     if (on / MANIFEST).is_file() and "test" in (data := open_dataset(on)).splits:
-        _print_scores(score(data, ["rtp"], models={out.name: made}), "test")
+        _print_scores(score(data, ["rtp"], networks=Networks({out.name: made})), "test")
 
 
 def _print_epoch(epoch: int, loss: float, checked: float) -> None:
@@ -173,6 +174,10 @@ def leaderboard(
             help="Draw how reliable the first network is, or the shipped one; scores nothing."
         ),
     ] = None,
+    tune: Annotated[
+        int,
+        typer.Option(min=0, help="Tune by so many days of each person, and score on later ones."),
+    ] = 0,
     gaps: Annotated[
         Path | None,
         typer.Option(help="Draw accuracy and log loss by gap, of all models; scores nothing."),
@@ -187,14 +192,15 @@ def leaderboard(
     """
     from fleet2d.algorithms.presence.learned import Weights
     from fleet2d.learning.datasets.reader import open_dataset
-    from fleet2d.learning.datasets.tasks import forecasts, measures_by_gap
+    from fleet2d.learning.datasets.tasks import Networks, forecasts, measures_by_gap
     from fleet2d.learning.datasets.tasks import leaderboard as score
 
     models = {path.name: Weights.read(path) for path in weights or []}
+    networks = Networks(models, tune)
     if picture is not None or gaps is not None:
         from fleet2d.viewing.pictures.charts import draw_forecasts, draw_gaps
 
-        made = forecasts(open_dataset(directory), split, models)
+        made = forecasts(open_dataset(directory), split, networks)
         name = [*models, "learned"][0]
         if made is None:
             raise InputError(f"{directory} has no windows in {split!r}: nothing to draw")
@@ -205,7 +211,7 @@ def leaderboard(
             draw_gaps(measures_by_gap(made), gaps)
             typer.echo(f"{gaps}: accuracy and log loss by gap")
         return
-    entries = score(open_dataset(directory), task or (), split, models)
+    entries = score(open_dataset(directory), task or (), split, networks)
     if as_json:
         rows: list[dict[str, Any]] = [
             {"task": e.task, "model": e.model, "count": e.cases, **e.scores} for e in entries

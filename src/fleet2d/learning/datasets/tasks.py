@@ -26,7 +26,7 @@ from fleet2d.configuration.problems import check_known
 from fleet2d.errors import InputError, errors_as
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.learning.datasets.reader import Dataset
-from fleet2d.learning.datasets.training import predict
+from fleet2d.learning.datasets.training import fine_tune, predict
 from fleet2d.learning.datasets.windows import PRIOR, Windows, windows_of
 from fleet2d.metrics.rtp_score import (
     GAP_ENDS,
@@ -41,6 +41,7 @@ from fleet2d.studies.intervals import MeanEstimate, estimate
 TRAIN = "train"
 Scores = dict[str, tuple[dict[str, float], int]]
 """By model: its numbers by metric, and the number of cases that were scored."""
+TUNED = "learned, tuned"
 SMOOTHING = 1.0  # added to each count of a baseline
 MAX_HOUSEHOLDS = 12  # that are scored each
 # of an interval: what its ends are named, after the name of what they enclose
@@ -91,11 +92,27 @@ def _agreeing(data: Dataset, split: str) -> Iterator[None]:
         yield
 
 
+class Networks(NamedTuple):
+    """What `rtp` scores beside the stored beliefs, and the shipped network.
+
+    Attributes:
+        models: Further networks, by name.
+        tune: Days of each person by which the shipped network is tuned, too, and which nothing is
+            scored on.
+    """
+
+    models: Mapping[str, Weights] = {}
+    tune: int = 0
+
+
+SHIPPED = Networks()
+
+
 def leaderboard(
     data: Dataset,
     tasks: Sequence[str] = (),
     split: str = "test",
-    models: Mapping[str, Weights] | None = None,
+    networks: Networks = SHIPPED,
 ) -> list[LeaderboardEntry]:
     """Score the baselines of tasks on a split.
 
@@ -103,7 +120,7 @@ def leaderboard(
         data: The data set.
         tasks: Names of tasks; none: all.
         split: The split to score on.
-        models: Further networks for `rtp`, by name.
+        networks: What `rtp` scores, too.
 
     Raises:
         InputError: There is no such task or split.
@@ -115,7 +132,7 @@ def leaderboard(
         return [
             LeaderboardEntry(task, model, scores, cases)
             for task in names
-            for model, (scores, cases) in TASKS[task](data, split, models or {}).items()
+            for model, (scores, cases) in TASKS[task](data, split, networks).items()
         ]
 
 
@@ -181,20 +198,22 @@ class SplitForecasts(NamedTuple):
         return estimate(means, {"home": homes.tolist()})
 
 
-def forecasts(
-    data: Dataset, split: str, models: Mapping[str, Weights] | None = None
-) -> SplitForecasts | None:
-    """Return the stored beliefs of a split, those of `learned`, and of further networks.
+def forecasts(data: Dataset, split: str, networks: Networks = SHIPPED) -> SplitForecasts | None:
+    """Return the stored beliefs of a split, those of `learned`, tuned or not, and of networks.
 
     None if the split has no windows.
     """
     parts = [part for part in windows(data, split) if len(part.truth)]
     if not parts:
         return None
-    networks = {"learned": shipped_weights(), **(models or {})}
+    weights = {"learned": shipped_weights(), **networks.models}
     beliefs: dict[str, list[F64]] = {}
-    for part in parts:
-        new = {n: predict(w, part) for n, w in networks.items() if n not in part.beliefs}
+    for k, whole in enumerate(parts):
+        is_first = whole.day < whole.day[0] + networks.tune
+        part = parts[k] = whole.rows(~is_first)
+        if networks.tune:
+            weights[TUNED] = fine_tune(shipped_weights(), [whole.rows(is_first)])
+        new = {n: predict(w, part) for n, w in weights.items() if n not in part.beliefs}
         for name, belief in {**part.beliefs, **new}.items():
             beliefs.setdefault(name, []).append(belief)
     width = max(belief.shape[1] for own in beliefs.values() for belief in own)
@@ -211,9 +230,9 @@ def forecasts(
     )
 
 
-def _score_rtp(data: Dataset, split: str, models: Mapping[str, Weights]) -> Scores:
-    made = forecasts(data, split, models)
-    if made is None:
+def _score_rtp(data: Dataset, split: str, networks: Networks) -> Scores:
+    made = forecasts(data, split, networks)
+    if made is None or not len(made.truth):
         return {}
     return {
         name: (
@@ -412,7 +431,7 @@ def _groups(data: Dataset, table: str, split: str, *also: str) -> dict[Any, dict
     }
 
 
-TASKS: Mapping[str, Callable[[Dataset, str, Mapping[str, Weights]], Scores]] = {
+TASKS: Mapping[str, Callable[[Dataset, str, Networks], Scores]] = {
     "rtp": _score_rtp,
     "ltp": _score_ltp,
     "next_room": partial(_score_shares, cases=_next_rooms, given="kind of room"),

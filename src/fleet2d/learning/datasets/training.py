@@ -14,7 +14,7 @@ from fleet2d.learning.datasets.windows import Windows, joined
 FLOOR = 1e-6
 FACTORS = tuple(k / 10 for k in range(16))  # of the correction, of which fine-tuning tries each
 CAUTION = 0.05  # log loss that a factor of 0 or of 2 must gain
-TRUST = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
+TRUST = (1.0, 0.9, 0.8, 0.8, 0.7, 0.5)
 # of Adam
 BETA_1 = 0.9
 BETA_2 = 0.999

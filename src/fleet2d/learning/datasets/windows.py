@@ -13,7 +13,15 @@ from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.algorithms.presence.learned import GAP, PlaceFacts
 from fleet2d.bounds import ENTRIES, TABLE_BYTES
 from fleet2d.errors import InputError
-from fleet2d.kernels import F64, I64, TRACE_FEATURES, TracedEvidence, trace_evidence, trace_size
+from fleet2d.kernels import (
+    F64,
+    I64,
+    TRACE_FEATURES,
+    Bool,
+    TracedEvidence,
+    trace_evidence,
+    trace_size,
+)
 from fleet2d.learning.datasets.specification import BELIEF, EVIDENCE, STAYS, PlannedRun
 from fleet2d.learning.datasets.tables import tables_of
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
@@ -39,6 +47,7 @@ class Windows(NamedTuple):
         features: float32 (windows, places, TRACE_FEATURES), what is known of each place.
         truth: int64 (windows,), the place where the user was; the last is away.
         step: int64 (windows,), the step of each window.
+        day: int64 (windows,), its day, as `date.toordinal` counts.
         beliefs: The stored beliefs of models, by name: float64 (windows, places).
     """
 
@@ -50,12 +59,23 @@ class Windows(NamedTuple):
     features: Any
     truth: I64
     step: I64
+    day: I64
     beliefs: Mapping[str, F64]
 
     @property
     def gap(self) -> F64:
         """Minutes since the newest sighting, 2,880 for longer ago, or never: float64 (windows,)."""
         return np.expm1(self.features[:, -1, GAP].astype(np.float64)).round(1)
+
+    def rows(self, own: Bool) -> "Windows":
+        """Return some of the windows: bool (windows,)."""
+        return self._replace(
+            features=self.features[own],
+            truth=self.truth[own],
+            step=self.step[own],
+            day=self.day[own],
+            beliefs={model: belief[own] for model, belief in self.beliefs.items()},
+        )
 
 
 def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
@@ -180,8 +200,8 @@ class _Dense:
         features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
         places = self.facts.features
         known = features.astype(np.float32)
-        step = self.step[kept]
-        return Windows(number, home, household, user, places, known, truth[kept], step, stored)
+        time = self.step[kept], self.day[kept]
+        return Windows(number, home, household, user, places, known, truth[kept], *time, stored)
 
 
 def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:
