@@ -185,14 +185,13 @@ class RealTimePresence(PresenceAlgorithm):
 
     Attributes:
         period: How often it is updated.
-        model: The model that computes it; in most homes `learned` is best. The default stays `hmm`,
-            so that scenarios without the key have the same runs in each version.
+        model: The model that computes it.
     """
 
     is_real_time = True
 
     period: PositiveDuration = timedelta(minutes=5)
-    model: OneOf[Model] = cast("Any", "hmm")
+    model: OneOf[Model] = cast("Any", "learned")
 
     def start(self, home: Home) -> None:
         """Begin without evidence, with a model that has usable files."""

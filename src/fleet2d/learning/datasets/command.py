@@ -97,7 +97,7 @@ def rtp(
         typer.Option("--from", help="Weights to go on from: a file, or `learned`, the shipped."),
     ] = None,
     hidden: Annotated[int, typer.Option(min=1, max=256, help="Width of the layers.")] = 32,
-    epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 10,
+    epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights.")] = 0,
 ) -> None:
     """Train the network of `model: learned`, or fit one to the days of a run.
