@@ -31,7 +31,7 @@ def main() -> None:
         seed=4,
         users={"ana": {"persona": "works_from_home"}},
         robots={"astro": {"behaviors": behaviors, "speed": SPEED}},
-        algorithms={"rtp": {"type": "real_time_presence"}},
+        algorithms={"rtp": {"type": "real_time_presence", "model": "hmm"}},
         metrics={"time_to_find": {"deadline": f"{DEADLINE} s"}},
     )
     rows = {policy: list[Any]() for policy in POLICIES}

@@ -26,9 +26,9 @@ def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
     model = np.array([[0.8, 0.2], [0.8, 0.2], [0.8, 0.2], [0.8, 0.2]])
     truth = np.zeros(4, np.int64)
     home = np.array(["a", "b", "b", "b"])
-    log = np.array(["casas", "uci", "uci", "uci"])
+    parts = {"uci": np.array([False, True, True, True]), "robot=patrol": np.ones(4, np.bool_)}
     made = SplitForecasts(
-        {"routine": prior, "mine": model}, truth, np.array([3, 3, 3, 500.0]), home, log
+        {"routine": prior, "mine": model}, truth, np.array([3, 3, 3, 500.0]), home, parts
     )
 
     scores = _difference(made, "mine")
@@ -41,7 +41,8 @@ def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
     assert "log_loss - routine over 4 h lower end" not in scores, "there is one home"
     assert -np.log(0.8) == pytest.approx(scores["log_loss of uci"])
     assert all(_difference(made, "routine")[f"log_loss - routine{end}"] == 0 for end in ENDS)
-    one = made._replace(home=np.array(["a"] * 4), household=np.array(["uci"] * 4))
+    assert "log_loss of robot=patrol" not in scores, "that is all of it"
+    one = made._replace(home=np.array(["a"] * 4), parts={})
     assert {"log_loss - routine"} == {name[:18] for name in _difference(one, "mine")}
 
 

@@ -34,7 +34,7 @@ def random_windows(seed: int, places: int = 4, count: int = 300) -> Windows:
     facts = np.zeros((places, PLACE_FEATURES))  # say nothing of a place
     steps = np.arange(count)
     return Windows(
-        seed, "home", "people", "ana", facts, features, truth, steps, steps // 60, belief
+        seed, "home", ("people",), "ana", facts, features, truth, steps, steps // 60, belief
     )
 
 

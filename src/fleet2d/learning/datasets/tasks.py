@@ -2,8 +2,8 @@
 
 - `rtp`: where a person is now, given the evidence so far, at each label with a stored belief: log
   loss [nats], accuracy and calibration error, over all and by the gap since the last sighting; log
-  loss by household; and the difference in log loss to `routine`, over all and by gap, with its
-  95 % interval over homes.
+  loss by household and by what was varied; and the difference in log loss to `routine`, over all
+  and by gap, with its 95 % interval over homes.
 - `ltp`: the share of time in each room, at home: total variation distance to the true shares.
 - `next_room`: the kind of place where a person goes next, for each stay: log loss, accuracy.
 - `time_to_return`: when a person who is away comes back: mean absolute error [min].
@@ -43,7 +43,7 @@ Scores = dict[str, tuple[dict[str, float], int]]
 """By model: its numbers by metric, and the number of cases that were scored."""
 TUNED = "learned, tuned"
 SMOOTHING = 1.0  # added to each count of a baseline
-MAX_HOUSEHOLDS = 12  # that are scored each
+MAX_PARTS = 20  # of a split that are scored each
 # of an interval: what its ends are named, after the name of what they enclose
 LOWER_END = " lower end"
 UPPER_END = " upper end"
@@ -177,14 +177,14 @@ class SplitForecasts(NamedTuple):
         truth: int64 (n,), the place where the person was.
         gap: float64 (n,), minutes since the newest sighting.
         home: str (n,), the home.
-        household: str (n,), the household.
+        parts: By household, and by value of what was varied: bool (n,), where it is.
     """
 
     beliefs: Mapping[str, F64]
     truth: I64
     gap: F64
     home: Any
-    household: Any
+    parts: Mapping[str, Bool]
 
     def over_homes(self, values: F64, own: Bool) -> MeanEstimate:
         """Return the mean over homes of the means of some windows, and its 95 % interval.
@@ -226,7 +226,10 @@ def forecasts(data: Dataset, split: str, networks: Networks = SHIPPED) -> SplitF
         np.concatenate([part.truth for part in parts]),
         np.concatenate([part.gap for part in parts]),
         np.repeat([part.home for part in parts], counts),
-        np.repeat([part.household for part in parts], counts),
+        {
+            label: np.repeat([label in part.labels for part in parts], counts)
+            for label in sorted({label for part in parts for label in part.labels})
+        },
     )
 
 
@@ -244,17 +247,14 @@ def _score_rtp(data: Dataset, split: str, networks: Networks) -> Scores:
 
 
 def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
-    """Return log loss by household; and its difference to `routine`, with an interval over homes.
+    """Return log loss by household and by what was varied, and its difference to `routine`.
 
-    The difference stands last, over all windows and by gap.
+    The difference has an interval over homes, and is told over all windows and by gap.
     """
     loss, prior = (log_loss(made.beliefs[model], made.truth) for model in (name, PRIOR))
     every = np.ones(len(loss), np.bool_)
-    households = np.unique(made.household).tolist()
-    scores = {
-        f"log_loss of {household}": float(loss[made.household == household].mean())
-        for household in households[: MAX_HOUSEHOLDS if len(households) > 1 else 0]
-    }
+    parts = [(label, own) for label, own in made.parts.items() if own.any() and not own.all()]
+    scores = {f"log_loss of {label}": float(loss[own].mean()) for label, own in parts[:MAX_PARTS]}
     for gap, own in (("", every), *by_gap(made.gap)):
         difference = made.over_homes(loss - prior, own)
         measure = f"log_loss - {PRIOR} {gap}".rstrip()

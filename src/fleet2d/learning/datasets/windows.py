@@ -41,7 +41,7 @@ class Windows(NamedTuple):
     Attributes:
         run: The number of the run.
         home: Its home, by name.
-        household: Its household, by the personas or logs of its people.
+        labels: Its household, and what was varied, such as "robot=hangout".
         user: The user.
         places: float64 (places, PLACE_FEATURES), what doesn't change, away last.
         features: float32 (windows, places, TRACE_FEATURES), what is known of each place.
@@ -53,7 +53,7 @@ class Windows(NamedTuple):
 
     run: int
     home: str
-    household: str
+    labels: tuple[str, ...]
     user: str
     places: F64
     features: Any
@@ -91,9 +91,9 @@ def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
     for number, run in columns["runs"].items():
         rooms = columns["rooms"][number]
         evidence = columns["evidence"].get(number)
-        labels = columns["labels"].get(number)
+        labelled = columns["labels"].get(number)
         beliefs = columns["beliefs"].get(number)
-        if labels is None or evidence is None:
+        if labelled is None or evidence is None:
             continue
         if beliefs is None or PRIOR not in beliefs["model"]:
             raise InputError(f"run {number} has no beliefs of {PRIOR}: list it under beliefs")
@@ -102,9 +102,10 @@ def windows_of(tables: Mapping[str, pa.Table]) -> Iterator[Windows]:
         xy = np.stack([rooms["x"], rooms["y"]], axis=1).tolist()
         facts = PlaceFacts.of(rooms["kind"].tolist(), rooms["area_m2"], xy)
         start = np.datetime64(run["start"][0], "us")
-        dense = _Dense(evidence, labels, beliefs, names, facts, start)
+        dense = _Dense(evidence, labelled, beliefs, names, facts, start)
+        labels = (run["household"][0], *filter(None, run["varied"][0].split("; ")))
         for user in run["users"][0]:
-            yield dense.windows(number, run["home"][0], run["household"][0], user)
+            yield dense.windows(number, run["home"][0], labels, user)
 
 
 def windows_of_run(run: "Run") -> list[Windows]:
@@ -176,7 +177,7 @@ class _Dense:
         belief = np.ones((len(self.step), self.watched.shape[1] + 1))
         return TracedEvidence(self.day, self.minute, self.watched, seen, self.unknown, belief)
 
-    def windows(self, number: int, home: str, household: str, user: str) -> Windows:
+    def windows(self, number: int, home: str, of_run: tuple[str, ...], user: str) -> Windows:
         """Return the windows of a user of the run."""
         labels = self.labels
         beliefs = self.beliefs
@@ -201,7 +202,7 @@ class _Dense:
         places = self.facts.features
         known = features.astype(np.float32)
         time = self.step[kept], self.day[kept]
-        return Windows(number, home, household, user, places, known, truth[kept], *time, stored)
+        return Windows(number, home, of_run, user, places, known, truth[kept], *time, stored)
 
 
 def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:
