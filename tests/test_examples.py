@@ -10,6 +10,7 @@ import yaml
 from tests.scenes import Cli
 from tests.thorough import THOROUGH
 
+from fleet2d.learning.datasets.specification import plan_dataset
 from fleet2d.runs.run import open_run
 from fleet2d.studies.driver import check_study
 
@@ -88,16 +89,29 @@ def test_a_scenario_runs_from_anywhere(fleet2d: Cli, examples: Path, path: Path)
         assert name in stored.tables
 
 
+@pytest.fixture
+def complete(examples: Path, path: Path, request: pytest.FixtureRequest) -> Path:
+    """A file of the examples, with the data beside it that its first lines name."""
+    file = examples / path.relative_to(EXAMPLES)
+    for name, folder in (("logs", "activity"), ("houseexpo", "houseexpo")):
+        if f"{name}/" in path.read_text():
+            (file.parent / name).symlink_to(request.getfixturevalue("shared_data") / folder)
+    return file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", DATA_SETS, ids=lambda path: path.name)
+def test_a_data_set_has_fitting_homes_and_households(
+    complete: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(complete.parent)
+    plan_dataset(complete)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
-def test_a_study_is_as_it_should_be(
-    examples: Path, path: Path, request: pytest.FixtureRequest
-) -> None:
-    studies = examples / "studies"
-    for name, folder in (("logs", "activity"), ("houseexpo", "houseexpo")):
-        if f"{name}/" in path.read_text():  # which its first lines say to put beside it
-            (studies / name).symlink_to(request.getfixturevalue("shared_data") / folder)
-    checked = check_study(studies / path.name)
+def test_a_study_is_as_it_should_be(complete: Path) -> None:
+    checked = check_study(complete)
     assert len(checked.plan.variants) > 10
     assert checked.specification.file.compare or checked.specification.file.tune
 
