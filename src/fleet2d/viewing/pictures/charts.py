@@ -263,6 +263,9 @@ def draw_gaps(measures: GapMeasures, path: Path) -> None:
                 axes.errorbar(place, means, reach, marker="o", capsize=2, color=color, label=name)
                 axes.set_xticks(range(len(gaps)), list(gaps), rotation=30)
             axes.set(ylabel=measure, xlabel="time since last seen")
+            if max(mean for gaps in models.values() for mean, *_ in gaps.values()) > 1:
+                axes.set_yscale("log")  # the room of the last sighting is wrong by far
+                axes.yaxis.set_major_formatter("{x:g}")
         panels[0].legend(frameon=False)
         figure.tight_layout()
 
