@@ -49,6 +49,7 @@ FEATURES = ("people", "rooms", "bedrooms", "area_m2")
 """Columns of what a home and its household are."""
 HOME, HOUSEHOLD, HAS, BEDROOMS, AREA = "home", "household", "has", "bedrooms", "area_m2"
 FIT = "fit"
+SIZE_UNITS = ((BEDROOMS, "bedrooms"), (AREA, "m2"))
 # Bedrooms beyond those that a household needs, and of how many households in a hundred: in England
 # and Wales in 2011, 26 % had as many as the bedroom standard asks for and 5 % fewer, counted as 0;
 # 37 % had two or more, counted as 2 (Census 2011, and English Housing Survey 2010-11).
@@ -462,7 +463,12 @@ def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) ->
         weights = [weight for _, weight in SPARE_BEDROOMS]
         spare = bisect_right(list(accumulate(weights)), draws.below(sum(weights)))
         new = _program(needed + SPARE_BEDROOMS[spare][0], plan, draws.below(MAX_SEED - 1))
-    return Choice(home.labels, ((keys, {**plan, **new}), *others))
+    if not new:
+        return home
+    (label,) = home.labels.values()
+    size = ", ".join(f"{new[key]:g} {unit}" for key, unit in SIZE_UNITS if key in new)
+    changes = ((keys, {**plan, **new}), *others)
+    return Choice({HOME: f"{label} ({size})"}, changes)  # another home of that seed is another one
 
 
 def _within(condition: Any, draws: Draws) -> float:
