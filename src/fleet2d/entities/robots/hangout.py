@@ -18,7 +18,7 @@ from fleet2d.errors import PlacementError
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, SUB, points_in_sight
+from fleet2d.kernels import F64, I64, SUB, pairs_in_sight
 from fleet2d.runtime.events import EventKind
 
 # Radius of the bodies whose ways count as the ways of people [m].
@@ -135,12 +135,12 @@ class HangoutPlaces:
         walls = self._actor.home.walls
         reach = sight_range(self._actor)
         seats = self._seats[room.index]
-        share = np.zeros(len(self.points))
-        for i, (x, y) in enumerate(self.points.tolist()):
-            near = ((seats - (x, y)) ** 2).sum(axis=1) <= reach * reach
-            if near.any():
-                share[i] = np.count_nonzero(points_in_sight(walls, x, y, seats[near])) / len(seats)
-        return share
+        if not len(seats):
+            return np.zeros(len(self.points))
+        squares = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2)
+        places, near = np.nonzero(squares <= reach * reach)
+        is_seen = pairs_in_sight(walls, self.points[places], seats[near])
+        return np.bincount(places[is_seen], minlength=len(self.points)) / len(seats)
 
     def _path(self, room: Room, tau: float) -> F64:
         actor = self._actor
