@@ -66,7 +66,7 @@ VIAS = 8
 
 
 # How many steps it looks for meetings at once.
-FORESIGHT = 600
+FORESIGHT = 3600
 NO_WAIT = np.zeros(1, np.int64)
 
 # Whose motion counts.
@@ -208,10 +208,15 @@ class Yielding(Watcher):
             end_plan: Called with a row and the step before its plan is replaced.
         """
         self._refresh(step)
-        decides = self._bodies.next_decision()
-        until = max(min([step + FORESIGHT, decides, *self._changes()]), step + 1)
-        found = self._meetings(self._present(step), step, until)
-        first = min((due for _, due, _, _ in found), default=until)
+        kept = self._present(step)
+        until = max(min(step + FORESIGHT, self._bodies.next_decision()), step + 1)
+        if self._patience or self._pauses or self._swapped:
+            until = min(until, *self._changes())
+        found = self._meetings(kept, step, until)
+        if not found:
+            self._foreseen = step, until, until
+            return
+        first = min(due for _, due, _, _ in found)
         self._foreseen = (step if first > step else -1, first, until)
         found = [meeting for meeting in found if meeting[1] == step]
         for row, _, at, other in found:
@@ -300,6 +305,8 @@ class Yielding(Watcher):
 
     def _present(self, step: int) -> Distances:
         """Return what the robots keep from all bodies at a step."""
+        if self._distances is not None and not (self._patience or self._pauses or self._swapped):
+            return self._distances
         lasting: tuple[dict[Any, Patience], ...] = self._patience, self._pauses
         for patiences in lasting:
             for key, patience in list(patiences.items()):

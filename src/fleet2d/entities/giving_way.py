@@ -312,7 +312,7 @@ class RoutesAround:
     def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
         space = self._body.space
-        shortest = None if self._body.entity.minds_costs else space.route(start, goal)
+        shortest = None if space.shortest is None else space.route(start, goal)
         if shortest is not None and self._is_clear(shortest):
             return shortest
         return route_by_cost(space, self.cost, start, goal)
