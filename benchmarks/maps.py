@@ -2,6 +2,7 @@
 
     python benchmarks/maps.py damaged --maps 1000   # clean plans with defects, the plan as truth
     python benchmarks/maps.py captured              # real maps with true rooms, of ../shared/data
+    python benchmarks/maps.py held-out              # the same, limits chosen on other places' maps
     python benchmarks/maps.py changed               # real maps turned, coarser, at other thresholds
 
 A map is damaged by some of noise, rays, shut doors, furniture, rotation, another resolution, grey
@@ -13,12 +14,15 @@ and precision at an IoU of 0.5.
 import argparse
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from hashlib import sha256
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from unittest.mock import MagicMock, patch
 
 import numpy as np
 import shapely
@@ -27,6 +31,17 @@ from shapely import Polygon, affinity
 import fleet2d
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.floorplan.rooms import division
+from fleet2d.floorplan.rooms.shape import (
+    IN_RAGGED_WALLS,
+    IN_STRAIGHT_WALLS,
+    OF_VACUUMS,
+    Hills,
+    Limits,
+    divide_by_shape,
+    find_hills,
+    join_hills,
+)
 from fleet2d.homes.formats.ros import Ros
 from fleet2d.kernels import label_parts
 
@@ -43,13 +58,23 @@ def score(rooms: Labels, truth: Labels) -> dict[str, float]:
 
     A room that lies less than a fifth in the truth doesn't count.
     """
+    return score_of(*overlap(rooms, truth))
+
+
+def overlap(rooms: Labels, truth: Labels) -> tuple[Labels, Labels, Labels]:
+    """Return how many pixels each room has in common with each true one, and how many they have."""
     height, width = (min(a, b) for a, b in zip(rooms.shape, truth.shape, strict=True))
     rooms, truth = rooms[:height, :width], truth[:height, :width]
     both = (rooms >= 0) & (truth >= 0)
-    common = np.zeros((int(rooms.max()) + 1, int(truth.max()) + 1))
+    common = np.zeros((int(rooms.max()) + 1, int(truth.max()) + 1), np.int64)
     np.add.at(common, (rooms[both], truth[both]), 1)
     of_room = np.bincount(rooms[rooms >= 0], minlength=len(common))
     of_truth = np.bincount(truth[truth >= 0], minlength=common.shape[1])
+    return common, of_room, of_truth
+
+
+def score_of(common: Labels, of_room: Labels, of_truth: Labels) -> dict[str, float]:
+    """Return the scores of an overlap."""
     iou = common / (of_room[:, None] + of_truth[None] - common)
     counted = common.sum(axis=1) > 0.2 * of_room
     return {
@@ -63,13 +88,20 @@ def score(rooms: Labels, truth: Labels) -> dict[str, float]:
 
 def room_pixels(plan: FloorPlan, pixel: float, rows: int, columns: int) -> Labels:
     """Return the room of each pixel of a map with its corner at the origin, first row on top."""
+    return np.append(plan.room_of_cell, -1).astype(np.int64)[
+        cell_pixels(plan, pixel, rows, columns)
+    ]
+
+
+def cell_pixels(plan: FloorPlan, pixel: float, rows: int, columns: int) -> Labels:
+    """Return the cell of each pixel, counted row by row, -1 outside of the plan; see above."""
     x, y = np.meshgrid((np.arange(columns) + 0.5) * pixel, (np.arange(rows) + 0.5) * pixel)
     cells = plan.lattice.to_lattice(np.stack([x, y], axis=-1)) // 64
     inside = (cells >= 0).all(axis=-1)
     inside &= (cells[..., 1] < plan.lattice.rows) & (cells[..., 0] < plan.lattice.columns)
-    labels = np.full((rows, columns), -1, np.int64)
-    labels[inside] = plan.room_of_cell[cells[..., 1][inside], cells[..., 0][inside]]
-    return labels[::-1]
+    numbers = np.full((rows, columns), -1, np.int64)
+    numbers[inside] = (cells[..., 1] * plan.lattice.columns + cells[..., 0])[inside]
+    return numbers[::-1]
 
 
 def write_map(folder: Path, pixels: Any, pixel: float, free_thresh: float = 0.196) -> Path:
@@ -266,61 +298,165 @@ def pictures() -> Iterator[tuple[str, Path, Callable[[], Labels]]]:
         yield "clutter", truth.with_name(name), lambda truth=truth: color_truth(truth)
 
 
-def vacuum_rooms(path: Path) -> tuple[Labels, Labels]:
-    """Return the rooms of a vacuum's floor found from its shape, and its segments."""
-    segments = fleet2d.load_floorplan(path)
-    plan = FloorPlan.build("walls", segments.free_space, doorways=None, regions_are="vacuum")
-    rows, columns = segments.room_of_cell.shape
-    x, y = segments.lattice.origin
-    other = plan.lattice.origin
-    row, column = (round((b - a) / 0.05) for a, b in zip((y, x), other[::-1], strict=True))
-    found = np.full((rows, columns), -1, np.int64)
-    height, width = (
-        min(n, m)
-        for n, m in zip(plan.room_of_cell.shape, (rows - row, columns - column), strict=True)
-    )
-    found[row : row + height, column : column + width] = plan.room_of_cell[:height, :width]
-    unknown = [room.index for room in segments.rooms if room.name == "unknown_0"]
-    truth = segments.room_of_cell.astype(np.int64)
-    truth[np.isin(truth, unknown)] = -1
-    return found, truth
+@dataclass(frozen=True)
+class Captured:
+    """A captured map with true rooms.
+
+    Attributes:
+        kind: The set that it is of.
+        name: Its name.
+        plan: What was made of it, or None if it was refused.
+        truth: The true room of each pixel, -1 for none.
+        cells: The plan's cell of each pixel, counted row by row, -1 for none.
+        seconds: How long it took.
+    """
+
+    kind: str
+    name: str
+    plan: FloorPlan | None
+    truth: Labels
+    cells: Labels
+    seconds: float = 0.0
+
+    @property
+    def scores(self) -> dict[str, Any]:
+        """How its rooms agree with the true ones."""
+        found = dict.fromkeys((*SCORES, "rooms", "true"), 0.0)
+        if self.plan:
+            found = score(np.append(self.plan.room_of_cell, -1)[self.cells], self.truth)
+        return {"name": self.name, "seconds": self.seconds, **found}
 
 
-def is_held_out(name: str) -> bool:
-    """Return whether a map is of the half, by its name, by which no constant is to be chosen."""
-    return sha256(name.removesuffix("_furnitures").encode()).digest()[0] % 2 == 1
-
-
-def captured_table() -> None:
-    """Print the scores of captured maps with true rooms."""
+def captured() -> Iterator[Captured]:
+    """Yield the captured maps."""
     from PIL import Image
 
-    sets: dict[str, list[dict[str, Any]]] = defaultdict(list)
     for kind, path, truth in pictures():
-        grey, name = np.asarray(Image.open(path).convert("L")), path.stem
+        grey = np.asarray(Image.open(path).convert("L"))
         with TemporaryDirectory() as folder:
             begin = time.process_time()
             try:
                 plan = Ros.model_construct(path=write_map(Path(folder), grey, PIXEL_M)).load()
             except FloorPlanError as error:
                 print(f"{path.name} is refused: {error}")
-                sets[kind].append(dict.fromkeys((*SCORES, "rooms", "true"), 0.0) | {"name": name})
+                yield Captured(kind, path.stem, None, truth(), np.full(grey.shape, -1))
                 continue
             seconds = time.process_time() - begin
-        rooms = room_pixels(plan, PIXEL_M, *grey.shape)
-        sets[kind].append({"name": name, "seconds": seconds, **score(rooms, truth())})
-    captured = DATA / "captured" / "vacuum"
-    for path in sorted([*captured.glob("*.json"), *(DATA / "valetudo").glob("*.json")]):
+        cells = cell_pixels(plan, PIXEL_M, *grey.shape)
+        yield Captured(kind, path.stem, plan, truth(), cells, seconds)
+    vacuums = DATA / "captured" / "vacuum"
+    for path in sorted([*vacuums.glob("*.json"), *(DATA / "valetudo").glob("*.json")]):
         if '"segment"' in path.read_text():  # else its rooms are found ones, too
-            found, segments = vacuum_rooms(path)
-            sets["vacuum"].append({"name": path.stem, **score(found, segments)})
+            yield of_vacuum(path)
+
+
+def of_vacuum(path: Path) -> Captured:
+    """Return the floor of a vacuum, its rooms found from its shape, with its segments as truth."""
+    segments = fleet2d.load_floorplan(path)
+    plan = FloorPlan.build("walls", segments.free_space, doorways=None, regions_are="vacuum")
+    rows, columns = segments.room_of_cell.shape
+    away = (np.array(segments.lattice.origin) - plan.lattice.origin) / plan.lattice.cell
+    column, row = np.rint(away).astype(int).tolist()
+    r, c = np.mgrid[row : row + rows, column : column + columns]
+    inside = (r >= 0) & (c >= 0) & (r < plan.lattice.rows) & (c < plan.lattice.columns)
+    cells = np.where(inside, r * plan.lattice.columns + c, -1)
+    unknown = [room.index for room in segments.rooms if room.name == "unknown_0"]
+    truth = segments.room_of_cell.astype(np.int64)
+    truth[np.isin(truth, unknown)] = -1
+    return Captured("vacuum", path.stem, plan, truth, cells)
+
+
+def captured_table() -> None:
+    """Print the scores of captured maps with true rooms."""
+    sets: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for item in captured():
+        sets[item.kind].append(item.scores)
     print("set, map                              IoU     R     P  rooms  true    s")
     for kind, rows in sets.items():
         for row in rows:
-            print(f"  {row['name']:<32}{_scores([row])}{row.get('seconds', 0):>5.1f}")
+            print(f"  {row['name']:<32}{_scores([row])}{row['seconds']:>5.1f}")
         print(f"{kind:<34}{_scores(rows)}")
-        print(f"{'    of them held out':<34}{_scores([r for r in rows if is_held_out(r['name'])])}")
     print("published: ROSE2 on its 11 cluttered maps IoU .69; morphological .52, Voronoi .52")
+
+
+# --- Limits that are chosen on the maps of other places -------------------------------------------
+
+SAME_PLACE = {
+    "intel": ("lab_intel", "intel_map", "map23"),
+    "freiburg": ("Freiburg52_scan", "freiburg_building52"),
+    "1c": ("1c_1096_areacleanup", "1c_1096_fullcleanup"),
+    "z10": ("z10_1056_paths", "dreame_z10_named_rooms_and_paths"),
+    "x40": ("l10su_1058_goto_target", "dreame_x40_named_rooms"),
+    "viomi": ("viomi_v6_41_no_path", "viomi_v7_47_cleaned_segment_ids"),
+}
+"""Maps of one place, which are left out together."""
+LIMITS = tuple(
+    Limits(*chosen)
+    for chosen in product(
+        (0.6, 0.65, 0.7, 0.75, 0.8),
+        (0.0, 0.25, 0.3, 0.35, 0.4),
+        (1.2, 2.5, 4.0, 6.0),
+    )
+)
+WALLS = {IN_STRAIGHT_WALLS: "straight walls", IN_RAGGED_WALLS: "ragged walls", OF_VACUUMS: "vacuum"}
+Scored = dict[Limits, dict[str, float]]
+
+
+def place_of(name: str) -> str:
+    """Return the place that a map shows."""
+    name = name.removesuffix("_furnitures")
+    return next((place for place, maps in SAME_PLACE.items() if name in maps), name)
+
+
+def scores_by_limits(captured: Captured) -> tuple[str, Scored]:
+    """Return what the walls of a map are like, and the scores of its rooms by limits."""
+    divide = MagicMock(wraps=divide_by_shape)
+    with patch.object(division, "divide_by_shape", divide):
+        kind = "vacuum" if captured.kind == "vacuum" else "none"
+        FloorPlan.build("map", captured.plan.free_space, doorways=None, regions_are=kind)
+    rooms, cell, own = divide.call_args.args
+    hill, hills = find_hills(rooms, cell)
+    pixels = np.append(hill, -1)[captured.cells].astype(np.int64)
+    return WALLS[own], dict(by_limits(hills, cell, *overlap(pixels, captured.truth)))
+
+
+def by_limits(
+    hills: Hills, cell: float, common: Labels, of_hill: Labels, of_truth: Labels
+) -> Iterator[tuple[Limits, dict[str, float]]]:
+    """Yield the scores of the rooms that hills make, by limits; see `overlap`."""
+    for limits in LIMITS:
+        part = join_hills(deepcopy(hills), cell, limits)[: len(of_hill)]
+        _, part = np.unique(part, return_inverse=True)
+        joined = np.zeros((int(part.max()) + 1, len(of_truth)))
+        np.add.at(joined, part, common)
+        yield limits, score_of(joined, np.bincount(part, of_hill), of_truth)
+
+
+def held_out_table() -> None:
+    """Print the scores of maps at the limits that are best for the maps of all other places."""
+    maps = [(item, *scores_by_limits(item)) for item in captured() if item.plan]
+    tables: dict[str, dict[str, list[dict[str, Any]]]] = defaultdict(lambda: defaultdict(list))
+    for walls in WALLS.values():
+        same = [(item, scored) for item, own, scored in maps if own == walls]
+        fitted = best_limits(scored for _, scored in same)
+        print(f"{walls}: {len(same)} maps, fitted to all of them {fitted}")
+        for item, scored in same:
+            others = [s for other, s in same if place_of(other.name) != place_of(item.name)]
+            chosen = best_limits(others)
+            tables[item.kind]["held out"].append(scored[chosen])
+            tables[item.kind]["fitted"].append(scored[fitted])
+            print(f"  {item.name:<32}{_scores([scored[chosen]])}  {tuple(chosen)}")
+    for kind, table in tables.items():
+        for name, rows in table.items():
+            print(f"{kind + ', ' + name:<34}{_scores(rows)}")
+
+
+def best_limits(maps: Iterable[Scored]) -> Limits:
+    """Return the limits of the highest mean of IoU and recall."""
+    scores = list(maps)
+    return max(
+        scores[0], key=lambda s: np.mean([(m[s]["iou"] + m[s]["recall"]) / 2 for m in scores])
+    )
 
 
 # --- Captured maps that are changed --------------------------------------------------------------
@@ -388,7 +524,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("damaged", "captured", "changed"))
+    parser.add_argument("what", choices=("damaged", "captured", "held-out", "changed"))
     parser.add_argument("--maps", type=int, default=60, help="number of damaged maps")
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
@@ -396,6 +532,8 @@ def main() -> None:
         damaged_table(options.maps, options.workers)
     elif options.what == "captured":
         captured_table()
+    elif options.what == "held-out":
+        held_out_table()
     else:
         changed_table()
 

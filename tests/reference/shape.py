@@ -5,20 +5,29 @@ from itertools import product
 
 import numpy as np
 
-from fleet2d.floorplan.rooms.shape import FINE, SMOOTHED_M, without_furniture
+from fleet2d.floorplan.rooms.shape import (
+    ARM_M2,
+    ARM_SHARE,
+    FINE,
+    LONG,
+    SMOOTHED_M,
+    Limits,
+    without_furniture,
+)
 from fleet2d.kernels import I64
 
 Cell = tuple[int, int]
 
 
-def parts_by_shape(
-    room_of_cell: I64, cell: float, pass_share: float, least_m2: float
-) -> set[frozenset[Cell]]:
+def parts_by_shape(room_of_cell: I64, cell: float, limits: Limits) -> set[frozenset[Cell]]:
     """Walk up from every cell, then join the parts most open to each other, pair by pair."""
     rooms = cells_of(room_of_cell)
     space = cells_of(without_furniture(room_of_cell.astype(np.int32), cell).astype(np.int64))
-    height = heights(space, rooms, round(SMOOTHED_M / cell))
+    reach = round(SMOOTHED_M / cell)
+    height = heights(space, rooms, reach)
     part = {at: top_above(at, rooms, height) for at in rooms}
+    scale = FINE * (2 * reach + 1) ** 2
+    part |= arms(part, height, cell, scale)
     while True:
         passes: dict[tuple[Cell, Cell], int] = {}
         for (row, column), top in part.items():
@@ -30,13 +39,47 @@ def parts_by_shape(
         joined = []
         for pair, highest in passes.items():
             sides = [[at for at in part if part[at] == top] for top in pair]
-            openness = highest / min(max(1, *(height[at] for at in side)) for side in sides)
-            if openness > pass_share or min(map(len, sides)) < least_m2 / cell**2:
+            tops = [max(1, *(height[at] for at in side)) for side in sides]
+            low, high = sorted((0, 1), key=tops.__getitem__)
+            least = limits.neck * tops[low]
+            if len(sides[low]) * scale**2 >= LONG * (2 * tops[low]) ** 2:
+                least = max(least, limits.mouth * tops[high])
+            openness = highest / least
+            if openness > 1 or min(map(len, sides)) < limits.least_m2 / cell**2:
                 joined.append((-openness, *pair))
         if not joined:
             return {frozenset(at for at in part if part[at] == top) for top in part.values()}
         _, kept, lost = min(joined)
         part = {at: kept if top == lost else top for at, top in part.items()}
+
+
+def arms(
+    part: dict[Cell, Cell], height: dict[Cell, int], cell: float, scale: int
+) -> dict[Cell, Cell]:
+    """Return the arms of the parts, numbered after all other parts."""
+    found: dict[Cell, Cell] = {}
+    for top in sorted(set(part.values())):
+        inside = [at for at in part if part[at] == top]
+        least = int(ARM_SHARE * max(1, *(height[at] for at in inside)))
+        wide = [at for at in inside if height[at] >= least] or [top]
+        left = {at for at in inside if min(math.dist(at, w) for w in wide) * scale >= least}
+        while left:
+            piece = [min(left)]
+            left.remove(piece[0])
+            for row, column in piece:
+                for at in (
+                    (row, column + 1),
+                    (row + 1, column),
+                    (row, column - 1),
+                    (row - 1, column),
+                ):
+                    if at in left:
+                        left.remove(at)
+                        piece.append(at)
+            if len(piece) * cell**2 >= ARM_M2:
+                number = len(set(found.values()))
+                found |= dict.fromkeys(piece, (max(part)[0] + 1, number))
+    return found
 
 
 def cells_of(labels: I64) -> dict[Cell, int]:

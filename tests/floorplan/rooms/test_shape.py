@@ -10,7 +10,9 @@ from tests.reference.shape import parts_by_shape
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.shape import (
     IN_RAGGED_WALLS,
+    IN_STRAIGHT_WALLS,
     OF_VACUUMS,
+    Limits,
     by_size,
     divide_by_shape,
     without_furniture,
@@ -40,27 +42,29 @@ SEEDS = st.integers(0, 2**32 - 1)
     SEEDS,
     st.sampled_from([0.1, 0.2, 0.5, 1.0]),
     st.sampled_from([0.5, 0.65, 0.8, 1.0]),
+    st.sampled_from([0.0, 0.3, 0.5]),
     st.integers(0, 12),
 )
 def test_rooms_are_divided_as_walking_up_and_joining_pair_by_pair_does(
-    seed: int, cell: float, pass_share: float, least_cells: int
+    seed: int, cell: float, neck: float, mouth: float, least_cells: int
 ) -> None:
-    rooms, limits = divided(seed), (cell, pass_share, least_cells * cell**2)
+    rooms = divided(seed)
+    limits = Limits(neck, mouth, least_cells * cell**2)
 
-    found = divide_by_shape(rooms, *limits)
+    found = divide_by_shape(rooms, cell, limits)
 
     parts = {
         frozenset(map(tuple, np.argwhere(found == part).tolist()))
         for part in range(found.max() + 1)
     }
-    assert parts_by_shape(rooms, *limits) == parts
+    assert parts_by_shape(rooms, cell, limits) == parts
 
 
 @given(SEEDS)
 def test_parts_are_in_one_piece_within_a_room_and_numbered_by_size(seed: int) -> None:
     rooms = divided(seed)
 
-    found = divide_by_shape(rooms, 0.2, 0.65, 0.0)
+    found = divide_by_shape(rooms, 0.2, Limits(0.65, 0.3, 0.0))
 
     assert np.array_equal(rooms < 0, found < 0)
     sizes = np.bincount(found[found >= 0]).tolist()
@@ -88,21 +92,32 @@ def test_space_is_divided_where_it_is_less_than_two_thirds_as_wide(
 ) -> None:
     two = space((1, 1, 5, 5), (5, 1, 6, 1 + width), (6, 1, 11, 5))
 
-    assert count == len(areas(divide_by_shape(two, CELL, *IN_RAGGED_WALLS)))
+    assert count == len(areas(divide_by_shape(two, CELL, IN_RAGGED_WALLS)))
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize(("width", "count"), [(1.4, 2), (3.0, 1)])
+def test_a_corridor_ends_where_it_opens_into_a_hall(width: float, count: int, turns: int) -> None:
+    """It is nowhere narrower there than along its length."""
+    rooms = np.rot90(space((0, 2, 6, 2 + width), (6, 0, 12, 6)), turns)
+
+    found = divide_by_shape(np.ascontiguousarray(rooms), CELL, IN_STRAIGHT_WALLS)
+
+    assert count == len(areas(found))
 
 
 def test_corridor_is_one_room_however_long_and_bent() -> None:
     assert [15.8] == areas(
-        divide_by_shape(space((0, 0, 12, 1), (11, 0, 12, 4.8)), CELL, *IN_RAGGED_WALLS)
+        divide_by_shape(space((0, 0, 12, 1), (11, 0, 12, 4.8)), CELL, IN_RAGGED_WALLS)
     )
 
 
 @pytest.mark.parametrize(("limits", "count"), [(IN_RAGGED_WALLS, 1), (OF_VACUUMS, 2)])
-def test_small_room_counts_in_the_map_of_a_vacuum(limits: tuple[float, float], count: int) -> None:
+def test_small_room_counts_in_the_map_of_a_vacuum(limits: Limits, count: int) -> None:
     """Elsewhere, it would be a gap among furniture."""
     hall_and_toilet = space((0, 0, 5, 5), (5, 2, 5.3, 2.7), (5.3, 1.5, 6.8, 3.2))
 
-    assert count == len(areas(divide_by_shape(hall_and_toilet, CELL, *limits)))
+    assert count == len(areas(divide_by_shape(hall_and_toilet, CELL, limits)))
 
 
 @pytest.mark.parametrize(("side", "count"), [(0.5, 1), (1.6, 2)])
@@ -111,7 +126,7 @@ def test_chair_narrows_nothing_but_a_cupboard_does(side: float, count: int) -> N
     at = slice(round((1.5 - side / 2) / CELL), round((1.5 + side / 2) / CELL))
     room[at, 38:42] = -1
 
-    assert count == len(areas(divide_by_shape(room, CELL, *IN_RAGGED_WALLS)))
+    assert count == len(areas(divide_by_shape(room, CELL, IN_RAGGED_WALLS)))
 
 
 def test_obstacle_at_the_edge_of_the_map_is_no_furniture() -> None:

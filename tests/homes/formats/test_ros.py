@@ -304,6 +304,9 @@ def test_ground_around_the_home_is_refused_with_what_to_type(tmp_path: Path, gro
 
     assert "it is the ground around the home" in message
     assert f"floorplan.unknown_grey={ground}" in message
+    with pytest.raises(FloorPlanError, match="fill what is outside with grey 205") as caught:
+        read_ros(write(tmp_path, pixels), unknown_grey=ground)
+    assert "set floorplan.unknown_grey" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["aws_small_house", "turtlebot3_house"])

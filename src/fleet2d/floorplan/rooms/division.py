@@ -449,14 +449,14 @@ def divide(
         return assign_rooms(lattice, free, regions)
     if kind == "vacuum" or (kind == "none" and not passages.between_straight_walls):
         limits = OF_VACUUMS if kind == "vacuum" else IN_RAGGED_WALLS
-        rooms = divide_by_shape(np.where(free, 0, -1), lattice.cell, *limits)
+        rooms = divide_by_shape(np.where(free, 0, -1), lattice.cell, limits)
         return number_rooms(lattice, rooms)
     chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
     if kind == "boxes":
         return label_rooms(lattice, free, regions, chambers, passages)
     widths = [math.dist(*segment) / lattice.units_per_m for segment in passages.segments]
     rooms = segment_rooms(chambers, passages.is_opening, widths, lattice.cell)
-    return number_rooms(lattice, divide_by_shape(rooms, lattice.cell, *IN_STRAIGHT_WALLS))
+    return number_rooms(lattice, divide_by_shape(rooms, lattice.cell, IN_STRAIGHT_WALLS))
 
 
 def select_doorways(

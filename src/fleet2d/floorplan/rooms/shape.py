@@ -12,17 +12,46 @@ Modalities Using Free Space Layout — MAORIS" (ICRA 2018).
 
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
+from typing import NamedTuple
 
 import numpy as np
 
-from fleet2d.kernels import I32, I64, box_sums, climb, label_parts, spread_labels, squared_distance
+from fleet2d.kernels import (
+    I32,
+    I64,
+    box_sums,
+    climb,
+    label_frames,
+    label_parts,
+    spread_labels,
+    squared_distance,
+)
 
-IN_STRAIGHT_WALLS = (0.75, 4.0)
-IN_RAGGED_WALLS = (0.65, 4.0)
-OF_VACUUMS = (0.8, 1.2)
-"""How much narrower a place that divides a room is, and the least area of a part [m²]. Among the
-clutter of ragged walls much is narrow. A vacuum gets close to furniture, which narrows rooms as
-walls do, and it knows of a small room only what is free in it."""
+
+class Limits(NamedTuple):
+    """Where space is divided.
+
+    Attributes:
+        neck: A place divides space if it is at most this share as wide as the narrower side …
+        mouth: … or, at the end of a corridor, as the wider side, the hall that it leads to.
+        least_m2: A part smaller than this belongs to the one that it is most open to [m²].
+    """
+
+    neck: float
+    mouth: float
+    least_m2: float
+
+
+IN_STRAIGHT_WALLS = Limits(0.75, 0.3, 4.0)
+IN_RAGGED_WALLS = Limits(0.65, 0.33, 4.0)
+OF_VACUUMS = Limits(0.8, 0.33, 1.2)
+"""Among the clutter of ragged walls much is narrow. A vacuum gets close to furniture, which narrows
+rooms as walls do, and it knows of a small room only what is free in it."""
+ARM_SHARE = 0.5
+ARM_M2 = 1.2
+"""An arm of a space is at most this share as wide, and at least this large [m²]."""
+LONG = 3
+"""A corridor is at least this many times as long as wide."""
 FURNITURE_M2 = 0.3
 """Free-standing obstacles up to this size, such as chairs, make no space narrower."""
 SMOOTHED_M = 0.2
@@ -31,28 +60,67 @@ FINE = 64
 """Distances are rounded down to this fraction of a cell's side."""
 
 
-def divide_by_shape(room_of_cell: I64, cell: float, pass_share: float, least_m2: float) -> I64:
+def divide_by_shape(room_of_cell: I64, cell: float, limits: Limits) -> I64:
     """Divide rooms where they narrow.
 
     Args:
         room_of_cell: The room of each cell, -1 where not free, (rows, columns).
         cell: Side of a cell [m].
-        pass_share: A room is divided where it is at most this share as wide as on either side.
-        least_m2: A part smaller than this belongs to the one that it is most open to [m²].
+        limits: Where they are divided.
 
     Returns:
         The room of each cell, by decreasing size; -1 where not free. int64 (rows, columns).
 
     >>> wide = [-1, 0, 0, 0, 0, -1, -1, 0, 0, 0, 0, 0, -1]
     >>> narrow = [-1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
-    >>> divide_by_shape(np.array([wide, narrow, wide, wide]), 1.0, 0.7, 4.0)[1].tolist()
+    >>> limits = Limits(neck=0.7, mouth=0.3, least_m2=4)
+    >>> divide_by_shape(np.array([wide, narrow, wide, wide]), 1.0, limits)[1].tolist()
     [-1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0]
     """
+    hill, hills = find_hills(room_of_cell, cell)
+    return by_size(join_hills(hills, cell, limits)[hill])
+
+
+def find_hills(room_of_cell: I64, cell: float) -> tuple[I32, "Hills"]:
+    """Return the hill of each cell, -1 where not free, and the hills; see `divide_by_shape`."""
     rooms = room_of_cell.astype(np.int32)
-    height = _heights(without_furniture(rooms, cell), round(SMOOTHED_M / cell))
-    hill = climb(rooms, height)
-    hills = _Hills.of(hill, rooms, height)
-    return by_size(_join(hills, pass_share, least_m2 / cell**2)[hill])
+    reach = round(SMOOTHED_M / cell)
+    height = _heights(without_furniture(rooms, cell), reach)
+    scale = FINE * (2 * reach + 1) ** 2
+    hill = _with_arms(climb(rooms, height), height, cell, scale)
+    return hill, Hills.of(hill, rooms, height, scale)
+
+
+def _with_arms(hill: I32, height: I64, cell: float, scale: int) -> I32:
+    """Return the hills, with the narrow arms of each, such as a corridor, as hills of their own.
+
+    A corridor of one width that opens into a hall has no top of its own.
+
+    Args:
+        hill: The hill of each cell.
+        height: Its height.
+        cell: Side of a cell [m].
+        scale: Height at a distance of one cell from a wall.
+    """
+    tops = np.zeros(int(hill.max()) + 1, np.int64)
+    np.maximum.at(tops, hill[hill >= 0], height[hill >= 0])
+    frames = label_frames(hill, len(tops))
+    count = len(tops)
+    out = hill.copy()
+    for number, (row, column, end_row, end_column) in enumerate(frames.tolist()):
+        if (end_row - row) * (end_column - column) * cell**2 < ARM_M2:
+            continue
+        window = np.s_[row:end_row, column:end_column]
+        inside = hill[window] == number
+        least = int(ARM_SHARE * tops[number])
+        wide = inside & (height[window] >= least)
+        arms = inside & (squared_distance(~wide) * scale**2 >= least**2)
+        part = label_parts(arms, False)
+        sizes = np.bincount(part[arms])
+        for arm in np.flatnonzero(sizes * cell**2 >= ARM_M2).tolist():
+            out[window][part == arm] = count
+            count += 1
+    return out
 
 
 def without_furniture(room_of_cell: I32, cell: float) -> I32:
@@ -88,28 +156,30 @@ def _heights(space: I32, reach: int) -> I64:
 
 
 @dataclass
-class _Hills:
+class Hills:
     """Hills and the passes between them.
 
     Attributes:
+        scale: Height at a distance of one cell from a wall.
         tops: Height of each.
         sizes: Cells of each.
         passes: For each hill, the hills beside it and how high the pass to each is.
     """
 
+    scale: int
     tops: list[int]
     sizes: list[int]
     passes: list[dict[int, int]]
 
     @classmethod
-    def of(cls, hill: I32, rooms: I32, height: I64) -> "_Hills":
+    def of(cls, hill: I32, rooms: I32, height: I64, scale: int) -> "Hills":
         """Return the hills of cells; there are passes only within rooms."""
         free = hill >= 0
         sizes = np.bincount(hill[free])
         count = len(sizes)
         tops = np.ones(count, np.int64)
         np.maximum.at(tops, hill[free], height[free])
-        hills = cls(tops.tolist(), sizes.tolist(), [{} for _ in range(count)])
+        hills = cls(scale, tops.tolist(), sizes.tolist(), [{} for _ in range(count)])
         for low, high in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
             meet = (hill[low] != hill[high]) & (rooms[low] == rooms[high])
             pairs = hill[low][meet].astype(np.int64) * count + hill[high][meet]
@@ -125,9 +195,17 @@ class _Hills:
         highest = max(height, self.passes[one].get(other, 0))
         self.passes[one][other] = self.passes[other][one] = highest
 
-    def openness(self, one: int, other: int) -> float:
-        """Return how high the pass between two hills is, as a share of the lower one."""
-        return self.passes[one][other] / min(self.tops[one], self.tops[other])
+    def is_long(self, hill: int) -> bool:
+        """Return whether a hill is several times as long as wide, like a corridor."""
+        return self.sizes[hill] * self.scale**2 >= LONG * (2 * self.tops[hill]) ** 2
+
+    def openness(self, one: int, other: int, limits: Limits) -> float:
+        """Return how high the pass between two hills is, as a share of what would divide them."""
+        low, high = sorted((one, other), key=self.tops.__getitem__)
+        least = limits.neck * self.tops[low]
+        if self.is_long(low):
+            least = max(least, limits.mouth * self.tops[high])
+        return self.passes[one][other] / least
 
     def join(self, one: int, other: int) -> None:
         """Make one hill of two."""
@@ -140,12 +218,17 @@ class _Hills:
         self.passes[other] = {}
 
 
-def _join(hills: _Hills, pass_share: float, least_cells: float) -> I64:
-    """Join hills, those with the highest pass first; return the part of each, and -1 for -1."""
+def join_hills(hills: Hills, cell: float, limits: Limits) -> I64:
+    """Make parts of hills, those with the highest pass first, and change these.
+
+    Returns:
+        The part of each hill, and -1 for -1.
+    """
+    least_cells = limits.least_m2 / cell**2
     part = np.arange(len(hills.tops) + 1)
     part[-1] = -1
     waiting = [
-        (-hills.openness(one, other), one, other)
+        (-hills.openness(one, other, limits), one, other)
         for one, others in enumerate(hills.passes)
         for other in others
         if one < other
@@ -153,19 +236,21 @@ def _join(hills: _Hills, pass_share: float, least_cells: float) -> I64:
     heapify(waiting)
     while waiting:
         openness, one, other = heappop(waiting)
-        if other not in hills.passes[one] or -openness != hills.openness(one, other):
+        if other not in hills.passes[one] or -openness != hills.openness(one, other, limits):
             continue  # one of the two has become part of another since
         is_small = min(hills.sizes[one], hills.sizes[other]) < least_cells
-        if -openness > pass_share or is_small:
+        if -openness > 1 or is_small:
             # Other passes are as open as before; a hill may have thousands.
             changed = set(hills.passes[other])
-            if hills.tops[other] > hills.tops[one]:
-                changed.update(hills.passes[one])
+            was_long = hills.is_long(one)
+            is_lower = hills.tops[other] > hills.tops[one]
             hills.join(one, other)
+            if is_lower or hills.is_long(one) != was_long:
+                changed.update(hills.passes[one])
             part[other] = one
             for third in changed - {one, other}:
                 low, high = sorted((one, third))
-                heappush(waiting, (-hills.openness(low, high), low, high))
+                heappush(waiting, (-hills.openness(low, high, limits), low, high))
     while ((further := part[part]) != part).any():
         part = further
     return part

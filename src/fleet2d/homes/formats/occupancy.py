@@ -178,10 +178,16 @@ class PictureSource(OccupancySource):
         if float(edge.buffer(raw.pixel / 4).intersection(free.exterior).length) < length / 2:
             return free
         grey, share = picture.edge_grey()
+        advice = f"if that is unknown, set floorplan.unknown_grey={grey}"
+        if self.unknown_grey == grey:
+            advice = (
+                "that is set already, but no floor is lighter: fill what is outside with grey 205,"
+                " or crop it away"
+            )
         raise FloorPlanError(
             "the free space runs along most of the edge of the picture: it is the ground around the"
-            f" home, not the home. {share:.0%} of the edge has grey {grey}: if that is unknown, set"
-            f" floorplan.unknown_grey={grey}; if dark pixels are floor, set negate"
+            f" home, not the home. {share:.0%} of the edge has grey {grey}: {advice}; if dark"
+            " pixels are floor, set negate"
         )
 
 
