@@ -6,7 +6,8 @@ Homes come from ten distributions, in three designs: a value for each home; four
 for each home; and differences of pairs with the same home and seed, homes and seeds crossed. A cell
 is the share of studies whose 95 % interval contains the true mean. From few homes no interval is
 told: there a cell is the share of studies that call most homes higher or lower though they aren't.
-Of three comparisons, of which one is true, all intervals must hold at once. The second table is of
+Of three comparisons, of which one is true, all intervals must hold at once. After a pilot, what it
+says that four of five studies show must show in at least as many. The second table is of
 the rates of tests, of homes that differ, and of tests that stop when they can decide.
 """
 
@@ -19,12 +20,22 @@ from typing import Any
 import numpy as np
 
 from fleet2d.studies.answers import Comparison, difference_limits, judged
-from fleet2d.studies.intervals import ENOUGH_UNITS, UNLIMITED, Limits, estimate, student_quantile
+from fleet2d.studies.intervals import (
+    ENOUGH_UNITS,
+    LEVEL,
+    UNLIMITED,
+    Limits,
+    estimate,
+    student_quantile,
+)
+from fleet2d.studies.pilot import smallest_shown
 from fleet2d.testing.claim import nested_rate_interval, rate_interval, rate_test
 
 HOMES = (5, 10, 20, 30, 40)
 DESIGNS = ("homes", "nested", "crossed")
 SEEDS = 4  # of a home
+PILOT_HOMES = 12
+STUDIES_OF_PILOT = 20
 RATES = (0.5, 0.8, 0.9, 0.95, 0.99)
 EFFECT = 0.8  # of the one of three comparisons that is true, in deviations of homes
 Levels = dict[str, Any]
@@ -176,6 +187,22 @@ def family(shape: str, homes: int, studies: int) -> tuple[float, float]:
     return hold / studies, false / studies
 
 
+def shown_after_pilot(shape: str, studies: int) -> float:
+    """Return the share of studies of 40 homes that show what a pilot of 12 said they would."""
+    center = SHAPES[shape].mean
+    shown = []
+    for pilot in range(studies // STUDIES_OF_PILOT):
+        values, levels, _ = Case(shape, PILOT_HOMES).study(pilot)
+        mean = estimate(values - center, levels)
+        if not mean.error > 0:
+            continue
+        size = smallest_shown(mean, {"home": HOMES[-1]}, LEVEL)
+        for number in range(STUDIES_OF_PILOT):
+            values, levels, _ = Case(shape, HOMES[-1]).study(pilot * STUDIES_OF_PILOT + number)
+            shown.append(estimate(values - center + size, levels).is_clear)
+    return float(np.mean(shown))
+
+
 def rate_coverage(rate: float, studies: int) -> tuple[float, float, float]:
     """Return how often intervals of a rate hold it: of 40 seeds, 20 homes of 5, and early stops."""
     generator = np.random.default_rng(1)
@@ -203,7 +230,8 @@ def row(shape: str, studies: int) -> list[str]:
     many = [coverage(Case(shape, homes), studies) for homes in HOMES if homes >= ENOUGH_UNITS]
     of_seeds = [coverage(Case(shape, HOMES[-1], design), studies).told for design in DESIGNS[1:]]
     hold, false = family(shape, HOMES[-1], studies)
-    shares = [*(each.told for each in many), *of_seeds, hold, false, many[-1].student]
+    shown = shown_after_pilot(shape, studies)
+    shares = [*(each.told for each in many), *of_seeds, hold, false, shown, many[-1].student]
     return [shape, *few, *(f"{share:.3f}" for share in shares)]
 
 
@@ -214,6 +242,7 @@ def main() -> None:
     studies = parser.parse_args().studies
     head = [
         "homes", *map(str, HOMES), "40, nested", "40, crossed", "three at once", "a false claim",
+        "after a pilot",
         "40: Student's t",
     ]  # fmt: skip
     print(f"| {' | '.join(head)} |\n| {' | '.join(['---', *['---:'] * (len(head) - 1)])} |")

@@ -95,12 +95,12 @@ def run(  # noqa: PLR0913 - options of the command line
         counts = run_study(
             checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
         )
-    answer = open_study(location).answer
     if as_json:
         facts = {"study": location, **vars(counts), "missing": counts.missing}
-        _print(json.dumps({"answer": answer.content, **facts}))
+        _print(json.dumps({"answer": open_study(location).answer.content, **facts}))
     elif not quiet:
-        _print(f"{counts.complete} of {counts.total} variants complete in {location}\n\n{answer}")
+        _print(f"{counts.complete} of {counts.total} variants complete in {location}\n")
+        _print(open_study(location).answer)
     if counts.failed:
         _print_failures(location)
     if counts.failed or counts.missing:

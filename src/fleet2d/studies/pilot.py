@@ -1,5 +1,6 @@
 """What a study of its size can tell, from a pilot: some of its variants, run for a minute."""
 
+import math
 import time
 from collections.abc import Mapping
 from contextlib import closing
@@ -7,6 +8,7 @@ from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.configuration.problems import counted
+from fleet2d.errors import extra
 from fleet2d.studies.answers import MAX_P, Comparison, StudyAnswers
 from fleet2d.studies.driver import CheckedStudy, describe, result_of_end
 from fleet2d.studies.executors import Crew, run_tasks
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 PILOT_S = 60.0
 PILOT_UNITS = 12  # combinations of home, people and seed
+RESERVE = 0.9  # share of pilots whose variance is not too small, after it
 MAX_OTHERS = 2  # values that are compared with the reference
 
 
@@ -108,7 +111,10 @@ class Pilot(StudyAnswers):
         parts = [part for c in found if (part := self._detects(c, enough))]
         shown = f"in four of five studies {enough[kind]} {plural(kind)} show"
         if parts:
-            says = f"By its variance, {shown} {listed(parts, 'difference')}: take a reserve."
+            says = (
+                f"By its variance, with a reserve, {shown} {listed(parts, 'difference')}; fewer do"
+                " if rare homes differ much."
+            )
         else:
             says = (
                 "For what differences show, two of its homes or seeds must be complete and differ."
@@ -130,8 +136,8 @@ class Pilot(StudyAnswers):
     def _detects(self, c: Comparison, sizes: Mapping[str, int]) -> str:
         """Return the smallest difference that the whole study shows; empty if it isn't known."""
         units = {kind: sizes[kind] for kind in c.estimate.spread.units}
-        smallest = c.estimate.spread.detectable(units, level=1 - MAX_P / c.number)
-        if not units or not smallest:
+        smallest = smallest_shown(c.estimate, units, 1 - MAX_P / c.number) if units else 0.0
+        if not smallest:
             return ""
         (axis, value), *_ = c.labels.items()
         unit = self.meta.unit(c.metric)
@@ -140,3 +146,19 @@ class Pilot(StudyAnswers):
             f"a difference of {amount} in {c.metric} between {axis} = {value} and {c.reference}"
             f" (here it is {number(abs(c.difference))})"
         )
+
+
+def smallest_shown(pilot: MeanEstimate, units: Mapping[str, int], level: float) -> float:
+    """Return the smallest mean that four of five studies show, by the variance of a pilot.
+
+    The variance of so small a sample is uncertain: it is the upper end of what it may be.
+
+    Args:
+        pilot: The mean of the pilot.
+        units: The number of units of each kind of the study.
+        level: The level of its intervals.
+    """
+    with extra("study", "intervals need scipy"):
+        from scipy.special import chdtri
+    reserve = math.sqrt(pilot.freedom / chdtri(pilot.freedom, RESERVE))
+    return reserve * pilot.spread.detectable(units, level=level)

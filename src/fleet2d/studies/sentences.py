@@ -294,6 +294,8 @@ class StudyAnswer:
         if math.isnan(c.p):
             return f"{c.metric} with {self._sides(c)}: there is only one pair"
         mean = f"where the mean is {number(abs(c.difference))} {c.direction}"
+        if not c.estimate.doubt:
+            mean += f", or anything from {' to '.join(map(number, c.interval))}"
         if c.p_holm < MAX_P:
             agreeing = c.above if c.difference > 0 else c.below
             why = f", but only {agreeing} of {c.pairs} pairs are"
