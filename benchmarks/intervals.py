@@ -191,7 +191,7 @@ def shown_after_pilot(shape: str, studies: int) -> float:
     """Return the share of studies of 40 homes that show what a pilot of 12 said they would."""
     center = SHAPES[shape].mean
     shown = []
-    for pilot in range(studies // STUDIES_OF_PILOT):
+    for pilot in range(-(-studies // STUDIES_OF_PILOT)):
         values, levels, _ = Case(shape, PILOT_HOMES).study(pilot)
         mean = estimate(values - center, levels)
         if not mean.error > 0:
