@@ -301,7 +301,7 @@ def check_setups(
     problems: dict[int, str] = {}
     places = setups_to_check(plan)
     if len(places) <= FEW_SETUPS:
-        crew = Crew(SerialExecutor())
+        crew = Crew(SerialExecutor(), plans=crew.plans)
     job = partial(setup_problem, plan.design)
     done = 0
     with closing(run_tasks(crew, job, plan.queue(plan.variants[places]))) as rounds:
