@@ -51,6 +51,34 @@ def test_a_shorter_gap_leaves_more_unknown(tmp_path: Path) -> None:
     assert known[0] > known[1]
 
 
+def test_what_one_sensor_can_not_tell_is_said(tmp_path: Path) -> None:
+    lines = events(tmp_path).path.read_text().replace("M018", "M003").splitlines()
+    (tmp_path / "one").write_text("\n".join(lines) + "\n")
+    lines = fit_routine(tmp_path / "one", tmp_path / "persona.yaml")
+    assert any("in one room, m003: changes of room, stays and absences can't" in x for x in lines)
+
+
+def test_a_week_without_the_person_is_left_out_with_the_reason(tmp_path: Path) -> None:
+    lines = events(tmp_path).path.read_text().splitlines()
+    later = [line.replace("2026-03-0", "2026-03-1") for line in lines]
+    (tmp_path / "holiday").write_text("\n".join(lines + later) + "\n")
+    told = fit_routine(tmp_path / "holiday", tmp_path / "persona.yaml")
+    assert any("days are left out: the night before or after them isn't" in x for x in told)
+
+
+def test_too_few_days_are_counted_with_what_is_missing(tmp_path: Path) -> None:
+    lines = events(tmp_path).path.read_text().splitlines()
+    (tmp_path / "short").write_text("\n".join(x for x in lines if x < "2026-03-05") + "\n")
+    with pytest.raises(LogError, match=r"2 of the 3 days of the log are whole.* log 1 more"):
+        fit_routine(tmp_path / "short", tmp_path / "persona.yaml")
+
+
+@pytest.mark.parametrize(("left_out", "has"), [("M018", "sleep alone"), ("M003", "no sleep")])
+def test_nights_that_can_not_be_told_are_an_error(left_out: str, has: str, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=f"the log has {has}.*--rooms LABEL=bedroom"):
+        fit_routine(events(tmp_path).path, tmp_path / "a.yaml", rooms=[f"{left_out}="])
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -305,7 +305,7 @@ def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda folder: write_life(folder, 2), "three are needed"),
+        (lambda folder: write_life(folder, 2), "0 of the 2 days of the log are whole"),
         (lambda folder: folder / "none.txt", "no such file"),
         (lambda folder: _csv(folder), "is a log of positions"),
     ],

@@ -171,7 +171,13 @@ def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
     unknown = float(np.mean(timeline.seconds[[day.number for day in days]] < 0)) if days else 0.0
     if unknown > MUCH_UNKNOWN:
         notes.append(f"{unknown:.0%} of the time is unknown: what was done before it goes on")
-    for place in USUAL_PLACES:
+    (only, *others) = timeline.places
+    if not others:
+        notes.append(
+            f"all of the log is in one room, {only}: changes of room, stays and absences can't be"
+            " fitted, and distances in rooms are 0 whatever the persona"
+        )
+    for place in USUAL_PLACES if others else ():
         if all(state.place != place for state in timeline.states):
             where = "out of the home" if place == AWAY else f"in a {place}"
             notes.append(f"nobody is ever {where} in this log, nor will the persona be")

@@ -17,6 +17,7 @@ from fleet2d.learning.fit.timeline import (
     by_minute,
     distances,
     find_days,
+    sleep_states,
 )
 from fleet2d.logs.log import LogError
 from fleet2d.routines.activity import Activity, seconds
@@ -179,10 +180,18 @@ def validate(
         LogError: There are too few days to hold any back.
     """
     days = find_days(timeline)
+    asleep = sleep_states(timeline)
+    if not asleep or len(asleep) == len(timeline.states):
+        what = "sleep alone" if asleep else "no sleep, and no room that is a bedroom"
+        raise LogError(
+            f"the log has {what}: nights and days can't be told apart; log other rooms or"
+            " activities, too, or name what a sensor stands in: --rooms LABEL=bedroom"
+        )
     if len(days) < 3:
         raise LogError(
-            f"the log has {len(days)} whole days, with a night before and after: three are needed"
-            " at least, to hold one back"
+            f"{len(days)} of the {len(timeline.minutes)} days of the log are whole, with a night"
+            f" before and after: log {3 - len(days)} more, as a persona is fitted to two at least,"
+            " and a third tells how well"
         )
     folds = min(folds, len(days))
     by_fold = []
