@@ -56,6 +56,8 @@ class Arbiter:
         self.active: int | None = None
         self.wake_step: int | None = None
         self._cool_at: dict[int, datetime] = {}  # when the cooldown of each is over
+        # By behavior: from when until when its hours hold, or don't.
+        self._hours: dict[int, tuple[datetime, datetime, bool]] = {}
         # By behavior: the plan to resume, the step of its interruption, its own interrupts, and the
         # rooms that the body kept out of.
         self._interrupted: dict[int, tuple[Plan, int, frozenset[str], frozenset[int]]] = {}
@@ -81,7 +83,7 @@ class Arbiter:
         if self.active is None or plan.is_over(now.step) or not is_due:
             return False
         active = self.behaviors[self.active]
-        if active.when and not active.busy() and holds(active.when, now.time) is None:
+        if active.when and not active.busy() and not self._hours_of(self.active, now.time)[1]:
             return False
         for number in range(self.active):
             if self.behaviors[number].preempts and self._may_decide(number, now):
@@ -123,8 +125,10 @@ class Arbiter:
             self.own = plan.interrupts
         times = list[datetime | None]()
         events = self.own
-        if self.active is not None and not self.behaviors[self.active].busy():
-            times.append(holds(self.behaviors[self.active].when, now.time))  # when its hours end
+        active = None if self.active is None else self.behaviors[self.active]
+        if self.active is not None and active is not None and active.when and not active.busy():
+            ends, holds_now = self._hours_of(self.active, now.time)
+            times += [ends] * holds_now
         for number, behavior in enumerate(self.behaviors[: self.active]):
             if not behavior.preempts or number in self.off:
                 continue
@@ -162,9 +166,22 @@ class Arbiter:
         cool = self._cool_at.get(number)
         if cool is not None and cool > time:
             time = cool
-        if when and holds(when, time) is None:
-            return min(span.next_begin(time) for span in when)
+        if when:
+            changes, holds_now = self._hours_of(number, time)
+            if not holds_now:
+                return changes
         return time if time > now.time else None
+
+    def _hours_of(self, number: int, time: datetime) -> tuple[datetime, bool]:
+        """Return until when the hours of a behavior hold, or don't, and whether they do."""
+        since, until, holds_now = self._hours.get(number, (time, time, False))
+        if not since <= time < until:
+            when = self.behaviors[number].when
+            end = holds(when, time)
+            holds_now = end is not None
+            until = min(span.next_begin(time) for span in when) if end is None else end
+            self._hours[number] = time, until, holds_now
+        return until, holds_now
 
     def _activate(self, number: int | None, now: Situation, plan: Plan) -> None:
         """Make a behavior the active one; the plan of the one before may be resumed later."""

@@ -406,8 +406,16 @@ class Persona(Settings):
 
     def activity(self, name: str) -> Activity:
         """Return an activity by name, its own first."""
-        activity = find_activity(name, self.known_activities)
-        return activity if self.fetches else activity.model_copy(update={"fetches": None})
+        if name not in self._done_activities:
+            activity = find_activity(name, self.known_activities)
+            without = activity.model_copy(update={"fetches": None})
+            self._done_activities[name] = activity if self.fetches else without
+        return self._done_activities[name]
+
+    @cached_property
+    def _done_activities(self) -> dict[str, Activity]:
+        """Activities that were asked for, as it does them."""
+        return {}
 
     @cached_property
     def known_activities(self) -> dict[str, Activity]:

@@ -263,7 +263,7 @@ class KnownHome:
         # The number of each place and of each activity's name, in the order of their first use.
         self._seats: dict[Seat, int] = {}  # `_last` refers to them
         self._names: dict[str, int] = {}
-        self._core_venues: dict[str, tuple[Venue, CoreVenue]] = {}
+        self._core_venues: dict[Hashable, CoreVenue] = {}
         self._resident: tuple[object, Resident | None] = None, None
 
     def __getstate__(self) -> dict[str, object]:
@@ -310,10 +310,11 @@ class KnownHome:
 
     def in_core(self, name: str, venue: Venue) -> CoreVenue:
         """Return the venue of an activity as the core needs it, after an `update`."""
-        known = self._core_venues.get(name)
-        if known is None or known[0] is not venue:
-            known = self._core_venues[name] = venue, self._make_core_venue(name, venue)
-        return known[1]
+        rooms, stores = ([room.index for room in each] for each in (venue.rooms, venue.stores))
+        key = name, tuple(rooms), tuple(venue.seats), tuple(stores)
+        if key not in self._core_venues:
+            self._core_venues[key] = self._make_core_venue(name, venue)
+        return self._core_venues[key]
 
     # What the core asks for.
 
