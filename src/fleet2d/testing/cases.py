@@ -297,6 +297,8 @@ class _Suite:
         if out is not None and key in self.files:
             return f"see it: fleet2d show {self.files[key][0]}{at}"
         run = test.command(key, self.builds[0], FAILURES)
+        if outcome is None:  # no run is stored of what can't be run
+            return f"again: {run}"
         return f"see it: {run}; fleet2d show {FAILURES}/{run_name(key)}{at}"
 
     @property
