@@ -17,7 +17,7 @@ from fleet2d.errors import RunDirectoryError
 from fleet2d.studies.answers import StudyAnswers, holm
 from fleet2d.studies.directory import Meta, MetricFacts
 from fleet2d.studies.intervals import ENOUGH_UNITS
-from fleet2d.studies.sentences import Answer, StudyAnswer
+from fleet2d.studies.sentences import Conclusion, StudyAnswer
 from fleet2d.studies.specification import PairedComparison
 
 METHOD, HOME, SEED = "method", "home", "seed"
@@ -49,7 +49,7 @@ class MadeUp(StudyAnswers):
         return self.frame
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> Conclusion:
         return StudyAnswer(self).answer()
 
 

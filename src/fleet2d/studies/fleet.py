@@ -18,7 +18,7 @@ from fleet2d.kernels import F64, I64, Bool
 from fleet2d.studies.answers import StudyAnswers, holm
 from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL, MeanEstimate, estimate
 from fleet2d.studies.results import VARIANT
-from fleet2d.studies.sentences import Answer, StudyAnswer, number
+from fleet2d.studies.sentences import Conclusion, StudyAnswer, number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -339,7 +339,7 @@ def groups(
     return pl.DataFrame(rows, schema=schema)
 
 
-def with_fleet(study: StudyAnswers, answer: Answer) -> Answer:
+def with_fleet(study: StudyAnswers, answer: Conclusion) -> Conclusion:
     """Return the answer of a study with what it says of its fleet."""
     if not study.meta.fleet or not study.counts.complete:
         return answer

@@ -14,7 +14,7 @@ from fleet2d.studies.driver import CheckedStudy, describe, result_of_end
 from fleet2d.studies.executors import Crew, run_tasks
 from fleet2d.studies.intervals import ENOUGH_UNITS, MeanEstimate, plural
 from fleet2d.studies.results import VARIANT, results_frame
-from fleet2d.studies.sentences import Answer, StudyAnswer, in_words, listed, number
+from fleet2d.studies.sentences import Conclusion, StudyAnswer, in_words, listed, number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -92,14 +92,14 @@ class Pilot(StudyAnswers):
                     break
         self._results = results_frame(rows)
 
-    def answer(self, workers: int) -> Answer:
+    def answer(self, workers: int) -> Conclusion:
         """Return what the study can tell, and how long it takes on a number of workers."""
         tried = counted(len(self._results), "run")
         question = f"What can {self.meta.name} tell?"
         if not self.counts.complete:
             failed = self._results["error"].drop_nulls().head(1).to_list()
             why = f"all failed: {failed[0]}" if failed else "a run takes longer"
-            return Answer(question, (f"A pilot of a minute can't say, as {why}.",))
+            return Conclusion(question, (f"A pilot of a minute can't say, as {why}.",))
         wall_s = float(self.complete["wall_s"].mean()) * len(self.whole) / workers
         took = in_words(timedelta(seconds=wall_s))
         whole = counted(len(self.whole), "run")
@@ -120,7 +120,7 @@ class Pilot(StudyAnswers):
                 "For what differences show, two of its homes or seeds must be complete and differ."
             )
         few = self._few(kind, sizes[kind], max(1, len(found)))
-        return Answer(question, tuple(filter(None, (cost, few, says))))
+        return Conclusion(question, tuple(filter(None, (cost, few, says))))
 
     def _few(self, kind: str, count: int, comparisons: int) -> str:
         """Return what a study of too few units to tell amounts can tell; empty if it has enough."""

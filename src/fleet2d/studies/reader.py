@@ -11,7 +11,7 @@ from fleet2d.studies import fleet
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import META, StudyDirectory
 from fleet2d.studies.results import TABLES, VARIANT, part_names, table_files
-from fleet2d.studies.sentences import Answer, StudyAnswer
+from fleet2d.studies.sentences import Conclusion, StudyAnswer
 from fleet2d.studies.storage import damaged
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Study(StudyAnswers):
         return f"<Study {self.location}: {counts.complete} of {counts.total} variants complete>"
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> Conclusion:
         """What the study found, in sentences and a table; `print` shows it, and so do notebooks."""
         answer = fleet.with_fleet(self, StudyAnswer(self).answer())
         if self.meta.rollout is None:

@@ -20,7 +20,7 @@ from fleet2d.kernels import F64, I64, Bool
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.design import WITH
 from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL, two_sample_interval
-from fleet2d.studies.sentences import Answer, number
+from fleet2d.studies.sentences import Conclusion, number
 from fleet2d.studies.simulator import DAILY
 from fleet2d.studies.specification import NEVER, ROLLOUT, STAGE, Bounds, Rollout
 
@@ -341,15 +341,15 @@ def _side(difference: float) -> str:
     return "lower" if difference < 0 else "higher"
 
 
-def with_rollout(study: StudyAnswers, answer: Answer) -> Answer:
+def with_rollout(study: StudyAnswers, answer: Conclusion) -> Conclusion:
     """Return the answer of a study with what it says of its rollout."""
     if not study.counts.complete:
         return answer
     try:
         found = RolloutAnswer(study)
     except InputError as error:
-        return Answer(answer.question, (*answer.sentences, f"{error}."), answer.table)
+        return Conclusion(answer.question, (*answer.sentences, f"{error}."), answer.table)
     day = found.stop[1].day if found.stop else found.days[-1] + 1
     rows = found.table.filter(date=str(found.date_of(day))).to_dicts()
     end = [s for s in answer.sentences if s.startswith(("Clear", "No difference", "It took"))]
-    return Answer(answer.question, (*found.sentences, *end), tuple(rows))
+    return Conclusion(answer.question, (*found.sentences, *end), tuple(rows))

@@ -29,7 +29,7 @@ NOT_SHOWN = ("high", "doubt", "variance_ratio", "needed", "clear", "verdict")
 
 
 @dataclass(frozen=True)
-class Answer:
+class Conclusion:
     """What was found, to be read and acted on.
 
     Attributes:
@@ -224,7 +224,7 @@ class StudyAnswer:
         """All that could be compared."""
         return [c for table in self.tables if isinstance(table, list) for c in table]
 
-    def answer(self) -> Answer:
+    def answer(self) -> Conclusion:
         """Return the answer."""
         study = self._study
         clear_first = sorted(self.comparisons, key=lambda c: not c.is_clear)
@@ -235,7 +235,7 @@ class StudyAnswer:
             if not self.asked:
                 table = [self._mean(metric) for metric in study.metrics[:MAX_METRICS]]
             sentences = list(filter(None, [*self._findings(), self._left_out(), self._cost()]))
-        return Answer(study.meta.description or study.meta.name, tuple(sentences), tuple(table))
+        return Conclusion(study.meta.description or study.meta.name, tuple(sentences), tuple(table))
 
     def _nothing(self) -> str:
         study = self._study

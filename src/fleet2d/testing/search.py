@@ -25,7 +25,7 @@ from fleet2d.scenario.load import scenario_of
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import AnyAxis, Choice, Parameter, key_path
 from fleet2d.studies.executors import Crew, TaskQueue, WorkerTask, run_tasks
-from fleet2d.studies.sentences import Answer
+from fleet2d.studies.sentences import Conclusion
 from fleet2d.studies.simulator import describe_error
 from fleet2d.studies.tuning import suggested
 from fleet2d.testing.claim import ATTRIBUTE, Claim, Variant
@@ -306,7 +306,7 @@ class FailureSearch(TaskQueue):
             lines += [", ".join(texts)] if texts else []
         return lines
 
-    def answer(self, question: str, took: str) -> Answer:
+    def answer(self, question: str, took: str) -> Conclusion:
         """Return what failed, told apart, and which values never did; or how rare failures are.
 
         Args:
@@ -326,7 +326,7 @@ class FailureSearch(TaskQueue):
             }
             for failure in self.failures
         ]
-        return Answer(question, (*words, *lost, cost), tuple(table))
+        return Conclusion(question, (*words, *lost, cost), tuple(table))
 
     def _found(self) -> Iterator[str]:
         tries: dict[str, list[str]] = {}
