@@ -182,7 +182,7 @@ def test_gaps_are_of_every_room_and_day(measured: dict[str, Result]) -> None:
 def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     measured: dict[str, Result],
 ) -> None:
-    rows = measured["rtp-gap"].numbers["means"]["top_1"]
+    rows = measured["rtp-gap"].numbers["means"]["simulated"]["top_1"]
     top_1 = {(row["model"], row["gap"]): row["mean"] for row in rows}
     assert top_1[NAIVE_GUESS, "0-1 min"] > 0.9
     assert top_1[NAIVE_GUESS, "over 4 h"] < 0.2

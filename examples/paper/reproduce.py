@@ -1,6 +1,7 @@
 """Measures the results of the paper again: speed, presence by days and by gap, the feedback loop.
 
     python examples/paper/reproduce.py [speed] [ltp-gap] [rtp-gap] [feedback] [--quick]
+    python examples/paper/reproduce.py rtp-gap --logs data/activity   # of real people, too
 
 It prints each table beside the paper's numbers, and writes numbers and pictures. Presence and the
 feedback loop are studies, whose files stand beside this one. It needs the extras `study` and `viz`.
@@ -52,7 +53,7 @@ USER = "ana"  # in all studies
 PAPER_COLUMN = "the paper's"  # heading of the column of the paper's own figures
 SPEED, LTP_GAP, RTP_GAP, FEEDBACK = RESULTS = ("speed", "ltp-gap", "rtp-gap", "feedback")
 SIZES = {SPEED: (3, 30), LTP_GAP: (100, 30), RTP_GAP: (10, 30), FEEDBACK: (30, 30)}
-"""The number of months of each kind and their days, by result."""
+"""The number of months of each kind (homes of rtp-gap) and their days, by result."""
 QUICK_SIZES = {SPEED: (1, 2), LTP_GAP: (4, 3), RTP_GAP: (2, 3), FEEDBACK: (2, 3)}
 
 
@@ -100,6 +101,7 @@ class PaperOptions:
         days: The days of a month; None: 30, or a few if `quick`.
         workers: The number of worker processes; 1: this process. Results don't depend on it.
         map: The map of a real home, for the speed table.
+        logs: The folder of the logs of real people, for rtp-gap; see `LOGS`.
         folder: The folder of the studies.
     """
 
@@ -108,6 +110,7 @@ class PaperOptions:
     days: int | None = None
     workers: int = 1
     map: Path | None = None
+    logs: Path | None = None
     folder: Path = Path("studies")
 
     def size(self, name: str) -> tuple[int, int]:
@@ -139,6 +142,9 @@ def study_content(name: str, seeds: int, days: int) -> dict[str, Any]:
     if "replicates" in content:
         content["replicates"] = seeds
         return content
+    if "home" in content["axes"]:
+        content["axes"]["home"]["synthetic"] = seeds
+        return content
     axis = content["axes"]["robot"]
     kinds = [robot for (robot,) in map(dict.values, axis["options"].values())]
     robots = {f"robot_{number}": kinds[number % len(kinds)] for number in range(seeds)}
@@ -146,14 +152,19 @@ def study_content(name: str, seeds: int, days: int) -> dict[str, Any]:
     return content
 
 
-def run_months(name: str, options: PaperOptions) -> Study:
+def run_months(name: str, options: PaperOptions, content: Mapping[str, Any] | None = None) -> Study:
     """Run the study of a result and open it; an interrupted study in a folder continues.
+
+    Args:
+        name: The name of the result, and of the folder of its study.
+        options: The size.
+        content: The study, if it isn't the one in the file of that name.
 
     Raises:
         ComponentError: A month failed.
         InputError: polars or scipy is missing, or the folder can't be used.
     """
-    content = study_content(name, *options.size(name))
+    content = content or study_content(name, *options.size(name))
     folder = options.folder / name
     executor: ExecutorName = "serial" if options.workers == 1 else "local"
     months = study(
@@ -164,13 +175,19 @@ def run_months(name: str, options: PaperOptions) -> Study:
     return months
 
 
-def estimates(rows: pl.DataFrame, row: str, column: str) -> pl.DataFrame:
+def estimates(rows: pl.DataFrame, row: str, column: str, by: Sequence[str] = ()) -> pl.DataFrame:
     """Return the mean of `value` with its 95 % interval by two columns of a frame, in its order.
+
+    Args:
+        rows: The frame.
+        row: A column.
+        column: Another one.
+        by: Columns of the units over which intervals hold; none: each value is one.
 
     Returns:
         A frame with the two columns, `mean`, `low`, `high`, and `doubt`, why there is no interval.
     """
-    means = group_means(rows, "value", (row, column), ())
+    means = group_means(rows, "value", (row, column), by)
     return means.select(row, column, "mean", "low", "high", "doubt")
 
 
@@ -241,38 +258,96 @@ NAIVE_SOURCE = "routine"  # the model beside whose scores those of the naive gue
 SCORES = {"top_1": "share of right rooms", "log_loss": "log loss [nats], smaller is better"}
 
 
+SIMULATED, REAL = "simulated", "real logs"
+LOG_HOMES, LOG_DAYS = 3, 9
+LOGS: Mapping[str, Mapping[str, Any]] = {
+    "casas_al": {"path": "casas_al/events_10_days.txt"},
+    "uci_adl_a": {"path": "uci_adl_a"},
+    "kasteren_a": {"path": "kasteren/kast_houseA-ss.txt"},
+    "kasteren_c": {
+        "path": "kasteren/kast_houseC-ss.txt",
+        "rooms": {
+            "keys": None,
+            "sink top flush": "bathroom",
+            "cabinet signs/herb reed": None,
+            "table scraps containers reed": None,
+        },
+    },
+}
+"""The logs of real people by name, as keys of `replay`; paths in the folder that `--logs` names."""
+
+
 def rtp_gap(options: PaperOptions) -> Result:
     """Measure how often the room of a user is right, by the time since the last sighting.
 
     Real-time presence by several models and by the naive guess (the room of the last sighting) is
     scored every minute: the share of right rooms, and the log loss, which is a proper score. The
-    result is the mean over seeds with its interval; each seed is a month of another life
-    with a robot on patrol.
+    result is the mean over homes and people with its interval, for simulated people and, if there
+    are some, for logs of real ones.
     """
-    seeds, days = options.size(RTP_GAP)
+    homes, days = options.size(RTP_GAP)
     months = run_months(RTP_GAP, options)
+    text = "{:.2f} ({:.2f} to {:.2f})"
+    parts = {SIMULATED: gap_scores(months)}
+    if options.logs is not None:
+        replayed = run_months(f"{RTP_GAP}-logs", options, logs_content(options))
+        parts[REAL] = gap_scores(replayed)
+    tables = []
+    means: dict[str, dict[str, Any]] = {}
+    for part, scores in parts.items():
+        size = f"{part}: {scores['home'].n_unique()} homes x {scores['person'].n_unique()} people"
+        means[part] = {}
+        for score, title in SCORES.items():
+            rows = scores.filter(score=score)
+            found = estimates(rows, "model", "gap", ("home", "person"))
+            tables.append(table_of_means(f"{title}; {size}", found, (*GAPS, ALL), text))
+            means[part][score] = found.to_dicts()
+    numbers = {
+        "homes": homes,
+        "days": days,
+        "means": means,
+        "scores": {part: scores.to_dicts() for part, scores in parts.items()},
+    }
+    return Result(RTP_GAP, months.meta.description, tables, numbers, (months.meta.notes,))
+
+
+def logs_content(options: PaperOptions) -> dict[str, Any]:
+    """Return the study in which real people's logs are replayed, each in some homes."""
+    assert options.logs is not None
+    folder = options.logs.absolute()
+    homes, days = options.size(RTP_GAP)
+    content = study_content(RTP_GAP, min(homes, LOG_HOMES), min(days, LOG_DAYS))
+    content["name"] = f"{RTP_GAP}-logs"
+    content["axes"]["person"] = {
+        "population": True,
+        "options": {
+            name: {
+                "users.ana": {
+                    **log,
+                    "type": "replay",
+                    "path": str(folder / log["path"]),
+                }
+            }
+            for name, log in LOGS.items()
+        },
+    }
+    return content
+
+
+def gap_scores(months: Study) -> pl.DataFrame:
+    """Return the scores of each model and of the naive guess by gap, home and person."""
     pattern = rf"^score_(?<model>\w+)\.{USER}\.(?<gap>[^.]+)\.(?<naive>naive_)?(?<score>\w+)$"
     is_naive = pl.col("naive").is_not_null()
-    scores = (
-        months.variants.unpivot(pl.selectors.starts_with("score_"), index="seed")
+    return (
+        months.variants.unpivot(pl.selectors.starts_with("score_"), index=["home", "person"])
         .with_columns(pl.col("variable").str.extract_groups(pattern))
         .unnest("variable")
         .filter(pl.col("score").is_in(list(SCORES)) & pl.col("value").is_not_null())
         .filter(~is_naive | (pl.col("model") == NAIVE_SOURCE))
         .sort(is_naive, maintain_order=True)
         .with_columns(model=pl.when(is_naive).then(pl.lit(NAIVE_GUESS)).otherwise("model"))
-        .select("score", "seed", "model", "gap", "value")
+        .select("score", "home", "person", "model", "gap", "value")
     )
-    scores_of = scores.partition_by("score", as_dict=True)
-    means = {score: estimates(scores_of[score,], "model", "gap") for score in SCORES}
-    size = f"{counted(seeds, 'seed')} of {counted(days, 'day')}"
-    tables = [
-        table_of_means(f"{title}; {size}", means[score], (*GAPS, ALL))
-        for score, title in SCORES.items()
-    ]
-    rows = {score: frame.to_dicts() for score, frame in means.items()}
-    numbers = {"seeds": seeds, "days": days, "means": rows, "scores": scores.to_dicts()}
-    return Result(RTP_GAP, months.meta.description, tables, numbers, (months.meta.notes,))
 
 
 NAIVE_ESTIMATOR = "sighting_share"
@@ -539,23 +614,31 @@ def draw_ltp_gap(numbers: Mapping[str, Any]) -> Figure:
     return figure
 
 
+HIGHEST_LOSS = 3.0  # of the figure [nats]: that of the naive guess leaves it
+
+
 def draw_rtp_gap(numbers: Mapping[str, Any]) -> Figure:
-    """Draw the share of right rooms by gap, with intervals."""
-    figure, axes = _figure()
-    rows = [row for row in numbers["means"]["top_1"] if row["gap"] in DRAWN_GAPS]
-    models = pl.DataFrame(rows).partition_by("model", maintain_order=True)
-    gaps = list(dict.fromkeys(row["gap"] for row in rows))
-    for number, of in enumerate(models):
-        x = np.array([gaps.index(gap) for gap in of["gap"]]) + 0.08 * (
-            number - (len(models) - 1) / 2
-        )
-        mean, low, high = of.select("mean", "low", "high").to_numpy().T
-        is_told = of["doubt"].to_numpy() == ""
-        ends = np.where(is_told, (mean - low, high - mean), 0)
-        axes.errorbar(x, mean, ends, fmt="o-", color=COLORS[number], label=of["model"][0], ms=4)
-    axes.set_xticks(range(len(gaps)), gaps)
-    axes.set(xlabel="time since the user was last seen", ylabel="share of right rooms", ylim=(0, 1))
-    axes.legend(frameon=False, fontsize=8, title="model", title_fontsize=8)
+    """Draw the share of right rooms and the log loss by gap, with intervals."""
+    parts = numbers["means"]
+    figure = Figure(figsize=(11, 4.4 * len(parts)), dpi=DPI, layout="constrained")
+    grid = figure.subplots(len(parts), len(SCORES), squeeze=False)
+    for panels, (part, scores) in zip(grid, parts.items(), strict=True):
+        for axes, (score, title) in zip(panels, SCORES.items(), strict=True):
+            rows = pl.DataFrame(scores[score]).filter(pl.col("gap").is_in(DRAWN_GAPS))
+            models = rows.partition_by("model", as_dict=True, maintain_order=True)
+            for number, ((model,), own) in enumerate(models.items()):
+                mean, low, high = own.select("mean", "low", "high").to_numpy().T
+                x = [DRAWN_GAPS.index(gap) + 0.07 * (number - 3) for gap in own["gap"]]
+                ends = np.nan_to_num((mean - low, high - mean))
+                axes.errorbar(
+                    x, mean, ends, marker="o", ms=4, lw=1.2, label=_words(model),
+                    color=DARK if model == NAIVE_GUESS else COLORS[number],
+                )  # fmt: skip
+            axes.set_xticks(range(len(DRAWN_GAPS)), DRAWN_GAPS, fontsize=8)
+            axes.set(title=part, ylabel=title, xlabel="time since the user was last seen")
+            axes.set_ylim(0, 1 if score == "top_1" else HIGHEST_LOSS)
+            axes.spines[["top", "right"]].set_visible(False)
+    grid[0, 0].legend(frameon=False, fontsize=8)
     return figure
 
 
@@ -615,11 +698,15 @@ def reproduce(
         Path | None,
         typer.Option("--map", help="A real home, for speed: a ROS map's YAML file, or a vacuum's."),
     ] = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(help="The folder of real people's logs, for rtp-gap: see LOGS in this file."),
+    ] = None,
 ) -> None:
     """Repeat the measurements of the paper, and print them beside its figures."""
     for name in results or ():
         check_known(name, "result", MEASURES, InputError)
-    options = PaperOptions(quick, seeds, days, workers or cores(), real_map, out / "studies")
+    options = PaperOptions(quick, seeds, days, workers or cores(), real_map, logs, out / "studies")
     with os_errors_as(InputError, f"{out} can't be created", "; name another directory by --out"):
         out.mkdir(parents=True, exist_ok=True)  # an error is shown before hours of work
     width = None if sys.stdout.isatty() else WIDTH

@@ -1,5 +1,6 @@
 """A whole experiment: resumable cell by cell, the same for any number of workers, and told in the end."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ import pytest
 import yaml
 from tests.learning.transfer.homes import write_home
 from tests.scenes import Cli
+from tests.thorough import THOROUGH
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.learning.transfer import driver
@@ -113,3 +115,33 @@ def test_the_command_prints_sentences_and_writes_a_table_and_a_figure_for_each_t
         assert f"]({picture})" in page
         assert (Path(made.location) / picture).stat().st_size > 10_000
     assert page.count("| usual | 3 | fitted | 2 |") == 2
+
+
+@pytest.fixture
+def examples(tmp_path: Path, shared_data: Path) -> Path:
+    """The examples beside the logs that they name."""
+    folder = shutil.copytree(
+        Path(__file__).parents[3] / "examples" / "transfer", tmp_path / "examples"
+    )
+    shutil.copytree(shared_data / "activity", folder / "logs")
+    return folder
+
+
+@pytest.mark.parametrize("name", ["real_homes", "presence"])
+def test_an_example_can_be_trained_and_scored(examples: Path, fleet2d: Cli, name: str) -> None:
+    code, out, err = fleet2d("transfer", examples / f"{name}.yaml", "--dry-run")
+    assert 0 == code, err
+    assert int(out.split()[0]) > 50
+
+
+@pytest.mark.skipif(not THOROUGH, reason="a minute of simulation and training")
+def test_the_small_example_tells_its_result_of_real_homes(examples: Path, fleet2d: Cli) -> None:
+    pytest.importorskip("sklearn", reason="needs the extra transfer")
+    code, out, _ = fleet2d("transfer", examples / "small.yaml", "--out", examples / "small")
+    assert 0 == code
+    *sentences, last = out.splitlines()
+    assert last.startswith("44 of 44 cells, 0 left out")
+    assert ["room in 60 min", "presence"] == list(
+        dict.fromkeys(s.partition(",")[0] for s in sentences)
+    )
+    assert (examples / "small" / "presence.png").exists()

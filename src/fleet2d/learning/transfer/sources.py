@@ -121,10 +121,12 @@ class Sources:
             start = known_midnight(home.log).isoformat()
             days = home.log.days
             keys = home.settings.model_dump(
-                include={"path", "format", "id", "time_zone", "sort", "rooms"},
-                exclude_defaults=True, mode="json",
-            )  # fmt: skip
-            people = [{"type": "replay", **keys}]
+                include={"path", "format", "id", "time_zone", "sort"},
+                exclude_defaults=True,
+                mode="json",
+            )
+            rooms = {label: kind or None for label, kind in home.settings.rooms.items()}
+            people = [{"type": "replay", **keys, "rooms": rooms}]
         else:
             home_name, _, count = rest.rpartition("-")
             people = [self._derived(kind, name, self.homes[home_name], int(count))]
