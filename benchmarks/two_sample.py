@@ -115,8 +115,8 @@ def fitted_days(path: Path, name: str, seed: int) -> Iterator[tuple[Days, Days]]
     lived = find_days(timeline)
     real, numbers = describe(traces_of_log(path)[0])
     for half in (0, 1):
-        fitted = fit_persona(timeline, lived[half::2])
-        held = np.isin(numbers, [day.number for day in lived[1 - half :: 2]])
+        fitted = fit_persona(timeline, [day for day in lived if day.number % 2 == half])
+        held = numbers % 2 != half
         count = int(np.count_nonzero(held))
         features, made = describe(traces_of_persona(fitted.document, count, seed + half)[0])
         yield Days(real[held], name, numbers[held]), Days(features, name, made + 1000 * half)

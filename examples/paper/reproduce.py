@@ -52,7 +52,7 @@ from fleet2d.viewing.pictures.floorplan import drawing_style, write_picture
 USER = "ana"  # in all studies
 PAPER_COLUMN = "the paper's"  # heading of the column of the paper's own figures
 SPEED, LTP_GAP, RTP_GAP, FEEDBACK = RESULTS = ("speed", "ltp-gap", "rtp-gap", "feedback")
-SIZES = {SPEED: (3, 30), LTP_GAP: (100, 30), RTP_GAP: (10, 30), FEEDBACK: (30, 30)}
+SIZES = {SPEED: (3, 30), LTP_GAP: (100, 30), RTP_GAP: (10, 14), FEEDBACK: (30, 30)}
 """The number of months of each kind (homes of rtp-gap) and their days, by result."""
 QUICK_SIZES = {SPEED: (1, 2), LTP_GAP: (4, 3), RTP_GAP: (2, 3), FEEDBACK: (2, 3)}
 

@@ -189,7 +189,10 @@ def run_transfer(
             for cell in [plan.cells[row["index"]]]
         ]
         sources = Sources(plan, folder)
-        sources.make(sources.names([task.cell for task in tasks]), crew)
+        unfit = sources.make(sources.names([task.cell for task in tasks]), crew)
+        for words in unfit.values():
+            observer.on_note(f"left out, with the cells that learn from it: {words}")
+        tasks = [task for task in tasks if unfit.keys().isdisjoint(sources.needed(task.cell))]
         observer.on_start(Counts(len(frame), len(frame) - len(missing), 0), crew.workers)
         queue = TaskQueue(by_home(tasks))
         job = CellJob(sources)

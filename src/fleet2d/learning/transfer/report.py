@@ -1,13 +1,17 @@
 """What a transfer experiment says: a table and a figure for each task, and a few sentences."""
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fleet2d.learning.transfer.driver import DAYS_TABLE
 from fleet2d.learning.transfer.specification import ARMS
+from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.storage.files import write_atomically
-from fleet2d.studies.intervals import estimate
+from fleet2d.studies.intervals import student_quantile
 from fleet2d.studies.reader import Study
 from fleet2d.viewing.pictures.floorplan import write_picture
 
@@ -28,44 +32,52 @@ def headline(task: str) -> str:
 def compared(study: Study, task: str, against: str) -> "pl.DataFrame":
     """Return the paired comparison of the arms of a task with one, by learner and number of days.
 
-    Its intervals hold over homes. `clear_homes` has the homes in which the difference is clear by
-    the days of that home alone, better before worse, as `2 + 1`.
+    Its intervals `low` to `high` hold over homes, of which there are few. `difference_by_day`, with
+    `low_by_day` and `high_by_day`, is the difference in log loss in these homes over their days.
     """
     import polars as pl
 
     metric = headline(task)
     table = study.paired(metric, {"arm": against}, by=("home",), within=("task", "learner", "days"))
     table = table.filter(task=task)
-    by_home = {
-        key: _clear(study, task, against, *key)
-        for key in table.select("arm", "learner", "days").rows()
-    }
-    better = [_text(by_home[key]) for key in table.select("arm", "learner", "days").rows()]
-    return table.with_columns(pl.Series("clear_homes", better, pl.String))
-
-
-def _text(clear: tuple[int, int]) -> str:
-    return f"{clear[0]} / {clear[1]}"
-
-
-def _clear(
-    study: Study, task: str, against: str, arm: str, learner: str, days: int
-) -> tuple[int, int]:
-    """Return in how many homes an arm has a clearly lower, or higher, log loss by their days."""
-    import polars as pl
-
-    rows = study.polars(DAYS_TABLE).filter(
-        (pl.col("task") == task) & (pl.col("learner") == learner) & (pl.col("days") == days)
+    scores = study.polars(DAYS_TABLE).filter(pl.col("task") == task).collect()
+    keys = ["home", "learner", "days", "day"]
+    pairs = scores.join(scores.filter(arm=against), on=keys, suffix="_of")
+    pairs = pairs.with_columns(less=pl.col("log_loss") - pl.col("log_loss_of"))
+    found = [
+        over_days([home["less"].to_list() for home in rows.partition_by("home")])
+        for arm, learner, days in table.select("arm", "learner", "days").iter_rows()
+        for rows in [pairs.filter(arm=arm, learner=learner, days=days)]
+    ]
+    columns = zip(*found, strict=True)
+    names = ("difference_by_day", "low_by_day", "high_by_day")
+    return table.with_columns(
+        pl.Series(name, values) for name, values in zip(names, columns, strict=True)
     )
-    frame = rows.collect()
-    both = frame.filter(arm=arm).join(frame.filter(arm=against), on=["home", "day"], suffix="_of")
-    better = worse = 0
-    for part in both.partition_by("home"):
-        difference = part["log_loss"] - part["log_loss_of"]
-        found = estimate(difference.to_list(), {"day": part["day"].to_list()})
-        better += found.high < 0
-        worse += found.low > 0
-    return better, worse
+
+
+def over_days(homes: Sequence[Sequence[float]]) -> tuple[float, float, float]:
+    """Return the mean over homes of their mean differences, and its 95 % interval over days.
+
+    The homes are given, their days are a sample: the variances of the means of the homes add up,
+    with the degrees of freedom of Satterthwaite.
+
+    Example:
+        >>> [round(value, 2) for value in over_days([[0.1, 0.2, 0.3], [0.3, 0.5, 0.4]])]
+        [0.3, 0.19, 0.41]
+    """
+    means = [sum_in_order(values) / len(values) for values in homes]
+    mean = sum_in_order(means) / len(means)
+    if min(map(len, homes)) < 2:  # one day tells nothing of others
+        return mean, math.nan, math.nan
+    squares = [float(np.var(v, ddof=1)) / len(v) / len(homes) ** 2 for v in homes]
+    variance = sum_in_order(squares)
+    if not variance:
+        return mean, mean, mean
+    parts = zip(squares, homes, strict=True)
+    freedom = variance**2 / sum_in_order(square**2 / (len(v) - 1) for square, v in parts)
+    reach = student_quantile(freedom) * math.sqrt(variance)
+    return mean, mean - reach, mean + reach
 
 
 def write_report(study: Study, folder: Path) -> list[str]:
@@ -98,14 +110,15 @@ def table(study: Study, task: str) -> list[str]:
     means = study.summary(metric, ["task", "learner", "days", "arm"]).filter(task=task)
     pairs = compared(study, task, REFERENCE) if _has(study, task, REFERENCE) else None
     head = ["learner", "own days", "arm", "homes", metric.replace("_", " ")]
-    head += [f"difference to {REFERENCE} (95 % over homes)", "homes clearly better / worse by days"]
+    head += [f"difference to {REFERENCE} (95 % over homes)", "better in"]
+    head += ["difference in log loss (95 % over the days of these homes)"]
     lines = [f"| {' | '.join(head)} |", "| " + " | ".join(["---"] * len(head)) + " |"]
     for row in means.sort("learner", "days", descending=[True, False]).to_dicts():
         cells = [row["learner"], row["days"], row["arm"], row["variants"], f"{row['mean']:.3f}"]
         pair: list[Any] = []
         if pairs is not None and row["arm"] != REFERENCE:
             pair = pairs.filter(arm=row["arm"], learner=row["learner"], days=row["days"]).to_dicts()
-        cells += [_difference(pair[0]), pair[0]["clear_homes"]] if pair else ["", ""]
+        cells += _compared_cells(pair[0], task) if pair else [""] * 3
         lines.append(f"| {' | '.join(map(str, cells))} |")
     return lines
 
@@ -114,8 +127,20 @@ def _has(study: Study, task: str, arm: str) -> bool:
     return bool(len(study.complete.filter(task=task, arm=arm)))
 
 
-def _difference(row: dict[str, Any]) -> str:
-    return f"{row['difference']:+.3f} ({row['low']:+.3f} to {row['high']:+.3f})"
+def _compared_cells(row: dict[str, Any], task: str) -> list[str]:
+    by_day = [row[f"{name}_by_day"] for name in ("difference", "low", "high")]
+    better = f"{_better(row, task)} of {row['pairs']}"
+    return [interval(row["difference"], row["low"], row["high"]), better, interval(*by_day)]
+
+
+def interval(mean: float, low: float, high: float) -> str:
+    """Return a difference with its interval as text."""
+    return f"{mean:+.3f} ({low:+.3f} to {high:+.3f})"
+
+
+def _better(row: dict[str, Any], task: str) -> int:
+    """Return in how many homes an arm is better than the reference."""
+    return int(row["above"] if headline(task) == "macro_f1" else row["below"])
 
 
 def sentences_of(study: Study, task: str) -> list[str]:
@@ -134,11 +159,11 @@ def _sentence(task: str, against: str, arm: str, rows: list[dict[str, Any]]) -> 
     metric = headline(task).replace("_", " ")
     parts = []
     for row in (rows[0], rows[-1]) if len(rows) > 1 else rows:
-        homes = row["pairs"]
-        good = row["above"] if metric == "macro f1" else row["below"]
+        by_day = [row[f"{name}_by_day"] for name in ("difference", "low", "high")]
         parts.append(
-            f"with {row['days']} own days {row['mean']:.3f} instead of {row['reference']:.3f}"
-            f" (difference {_difference(row)}; better in {good} of {homes} homes)"
+            f"with {row['days']} own days {row['mean']:.3f} instead of {row['reference']:.3f},"
+            f" better in {_better(row, task)} of {row['pairs']} homes (log loss over their days"
+            f" {interval(*by_day)})"
         )
     return f"{task}, {metric}: {ARMS[arm]}, beside {ARMS[against]}: {'; '.join(parts)}."
 

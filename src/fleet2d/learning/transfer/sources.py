@@ -85,26 +85,32 @@ class Sources:
             if cell.arm in ("markov", "copied"):
                 yield f"{cell.arm}-{cell.home}-{cell.days}"
 
-    def make(self, names: list[str], crew: Crew) -> None:
+    def make(self, names: list[str], crew: Crew) -> dict[str, str]:
         """Simulate the data sets that are lacking; all are checked before the first run.
+
+        Returns:
+            Why a data set can't be made at all, by its name, where `skip` allows that.
 
         Raises:
             ScenarioError: People don't fit into homes, and `skip` is left out.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         contents = {name: self._content(name) for name in names}
-        problems = []
+        problems = {}
         for name, content in contents.items():
             try:
                 check_dataset(
                     content, self.folder / name, workers=crew.workers, executor=crew.executor
                 )
             except ScenarioError as error:
-                problems.append(f"{name}: {error}")
-        if problems:
-            raise ScenarioError("\n".join(problems))
+                problems[name] = f"{name}: {error}"
+        if problems and self.file.skip is None:
+            raise ScenarioError("\n".join(problems.values()))
         for name, content in contents.items():
+            if name in problems:
+                continue
             dataset(content, self.folder / name, workers=crew.workers, executor=crew.executor)
+        return problems
 
     def _content(self, name: str) -> dict[str, Any]:
         """Return the file of a data set."""

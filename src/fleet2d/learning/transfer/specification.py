@@ -19,7 +19,6 @@ from fleet2d.learning.transfer.traces import (
     OTHER,
     OUT,
     MinuteTrace,
-    known_midnight,
     trace_of_log,
 )
 from fleet2d.logs.layout import Layout, read_log
@@ -286,8 +285,3 @@ def _unfitted(home: Home, days: list[int]) -> dict[int, str]:
             except LogError as error:
                 reasons[count] = str(error)
     return reasons
-
-
-def first_day(home: Home) -> str:
-    """Return the date of the first day of a home's log, for a run."""
-    return known_midnight(home.log).isoformat()

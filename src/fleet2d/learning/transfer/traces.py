@@ -10,13 +10,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from fleet2d.kernels import I16, I64, Bool
+from fleet2d.kernels import I16, I64
 from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.tasks import labels_by_person
 from fleet2d.learning.fit.timeline import ActivityPlace, by_minute, kinds_of, read_seconds
 from fleet2d.logs.log import AWAY, ActivityLog
 from fleet2d.logs.placement import DOOR
-from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
+from fleet2d.runtime.clock import DAY_MINUTES
 
 KINDS = (AWAY, "bathroom", "bedroom", "kitchen", "living_room", "other", "entry")
 """The kinds of rooms that all homes are compared in; `entry` is that of sensors only."""
@@ -67,11 +67,11 @@ class MinuteTrace:
 
     def joined(self, days: Sequence[int] | I64) -> Self:
         """Return some of its days as a trace of their own, one after the other."""
-        parts = [
+        rooms, sensors, activities = (
             labels.reshape(-1, DAY_MINUTES)[days].ravel()
             for labels in (self.rooms, self.sensors, self.activities)
-        ]
-        return self.of(*parts, (self.weekday + int(days[0])) % 7)
+        )
+        return self.of(rooms, sensors, activities, (self.weekday + int(days[0])) % 7)
 
 
 def class_of(activity: str) -> str:
@@ -187,31 +187,22 @@ def markov(trace: MinuteTrace, days: Any, count: int, seed: int) -> MinuteTrace:
     for k, draw in enumerate(np.random.default_rng(seed).random(len(path)).tolist()):
         path[k] = at
         at = min(int(limits[at].searchsorted(draw, "right")), len(limits) - 1)
-    return MinuteTrace.of(*states[:, path].astype(np.int16), trace.weekday)
+    rooms, sensors, activities = states[:, path].astype(np.int16)
+    return MinuteTrace.of(rooms, sensors, activities, trace.weekday)
 
 
 def write_log(trace: MinuteTrace, first_day: date, path: Path) -> None:
-    """Write the rooms of a trace as a log that can be replayed: a line a minute, but no repeats."""
+    """Write the rooms of a trace, but those of no known kind, as a log that can be replayed."""
     moment = datetime.combine(first_day, datetime.min.time())
     lines = []
     for minute, code in enumerate(trace.rooms.tolist()):
-        if code >= 0:
+        if code not in (UNKNOWN, OTHER):
             room = "Away" if code == OUT else KINDS[code]
             at = moment + timedelta(minutes=minute)
             lines.append(f"{at} {room} {room} ON")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def in_days(day: I64, chosen: I64) -> Bool:
-    """Return which of some day numbers are among the chosen ones."""
-    return np.isin(day, chosen)
-
-
 def known_midnight(log: ActivityLog) -> date:
     """Return the date of the first day of a log; a Monday if it has none."""
     return log.first_day or date(2026, 1, 5)
-
-
-def days_of(log: ActivityLog) -> int:
-    """Return the number of days of a log."""
-    return max(reading.end_us for reading in log.readings) // DAY_US + 1
