@@ -171,15 +171,16 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> None:
-    """Up to five minutes nobody; up to a quarter of an hour some, by 0.02."""
+    """In the first minute nobody, of people simulated or real; up to a quarter of an hour some, by 0.03."""
     text = text_of("paper")
-    table = text[text.index("| routine | 0.9") :].split("\n\n")[0]
-    rows = {row.split("|")[1].strip(): row.split("|")[2:5] for row in table.splitlines()}
-    naive = [float(cell) for cell in rows.pop("naive")]
-    best = [max(float(row[i]) for row in rows.values()) for i in range(3)]
-    assert best[0] < naive[0]
-    assert best[1] < naive[1]
-    assert 0 < best[2] - naive[2] < 0.025
+    tables = [part.split("\n\n")[0] for part in re.split(r"(?=\| learned \| 0\.9)", text)[1:]]
+    assert 2 == len(tables)
+    for table in tables:
+        rows = {row.split("|")[1].strip(): row.split("|")[2:5] for row in table.splitlines()}
+        naive = [float(cell) for cell in rows.pop("naive")]
+        best = [max(float(row[i]) for row in rows.values()) for i in range(3)]
+        assert best[0] < naive[0]
+        assert all(0 < round(best[i] - naive[i], 2) <= 0.03 for i in (1, 2))
 
 
 def test_concepts_deny_nothing_that_there_is() -> None:

@@ -8,6 +8,7 @@ feedback loop are studies, whose files stand beside this one. It needs the extra
 """
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -44,6 +45,7 @@ from fleet2d.studies.answers import group_means
 from fleet2d.studies.api import ExecutorName, study
 from fleet2d.studies.executors import cores
 from fleet2d.studies.figures import COLORS, DARK
+from fleet2d.studies.intervals import UNLIMITED, Limits
 from fleet2d.studies.progress import progress_bar
 from fleet2d.studies.reader import Study
 from fleet2d.viewing.film import draw_frames, stage_of
@@ -175,7 +177,13 @@ def run_months(name: str, options: PaperOptions, content: Mapping[str, Any] | No
     return months
 
 
-def estimates(rows: pl.DataFrame, row: str, column: str, by: Sequence[str] = ()) -> pl.DataFrame:
+def estimates(
+    rows: pl.DataFrame,
+    row: str,
+    column: str,
+    by: Sequence[str] = (),
+    limits: Limits = UNLIMITED,
+) -> pl.DataFrame:
     """Return the mean of `value` with its 95 % interval by two columns of a frame, in its order.
 
     Args:
@@ -183,11 +191,12 @@ def estimates(rows: pl.DataFrame, row: str, column: str, by: Sequence[str] = ())
         row: A column.
         column: Another one.
         by: Columns of the units over which intervals hold; none: each value is one.
+        limits: The least and the largest value that there can be.
 
     Returns:
         A frame with the two columns, `mean`, `low`, `high`, and `doubt`, why there is no interval.
     """
-    means = group_means(rows, "value", (row, column), by)
+    means = group_means(rows, "value", (row, column), by, limits)
     return means.select(row, column, "mean", "low", "high", "doubt")
 
 
@@ -299,7 +308,8 @@ def rtp_gap(options: PaperOptions) -> Result:
         means[part] = {}
         for score, title in SCORES.items():
             rows = scores.filter(score=score)
-            found = estimates(rows, "model", "gap", ("home", "person"))
+            limits = (0.0, 1.0 if score == "top_1" else math.inf)
+            found = estimates(rows, "model", "gap", ("home", "person"), limits)
             tables.append(table_of_means(f"{title}; {size}", found, (*GAPS, ALL), text))
             means[part][score] = found.to_dicts()
     numbers = {
