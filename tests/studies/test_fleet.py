@@ -131,6 +131,12 @@ def test_one_home_is_a_fleet_whose_answer_says_so(tmp_path: Path) -> None:
     assert (None, None, "1 robots are too few") == (median["low"], median["high"], median["doubt"])
 
 
+def test_a_fleet_alone_compares_nothing_not_even_its_seeds(tmp_path: Path) -> None:
+    _, study = run(fleet(2), tmp_path / "fleet")
+    assert "There is nothing to compare: the table has the means." in study.answer.sentences
+    assert {"p1", "p99"} <= {*study.answer.table[0]}
+
+
 def test_a_study_without_a_fleet_has_no_robots_to_rank(tmp_path: Path) -> None:
     from tests.studies.scenes import small
 

@@ -102,7 +102,7 @@ class Meta(BaseModel):
         tags: Words to find the study by.
         notes: Remarks of its author, and how many lives of a population are left out.
         fleet: The column with the numbers of the lives of a population; empty without one.
-        features: The columns of what was drawn for each life.
+        features: The columns of what was drawn for each life, its seed the last.
         rollout: The rollout, as `Rollout` takes it; None without one.
     """
 

@@ -48,7 +48,7 @@ from fleet2d.studies.results import (
     results_frame,
 )
 from fleet2d.studies.simulator import VariantOutcome, describe_error, execute, is_kept
-from fleet2d.studies.specification import Specification, read_specification
+from fleet2d.studies.specification import SEED, Specification, read_specification
 from fleet2d.studies.storage import Storage
 
 if TYPE_CHECKING:
@@ -341,10 +341,10 @@ def result_of_end(end: TaskEnd) -> VariantResult:
 
 
 def _features(checked: CheckedStudy) -> tuple[str, ...]:
-    """Return the columns of what was drawn for each life of a population."""
+    """Return the columns of what was drawn for each life of a population, its seed the last."""
     fleet = checked.specification.file.fleet
-    axes = (axis for axis in checked.plan.design.axes if axis.name == fleet)
-    return tuple(column for axis in axes for column in axis.columns[1:])
+    columns = [axis.columns[1:] for axis in checked.plan.design.axes if axis.name == fleet]
+    return (*columns[0], SEED) if columns else ()
 
 
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:

@@ -34,8 +34,9 @@ FEWEST = 4 * ENOUGH_UNITS  # robots: two groups in each half of the homes
 
 def features_of(study: StudyAnswers) -> list[str]:
     """Return the columns of what was drawn for each robot, that differ."""
-    varying = [c for c in study.meta.features if study.complete[c].drop_nulls().n_unique() > 1]
-    return [c for c in varying if c not in study.populations]
+    *drawn, seed = study.meta.features
+    varying = [c for c in drawn if study.complete[c].drop_nulls().n_unique() > 1]
+    return [c for c in varying if c not in (*study.populations, seed)]
 
 
 def by_robot(
