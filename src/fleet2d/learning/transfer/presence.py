@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fleet2d.algorithms.presence.learned import TRUSTS
 from fleet2d.kernels import I64
 from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, predict, train
 from fleet2d.learning.datasets.windows import PRIOR, Windows
@@ -14,7 +15,7 @@ from fleet2d.learning.transfer.specification import Cell
 from fleet2d.metrics.rtp_score import log_loss, top_k
 from fleet2d.runtime.clock import DAY_S
 
-SETTINGS = TrainingSettings(hidden=16, epochs=6, trust=1.0)
+SETTINGS = TrainingSettings(hidden=16, epochs=6, trust=(1.0,) * TRUSTS)
 OWN_REPEATS = 3  # of a home's own windows among others
 
 

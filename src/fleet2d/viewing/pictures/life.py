@@ -42,7 +42,7 @@ HATCH_COLOR = "#cfd2d6"
 class Chip(NamedTuple):
     """An entry of a legend: a small picture and its label."""
 
-    kind: Literal["room", "away", "seen", "spot", "way", "ring", "view"]
+    kind: Literal["room", "away", "area", "seen", "spot", "way", "ring", "view"]
     color: Any
     label: str
 
