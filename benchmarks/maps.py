@@ -390,14 +390,8 @@ SAME_PLACE = {
     "viomi": ("viomi_v6_41_no_path", "viomi_v7_47_cleaned_segment_ids"),
 }
 """Maps of one place, which are left out together."""
-LIMITS = tuple(
-    Limits(*chosen)
-    for chosen in product(
-        (0.6, 0.65, 0.7, 0.75, 0.8),
-        (0.0, 0.25, 0.3, 0.35, 0.4),
-        (1.2, 2.5, 4.0, 6.0),
-    )
-)
+NECKS = (0.6, 0.65, 0.7, 0.75, 0.8)
+MOUTHS = (0.0, 0.25, 0.3, 0.35, 0.4)
 WALLS = {IN_STRAIGHT_WALLS: "straight walls", IN_RAGGED_WALLS: "ragged walls", OF_VACUUMS: "vacuum"}
 Scored = dict[Limits, dict[str, float]]
 
@@ -417,14 +411,15 @@ def scores_by_limits(captured: Captured) -> tuple[str, Scored]:
     rooms, cell, own = divide.call_args.args
     hill, hills = find_hills(rooms, cell)
     pixels = np.append(hill, -1)[captured.cells].astype(np.int64)
-    return WALLS[own], dict(by_limits(hills, cell, *overlap(pixels, captured.truth)))
+    return WALLS[own], dict(by_limits(hills, cell, own.least_m2, *overlap(pixels, captured.truth)))
 
 
 def by_limits(
-    hills: Hills, cell: float, common: Labels, of_hill: Labels, of_truth: Labels
+    hills: Hills, cell: float, least_m2: float, common: Labels, of_hill: Labels, of_truth: Labels
 ) -> Iterator[tuple[Limits, dict[str, float]]]:
     """Yield the scores of the rooms that hills make, by limits; see `overlap`."""
-    for limits in LIMITS:
+    for neck, mouth in product(NECKS, MOUTHS):
+        limits = Limits(neck, mouth, least_m2)
         part = join_hills(deepcopy(hills), cell, limits)[: len(of_hill)]
         _, part = np.unique(part, return_inverse=True)
         joined = np.zeros((int(part.max()) + 1, len(of_truth)))
