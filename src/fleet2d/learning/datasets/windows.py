@@ -67,8 +67,8 @@ class Windows(NamedTuple):
         """Minutes since the newest sighting, 2,880 for longer ago, or never: float64 (windows,)."""
         return np.expm1(self.features[:, -1, GAP].astype(np.float64)).round(1)
 
-    def rows(self, own: Bool) -> "Windows":
-        """Return some of the windows: bool (windows,)."""
+    def rows(self, own: Bool | slice) -> "Windows":
+        """Return some of the windows: a mask, bool (windows,), or a slice."""
         return self._replace(
             features=self.features[own],
             truth=self.truth[own],

@@ -1,7 +1,6 @@
 """Real-time presence: networks trained on windows of simulated robots, scored on replayed logs."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -19,25 +18,15 @@ SETTINGS = TrainingSettings(hidden=16, epochs=6, trust=(1.0,) * TRUSTS)
 OWN_REPEATS = 3  # of a home's own windows among others
 
 
-def chosen(part: Windows, which: Any) -> Windows:
-    """Return some windows of a person: a mask, or a slice."""
-    return part._replace(
-        features=part.features[which],
-        truth=part.truth[which],
-        step=part.step[which],
-        beliefs={name: belief[which] for name, belief in part.beliefs.items()},
-    )
-
-
 def of_days(parts: Sequence[Windows], days: I64) -> list[Windows]:
     """Return the windows of some days of a log whose replay began at midnight, in steps of 1 s."""
-    return [chosen(part, np.isin(part.step // DAY_S, days)) for part in parts]
+    return [part.rows(np.isin(part.step // DAY_S, days)) for part in parts]
 
 
 def thinned(parts: Sequence[Windows], rows: int) -> list[Windows]:
     """Return every n-th window, so that they are about so many."""
     every = max(1, -(-sum(len(part.truth) for part in parts) // rows))
-    return [chosen(part, slice(None, None, every)) for part in parts]
+    return [part.rows(slice(None, None, every)) for part in parts]
 
 
 def presence_forecast(sources: Sources, cell: Cell) -> Forecast:
