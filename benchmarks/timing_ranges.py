@@ -297,7 +297,7 @@ def values_of(numbers: F64, lives: int) -> list[float]:
 
 def drop_out(people: int, days: int = 90) -> None:
     """Print when people of each kind disengage from one notification a day, beside the paper."""
-    daily = {"app": {"do": "offer", "at": ["11:00"], "within": "12 h", "worth": 1}}
+    daily = {"app": {"do": "offer", "at": ["11:00"], "within": "1 h", "worth": 1}}
     kinds = {"steady": 0.2418, "fading": 0.1913, "leaving": 0.5668}
     ends: dict[str, list[int]] = {}
     for kind, share in kinds.items():
