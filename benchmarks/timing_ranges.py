@@ -297,7 +297,7 @@ def values_of(numbers: F64, lives: int) -> list[float]:
 
 def drop_out(people: int, days: int = 90) -> None:
     """Print when people of each kind disengage from one notification a day, beside the paper."""
-    daily = {"app": {"do": "offer", "at": ["11:00"], "within": "1 h", "worth": 1}}
+    daily = {"app": {"do": "offer", "at": ["11:00"], "within": "12 h", "worth": 1}}
     kinds = {"steady": 0.2418, "fading": 0.1913, "leaving": 0.5668}
     ends: dict[str, list[int]] = {}
     for kind, share in kinds.items():
@@ -392,7 +392,7 @@ def main() -> None:
         most = [f"{NUMBERS[k].name} {index[k]:.2f}" for k in np.argsort(-index)[:4]]
         holds = f"{np.mean(differences[-1] > 0):4.0%}"
         print(f"  {one} > {other}: {holds}; {', '.join(most)} (held out: {explained:.2f})")
-    drop_out(600)
+    drop_out(200)
     if arguments.pictures:
         draw(differences, indices, arguments.pictures / "timing_ranges.png")
 
