@@ -25,7 +25,7 @@ from fleet2d.runtime.memory import free_memory_of_polars
 from fleet2d.studies.api import open_crew
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor, WorkerTask
-from fleet2d.studies.population import HomeFacts
+from fleet2d.studies.population import HomeFeatures
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import VariantResult, result_of
 from fleet2d.studies.simulator import VariantOutcome
@@ -48,7 +48,7 @@ class InstantExecutor(SerialExecutor):
         """Return a result for each task, or that its set-up has no problem."""
         content, tasks, *_ = args
         if b"FactsJob" in content:
-            facts = HomeFacts(7, 3, 120.0, frozenset({"bedroom"}))
+            facts = HomeFeatures(7, 3, 120.0, frozenset({"bedroom"}))
             return super().submit(lambda: [facts] * len(tasks))
         if b"StudyJob" not in content:
             return super().submit(lambda: [""] * len(tasks))

@@ -293,7 +293,7 @@ def test_show_draws_a_plan_and_says_where(fleet2d: Cli) -> None:
     assert Path("flat.png").read_bytes().startswith(PNG)
     assert (0, "home.svg\n") == fleet2d("show", flat_path(), "--out", "home.svg")[:2]
     drawn = Path("home.svg").read_text()
-    for word in ("<svg", "kitchen", "bedroom", "bathroom"):
+    for word in ("<svg", "Kitchen", "Bedroom", "Bathroom"):
         assert word in drawn
     assert 2 == len(list(Path().iterdir()))
 

@@ -151,7 +151,7 @@ PLAIN = (
     "run home.yaml --out plain", "validate home.yaml", "test home.yaml",
     "verify run", "verify run --again", "export run run.csv", "export run run.html", "components",
     "dataset make people.yaml --out plain-data --workers 1", "dataset score data",
-    "train rtp --on data --out weights.npz --epochs 1",
+    "dataset train --on data --out weights.npz --epochs 1",
     "live home.yaml --with udp://127.0.0.1:0 --speed 0",
 )  # fmt: skip
 

@@ -18,7 +18,7 @@ from fleet2d.testing.gate import (
     sign_test,
     tally,
 )
-from fleet2d.testing.suite import Outcome, SuiteTest, TrialKey, TrialReport
+from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 
 TEST = SuiteTest(Path("home.yaml"), seeds=tuple(range(20)))
 
@@ -29,7 +29,7 @@ def reports(failing: set[int], homes: int = 1, margin: float = 1.0) -> list[Tria
         TrialReport(
             TrialKey(TEST.name, f"{seed % homes}" if homes > 1 else "", seed),
             (
-                Outcome(
+                TrialOutcome(
                     "finds", seed not in failing, seed in failing, f"said {seed}",
                     -1.0 - seed if seed in failing else margin, "m", 3, ("REQ-1",),
                 ),

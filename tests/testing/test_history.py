@@ -8,19 +8,19 @@ from tests.scenes import Cli
 from tests.testing.test_cases import FAILS, HOLDS, written
 
 from fleet2d.errors import InputError
-from fleet2d.testing.history import History, PastTrials, plan
-from fleet2d.testing.suite import Outcome, TrialKey, TrialReport
+from fleet2d.testing.history import PastTrials, VerdictHistory, plan
+from fleet2d.testing.suite import TrialKey, TrialOutcome, TrialReport
 
 PRINTS = {"home.yaml": "f00"}
 
 
 def report(seed: int, *, fails: bool = False, wall_s: float = 1.0) -> TrialReport:
-    outcome = Outcome("still", not fails, fails, "it moved", 0.5, "m")
+    outcome = TrialOutcome("still", not fails, fails, "it moved", 0.5, "m")
     return TrialReport(TrialKey("home.yaml", "", seed), (outcome,), "", wall_s)
 
 
 def test_what_is_added_is_read_again_and_newer_trials_replace_older(tmp_path: Path) -> None:
-    history = History(tmp_path / "history.db")
+    history = VerdictHistory(tmp_path / "history.db")
     history.add("2.0", PRINTS, [report(1), report(2, fails=True)])
     history.add("2.1", PRINTS, [report(1)])
     history.add("2.0", PRINTS, [report(2)])
@@ -33,7 +33,7 @@ def test_what_is_added_is_read_again_and_newer_trials_replace_older(tmp_path: Pa
 
 
 def test_trials_of_a_test_that_has_changed_are_not_compared(tmp_path: Path) -> None:
-    history = History(tmp_path / "history.db")
+    history = VerdictHistory(tmp_path / "history.db")
     history.add("2.0", PRINTS, [report(1)])
 
     assert [] == history.reports("2.0", {"home.yaml": "other"})
@@ -51,13 +51,13 @@ def foreign(path: Path) -> None:
 
 
 def newer(path: Path) -> None:
-    History(path).add("2.0", PRINTS, [report(1)])
+    VerdictHistory(path).add("2.0", PRINTS, [report(1)])
     with sqlite3.connect(path) as file:
         file.execute("PRAGMA user_version = 7")
 
 
 def locked(path: Path) -> None:
-    History(path).add("2.0", PRINTS, [report(1)])
+    VerdictHistory(path).add("2.0", PRINTS, [report(1)])
     file = sqlite3.connect(path, check_same_thread=False)
     file.execute("BEGIN EXCLUSIVE")
     LOCKS.append(file)

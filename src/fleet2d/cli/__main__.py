@@ -34,7 +34,7 @@ GROUPS = {
     "Look": ("view", "show", "export"),
     "Test": ("test", "falsify", "verify"),
     "Experiment": ("study", "transfer"),
-    "Learn": ("fit", "dataset", "train"),
+    "Learn": ("fit", "dataset"),
     "Homes and files": ("validate", "convert", "components"),
 }
 """The commands below each heading of the help, the most used first; others are `INSTALLED`."""

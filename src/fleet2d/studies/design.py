@@ -25,7 +25,7 @@ from fleet2d.studies.axes import Choice, Label, key_path
 from fleet2d.studies.executors import Crew
 from fleet2d.studies.population import (
     MAX_SEED,
-    Lives,
+    FleetLives,
     PopulationAxis,
     find_lives,
     first_life,
@@ -167,7 +167,7 @@ class LifeChanges(Sequence[Document]):
         place: What messages name.
     """
 
-    lives: Lives
+    lives: FleetLives
     place: str
 
     def __len__(self) -> int:
@@ -228,7 +228,7 @@ class Design:
     @property
     def left_out(self) -> str:
         """How many lives of a population are left out, and why; empty without any."""
-        lives = (axis.choices for axis in self.axes if isinstance(axis.choices, Lives))
+        lives = (axis.choices for axis in self.axes if isinstance(axis.choices, FleetLives))
         return "".join(each.words for each in lives)
 
     @property
@@ -433,7 +433,7 @@ def _check_first_life(design: Design) -> None:
         design.scenario(index)
 
 
-def _with_lives(axis: AxisPlan, lives: Lives, rollout: Rollout | None) -> AxisPlan:
+def _with_lives(axis: AxisPlan, lives: FleetLives, rollout: Rollout | None) -> AxisPlan:
     """Return the axis of a population with its lives, and the stage of each in a rollout."""
     changes = axis.changes
     assert isinstance(changes, LifeChanges)

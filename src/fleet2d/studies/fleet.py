@@ -134,7 +134,7 @@ def worst(study: StudyAnswers, metric: str, share: float = WORST_SHARE) -> "pl.D
 
 
 @dataclass(frozen=True)
-class Condition:
+class GroupCondition:
     """A condition on a feature of a robot.
 
     Attributes:
@@ -179,7 +179,7 @@ class Group:
         high: Its upper end.
     """
 
-    conditions: tuple[Condition, ...]
+    conditions: tuple[GroupCondition, ...]
     robots: int
     estimate: MeanEstimate
     p: float
@@ -208,10 +208,10 @@ def find_groups(
     numbers = np.array([places[home] for home in homes], np.int64)
     finds = numbers % 2 == 0
     smallest = max(ENOUGH_UNITS, math.ceil(SMALLEST_SHARE * finds.sum()))
-    splits: list[tuple[tuple[Condition, ...], Condition, float]] = []
-    leaves: list[tuple[Condition, ...]] = []
+    splits: list[tuple[tuple[GroupCondition, ...], GroupCondition, float]] = []
+    leaves: list[tuple[GroupCondition, ...]] = []
 
-    def grow(path: tuple[Condition, ...], inside: Bool) -> None:
+    def grow(path: tuple[GroupCondition, ...], inside: Bool) -> None:
         split = None if len(path) == DEPTH else _best(values, columns, inside & finds, smallest)
         if split is None:
             leaves.append(path)
@@ -238,7 +238,9 @@ def find_groups(
     return groups
 
 
-def _pruned(path: tuple[Condition, ...], clear: Mapping[Any, float]) -> tuple[Condition, ...]:
+def _pruned(
+    path: tuple[GroupCondition, ...], clear: Mapping[Any, float]
+) -> tuple[GroupCondition, ...]:
     """Return the start of a path up to the first split that isn't clear."""
     for depth in range(len(path)):
         if path[:depth] not in clear:
@@ -248,9 +250,9 @@ def _pruned(path: tuple[Condition, ...], clear: Mapping[Any, float]) -> tuple[Co
 
 def _best(
     values: F64, columns: Mapping[str, Sequence[Any]], inside: Bool, smallest: int
-) -> Condition | None:
+) -> GroupCondition | None:
     """Return the condition that divides robots best: with the largest sum of squares between."""
-    best: tuple[float, Condition] | None = None
+    best: tuple[float, GroupCondition] | None = None
     own = values[inside]
     mean = own.mean() if len(own) else 0.0
     for condition in _candidates(columns, inside):
@@ -265,7 +267,7 @@ def _best(
     return best[1] if best else None
 
 
-def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[Condition]:
+def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[GroupCondition]:
     """Return all conditions that may divide robots, at most so many of each feature."""
     found = []
     for feature, values in columns.items():
@@ -274,9 +276,9 @@ def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[Cond
         if known and kinds <= {int, float}:
             shares = np.linspace(0, 1, CUTS + 2)[1:-1]
             cuts = np.unique(np.quantile(known, shares, method="inverted_cdf"))
-            found += [Condition(feature, cut.item(), True) for cut in cuts if cut < max(known)]
+            found += [GroupCondition(feature, cut.item(), True) for cut in cuts if cut < max(known)]
         else:
-            found += [Condition(feature, value, False) for value in dict.fromkeys(known)]
+            found += [GroupCondition(feature, value, False) for value in dict.fromkeys(known)]
     return found
 
 

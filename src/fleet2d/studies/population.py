@@ -108,7 +108,7 @@ def fulfils(value: Any, condition: Any) -> bool:
     return bool(value == condition)
 
 
-class HomeFacts(NamedTuple):
+class HomeFeatures(NamedTuple):
     """What conditions ask of a home.
 
     Attributes:
@@ -213,7 +213,7 @@ StudyAxis = Annotated[Axis, BeforeValidator(_study_axis)]
 
 
 @dataclass(frozen=True)
-class Life:
+class FleetLife:
     """A home with its people and settings.
 
     Attributes:
@@ -322,7 +322,7 @@ class Draw:
         self._key = int(stream_key(seed, path, "run"))
         self._home_key = int(stream_key(seed, path, HOME))
         self.homes = HomeList(settings.homes)
-        self.facts: dict[int, HomeFacts] = {}
+        self.facts: dict[int, HomeFeatures] = {}
         self._eligible: dict[tuple[int, int], list[int]] = {}
         self._varied = {name: axis.choices(name) for name, axis in vary.items()}
         self._rows, self._ends = _read_table(settings)
@@ -371,7 +371,7 @@ class Draw:
         key = stream_key(self._seed, "population", "rollout")
         return Draws(np.uint64(key), number).uniform()
 
-    def life(self, number: int) -> Life:
+    def life(self, number: int) -> FleetLife:
         """Draw a life; without a reason for another one, homes are taken in turn."""
         draws = Draws(np.uint64(self._key), number)
         place = -1
@@ -395,7 +395,7 @@ class Draw:
             home = self.homes[of_home.choice(self._fitting(place, needed))]
         else:
             home = self.homes[number % len(self.homes)]
-        return Life(number, _settled(home, row, needed, of_home), household, varied, row)
+        return FleetLife(number, _settled(home, row, needed, of_home), household, varied, row)
 
     def _fitting(self, row: int, needed: int) -> list[int]:
         """Return the places of homes that a row of the table and a household can have.
@@ -422,7 +422,7 @@ class Draw:
                 raise ScenarioError(f"{where}no home has {words}")
         return self._eligible[key]
 
-    def left_out(self, life: Life, facts: HomeFacts | None) -> str:
+    def left_out(self, life: FleetLife, facts: HomeFeatures | None) -> str:
         """Return the condition that a life doesn't meet, empty if it meets all.
 
         Args:
@@ -594,7 +594,7 @@ def bedrooms_needed(household: Any) -> int:
     return max(len(people) - children - len(couples) + math.ceil(children / 2), 1)
 
 
-def feature_labels(household: Any, facts: HomeFacts) -> dict[str, Label]:
+def feature_labels(household: Any, facts: HomeFeatures) -> dict[str, Label]:
     """Return the labels of the features of a life."""
     people = None if household is None else len(members_of(household))
     return {
@@ -615,7 +615,7 @@ class FactsJob:
 
     base: Document
 
-    def __call__(self, task: "HomeTask") -> HomeFacts | str:
+    def __call__(self, task: "HomeTask") -> HomeFeatures | str:
         """Return the facts of a home, or why it can't be built."""
         try:
             return facts_of(self.base, task.changes)
@@ -637,7 +637,7 @@ class HomeTask(WorkerTask):
 _FLOORPLAN: TypeAdapter[FloorPlanSource] = TypeAdapter(OneOf[FloorPlanSource])
 
 
-def facts_of(base: Document, changes: Sequence[tuple[tuple[str, ...], Any]]) -> HomeFacts:
+def facts_of(base: Document, changes: Sequence[tuple[tuple[str, ...], Any]]) -> HomeFeatures:
     """Build the home of a scenario with changes; return facts of it.
 
     Raises:
@@ -647,11 +647,11 @@ def facts_of(base: Document, changes: Sequence[tuple[tuple[str, ...], Any]]) -> 
     plan = _FLOORPLAN.validate_python(composed.data.get("floorplan") or {}).plan()
     kinds = frozenset(kind for room in plan.rooms for kind in (room.type, *room.labels))
     bedrooms = len(plan.rooms_of_type("bedroom"))
-    return HomeFacts(len(plan.rooms), bedrooms, round(plan.area_m2, 1), kinds)
+    return HomeFeatures(len(plan.rooms), bedrooms, round(plan.area_m2, 1), kinds)
 
 
 @dataclass
-class Lives(Sequence[Choice]):
+class FleetLives(Sequence[Choice]):
     """The lives of a population that meet its conditions, each drawn again when it is needed.
 
     Attributes:
@@ -699,7 +699,7 @@ def find_lives(
     base: Document,
     crew: Crew | None = None,
     on_progress: Callable[[int, int], None] = lambda *_: None,
-) -> Lives:
+) -> FleetLives:
     """Draw the lives of a population until there are as many as it asks for; build each home.
 
     Args:
@@ -721,13 +721,13 @@ def find_lives(
         AREA: np.array([each.area_m2 for each in facts], np.float64),
     }
     kept = np.array(numbers, np.int32)
-    return Lives(column, axis.draw, kept, features, finder.left_out)
+    return FleetLives(column, axis.draw, kept, features, finder.left_out)
 
 
-def first_life(axis: PopulationAxis, column: str) -> Lives:
+def first_life(axis: PopulationAxis, column: str) -> FleetLives:
     """Return the first life of a population, whose home isn't built yet."""
     features = {"rooms": np.zeros(1, np.int32), BEDROOMS: np.zeros(1, np.int32)}
-    return Lives(column, axis.draw, np.zeros(1, np.int32), {**features, AREA: np.zeros(1)})
+    return FleetLives(column, axis.draw, np.zeros(1, np.int32), {**features, AREA: np.zeros(1)})
 
 
 class LifeFinder:
@@ -750,14 +750,14 @@ class LifeFinder:
         self._base = base
         self._crew = crew or Crew(SerialExecutor())
         self._on_progress = on_progress
-        self._facts: dict[str, HomeFacts] = {}
+        self._facts: dict[str, HomeFeatures] = {}
         if draw.asks_homes:
             listed = draw.homes.listed
             changes = [draw.homes[place].changes for place in listed]
             self._build(changes, [f"home {draw.homes[place].words}" for place in listed])
             draw.facts = {p: self._facts[repr(c)] for p, c in zip(listed, changes, strict=True)}
 
-    def facts_of(self, number: int) -> HomeFacts:
+    def facts_of(self, number: int) -> HomeFeatures:
         """Return the facts of the home of a life that was found."""
         return self._facts[repr(_home_changes(self._draw.life(number)))]
 
@@ -787,7 +787,7 @@ class LifeFinder:
                     kept.append(life.number)
         return kept
 
-    def _is_left_out(self, life: Life, facts: HomeFacts | None) -> bool:
+    def _is_left_out(self, life: FleetLife, facts: HomeFeatures | None) -> bool:
         reason = self._draw.left_out(life, facts)
         if reason:
             self.left_out[reason] += 1
@@ -813,7 +813,7 @@ class LifeFinder:
                 self._on_progress(done, len(keys))
                 for end in ends:
                     key = keys[end.task.number]
-                    if isinstance(end.payload, HomeFacts):
+                    if isinstance(end.payload, HomeFeatures):
                         self._facts[key] = end.payload
                     else:
                         problems[end.task.number] = f"{new[key][1]}: {end.loss or end.payload}"
@@ -830,7 +830,7 @@ def left_out_words(name: str, left_out: Mapping[str, int]) -> str:
     return f"{name}: {sum(left_out.values()):,} left out: {reasons}" if left_out else ""
 
 
-def _home_changes(life: Life) -> tuple[tuple[tuple[str, ...], Any], ...]:
+def _home_changes(life: FleetLife) -> tuple[tuple[tuple[str, ...], Any], ...]:
     """Return the changes of a life that its home depends on."""
     return tuple((keys, value) for keys, value in life.changes if keys[0] == "floorplan")
 

@@ -32,7 +32,7 @@ DAY_S = 86_400
 
 
 @dataclass(frozen=True)
-class Look:
+class RolloutLook:
     """What is known of a metric at the end of a day.
 
     Attributes:
@@ -64,7 +64,7 @@ class Look:
 
 def looks_of(
     without: F64, treated: F64, begins: I64, level: float, days: Sequence[int]
-) -> list[Look]:
+) -> list[RolloutLook]:
     """Return what is known of a metric on each of some days.
 
     Args:
@@ -92,7 +92,7 @@ def looks_of(
                 low, high = two_sample_interval(sides[0], sides[1], level)
         with_it = len(own) > 0
         looks.append(
-            Look(
+            RolloutLook(
                 day + 1,
                 len(own),
                 len(others),
@@ -191,7 +191,7 @@ class RolloutAnswer:
         return without, np.where(np.isnan(treated), without, treated)
 
     @cached_property
-    def looks(self) -> dict[str, list[Look]]:
+    def looks(self) -> dict[str, list[RolloutLook]]:
         """What is known of each metric on each day."""
         level = 1 - (1 - LEVEL) / (len(self.days) * len(self.metrics))
         return {
@@ -200,7 +200,7 @@ class RolloutAnswer:
         }
 
     @cached_property
-    def stop(self) -> tuple[str, Look] | None:
+    def stop(self) -> tuple[str, RolloutLook] | None:
         """The guard that stops the rollout first, and what was known then; None if none does."""
         breaks = [
             (look.day, metric, look)
@@ -258,7 +258,7 @@ class RolloutAnswer:
             )
         return " ".join(parts)
 
-    def _known(self, look: Look) -> str:
+    def _known(self, look: RolloutLook) -> str:
         size = f"{number(abs(look.difference))} {_side(look.difference)}"
         if math.isnan(look.low):
             return f"{size} (how much in all robots can't be told from so few)"

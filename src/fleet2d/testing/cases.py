@@ -17,7 +17,7 @@ from fleet2d.options import Workers
 
 if TYPE_CHECKING:
     from fleet2d.testing.gate import Gate, Tally
-    from fleet2d.testing.history import History
+    from fleet2d.testing.history import VerdictHistory
     from fleet2d.testing.suite import Build, SuiteTest, TrialKey, TrialReport
 
 MAX_STORED = 5
@@ -132,7 +132,7 @@ class _Suite:
     show: bool
     builds: "list[Build]" = field(default_factory=list)
     against: str = ""
-    history: "History | None" = None
+    history: "VerdictHistory | None" = None
     requirements: dict[str, str] | None = None
     numbers: dict[str, list[int]] = field(default_factory=dict)
     keys: "dict[str, list[TrialKey]]" = field(default_factory=dict)
@@ -156,7 +156,7 @@ class _Suite:
             InputError: One of them is wrong.
         """
         from fleet2d.testing.gate import read_requirement_list
-        from fleet2d.testing.history import History, fingerprints_of
+        from fleet2d.testing.history import VerdictHistory, fingerprints_of
 
         if history is not None and build is None:
             raise InputError("--history: name the build whose verdicts are added: --build NAME")
@@ -165,7 +165,7 @@ class _Suite:
         self.keys = {test.name: test.keys() for test in self.tests}
         self.builds = [_build_of(build or "")]
         if history is not None:
-            self.history = History(history)
+            self.history = VerdictHistory(history)
             self.prints = fingerprints_of(self.tests)
         if against is not None:
             self._read_other(against)
@@ -244,15 +244,15 @@ class _Suite:
             folder: Where runs and pictures are stored.
             most: The largest number of trials of each expectation.
         """
-        from fleet2d.testing.suite import TrialJob, TrialTask, run_name
+        from fleet2d.testing.suite import SuiteJob, SuiteTask, run_name
 
-        job = TrialJob(tuple(self.tests), tuple(self.builds))
+        job = SuiteJob(tuple(self.tests), tuple(self.builds))
         failing = [each for each in [*gate.blocking, *gate.known] if each.outcomes]
         for each, key in [(t, k) for t in failing for k in _to_see(gate, t)[:most]]:
             if key in self.files:
                 continue
             test = next(n for n, test in enumerate(self.tests) if test.name == each.test)
-            task = TrialTask(0, 0, "", "", key, test, 0, self.keys[each.test].index(key))
+            task = SuiteTask(0, 0, "", "", key, test, 0, self.keys[each.test].index(key))
             directory = folder / run_name(key)
             try:
                 result = job.run(task, directory)

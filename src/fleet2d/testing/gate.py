@@ -14,7 +14,7 @@ from fleet2d.errors import InputError
 from fleet2d.expectations.verdict import amount
 from fleet2d.studies.answers import holm
 from fleet2d.testing.claim import nested_rate_interval, percent
-from fleet2d.testing.suite import Outcome, SuiteTest, TrialKey, TrialReport
+from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 
 ERROR = 0.05
 """Largest probability that any expectation is called worse or better if none differs."""
@@ -42,7 +42,7 @@ class Tally:
 
     test: str
     name: str
-    outcomes: Mapping[TrialKey, Outcome]
+    outcomes: Mapping[TrialKey, TrialOutcome]
     errors: tuple[TrialReport, ...] = ()
     accepted: bool | None = True
 
@@ -109,7 +109,7 @@ class Tally:
         return f"{text}{where}: {self.outcomes[worst].says}"
 
 
-def _depth(outcome: Outcome) -> tuple[bool, float]:
+def _depth(outcome: TrialOutcome) -> tuple[bool, float]:
     """Return what sorts failures, the worst first: violations before what was untested."""
     return outcome.holds is None, -math.inf if outcome.margin is None else outcome.margin
 
@@ -120,7 +120,7 @@ def tally(tests: Sequence[SuiteTest], reports: Sequence[TrialReport]) -> list[Ta
     for test in tests:
         of_test = [report for report in reports if report.key.test == test.name]
         errors = tuple(report for report in of_test if report.error)
-        outcomes: dict[str, dict[TrialKey, Outcome]] = {}
+        outcomes: dict[str, dict[TrialKey, TrialOutcome]] = {}
         for report in of_test:
             for outcome in report.outcomes:
                 outcomes.setdefault(outcome.name, {})[report.key] = outcome
@@ -252,11 +252,13 @@ def compare(new: Sequence[Tally], old: Sequence[Tally]) -> list[PairedChange]:
     ]
 
 
-def _is_tested(outcome: Outcome) -> bool:
+def _is_tested(outcome: TrialOutcome) -> bool:
     return outcome.holds is not None or outcome.fails
 
 
-def _change(tally: Tally, pairs: Mapping[TrialKey, tuple[Outcome, Outcome]]) -> PairedChange:
+def _change(
+    tally: Tally, pairs: Mapping[TrialKey, tuple[TrialOutcome, TrialOutcome]]
+) -> PairedChange:
     several = len({key.home for key in pairs}) > 1
     signs = {key: int(old.fails) - int(new.fails) for key, (new, old) in pairs.items()}
     shifts = {
@@ -295,7 +297,7 @@ def _by_unit(values: Mapping[TrialKey, float], several: bool) -> tuple[int, int]
     return sum(total < 0 for total in totals), sum(total > 0 for total in totals)
 
 
-class Coverage(NamedTuple):
+class RequirementCoverage(NamedTuple):
     """A requirement, and what covers it.
 
     Attributes:
@@ -326,7 +328,9 @@ def read_requirement_list(path: Path) -> dict[str, str]:
     return {str(name): text for name, text in data.items()}
 
 
-def cover(tallies: Sequence[Tally], requirements: Mapping[str, str] | None) -> list[Coverage]:
+def cover(
+    tallies: Sequence[Tally], requirements: Mapping[str, str] | None
+) -> list[RequirementCoverage]:
     """Return the coverage of requirements by the expectations of tests.
 
     Raises:
@@ -342,7 +346,7 @@ def cover(tallies: Sequence[Tally], requirements: Mapping[str, str] | None) -> l
                 )
             rows.setdefault(requirement, {})[each.test, each.name] = each.verdict
     texts = requirements if requirements is not None else dict.fromkeys(sorted(rows), "")
-    return [Coverage(name, text, rows[name]) for name, text in texts.items()]
+    return [RequirementCoverage(name, text, rows[name]) for name, text in texts.items()]
 
 
 @dataclass(frozen=True)
@@ -365,7 +369,7 @@ class Gate:
     against: str = ""
     before: Sequence[Tally] = ()
     changes: Sequence[PairedChange] = ()
-    coverage: Sequence[Coverage] = ()
+    coverage: Sequence[RequirementCoverage] = ()
     trend: Mapping[str, Mapping[Place, tuple[int, int]]] = field(default_factory=dict)
     notes: Sequence[str] = ()
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from fleet2d.configuration.problems import suggest
 from fleet2d.errors import InputError
 from fleet2d.testing.gate import Place
-from fleet2d.testing.suite import Outcome, SuiteTest, TrialKey, TrialReport
+from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 
 APPLICATION = 0xF1EE72D
 """What tells such a file from other SQLite files."""
@@ -44,7 +44,7 @@ class PastTrials(NamedTuple):
     wall_s: float
 
 
-class History:
+class VerdictHistory:
     """A file of verdicts by build; it is made when the first are added.
 
     Args:
@@ -152,10 +152,10 @@ class History:
             "SELECT trials.id, test, home, seed, fingerprint, error, wall_s FROM trials"
             " JOIN builds ON builds.id = build WHERE name = ? ORDER BY trials.id"
         )
-        outcomes: dict[int, list[Outcome]] = {}
+        outcomes: dict[int, list[TrialOutcome]] = {}
         for trial, name, holds, fails, margin, unit, says in self._rows("SELECT * FROM verdicts"):
             held = None if holds is None else bool(holds)
-            outcome = Outcome(name, held, bool(fails), says, margin, unit)
+            outcome = TrialOutcome(name, held, bool(fails), says, margin, unit)
             outcomes.setdefault(trial, []).append(outcome)
         return [
             TrialReport(TrialKey(test, home, seed), tuple(outcomes.get(number, ())), error, wall_s)

@@ -87,7 +87,7 @@ NO_TRIAL = TrialKey("", "", 0)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialOutcome:
     """What came of an expectation in a trial.
 
     Attributes:
@@ -125,7 +125,7 @@ class TrialReport:
     """
 
     key: TrialKey
-    outcomes: tuple[Outcome, ...] = ()
+    outcomes: tuple[TrialOutcome, ...] = ()
     error: str = ""
     wall_s: float = 0.0
 
@@ -348,7 +348,7 @@ def _homes(homes: str, scenario: Scenario) -> Iterator[tuple[str, tuple[str, ...
 
 
 @dataclass(frozen=True)
-class TrialTask(WorkerTask):
+class SuiteTask(WorkerTask):
     """One trial of a build.
 
     Attributes:
@@ -365,14 +365,14 @@ class TrialTask(WorkerTask):
 
 
 @dataclass
-class TrialJob:
+class SuiteJob:
     """Runs trials of the tests of a suite with builds."""
 
     tests: tuple[SuiteTest, ...]
     builds: tuple[Build, ...]
     _ready: dict[tuple[int, int], list[Variant]] = field(default_factory=dict)
 
-    def __call__(self, task: TrialTask) -> TrialReport:
+    def __call__(self, task: SuiteTask) -> TrialReport:
         """Run a trial; an error of the test or of the build is part of its report."""
         test = self.tests[task.test]
         start_s = time.perf_counter()
@@ -385,7 +385,7 @@ class TrialJob:
             return TrialReport(task.key, error=describe_error(error))
         return TrialReport(task.key, outcomes, wall_s=time.perf_counter() - start_s)
 
-    def run(self, task: TrialTask, out: Path | None = None) -> TrialResult:
+    def run(self, task: SuiteTask, out: Path | None = None) -> TrialResult:
         """Run a trial, and store it if there is a directory for it.
 
         Raises:
@@ -398,7 +398,7 @@ class TrialJob:
         return run_trial(self._ready[place][task.trial], test.body(), out=out)
 
 
-def _outcomes(test: SuiteTest, result: TrialResult) -> tuple[Outcome, ...]:
+def _outcomes(test: SuiteTest, result: TrialResult) -> tuple[TrialOutcome, ...]:
     """Return the outcomes of the expectations of a trial, and of its asserts."""
     expected = result.variant.scenario.expect
     may_be_untested = bool(test.function) and test.claim().may_be_untested
@@ -408,11 +408,11 @@ def _outcomes(test: SuiteTest, result: TrialResult) -> tuple[Outcome, ...]:
         if each.verdict is not None
     ]
     others = [failure for failure in result.failures if failure.verdict is None]
-    outcomes += [Outcome(f.name, None if f.untested else False, True, f.text) for f in others]
+    outcomes += [TrialOutcome(f.name, None if f.untested else False, True, f.text) for f in others]
     if may_be_untested:
         outcomes = [replace(o, fails=o.fails and o.holds is not None) for o in outcomes]
     if test.function and not others and asserts(test.body()):
-        outcomes.append(Outcome(ASSERT, True, False, "the asserts held"))
+        outcomes.append(TrialOutcome(ASSERT, True, False, "the asserts held"))
     return tuple(outcomes)
 
 
@@ -420,11 +420,11 @@ def _covers(expected: Mapping[str, Any], name: str) -> tuple[str, ...]:
     return expected[name].covers if name in expected else ()
 
 
-def _outcome(verdict: Verdict, covers: tuple[str, ...]) -> Outcome:
+def _outcome(verdict: Verdict, covers: tuple[str, ...]) -> TrialOutcome:
     margin, unit = verdict.robustness, verdict.unit
     if not math.isfinite(margin) and verdict.slack_s is not None:
         margin, unit = verdict.slack_s, "s"
-    return Outcome(
+    return TrialOutcome(
         verdict.name,
         verdict.holds,
         verdict.fails,
@@ -456,9 +456,9 @@ def run_suite(
         workers: Number of processes; None: one per core.
         show: Whether progress is shown.
     """
-    job = TrialJob(tuple(tests), tuple(builds))
+    job = SuiteJob(tuple(tests), tuple(builds))
     tasks = [
-        TrialTask(0, trial, "", each.name, keys[each.name][trial], test, build, trial)
+        SuiteTask(0, trial, "", each.name, keys[each.name][trial], test, build, trial)
         for test, each in enumerate(tests)
         for trial in numbers[each.name]
         for build in range(len(builds))
@@ -477,7 +477,7 @@ def run_suite(
 
 
 def _reports(
-    job: TrialJob, tasks: list[TrialTask], workers: int
+    job: SuiteJob, tasks: list[SuiteTask], workers: int
 ) -> Iterator[tuple[int, TrialReport]]:
     """Yield the number and report of each task: the first few seconds here, then of workers."""
     waiting = list(reversed(tasks))

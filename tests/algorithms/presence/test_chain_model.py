@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet2d.algorithms.presence.chain_model import Habits, steps_of
+from fleet2d.algorithms.presence.chain_model import ChainHabits, steps_of
 from fleet2d.kernels import StayModel
 
 PLACES = 4
@@ -26,13 +26,13 @@ def model(seed: int, stages: int = 1) -> StayModel:
     return StayModel(1 - chance, follow, spread, restless, first, 0.9)
 
 
-def habits(seed: int, smoothing: float = 0.0) -> Habits:
+def habits(seed: int, smoothing: float = 0.0) -> ChainHabits:
     """Hours of working days and weekends with shares of their own, of four weeks."""
     random = np.random.default_rng([seed, 1])
     p = stationary(model(seed))
     hours = random.dirichlet(p * 20, 168) * 240
     week = np.concatenate([hours, np.full((168, 1), 240.0)], axis=1)
-    return Habits(week, np.append(p * 240 * 168, 240.0 * 168), smoothing)
+    return ChainHabits(week, np.append(p * 240 * 168, 240.0 * 168), smoothing)
 
 
 def stationary(of: StayModel) -> np.ndarray:

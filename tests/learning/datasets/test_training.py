@@ -120,13 +120,13 @@ def test_a_data_set_trains_weights_that_a_run_uses(
     own, tuned = tmp_path / "own.npz", tmp_path / "tuned.npz"
 
     code, out, err = fleet2d(
-        "train", "rtp", f"--on={folder}", f"--out={own}", "--epochs=2", "--hidden=4"
+        "dataset", "train", f"--on={folder}", f"--out={own}", "--epochs=2", "--hidden=4"
     )
     assert (0, "epoch 2" in err) == (code, True), err
     assert "windows" in out
     assert Weights.read(own).network.bias.shape == (4,)
 
-    code, _, err = fleet2d("train", "rtp", "--from=learned", f"--on={folder}", f"--out={tuned}")
+    code, _, err = fleet2d("dataset", "train", "--from=learned", f"--on={folder}", f"--out={tuned}")
     assert 0 == code, err
     assert Weights.read(tuned).network.bias.shape == shipped_weights().network.bias.shape
 
@@ -144,7 +144,7 @@ def test_the_file_of_a_data_set_is_made_and_the_weights_compared_with_the_shippe
     shutil.copytree(data.root, tmp_path / "learned_data")
     options = (f"--on={tmp_path / 'small.yaml'}", f"--out={tmp_path / 'learned.npz'}")
 
-    code, out, err = fleet2d("train", "rtp", *options, "--epochs=1", "--hidden=4")
+    code, out, err = fleet2d("dataset", "train", *options, "--epochs=1", "--hidden=4")
 
     assert 0 == code, err
     assert "learned_data: train 3, test 1 runs" in out
@@ -156,7 +156,7 @@ def test_weights_that_could_not_be_written_are_refused_before_training(
     data: Dataset, tmp_path: Path, fleet2d: Cli
 ) -> None:
     code, _, err = fleet2d(
-        "train", "rtp", "--on", str(data.root), "--out", str(tmp_path / "x/own.npz")
+        "dataset", "train", "--on", str(data.root), "--out", str(tmp_path / "x/own.npz")
     )
 
     assert code == 2

@@ -27,7 +27,7 @@ MAX_LEAVE = 0.5  # largest probability per bin to leave, unless it was larger be
 MAX_HORIZON = 10_080  # bins ahead; later forecasts equal the one at this horizon
 
 
-class Habits(NamedTuple):
+class ChainHabits(NamedTuple):
     """Time spent in each place, by hour of the week.
 
     Attributes:
@@ -87,7 +87,7 @@ class PersonForecast(NamedTuple):
 
     now: F64
     model: StayModel
-    habits: Habits | None = None
+    habits: ChainHabits | None = None
 
     @property
     def places(self) -> F64:
@@ -187,7 +187,7 @@ class Follower:
         self.now = np.stack([np.zeros_like(anywhere), anywhere])
         self.shown: I64 = np.full(anywhere.shape[1], -1, np.int64)
 
-    def forecast(self, model: StayModel, habits: Habits | None) -> PersonForecast:
+    def forecast(self, model: StayModel, habits: ChainHabits | None) -> PersonForecast:
         """Return the present distribution over rooms, with the transitions of the person."""
         stages = self.layout.stages
         nodes = self.layout.room[:, np.newaxis] * stages + np.arange(stages)
@@ -255,7 +255,7 @@ class Filter(Model):
         follower = self.followers[user]
         return follow(model, stretches, follower.now, follower.shown)
 
-    def habits(self, user: int) -> Habits | None:
+    def habits(self, user: int) -> ChainHabits | None:
         """Return how a user's transitions depend on the hour; None: they don't."""
         return None
 
@@ -315,14 +315,14 @@ class RoutineModel(SemiMarkov):
         each = zip(parts, models, strict=True)
         return np.concatenate([follow(user, between(day, *part), at) for part, at in each])
 
-    def habits(self, user: int) -> Habits:
+    def habits(self, user: int) -> ChainHabits:
         """Return how a user's transitions depend on the hour, as learned so far."""
         # places, and all bins
         counts = self.learner.counts
         columns = [*range(self.rooms + 1), -1]
         week = counts.by_hour_of_week[:, user]
         total = counts.total[user]
-        return Habits(week[:, columns], total[columns], self.smoothing)
+        return ChainHabits(week[:, columns], total[columns], self.smoothing)
 
 
 class MarkovDecay(Filter):

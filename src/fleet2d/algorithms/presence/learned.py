@@ -128,7 +128,7 @@ class Weights(NamedTuple):
         except Exception as error:  # noqa: BLE001 - a damaged archive raises almost anything
             raise InputError(
                 f"{path} can't be read as weights of a model of presence ({one_line(error, 100)}):"
-                " give a file that `fleet2d train rtp` wrote, or `type: onnx` for an ONNX file"
+                " give a file that `fleet2d dataset train` wrote, or `type: onnx` for an ONNX file"
             ) from None
         form = str(arrays.get("format", "nothing"))
         if form != FORMAT:
@@ -269,7 +269,7 @@ class LearnedModel(CorrectedRoutine):
     live unlike those it was trained on; docs/how-to/datasets.md has the numbers.
 
     Attributes:
-        weights: A file that `fleet2d train rtp` wrote; left out: the weights that ship.
+        weights: A file that `fleet2d dataset train` wrote; left out: the weights that ship.
     """
 
     weights: InputPath | None = None

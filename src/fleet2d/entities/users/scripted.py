@@ -74,7 +74,7 @@ class Live(Behavior):
         return now.plan().stay()
 
 
-class _Goal(NamedTuple):
+class _SentGoal(NamedTuple):
     """Where a program sent a body: as it said it, the point, or why no way leads there."""
 
     to: Any
@@ -125,7 +125,7 @@ class ProcessBehavior(Behavior):
         self.program = ExternalProgram(
             self.command, self.arguments, self.timeout.total_seconds(), about
         )
-        self._goal: _Goal | None = None
+        self._goal: _SentGoal | None = None
 
     def decide(self, now: Situation) -> Plan | None:
         """Ask the program."""
@@ -168,9 +168,9 @@ class ProcessBehavior(Behavior):
         try:
             plan.go_to(place)
         except (PlacementError, NoWayError) as error:
-            self._goal = _Goal(place, None, str(error))
+            self._goal = _SentGoal(place, None, str(error))
             raise
-        self._goal = _Goal(place, plan.position, "")
+        self._goal = _SentGoal(place, plan.position, "")
 
     def _add(self, plan: Plan, item: Mapping[str, Any]) -> None:
         """Add an item of an answer to a plan."""

@@ -1,4 +1,4 @@
-"""The commands `fleet2d dataset make`, `verify` and `score`, and `fleet2d train rtp`."""
+"""`fleet2d dataset`: data sets are made, verified, trained on, and scored."""
 
 import json
 import time
@@ -19,18 +19,12 @@ if TYPE_CHECKING:
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")]
 making = typer.Typer(
-    help="Make, verify and score data sets of labelled evidence.\n\nExamples:\n"
+    help="Make data sets of labelled evidence; train and score on them.\n\nExamples:\n"
     "  fleet2d dataset make presence.yaml --out presence\n"
+    "  fleet2d dataset train --on presence --out rtp.npz\n"
     "  fleet2d dataset score presence --task rtp",
     no_args_is_help=True,
 )
-training = typer.Typer(
-    help="Train networks on data sets.\n\nExamples:\n"
-    "  fleet2d train rtp --on presence --out rtp.npz",
-    no_args_is_help=True,
-)
-# A callback, as typer would otherwise drop the name of the only subcommand.
-training.callback()(lambda: None)
 
 
 @making.command()
@@ -83,8 +77,8 @@ def _print_size(made: "Dataset") -> None:
     typer.echo(f"{made.root}: {runs} runs, {size / 1e6:.2f} MB")
 
 
-@training.command()
-def rtp(
+@making.command("train")
+def train_network(
     on: Annotated[
         Path,
         typer.Option(
@@ -106,8 +100,8 @@ def rtp(
     data set has a split `test`, the weights are scored on it in the end, beside the shipped ones.
 
     Examples:
-      fleet2d train rtp --on presence --out rtp.npz
-      fleet2d train rtp --on runs/home-001 --from learned
+      fleet2d dataset train --on presence --out rtp.npz
+      fleet2d dataset train --on runs/home-001 --from learned
     """
     from fleet2d.algorithms.presence.learned import Weights, shipped_weights
     from fleet2d.learning.datasets.reader import MANIFEST, open_dataset

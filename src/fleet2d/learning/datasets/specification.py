@@ -29,7 +29,7 @@ from fleet2d.studies.population import (
     SEED_STEP,
     Draw,
     DrawSettings,
-    Life,
+    FleetLife,
     LifeFinder,
     left_out_words,
     members_of,
@@ -222,7 +222,7 @@ class DatasetPlan:
             for words, home, household, values in cases:
                 with errors_as(ScenarioError, f"{split}, {words}"):
                     load_scenario(
-                        self._scenario(Life(0, home, household, tuple(values), first.row))
+                        self._scenario(FleetLife(0, home, household, tuple(values), first.row))
                     )
 
     def _first_number(self, split: str) -> int:
@@ -230,7 +230,7 @@ class DatasetPlan:
         before = takewhile(lambda name: name != split, self.file.splits)
         return sum(self.file.splits[name].runs for name in before)
 
-    def _scenario(self, life: Life) -> dict[str, Any]:
+    def _scenario(self, life: FleetLife) -> dict[str, Any]:
         changes = [assignment(keys, value, life.home.words) for keys, value in life.changes]
         scenario = deepcopy(apply_changes(self.base, changes).data)
         every = f"{self.file.every.total_seconds()} s"

@@ -22,7 +22,7 @@ def transfer(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Measure what simulated people are worth to models in real homes.
+    """Measure what simulated people are worth to real homes.
 
     Models are trained on real days, simulated days, or both, and tested on days of real homes.
 

@@ -23,7 +23,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 
-class Moments(NamedTuple):
+class ForecastMoments(NamedTuple):
     """Moments of a trace: features, what is to be predicted, and the day.
 
     Attributes:
@@ -38,16 +38,16 @@ class Moments(NamedTuple):
     day: I64
     weight: F64
 
-    def where(self, chosen: Any) -> "Moments":
+    def where(self, chosen: Any) -> "ForecastMoments":
         """Return some of the moments."""
-        return Moments(*(column[chosen] for column in self))
+        return ForecastMoments(*(column[chosen] for column in self))
 
-    def weighted(self, weight: float) -> "Moments":
+    def weighted(self, weight: float) -> "ForecastMoments":
         """Return them with another weight."""
         return self._replace(weight=np.full(len(self.outcome), weight))
 
 
-def moments(trace: MinuteTrace, task: str) -> Moments:
+def moments(trace: MinuteTrace, task: str) -> ForecastMoments:
     """Return the moments of a trace at which something is to be predicted.
 
     Args:
@@ -64,7 +64,7 @@ def moments(trace: MinuteTrace, task: str) -> Moments:
     )
     at = at[inside & (codes[at] >= 0) & (outcomes[at + ahead] >= 0)]
     outcome = outcomes[at + ahead].astype(np.int64)
-    return Moments(
+    return ForecastMoments(
         _features(codes, trace.weekday, at), outcome, at // DAY_MINUTES, np.ones(len(at))
     )
 
@@ -90,16 +90,18 @@ def _features(codes: I16, weekday: int, at: I64) -> Any:
     return np.stack(columns, axis=1).astype(np.float32)
 
 
-def pooled(parts: Sequence[Moments], rows: int, seed: int) -> Moments:
+def pooled(parts: Sequence[ForecastMoments], rows: int, seed: int) -> ForecastMoments:
     """Return moments of several traces together, at most so many of them, drawn at random."""
-    whole = Moments(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    whole = ForecastMoments(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     if len(whole.outcome) <= rows:
         return whole
     chosen = np.random.default_rng(seed).choice(len(whole.outcome), rows, replace=False)
     return whole.where(np.sort(chosen))
 
 
-def fit_and_predict(known: Moments, asked: Moments, learner: str, outcomes: int) -> F64:
+def fit_and_predict(
+    known: ForecastMoments, asked: ForecastMoments, learner: str, outcomes: int
+) -> F64:
     """Train a model and return the probability of each outcome at other moments.
 
     Args:
@@ -149,7 +151,7 @@ class Forecast(NamedTuple):
     metrics: dict[str, float]
 
 
-def forecast(known: Moments, asked: Moments, learner: str, task: str) -> Forecast:
+def forecast(known: ForecastMoments, asked: ForecastMoments, learner: str, task: str) -> Forecast:
     """Train a model, and score it."""
     outcomes = CLASSES if task == "activity" else KINDS
     found = fit_and_predict(known, asked, learner, len(outcomes))

@@ -16,8 +16,8 @@ from fleet2d.learning.datasets.reader import open_dataset
 from fleet2d.learning.datasets.tasks import windows
 from fleet2d.learning.datasets.windows import Windows
 from fleet2d.learning.fit.persona import to_yaml
-from fleet2d.learning.transfer.learners import OWN_WEIGHT, Moments, moments, pooled
-from fleet2d.learning.transfer.specification import Cell, Home, TransferFile, TransferPlan
+from fleet2d.learning.transfer.learners import OWN_WEIGHT, ForecastMoments, moments, pooled
+from fleet2d.learning.transfer.specification import Cell, HomeEntry, TransferFile, TransferPlan
 from fleet2d.learning.transfer.traces import (
     MinuteTrace,
     copied,
@@ -46,10 +46,10 @@ class Sources:
     def __init__(self, plan: TransferPlan, folder: Path) -> None:
         """Make nothing yet."""
         self.file: TransferFile = plan.file
-        self.homes: Mapping[str, Home] = plan.homes
+        self.homes: Mapping[str, HomeEntry] = plan.homes
         self.tested: Mapping[str, I64] = plan.tested
         self.folder = folder
-        self._moments: dict[tuple[str, str], Moments] = {}
+        self._moments: dict[tuple[str, str], ForecastMoments] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what a worker computes anew."""
@@ -156,7 +156,7 @@ class Sources:
             "skip": self.file.skip,
         }
 
-    def _derived(self, kind: str, name: str, home: Home, days: int) -> dict[str, Any]:
+    def _derived(self, kind: str, name: str, home: HomeEntry, days: int) -> dict[str, Any]:
         """Write a persona, or a log, that is made of the own days of a home; return its user."""
         if kind == "fitted":
             path = self.folder / f"{name}.yaml"
@@ -167,13 +167,13 @@ class Sources:
         write_log(trace, known_midnight(home.log), path)
         return {"type": "replay", "path": str(path.absolute())}
 
-    def _copies(self, kind: str, home: Home, days: int, count: int) -> MinuteTrace:
+    def _copies(self, kind: str, home: HomeEntry, days: int, count: int) -> MinuteTrace:
         make = markov if kind == "markov" else copied
         return make(home.trace, home.own(days), count, self.file.seed)
 
     # Moments, for rooms and activities
 
-    def moments_of(self, name: str, task: str) -> Moments:
+    def moments_of(self, name: str, task: str) -> ForecastMoments:
         """Return the moments of a source: a data set, or `real-HOME`."""
         key = name, task
         if key not in self._moments:
@@ -188,7 +188,7 @@ class Sources:
             self._moments[key] = pooled([moments(t, task) for t in traces], 10**9, 0)
         return self._moments[key]
 
-    def training(self, cell: Cell) -> Moments:
+    def training(self, cell: Cell) -> ForecastMoments:
         """Return the moments that the model of a cell learns from."""
         task = cell.task
         parts = []
@@ -204,14 +204,14 @@ class Sources:
             parts.append(own.weighted(OWN_WEIGHT if cell.arm != "own" else 1.0))
         return pooled(parts, 10**9, 0)
 
-    def _pooled(self, names: list[str], task: str) -> Moments:
+    def _pooled(self, names: list[str], task: str) -> ForecastMoments:
         key = "+".join(names), task
         if key not in self._moments:
             parts = [self.moments_of(name, task) for name in names]
             self._moments[key] = pooled(parts, self.file.rows, self.file.seed)
         return self._moments[key]
 
-    def of_days(self, cell: Cell, days: I64) -> Moments:
+    def of_days(self, cell: Cell, days: I64) -> ForecastMoments:
         """Return the moments of some days of the home of a cell."""
         own = self.moments_of(f"real-{cell.home}", cell.task)
         return own.where(np.isin(own.day, days))

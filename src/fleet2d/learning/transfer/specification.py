@@ -132,7 +132,7 @@ class Cell(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Home:
+class HomeEntry:
     """What is known of a real home.
 
     Attributes:
@@ -182,7 +182,7 @@ class TransferPlan:
     name: str
     file: TransferFile
     source: str = ""
-    homes: dict[str, Home] = field(default_factory=dict)
+    homes: dict[str, HomeEntry] = field(default_factory=dict)
     cells: list[Cell] = field(default_factory=list)
     tested: dict[str, I64] = field(default_factory=dict)
     unfit: dict[str, int] = field(default_factory=dict)
@@ -219,7 +219,7 @@ def read_plan(path: Path) -> TransferPlan:
     return plan
 
 
-def _read_home(settings: RealHome) -> Home:
+def _read_home(settings: RealHome) -> HomeEntry:
     """Read the log of a home.
 
     Raises:
@@ -233,7 +233,7 @@ def _read_home(settings: RealHome) -> Home:
             f"its labels ({labels}) name no kind of room: say which they are, as in rooms:"
             " {M003: bedroom}"
         )
-    return Home(settings, log, trace, read_timeline(log, settings.rooms))
+    return HomeEntry(settings, log, trace, read_timeline(log, settings.rooms))
 
 
 def _cells(file: TransferFile, home: str) -> Iterator[Cell]:
@@ -246,7 +246,7 @@ def _cells(file: TransferFile, home: str) -> Iterator[Cell]:
                         yield Cell(task, learner, home, arm, days)
 
 
-def _add_cells(plan: TransferPlan, name: str, home: Home) -> None:
+def _add_cells(plan: TransferPlan, name: str, home: HomeEntry) -> None:
     """Add the cells of a home, or say why not."""
     file = plan.file
     known = len(home.trace.days)
@@ -275,7 +275,7 @@ def _add_cells(plan: TransferPlan, name: str, home: Home) -> None:
         plan.unfit[words] = plan.unfit.get(words, 0) + 1
 
 
-def _unfitted(home: Home, days: list[int]) -> dict[int, str]:
+def _unfitted(home: HomeEntry, days: list[int]) -> dict[int, str]:
     """Return why no persona can be fitted, by the number of days."""
     reasons = {}
     for count in days:

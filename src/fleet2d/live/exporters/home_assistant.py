@@ -56,7 +56,7 @@ CREATE INDEX ix_state_attributes_hash ON state_attributes (hash);
 AWAY = "not_home"
 
 
-class _State(NamedTuple):
+class _EntityState(NamedTuple):
     """A state of an entity, from a step on."""
 
     step: int
@@ -160,29 +160,28 @@ def _sensors(run: Run) -> dict[str, type[Sensor]]:
     return {name: kind for name, kind in classes.items() if issubclass(kind, Sensor)}
 
 
-def _states(run: Run, part: Selection) -> Iterator[_State]:
+def _states(run: Run, part: Selection) -> Iterator[_EntityState]:
     """Yield the states of the entities, in order of time."""
     records = Records(run, part)
     rooms = [room.name for room in run.plan.rooms]
     sensors = _sensors(run)
     for name in sensors:
-        yield _State(part.first, entity_name("binary_sensor", name), "off")
+        yield _EntityState(part.first, entity_name("binary_sensor", name), "off")
     now: dict[str, str] = {}
     tables = ["sensors"] if "sensors" in run.tables else []
     for chunk in records.chunks(tables=tables):
-        states = []
+        states: list[_EntityState] = []
         for name, way in chunk.poses.items():
             inside = entity_name("sensor", f"{name} room")
-            states += [_State(step, inside, state) for step, state in _rooms(way, rooms)]
-            if name in records.users:
-                states += [
-                    _State(step, entity_name("person", name), AWAY if state == AWAY else "home")
-                    for step, state in _rooms(way, rooms)
-                ]
+            person = entity_name("person", name)
+            for step, room in _rooms(way, rooms):
+                states.append(_EntityState(step, inside, room))
+                if name in records.users:
+                    states.append(_EntityState(step, person, AWAY if room == AWAY else "home"))
         for row in chunk.rows.get("sensors", ()):
             on, _ = sensors[row["sensor"]].words
             entity = entity_name("binary_sensor", row["sensor"])
-            states.append(_State(row["step"], entity, "on" if row["state"] == on else "off"))
+            states.append(_EntityState(row["step"], entity, "on" if row["state"] == on else "off"))
         for state in sorted(states, key=attrgetter("step")):
             if now.get(state.entity) != state.state:
                 now[state.entity] = state.state
