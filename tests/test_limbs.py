@@ -99,7 +99,7 @@ def test_heart_works_without_limbs(missing: list[str], copy: Path) -> None:
 
     assert [(0, "")] * len(calls) == [(done.returncode, done.stderr) for done in calls]
     commands = {line.split()[0] for line in calls[1].stdout.splitlines() if line.startswith("  ")}
-    assert {"run", "resume", "verify", "validate", "convert", "components"} <= commands
+    assert {"run", "resume", "verify", "validate", "components"} <= commands
     assert not commands & set().union(*map(commands_of, missing))
 
 

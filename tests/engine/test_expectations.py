@@ -390,9 +390,17 @@ def test_wrong_expectations_are_refused_with_their_line(
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("wrong", [{"always": "moving(ana)"}, ["moving(ana)"], 3, True])
-def test_what_is_no_text_is_refused_with_an_example(wrong: Any) -> None:
-    with pytest.raises(ScenarioError, match=r"expect\.wrong: expected an expectation like always"):
+@pytest.mark.parametrize(
+    ("wrong", "example"),
+    [
+        ({"always": "moving(ana)"}, "expected two lines, such as `that: always"),
+        (["moving(ana)"], "expected an expectation like always"),
+        (3, "expected an expectation like always"),
+        (True, "expected an expectation like always"),
+    ],
+)
+def test_what_is_no_text_is_refused_with_an_example(wrong: Any, example: str) -> None:
+    with pytest.raises(ScenarioError, match=rf"expect\.wrong: {example}"):
         fleet2d.Simulation(home(expect={"wrong": wrong}))
 
 

@@ -16,7 +16,14 @@ EXAMPLES = sorted(
     path
     for path in (Path(__file__).parents[2] / "examples").rglob("*.yaml")
     if path.parent.name
-    not in ("studies", "datasets", "agents", "paper", "release_gate")  # other kinds of files
+    not in (
+        "studies",
+        "datasets",
+        "agents",
+        "paper",
+        "release_gate",
+        "transfer",
+    )  # other kinds of files
 )
 
 

@@ -585,10 +585,10 @@ def found(body: str, by: str) -> Expectation:
     >>> print(found("ana", by="astro"))
     events("found", "astro", detail="ana") and in_view("ana", by="astro")
     """
-    return events("found", by, detail=body) & in_view(body, by=by)
+    return events(EventKind.FOUND, by, detail=body) & in_view(body, by=by)
 
 
-WORDS["found"] = found
+WORDS[found.__name__] = found
 
 
 class during(Condition):

@@ -294,7 +294,7 @@ class PerceptionError(Component):
         ...         is_wrong = sightings.uniform("backwards") < self.share
         ...         return sightings.replace(heading=sightings.heading + np.pi * is_wrong)
         >>> robot = {"perception": {"errors": {"backwards": Backwards(share="20 %")}}}
-        >>> run = fleet2d.run(duration="12 h", seed=4, robots={"astro": robot})
+        >>> run = fleet2d.run(duration="3 d", seed=4, robots={"astro": robot})
         >>> rows = run.pandas("observations")
         >>> wrong = (rows.heading - rows.true_heading).abs() > 3
         >>> bool(0.19 < wrong.mean() < 0.21)

@@ -93,7 +93,7 @@ def quantile_ranks(count: int, share: float) -> tuple[int | None, int | None]:
     """Return the ranks, from 0 on, of the ends of the interval of a quantile; None: too few values.
 
     >>> quantile_ranks(2000, 0.01), quantile_ranks(100, 0.01)
-    ((11, 28), (None, 3))
+    ((11, 29), (None, 3))
     """
     with extra("study", "intervals need scipy"):
         from scipy.special import bdtr

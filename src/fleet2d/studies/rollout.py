@@ -326,7 +326,7 @@ class RolloutAnswer:
             bounds = self.settings.guards.get(metric, Bounds())
             for end in (bounds.least, bounds.most):
                 if end is not None:
-                    axis.axhline(end, color="tab:red", lw=1, label="allowed")
+                    axis.axhline(end, color="tab:red", lw=1, label="bounds")
             if self.stop is not None and self.stop[0] == metric:
                 axis.axvline(self.stop[1].day, color="tab:red", lw=1.5)
             axis.axhline(0, color="grey", lw=0.4)

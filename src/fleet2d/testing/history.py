@@ -55,7 +55,7 @@ class VerdictHistory:
 
     Example:
         >>> import tempfile
-        >>> history = History(Path(tempfile.mkdtemp()) / "history.db")
+        >>> history = VerdictHistory(Path(tempfile.mkdtemp()) / "history.db")
         >>> history.add("1.0", {"a.yaml": "f00"}, [TrialReport(TrialKey("a.yaml", "", 3))])
         >>> history.builds, len(history.reports("1.0", {"a.yaml": "f00"}))
         (['1.0'], 1)
@@ -219,7 +219,7 @@ def plan(
     Example:
         >>> past = {"sure": PastTrials(50, 0, 1.0), "unsure": PastTrials(50, 20, 1.0)}
         >>> plan({"sure": 20, "unsure": 20}, past, 10**6, 12.0)[0]
-        {'sure': 3, 'unsure': 9}
+        {'sure': 2, 'unsure': 10}
     """
     if seconds is not None and not any(test in past for test in sizes):
         raise InputError(

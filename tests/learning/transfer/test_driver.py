@@ -1,6 +1,7 @@
 """A whole experiment: resumable cell by cell, the same for any number of workers, and told in the end."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from fleet2d.learning.transfer import driver
 from fleet2d.learning.transfer.driver import COLUMNS, run_transfer
 from fleet2d.learning.transfer.report import compared
 from fleet2d.learning.transfer.specification import read_plan
+from fleet2d.studies import results
 from fleet2d.studies.api import open_crew
 from fleet2d.studies.reader import Study, open_study
 
@@ -73,7 +75,9 @@ def test_a_kill_loses_only_the_cell_under_way_and_results_are_the_same(
         return score(*arguments)
 
     monkeypatch.setattr(driver, "forecast", dies_at_the_fourth)
-    with open_crew("serial") as crew:
+    monkeypatch.setattr(results, "FLUSH_EVERY_S", 0.0)  # else a kill loses the last second
+    with open_crew("serial") as several:
+        crew = replace(several, batch_s=0.0)  # else it may lose what a worker did within seconds
         with pytest.raises(Killed):
             run_transfer(read_plan(file), tmp_path / "out", crew)
         counts = run_transfer(read_plan(file), tmp_path / "out", crew)

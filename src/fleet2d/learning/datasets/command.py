@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A data set.")]
 making = typer.Typer(
-    help="Make data sets of labelled evidence; train and score on them.\n\nExamples:\n"
+    help="Make labelled data sets; train and score models on them.\n\nExamples:\n"
     "  fleet2d dataset make presence.yaml --out presence\n"
     "  fleet2d dataset train --on presence --out rtp.npz\n"
     "  fleet2d dataset score presence --task rtp",
@@ -94,7 +94,7 @@ def train_network(
     epochs: Annotated[int, typer.Option(min=1, help="How often each window is used.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights.")] = 0,
 ) -> None:
-    """Train the network of `model: learned`, or fit one to the days of a run.
+    """Train the network of `learned` on a data set or a run.
 
     The data set of a YAML file is made beside the weights, once: learned_data for learned.npz. If a
     data set has a split `test`, the weights are scored on it in the end, beside the shipped ones.

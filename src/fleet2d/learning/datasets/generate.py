@@ -370,7 +370,8 @@ def _without_unfit(
         ScenarioError: People don't fit into homes, and `skip` is left out; a line for each.
     """
     path = parts / PLAN
-    if path.is_file() and read_bytes(path, FILE_BYTES) == _identity(plan):  # it was checked
+    is_checked = path.is_file() and read_bytes(path, FILE_BYTES) == _identity(plan)
+    if is_checked and (parts / UNFIT).is_file():
         return replace(plan, unfit=_by_number(read_json(read_bytes(parts / UNFIT, FILE_BYTES))))
     first_of: dict[tuple[str, str], PlannedRun] = {}
     same_as: dict[int, int] = {}
