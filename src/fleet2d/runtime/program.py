@@ -14,7 +14,6 @@ reads messages from its standard input and answers each by one on its standard o
 import contextlib
 import json
 import os
-import select
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,8 @@ import time
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from queue import Empty, Queue, SimpleQueue
+from threading import Thread
 from typing import IO, Any, NamedTuple
 
 from fleet2d.errors import ComponentError
@@ -31,6 +32,8 @@ VERSION = 1
 MAX_BLOCK = 256 << 20
 MAX_LINE = 16 << 20
 READ_SIZE = 1 << 20
+# So many parts of an answer wait to be read; a program that writes more waits, too.
+READ_AHEAD = 4
 # Time for a program to end by itself [s].
 END_S = 1.0
 # The end of what it wrote on stderr that an error quotes [characters].
@@ -137,10 +140,15 @@ class ExternalProgram:
         self._unread = bytearray()
         assert process.stdin is not None
         assert process.stdout is not None
-        self._ends = process.stdin.fileno(), process.stdout.fileno()
-        for end in self._ends:
-            os.set_blocking(end, False)
-        self._finalizer = weakref.finalize(self, _end, process, self._stderr)
+        # A thread for each pipe, on any system: neither side reads while it waits for the other one
+        # to take its bytes.
+        self._messages = SimpleQueue[bytes | None]()
+        self._parts = Queue[bytes](READ_AHEAD)
+        reader = Thread(target=_read, args=(process.stdout, self._parts), daemon=True)
+        Thread(target=_write, args=(process.stdin, self._messages), daemon=True).start()
+        reader.start()
+        ends = self._messages, self._parts, reader
+        self._finalizer = weakref.finalize(self, _end, process, self._stderr, *ends)
         self._exchange({"type": "start", "version": VERSION, **self._start}, {}, "ready")
         if self._state is not None:
             self._exchange({"type": "load"}, {"state": self._state}, "ready")
@@ -154,7 +162,7 @@ class ExternalProgram:
             raise self._failure(f"wrote {bytes(self._unread[:80])!r} without being asked")
         message = json.dumps(content).encode() + b"\n" + b"".join(blocks.values())
         try:
-            answer = self._transfer(memoryview(message))
+            answer = self._transfer(message)
         except TimeoutError:
             raise self._failure(
                 f"didn't answer {content['type']!r} within {self._timeout_s:g} s and was ended"
@@ -181,39 +189,28 @@ class ExternalProgram:
             raise self._failure(f"answered {kind!r}{said} to {content['type']!r}, not {expected!r}")
         return answer
 
-    def _transfer(self, message: memoryview) -> Answer | None:
-        """Write a message while reading the answer; return None if the program has ended.
-
-        Both at once, as neither side reads while it waits for the other one to take its bytes.
+    def _transfer(self, message: bytes) -> Answer | None:
+        """Write a message, and read the answer; return None if the program has ended.
 
         Raises:
             TimeoutError: It doesn't answer in time.
             ValueError: It answers with something else.
         """
-        to_program, from_program = self._ends
-        poll = select.poll()
-        poll.register(from_program, select.POLLIN)
-        poll.register(to_program, select.POLLOUT)
+        self._messages.put(message)
         deadline = time.monotonic() + self._timeout_s
         needed = 0
-        answer: Answer | None = None
         while True:
-            if message:
-                message = message[_write(to_program, message) :]
-                if not message:
-                    poll.unregister(to_program)
-            if answer is not None and not message:
-                return answer
-            ready = poll.poll(max(0.0, deadline - time.monotonic()) * 1000)
-            if not ready:
-                raise TimeoutError
-            if all(end != from_program for end, _ in ready):
-                continue
-            if not (part := os.read(from_program, READ_SIZE)):
+            try:
+                part = self._parts.get(timeout=max(0.0, deadline - time.monotonic()))
+            except Empty:
+                raise TimeoutError from None
+            if not part:
                 return None
             self._unread += part
-            if answer is None and len(self._unread) >= needed:
+            if len(self._unread) >= needed:
                 answer, needed = self._parse()
+                if answer is not None:
+                    return answer
 
     def _parse(self) -> tuple[Answer | None, int]:
         """Return an answer that has arrived as a whole; else None, and the size to wait for.
@@ -250,18 +247,32 @@ class ExternalProgram:
         return ComponentError(f"{self._program} {text}{quoted}")
 
 
-def _write(pipe: int, message: memoryview) -> int:
-    """Write as much of a message as a pipe takes; return the number of bytes that are done with."""
-    try:
-        return os.write(pipe, message)
-    except BlockingIOError:
-        return 0
-    except BrokenPipeError:  # the program has ended, maybe with an answer
-        return len(message)
+def _write(pipe: IO[bytes], messages: "SimpleQueue[bytes | None]") -> None:
+    """Write messages to a program until there is None, or it has ended, maybe with an answer."""
+    with contextlib.suppress(OSError, ValueError):
+        while (message := messages.get()) is not None:
+            unwritten = memoryview(message)
+            while unwritten:
+                unwritten = unwritten[pipe.write(unwritten) :]
 
 
-def _end(process: "subprocess.Popen[bytes]", stderr: IO[bytes]) -> None:
+def _read(pipe: IO[bytes], parts: "Queue[bytes]") -> None:
+    """Read what a program writes; an empty part is its end."""
+    with contextlib.suppress(OSError, ValueError):
+        while part := pipe.read(READ_SIZE):
+            parts.put(part)
+    parts.put(b"")
+
+
+def _end(
+    process: "subprocess.Popen[bytes]",
+    stderr: IO[bytes],
+    messages: "SimpleQueue[bytes | None]",
+    parts: "Queue[bytes]",
+    reader: Thread,
+) -> None:
     """End a program: by the end of its input, else by force."""
+    messages.put(None)
     with contextlib.suppress(OSError):
         assert process.stdin is not None
         process.stdin.close()
@@ -270,6 +281,9 @@ def _end(process: "subprocess.Popen[bytes]", stderr: IO[bytes]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+    while reader.is_alive():  # it waits for room, and there is no more than what has arrived
+        with contextlib.suppress(Empty):
+            parts.get(timeout=0.01)
     with contextlib.suppress(OSError):
         assert process.stdout is not None
         process.stdout.close()
