@@ -45,7 +45,8 @@ std::vector<Point> find_route(const Mesh& mesh, const RouteGraph& graph, Point s
 
 // Points as rows, (points, 2).
 inline View<const i64, 2> rows_of(const std::vector<Point>& points) {
-    return {&points.data()->x, {static_cast<i64>(points.size()), 2}};
+    const i64* first = points.empty() ? nullptr : &points.front().x;
+    return {first, {static_cast<i64>(points.size()), 2}};
 }
 
 // The routes that were found last: bodies go the same ways day after day. Threads may share it.
