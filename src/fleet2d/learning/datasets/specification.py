@@ -190,7 +190,9 @@ class DatasetPlan:
 
     def run(self, split: str, k: int) -> PlannedRun:
         """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
-        life = self.draws[split].life(self.numbers[split][k])
+        lives = self.numbers[split]
+        # Fresh runs have no end: then with further lives, or those that meet the conditions again.
+        life = self.draws[split].life(lives[k % len(lives)] if self.file.splits[split].where else k)
         number = self._first_number(split) + k
         scenario = self._scenario(life)
         scenario["simulation"]["seed"] = (self.file.seed * SEED_STEP + number) % MAX_SEED
