@@ -12,6 +12,7 @@ from tests.engine.test_sensors import household, plan  # noqa: F401  (a fixture)
 from tests.scenes import run
 
 import fleet2d
+from fleet2d.errors import RunDirectoryError
 from fleet2d.live.exporters import export, format_of
 from fleet2d.logs.layouts.states import read_states
 
@@ -82,3 +83,14 @@ def test_a_database_is_its_suffix_and_the_states_of_each_entity_differ(database:
     assert "home_assistant" == format_of(Path("home-assistant_v2.db"))
     states = [state for state, _ in states_of(database, "sensor.astro_room")]
     assert all(first != second for first, second in itertools.pairwise(states))
+
+
+def test_names_that_would_be_one_entity_are_refused(tmp_path: Path) -> None:
+    home = {
+        "extends": "bundled:paper",
+        "simulation": {"duration": "1 min"},
+        "users": {"Ana": {"type": "routine", "persona": "retired"}},
+    }
+
+    with pytest.raises(RunDirectoryError, match="rename one in the scenario"):
+        export(fleet2d.run(home), tmp_path / "home.db")

@@ -14,6 +14,7 @@ import numpy as np
 
 from fleet2d.configuration.components import components
 from fleet2d.entities.sensor import Sensor
+from fleet2d.errors import RunDirectoryError
 from fleet2d.live.exporters import Records, Selection, new_file
 from fleet2d.live.peers import DEVICE_CLASSES
 from fleet2d.runs.run import Run
@@ -79,10 +80,17 @@ def export_home_assistant(run: Run, path: Path, part: Selection) -> str:
         A line with the number of states.
 
     Raises:
-        RunDirectoryError: The file can't be written.
+        RunDirectoryError: The file can't be written, or two names would be one entity.
     """
     clock = run.clock
     entities = _entities(run)
+    records = Records(run, part)
+    bodies = len(records.users) + len(records.robots)
+    if len(entities) < len(records.users) + bodies + len(_sensors(run)):
+        raise RunDirectoryError(
+            f"{path}: two names of people, robots or sensors differ in capitals, spaces or _ only,"
+            " and would be one entity of Home Assistant: rename one in the scenario"
+        )
     number = {entity: row for row, entity in enumerate(entities, 1)}
     last: dict[str, int] = {}
     rows = []
