@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, cast
 
-import pytest
 import typer
 import yaml
 from pydantic import BaseModel, TypeAdapter
@@ -12,17 +11,13 @@ from tests.hostile.defences import DEFENCES
 from tests.pages import ROOT, text_of
 
 from fleet2d.cli.__main__ import app
-from fleet2d.configuration.components import lookup
+from fleet2d.configuration.components import components, lookup
 
 # What a page says of a default that is no value of the key, or a value that depends on others.
 IN_WORDS = re.compile(
     r"required|none|always|all|every step|until the next item|see .*|the .*|.* ± .*|.*, positions .*"
     r"|one is required|.*without end|path, .*|`works_outside`|"  # persona: what its lack means
 )
-
-
-def fields_of(component: str | type[BaseModel], kind: str = "behavior") -> type[BaseModel]:
-    return lookup(kind, component) if isinstance(component, str) else component
 
 
 def is_default(model: type[BaseModel], key: str, said: str) -> bool:
@@ -35,16 +30,22 @@ def is_default(model: type[BaseModel], key: str, said: str) -> bool:
     return bool(value == default or adapter.validate_python(default) == value)
 
 
-@pytest.mark.parametrize(("kind", "verb"), [("behavior", "does"), ("drive", "moves")])
-def test_keys_of_the_other_behaviors_and_of_drives_exist_with_their_defaults(
-    kind: str, verb: str
-) -> None:
-    text = text_of("robots")
-    rows = text.split(f"| type | {verb} | keys (default) |")[1].split("\n\n", 1)[0].splitlines()[2:]
+def rows_below(heading: str) -> list[list[str]]:
+    """Return the cells of each row of the table of the page on robots that has this heading."""
+    rows = text_of("robots").split(heading)[1].split("\n\n", 1)[0].splitlines()[2:]
+    return [[part.strip() for part in row.strip("|").split("|")] for row in rows]
+
+
+def test_the_other_behaviors_of_robots_exist() -> None:
+    names = [name for cells in rows_below("| type | does |") for name in cells[0].split("`")[1::2]]
+    assert 10 <= len(names)
+    assert set() == set(names) - components("behavior").keys()
+
+
+def test_keys_of_drives_exist_with_their_defaults() -> None:
     wrong = []
-    for row in rows:
-        name, _, cell = [part.strip() for part in row.strip("|").split("|")]
-        model = fields_of(name.split("`")[1], kind)
+    for name, _, cell in rows_below("| type | moves | keys (default) |"):
+        model = lookup("drive", name.split("`")[1])
         for key, said in re.findall(r"(?:^|[,;] )`([a-z_]+)` \(([^):]*)", cell):
             said = said.removesuffix(" m/s²")
             if not IN_WORDS.fullmatch(said) and not is_default(model, key, said):
