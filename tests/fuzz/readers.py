@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from tests.fuzz.changes import lines, pieces, structures
 from tests.homes.test_damaged_files import FORMATS, PGM
 from tests.logs.test_layout_reading import ADLS, CASAS, HOMER, SENSORS
-from tests.logs.test_layouts import EVENTS, KASTEREN, MIT, OPENSHS, STATES
+from tests.logs.test_layouts import EVENTS, HISTORY, KASTEREN, MIT, OPENSHS, STATES
 from tests.scenes import flat_document, scenario
 
 import fleet2d
@@ -347,6 +347,7 @@ READERS = {
         Reader("mit", "activities_data.csv", lambda: lines(MIT), _replay, cost=2),
         Reader("openshs", "d1.csv", lambda: lines(OPENSHS), _replay, cost=2),
         Reader("states", "history.csv", lambda: lines(STATES), _replay, cost=2),
+        Reader("history", "history.json", lambda: _json(json.loads(HISTORY)), _replay, cost=2),
         Reader("fixes", "rtls.csv", _words(FIXES), _replay, cost=2),
         Reader(
             "fixes as Parquet", "rtls.parquet",

@@ -1,5 +1,6 @@
 """Layouts of published smart homes: generated logs equal their truth, real ones are read whole."""
 
+import json
 import random
 import sqlite3
 from collections.abc import Callable
@@ -44,6 +45,11 @@ OPENSHS = """\
 kitchenCarp,bedroomLight,Activity,timestamp
 0,1,sleep,2026-03-02 08:00:00
 1,0,eat,2026-03-02 08:00:01
+"""
+HISTORY = """\
+[[{"entity_id": "binary_sensor.kitchen", "state": "on", "last_changed": "2026-03-02T08:00:00+00:00"},
+  {"state": "off", "last_changed": "2026-03-02T08:01:00+00:00"}],
+ [{"entity_id": "person.ana", "state": "not_home", "last_changed": "2026-03-02T09:00:00+00:00"}]]
 """
 STATES = """\
 entity_id,state,last_changed
@@ -195,6 +201,39 @@ def old_database(stays: list[Stay], path: Path) -> Path:
     return database(stays, path, is_old=True)
 
 
+def as_history(stays: list[Stay], path: Path) -> dict[str, list[tuple[str, datetime]]]:
+    """Return the states of each entity with their times, in UTC."""
+    rows = [row.split(";") for row in table_of_states(stays, path).read_text().splitlines()[1:]]
+    states: dict[str, list[tuple[str, datetime]]] = {}
+    for entity, state, time in rows:
+        states.setdefault(entity, []).append((state, datetime.fromisoformat(f"{time}+00:00")))
+    return states
+
+
+def rest_history(stays: list[Stay], path: Path) -> Path:
+    """Write what the REST API answers: of the states between, entity and attributes are left out."""
+    content = []
+    for entity, states in as_history(stays, path).items():
+        times = [{"state": state, "last_changed": time.isoformat()} for state, time in states]
+        for end in (0, -1):
+            times[end] |= {"entity_id": entity, "attributes": {"friendly_name": "motion"}}
+        content.append(times)
+    return written(path / "history.json", [json.dumps(content)])
+
+
+def socket_history(stays: list[Stay], path: Path) -> Path:
+    """Write the message of the WebSocket API; states were updated later than they changed."""
+    content: dict[str, Any] = {}
+    for entity, states in as_history(stays, path).items():
+        content[entity] = [
+            {"s": state, "a": {}, "lu": time.timestamp() + 1, "lc": time.timestamp()}
+            for state, time in states
+        ]
+        content[entity][0] = {"s": states[0][0], "lu": states[0][1].timestamp()}
+    message = {"id": 2, "type": "result", "success": True, "result": content}
+    return written(path / "history.txt", [json.dumps(message, indent=2)])
+
+
 def written(path: Path, lines: list[str]) -> Path:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -210,6 +249,8 @@ LAYOUTS: dict[str, tuple[Writer, dict[str, Any]]] = {
     "states": (table_of_states, {}),
     "database": (database, {"time_zone": "UTC"}),
     "old database": (old_database, {"time_zone": "UTC"}),
+    "REST history": (rest_history, {"time_zone": "UTC"}),
+    "WebSocket history": (socket_history, {"time_zone": "UTC"}),
 }
 # What stands in each layout for the rooms: labels of sensors, or activities.
 OF_ACTIVITY = {doing: room for room, doing in DOINGS.items()} | {
@@ -236,17 +277,17 @@ def test_rooms_stays_and_activities_equal_the_truth(name: str, seed: int, tmp_pa
     log = read_log(write(stays, tmp_path), **keys)
 
     assert isinstance(log, ActivityLog)
-    assert log.layout == ("states" if "database" in name else name)
+    is_of_states = name == "states" or " " in name or name == "database"
+    assert log.layout == ("states" if is_of_states else name)
     assert log.first_day in (None, date(2026, 3, 2))
     has_absence = name != "casas"
-    has_activity = name not in ("states", "database", "old database")
     for begin, end, room, doing in stays:
         middle = begin + min(30, (end - begin) // 2)
         if room == AWAY and not has_absence:
             continue
         found, activity = at(log, middle)
         assert found == room, (begin, end)
-        if has_activity and room != AWAY and name != "aras":
+        if not is_of_states and room != AWAY and name != "aras":
             assert activity == doing
 
 
@@ -280,6 +321,13 @@ def test_an_absence_of_days_is_normal(tmp_path: Path) -> None:
         ("a.csv", "entity_id,state,last_changed\na,on", "line 2: expected 3 values, got 2"),
         ("a.csv", "entity_id,state,last_changed\na,on,yesterday", "expected a time like"),
         ("a.csv", "entity_id,state,last_changed\na,on,2026-03-02T08:00:00Z", "name the home's time_zone"),
+        ("a.json", '[[{"entity_id": "a"', "not JSON: .* in line 2, column 1"),
+        ("a.json", "[" * 100_000, "can't be read"),
+        ("a.json", '{"message": "Not found."}', "expected a history of Home Assistant"),
+        ("a.json", '[["on"]]', "state 1: expected a history"),
+        ("a.json", '[[{"state": "on", "last_changed": "2026-03-02"}]]', "state 1: expected a history"),
+        ("a.json", '{"a.b": [{"s": "on", "lu": 1e300}]}', "state 1: 1e.300 is not a time"),
+        ("a.json", '{"a.b": [{"s": "on", "lu": 9}, {"s": "on", "lu": 1}]}', "state 2: the time of a.b"),
         (
             "a.csv",
             "device,value,time\nperson.a,home,2026-03-02 08:00\nperson.b,home,2026-03-02 08:00",
@@ -291,6 +339,8 @@ def test_a_damaged_log_is_refused_with_the_line(
     tmp_path: Path, name: str, line: str, message: str
 ) -> None:
     keys = {"id": "1"} if "28 1" in line else {}
+    if name.endswith(".json"):
+        keys = {"time_zone": "UTC"}
     with pytest.raises(LogError, match=message):
         read_log(written(tmp_path / name, line.split("\n")), **keys)
 
@@ -302,6 +352,25 @@ def test_two_residents_are_chosen_by_id(tmp_path: Path) -> None:
     other = read_log(tmp_path, id="1")
     assert isinstance(other, ActivityLog)
     assert set(other.rooms) == {"Changing Clothes"}
+
+
+def test_local_times_of_a_history_follow_the_time_zone_through_the_end_of_summer(
+    tmp_path: Path,
+) -> None:
+    states = [
+        {"entity_id": "binary_sensor.hall", "state": state, "last_changed": time}
+        for state, time in [
+            ("unavailable", "2026-10-24T21:00:00+00:00"),
+            ("on", "2026-10-24T23:30:00+00:00"),
+            ("unknown", "2026-10-25T00:10:00+00:00"),
+            ("on", "2026-10-25T05:30:00+00:00"),
+        ]
+    ]
+    log = read_log(written(tmp_path / "h.json", [json.dumps(states)]), time_zone="Europe/Berlin")
+    assert isinstance(log, ActivityLog)
+    assert [r.begin_us // (60 * S) for r in log.readings] == [25 * 60 + 30, 30 * 60 + 30]
+    assert log.first_day == date(2026, 10, 24)
+    assert log.notes == ("left out as unavailable or unknown: 2 states",)
 
 
 def test_a_database_of_something_else_is_refused(tmp_path: Path) -> None:

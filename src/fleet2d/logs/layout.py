@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from fleet2d.bounds import one_line
-from fleet2d.logs.layouts import aras, kasteren, mit, openshs, states
+from fleet2d.logs.layouts import aras, home_assistant, kasteren, mit, openshs, states
 from fleet2d.logs.layouts.casas import read_casas, shows_casas
 from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.layouts.intervals import is_leaving, label_by_activities
@@ -387,7 +387,7 @@ def _recognize(path: Path) -> str:
                 f" ({', '.join(several)}): for other layouts name the file"
             )
         return layout
-    if states.is_database(path):
+    if home_assistant.reader_of(path):
         return "states"
     suffix = path.suffix.lower()
     if suffix in (".parquet", ".pq", ".jsonl", ".ndjson"):

@@ -6,25 +6,25 @@
     binary_sensor.kitchen_motion,on,2026-03-28T23:30:00.123Z
     person.ana,not_home,2026-03-29T07:02:11.000Z
 
-Home Assistant's recorder is a database, `home-assistant_v2.db`, which is read as it is.
+Home Assistant's recorder is a database, `home-assistant_v2.db`, which is read as it is, and so is
+the history that its APIs answer.
 """
 
 import csv
 import re
-import sqlite3
-import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import closing
-from datetime import UTC, datetime
+from datetime import datetime
 from datetime import time as clock
 from pathlib import Path
 from typing import NamedTuple
 
-from fleet2d.bounds import LOG_BYTES, LOG_ROWS, check_file, one_line
-from fleet2d.configuration.problems import suggest
+from fleet2d.bounds import one_line
+from fleet2d.configuration.problems import counted, suggest
 from fleet2d.configuration.units import micros
 from fleet2d.errors import errors_as
+from fleet2d.logs.layouts import home_assistant
+from fleet2d.logs.layouts.home_assistant import StateRow
 from fleet2d.logs.log import (
     AWAY,
     ActivityLog,
@@ -45,24 +45,11 @@ HEAD = re.compile(
     re.IGNORECASE,
 )
 """The first line of a table."""
-DATABASE = b"SQLite format 3\0"
-"""How a database begins."""
 _ON = frozenset({"on", "open", "opened", "detected", "occupied", "motion", "present", "true", "1"})
 _OFF = frozenset({"off", "closed", "close", "clear", "false", "0", "idle", "absent", "no_motion"})
 _OUT = frozenset({"not_home", "away", "absent"})
 _PEOPLE = ("person.", "device_tracker.")
 _UNKNOWN = frozenset({"unavailable", "unknown", "none", ""})
-_QUERIES = {
-    "metadata_id": "SELECT m.entity_id, s.state, coalesce(s.last_changed_ts, s.last_updated_ts)"
-    " FROM states s JOIN states_meta m ON s.metadata_id = m.metadata_id"
-    " ORDER BY coalesce(s.last_changed_ts, s.last_updated_ts), s.state_id",
-    "entity_id": "SELECT entity_id, state, coalesce(last_changed, last_updated) FROM states"
-    " ORDER BY coalesce(last_changed, last_updated), state_id",
-}
-"""The query of each edition of the database, by a column that only it has."""
-# A database that takes longer is damaged, or isn't Home Assistant's [s].
-_MAX_SECONDS = 60.0
-_STEPS_BETWEEN = 1_000_000
 
 
 class _StateLine(NamedTuple):
@@ -97,29 +84,30 @@ def read_states(
     Raises:
         LogError: A row is damaged, there are several people, or a time zone is missing or unknown.
     """
-    rows = list(_database(path) if is_database(path) else _table(path))
+    read = home_assistant.reader_of(path) or _table
+    rows = list(read(path))
     zone = None if zone is None else _of_years(path, rows, zone)
     states = list(_local(path, rows, zone or time_zone))
     if not states:
         raise LogError(f"{path} holds no reading: is it the right file?")
     person = _person(path, {s.entity for s in states}, id)
-    states = _in_order(path, states, sort=sort)
+    states = _in_order(path, states, "line" if read is _table else "state", sort=sort)
     first_midnight = datetime.combine(min(state.time for state in states).date(), clock.min)
     begin = first_midnight if zone is None else zone.at(first_midnight)
     first_day = min(state.time for state in states).date()
     readings: list[Reading] = []
     others: Counter[str] = Counter()
-    left: int | None = None  # the reading of being away that isn't over
+    absence: int | None = None  # the reading of being away that isn't over
     for state in states:
         at = micros(state.time - begin)
         word = state.state.strip().lower()
         if state.entity.startswith(_PEOPLE):
             is_out = word in _OUT and state.entity == person
-            if left is not None and state.entity == person:
-                readings[left] = readings[left]._replace(end_us=at)
-                left = None
+            if absence is not None and state.entity == person:
+                readings[absence] = readings[absence]._replace(end_us=at)
+                absence = None
             if is_out:
-                left = len(readings)
+                absence = len(readings)
                 readings.append(Reading(at, at, AWAY, "", state.line))
         elif word in _ON:
             readings.append(Reading(at, at, state.entity, "", state.line))
@@ -127,15 +115,18 @@ def read_states(
             others["unavailable" if word in _UNKNOWN else state.entity] += 1
     readings, notes = in_order(readings, path, sort=sort)
     if gone := others.pop("unavailable", 0):
-        notes.append(f"{gone} states are unavailable or unknown and left out")
+        notes.append(f"left out as unavailable or unknown: {counted(gone, 'state')}")
     if others:
         names = one_line(", ".join(sorted(others)[:5]), 200)
-        notes.append(f"{others.total()} states are neither on nor off and left out: {names}")
+        left = counted(others.total(), "state")
+        notes.append(f"left out as neither on nor off: {left} of {names}")
     return ActivityLog(path, "states", first_day, tuple(readings), tuple(notes))
 
 
-def _in_order(path: Path, states: list[_StateLine], *, sort: bool) -> list[_StateLine]:
+def _in_order(path: Path, states: list[_StateLine], noun: str, *, sort: bool) -> list[_StateLine]:
     """Return states in order of time; a file may have one entity after the other.
+
+    A place in the file is a number of the noun.
 
     Raises:
         LogError: The times of an entity run backwards, and `sort` is off.
@@ -144,19 +135,11 @@ def _in_order(path: Path, states: list[_StateLine], *, sort: bool) -> list[_Stat
     for state in () if sort else states:
         if state.time < last.get(state.entity, state.time):
             raise LogError(
-                f"{path}, line {state.line}: the time of {state.entity} runs backwards there; check"
-                " the clock of the log, or put its lines in order of time by 'sort: true'"
+                f"{path}, {noun} {state.line}: the time of {state.entity} runs backwards there;"
+                f" check the clock of the log, or put its {noun}s in order of time by 'sort: true'"
             )
         last[state.entity] = state.time
     return sorted(states, key=lambda state: state.time)
-
-
-def is_database(path: Path) -> bool:
-    """Return whether a file is a database of SQLite; a pipe or a device is none, and isn't read."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return file.read(len(DATABASE)) == DATABASE
 
 
 def _person(path: Path, entities: set[str], name: str | None) -> str | None:
@@ -174,7 +157,7 @@ def _person(path: Path, entities: set[str], name: str | None) -> str | None:
     return name or next(iter(people), None)
 
 
-def _table(path: Path) -> Iterator[tuple[str, str, datetime, int]]:
+def _table(path: Path) -> Iterator[StateRow]:
     lines = [text for _, text in log_lines(path)]
     mark = max(",;\t", key=lines[0].count) if lines else ","
     rows = csv.reader(lines, delimiter=mark)
@@ -194,42 +177,7 @@ def _column(head: list[str], names: tuple[str, ...]) -> int:
     return next((head.index(name) for name in names if name in head), -1)
 
 
-def _database(path: Path) -> Iterator[tuple[str, str, datetime, int]]:
-    check_file(path, LOG_BYTES, LogError)
-    try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as database:
-            begun = time.monotonic()
-            database.set_progress_handler(
-                lambda: time.monotonic() - begun > _MAX_SECONDS, _STEPS_BETWEEN
-            )
-            kinds = dict(database.execute("SELECT name, type FROM sqlite_master").fetchall())
-            names = {row[1] for row in database.execute("PRAGMA table_info(states)")}
-            query = next((text for column, text in _QUERIES.items() if column in names), None)
-            # A view could be any query, and never end.
-            if query is None or "view" in (kinds["states"], kinds.get("states_meta")):
-                raise LogError(f"{path} has no table of states, as Home Assistant's recorder has")
-            for number, (entity, state, at) in enumerate(database.execute(query), 1):
-                if number > LOG_ROWS.limit:
-                    LOG_ROWS.check(number, path, LogError, prefix="more than ")
-                if entity is not None and at is not None:
-                    moment = _moment(at, path, number)
-                    yield str(entity), "" if state is None else str(state), moment, number
-    except sqlite3.Error as error:
-        raise LogError(f"{path} can't be read: {error}") from None
-
-
-def _moment(at: object, path: Path, row: int) -> datetime:
-    """Return a time of a database: seconds since 1970, or text, in UTC."""
-    if not isinstance(at, int | float):
-        moment = parse_time(str(at), path, row)
-        return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-    try:
-        return datetime.fromtimestamp(at, UTC)
-    except (ValueError, OverflowError, OSError):
-        raise LogError(f"{path}, row {row}: {at!r} is not a time") from None
-
-
-def _of_years(path: Path, rows: list[tuple[str, str, datetime, int]], zone: Zone) -> Zone:
+def _of_years(path: Path, rows: list[StateRow], zone: Zone) -> Zone:
     """Return the clock of a home for the years of a log.
 
     Raises:
@@ -240,9 +188,7 @@ def _of_years(path: Path, rows: list[tuple[str, str, datetime, int]], zone: Zone
         return zone.over(min(times_us), max(times_us))
 
 
-def _local(
-    path: Path, rows: Iterable[tuple[str, str, datetime, int]], zone: Zone | str | None
-) -> Iterator[_StateLine]:
+def _local(path: Path, rows: Iterable[StateRow], zone: Zone | str | None) -> Iterator[_StateLine]:
     """Yield states with local times: of a clock that changes, if it is given.
 
     Raises:
