@@ -6,6 +6,7 @@ import pytest
 from tests.scenes import Cli
 
 from fleet2d.errors import InputError
+from fleet2d.testing.answer import answer, headline
 from fleet2d.testing.gate import (
     FAILED,
     HELD,
@@ -101,8 +102,9 @@ def test_what_holds_by_less_is_told_although_no_verdict_differs() -> None:
     found = gate(set(), set(), margin=0.75)
 
     assert found.passes
-    assert any("holds by less in 20 of 20 trials" in says for says in found.sentences())
-    assert any("by 0.25 m in the median" in says for says in found.sentences())
+    says = " ".join(answer(found).sentences)
+    assert "finds (REQ-1) holds by less in 20 of 20 trials" in says
+    assert "by 0.25 m in the median" in says
 
 
 def test_failures_are_grouped_and_the_worst_leads() -> None:
@@ -116,10 +118,10 @@ def test_failures_are_grouped_and_the_worst_leads() -> None:
 
 
 @pytest.mark.parametrize(
-    ("new", "old", "passes", "headline"),
+    ("new", "old", "passes", "words"),
     [
-        (set(), None, True, "2.1 passes: 1 of 1 expectation held, after 20 trials"),
-        ({3}, None, False, "2.1 doesn't pass: 1 of 1 expectation fails, after 20 trials"),
+        (set(), None, True, "2.1 passes: 1 of 1 expectation held"),
+        ({3}, None, False, "2.1 doesn't pass: 1 of 1 expectation fails"),
         ({3}, {3, 4}, True, "none of 1 expectation is shown to be worse than with 2.0"),
         ({3}, set(), False, "1 of 1 expectation is worse than with 2.0"),
         (set(range(8)), {0}, False, "1 of 1 expectation is worse than with 2.0"),
@@ -127,25 +129,34 @@ def test_failures_are_grouped_and_the_worst_leads() -> None:
     ids=["all held", "one failed", "failed before, too", "only now", "more often"],
 )
 def test_what_speaks_against_a_release(
-    new: set[int], old: set[int] | None, passes: bool, headline: str
+    new: set[int], old: set[int] | None, passes: bool, words: str
 ) -> None:
     found = gate(new, old)
 
     assert passes == found.passes
-    assert headline in found.headline()
+    assert words in headline(found)
 
 
 def test_equal_builds_say_what_may_have_gone_unseen() -> None:
-    assert "all 20 verdicts are those of 2.0; what differs in less than 13.9 % of trials may" in (
-        "\n".join(gate(set(), set()).sentences())
+    assert "All 20 verdicts are those of 2.0; what differs in less than 13.9 % of trials may" in (
+        str(answer(gate(set(), set())))
     )
+
+
+def test_a_difference_that_may_be_chance_says_how_many_trials_would_show_it() -> None:
+    # 3 of 20 are worse: 2 / 2**3 is .25, and 2 / 2**6 is below .05.
+    says = " ".join(answer(gate({1, 2, 3}, set())).sentences)
+
+    assert "finds (REQ-1) is worse in 3 of 20 trials (p = 0.25, not shown for other trials)" in says
+    assert "whether finds differs for others, 2 times as many trials would show" in says
+    assert "times as many" not in str(answer(gate(set(range(9)), set())))
 
 
 def test_a_build_without_common_trials_is_not_compared() -> None:
     tallies = tally([TEST], reports(set()))
     found = Gate("2.1", tallies, "2.0", [], compare(tallies, []))
 
-    assert "no trial of 2.0 is the same: nothing is compared" in list(found.sentences())
+    assert "No trial of 2.0 is the same: nothing is compared." in answer(found).sentences
 
 
 def test_a_build_that_does_not_run_is_said_and_does_not_pass() -> None:
@@ -153,9 +164,11 @@ def test_a_build_that_does_not_run_is_said_and_does_not_pass() -> None:
     tallies = tally([TEST], broken)
     found = Gate("2.1", tallies, "2.0", tally([TEST], reports(set())))
 
-    assert "2.1 doesn't pass: 1 test can't be run, after 20 trials" == found.headline()
-    assert "home.yaml can't be run in 20 of 20 trials, first in seed 0: robots.astro.speeed" in (
-        next(found.sentences())
+    says = answer(found).sentences
+    assert "2.1 doesn't pass: 1 test can't be run." == says[0]
+    assert "home.yaml can't be run in 20 of 20 trials: robots.astro.speeed: unknown key." == says[1]
+    assert "can't be run in 20 of 20 trials, first in seed 0: robots.astro.speeed" in (
+        next(found.details({}))
     )
 
 
@@ -186,6 +199,7 @@ def test_a_python_test_with_a_rate_is_judged_by_it(fleet2d: Cli) -> None:
     code, out, _ = fleet2d("test", ".", "--workers", "1")
 
     assert code == 0
+    assert "test_moves can't tell 80 % from " in out
     assert "1 of 1 requirement held" in out
     assert "19 of 19" in out  # the trial with the failed assert ended before it
     code, out, _ = fleet2d("test", "test_robot.py", "--seed", "4")

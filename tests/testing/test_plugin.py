@@ -1,5 +1,6 @@
 """The plugin of pytest: tests with a trial run as other tests do, and say what was decided."""
 
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -81,7 +82,7 @@ def test_seeds():
     assert seeds == list(range(12))
 """, "--junit-xml=report.xml")  # fmt: skip
     assert {"passed": 2} == result.outcomes
-    assert "test_suite.py::test_all: held in 12 of 12 seeds" in result.text
+    assert "test_all  assert       held     12 of 12  73.5 % to 100 %" in result.text
     report = ET.parse("report.xml")
     shown = "held in 12 of 12 seeds; at least 77.9 % was shown"
     assert [{"name": "fleet2d", "value": shown}] == [
@@ -101,10 +102,9 @@ def test_mostly(trial):
 """, "--fleet2d-shrink=0")  # fmt: skip
     assert {"passed": 1, "failed": 1} == result.outcomes
     text = result.text
-    assert "test_never: held in 0 of" in text
+    assert "test_mostly  assert       held     50 %" in text
     assert "50 % refused after" in text
-    assert "50 % accepted after" in text
-    assert "after 200" not in text
+    assert " of 200" not in text
 
 
 @pytest.mark.slow
@@ -187,7 +187,7 @@ def test_trials():
     assert trials[4:] == [("ana", .3, 4), ("vera", .3, 5), ("ana", .6, 6), ("vera", .6, 7)]
 """.replace("flat.json", scenario()["floorplan"]["path"]))  # fmt: skip
     assert {"passed": 2} == result.outcomes
-    assert "held in 8 of 8 runs" in result.text
+    assert "held     8 of 8 " in result.text
 
 
 @pytest.mark.parametrize(
@@ -274,7 +274,74 @@ def test_many(trial, number):
     (tmp_path / "test_suite.py").write_text(HEAD + code)
     done = process("-m", "pytest", *LOAD, "-n", "2", "-p", "no:cacheprovider", cwd=tmp_path)
     assert "4 passed" in done.stdout
-    assert 4 == done.stdout.count("held in 5 of 5 seeds")
+    assert 4 == done.stdout.count("held     5 of 5 ")
+    assert "It took 20 trials: 1.0 min simulated in " in done.stdout
+
+
+TELLS = "= what the trials show ="
+
+
+def test_a_session_without_trials_says_nothing_of_them(suite: Suite) -> None:
+    assert TELLS not in suite("def test_other(): pass").text
+
+
+def test_all_that_was_skipped_is_told(suite: Suite) -> None:
+    result = suite("""
+@pytest.mark.skip(reason="no time")
+@trial("flat.yaml")
+def test_one(trial): pass
+@pytest.mark.skip(reason="no time")
+@trial("flat.yaml")
+def test_other(trial): pass
+""")  # fmt: skip
+    said = result.text.partition(TELLS)[2]
+    assert "The robot is untested: no trial was run.\n2 tests skipped: no time." in said
+    assert "It took" not in said
+
+
+def test_one_seed_tells_little_and_how_many_more_would_tell(suite: Suite) -> None:
+    said = suite("""
+@trial("flat.yaml")
+def test_moves(trial):
+    trial.expect("eventually(moving(astro))", "moves")
+""").text.partition(TELLS)[2]
+    assert "1 of 1 expectation held.\n" in said
+    assert (
+        "What fails in less than 95 % of trials may have gone unseen: 28 more trials of test_moves"
+        " would show what fails in 10 %." in said
+    )
+    assert "It took 1 trial: " in said
+
+
+def test_what_failed_is_told_with_its_worst_seed_and_what_is_not_covered(
+    suite: Suite, tmp_path: Path
+) -> None:
+    (tmp_path / "requirements.yaml").write_text("REQ-1: stands still\nREQ-2: greets\n")
+    code = """
+@trial("flat.yaml", seeds=20, holds=0.9)
+def test_near(trial):
+    trial.expect("never(moving(astro))", "still", covers=["REQ-1"])
+    trial.expect("always(distance(ana, astro) < 0.1)", "near")
+@pytest.mark.xfail
+@trial("flat.yaml")
+def test_expected(trial):
+    trial.expect("never(moving(astro))", "still")
+@pytest.fixture
+def broken():
+    raise ValueError("no network")
+@trial("flat.yaml")
+def test_broken(trial, broken): pass
+"""
+    options = ("--fleet2d-shrink=0", "--fleet2d-requirements=requirements.yaml")
+    said = suite(code, *options).text.partition(TELLS)[2]
+    lines = said.splitlines()
+    assert "2 of 3 expectations fail and 1 test can't be run." in lines
+    assert "test_broken can't be run: ValueError: no network" in said
+    assert "still of test_near (REQ-1) failed in " in said
+    assert "near of test_near failed in " in said
+    assert re.search(r"worst in seed \d+, by [\d.]+ m", said)
+    assert "still of test_expected fails as expected, in 1 of 1 trial." in lines
+    assert "0 of 2 requirements held; failed: REQ-1; not covered: REQ-2." in lines
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """`fleet2d test`: run tests of one build, or of two on the same trials, and say what they show."""
 
 import json
+import time
 from collections import Counter
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -115,7 +116,10 @@ def test(  # noqa: PLR0913 - options of the command line
 
         write_junit(junit, gate, suite.times_s, hints)
     if as_json:
-        typer.echo(json.dumps({**gate.content(), "trials": suite.content()}))
+        from fleet2d.testing.answer import answer, headline
+
+        first = {"verdict": headline(gate), "answer": answer(gate).content}
+        typer.echo(json.dumps({**first, **gate.content(), "trials": suite.content()}))
     else:
         _print(gate, hints, suite.files if out is not None else {})
     if not gate.passes:
@@ -141,6 +145,7 @@ class _Suite:
     files: "dict[TrialKey, list[Path]]" = field(default_factory=dict)
     pictures: "dict[Tally, Path]" = field(default_factory=dict)
     prints: dict[str, str] = field(default_factory=dict)
+    wall_s: float = 0.0
 
     def read(
         self,
@@ -211,17 +216,21 @@ class _Suite:
         """Run all trials, and add them to the history."""
         from fleet2d.testing.suite import run_suite
 
+        start_s = time.monotonic()
         self.reports = run_suite(
             self.tests, self.builds, self.keys, self.numbers, workers=self.workers, show=self.show
         )
+        self.wall_s = time.monotonic() - start_s
         if self.history is not None:
             for build, reports in reversed([*zip(self.builds, self.reports, strict=True)]):
                 self.history.add(build.name, self.prints, reports)
 
     def gate(self) -> "Gate":
         """Return what the trials show."""
+        from fleet2d.testing.answer import cost_of
         from fleet2d.testing.gate import Gate, compare, cover, tally
 
+        reports = [report for of_build in self.reports for report in of_build]
         tallies = tally(self.tests, self.reports[0])
         other = self.reports[1] if len(self.reports) > 1 else self.earlier
         before = tally(self.tests, other) if self.against else []
@@ -234,6 +243,7 @@ class _Suite:
             cover(tallies, self.requirements),
             {} if self.history is None else self.history.trend(),
             self.notes,
+            cost_of(reports, self.wall_s, len(self.builds)),
         )
 
     def store(self, gate: "Gate", folder: Path, most: int) -> None:
@@ -355,60 +365,14 @@ def _to_see(gate: "Gate", each: "Tally") -> "list[TrialKey]":
 def _print(
     gate: "Gate", hints: "Mapping[Tally, str]", files: "Mapping[TrialKey, list[Path]]"
 ) -> None:
-    """Print a table of expectations, what failed or differs, and the verdict."""
-    from rich.console import Console
+    """Print what failed and how to see it, and the answer."""
+    from fleet2d.testing.answer import answer
 
-    console = Console(highlight=False, markup=False, soft_wrap=True)
-    console.print(_table(gate), soft_wrap=False)
     outcomes = [o for each in gate.tallies for o in each.outcomes.values()]
     notes = dict.fromkeys(note for o in outcomes for note in o.content.get("notes", ()))
-    stored = [f"stored: {path}" for paths in files.values() for path in paths]
-    says = list(gate.sentences(hints))
-    headline = gate.headline()
-    console.print(*(f"note: {note}" for note in notes), *says, *stored, headline, sep="\n")
-
-
-def _table(gate: "Gate") -> object:
-    from rich.table import Table
-
-    outcomes = [o for each in gate.tallies for o in each.outcomes.values()]
-    has_untested = any(o.holds is None for o in outcomes)
-    has_occasions = any(o.content.get("occasions") is not None for o in outcomes)
-    columns = [*(["untested"] * has_untested), *(["occasions"] * has_occasions)]
-    columns += ["at least by", *([f"than {gate.against}"] if gate.against else [])]
-    table = Table(show_edge=False)
-    for column in ("test", "expectation", "held", *columns):
-        table.add_column(column, overflow="fold")
-    last = ""
-    for each in gate.tallies:
-        found = list(each.outcomes.values())
-        row = ["" if each.test == last else gate.short[each.test], each.name or "(can't be run)"]
-        row.append(f"{each.held} of {len(found) + len(each.errors)}")
-        row += [str(sum(o.holds is None for o in found) or "")] if has_untested else []
-        if has_occasions:
-            numbers = [o.content.get("occasions") for o in found]
-            is_known = any(number is not None for number in numbers)
-            row.append(str(sum(filter(None, numbers))) if is_known else "")
-        row.append(_least(each))
-        if gate.against:
-            change = gate.change_of.get((each.test, each.name))
-            row.append("" if change is None else _difference(len(change.worse), len(change.better)))
-        table.add_row(*row)
-        last = each.test
-    return table
-
-
-def _difference(worse: int, better: int) -> str:
-    numbers = {"worse": worse, "better": better}
-    return ", ".join(f"{number} {word}" for word, number in numbers.items() if number) or "same"
-
-
-def _least(each: "Tally") -> str:
-    """Return the lowest margin of an expectation as text."""
-    from fleet2d.expectations.verdict import amount
-
-    margins = [(o.margin, o.unit) for o in each.outcomes.values() if o.margin is not None]
-    if not margins:
-        return ""
-    margin, unit = min(margins)
-    return f"{margin:g} s to spare" if unit == "s" else amount(margin, unit)
+    lines = [f"note: {note}" for note in notes]
+    lines += gate.details(hints)
+    lines += [f"stored: {path}" for paths in files.values() for path in paths]
+    for line in [*lines, ""] if lines else []:
+        typer.echo(line)
+    typer.echo(answer(gate))

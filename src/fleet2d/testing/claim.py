@@ -65,6 +65,16 @@ class RateTest(NamedTuple):
             return False
         return True if failures <= self.accept[seeds] else None
 
+    def judge(self, held: Sequence[bool]) -> bool | None:
+        """Return whether trials, in order, show the claim; None if they are too few."""
+        failures = 0
+        for number, holds in enumerate(held[: self.seeds], 1):
+            failures += not holds
+            decided = self.decide(number, failures)
+            if decided is not None:
+                return decided
+        return None
+
     def acceptance(self, rate: float) -> float:
         """Return the exact probability that the claim is accepted if this is the true rate."""
         return sum_in_order(accepted for accepted, _, _ in steps_of(self.accept, self.refuse, rate))

@@ -13,7 +13,7 @@ from fleet2d.configuration.problems import counted, suggest
 from fleet2d.errors import InputError
 from fleet2d.expectations.verdict import amount
 from fleet2d.studies.answers import holm
-from fleet2d.testing.claim import nested_rate_interval, percent
+from fleet2d.testing.claim import RateTest, nested_rate_interval
 from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 
 ERROR = 0.05
@@ -38,6 +38,7 @@ class Tally:
         outcomes: Its outcomes by trial.
         errors: The trials that couldn't be run, or broke.
         accepted: Whether the claim of its test was accepted; None if trials are too few for that.
+        claim: What its test claims; None if none of its trials could be judged.
     """
 
     test: str
@@ -45,6 +46,7 @@ class Tally:
     outcomes: Mapping[TrialKey, TrialOutcome]
     errors: tuple[TrialReport, ...] = ()
     accepted: bool | None = True
+    claim: RateTest | None = None
 
     @property
     def title(self) -> str:
@@ -56,6 +58,11 @@ class Tally:
     def covers(self) -> frozenset[str]:
         """The requirements that it covers."""
         return frozenset(r for outcome in self.outcomes.values() for r in outcome.covers)
+
+    @property
+    def trials(self) -> int:
+        """The number of its trials."""
+        return len(self.outcomes) + len(self.errors)
 
     @property
     def failed(self) -> list[TrialKey]:
@@ -95,16 +102,16 @@ class Tally:
 
     def sentence(self) -> str:
         """Return what failed in how many trials, and how in the worst."""
-        number = len(self.outcomes) + len(self.errors)
+        number = counted(self.trials, "trial")
         if self.errors:
             first = self.errors[0]
-            what = f"{self.test} can't be run in {len(self.errors)} of {counted(number, 'trial')}"
+            what = f"{self.test} can't be run in {len(self.errors)} of {number}"
             return f"{what}, first in {first.key.label}: {first.error}"
         failed = self.failed
         if not failed:
-            return f"{self.title}: {self.verdict} in {counted(number, 'trial')}"
+            return f"{self.title}: {self.verdict} in {number}"
         worst = failed[0]
-        text = f"{self.title}: failed in {len(failed)} of {counted(number, 'trial')}"
+        text = f"{self.title}: failed in {len(failed)} of {number}"
         where = f", worst in {worst.label}" if len(failed) > 1 else f", in {worst.label}"
         return f"{text}{where}: {self.outcomes[worst].says}"
 
@@ -119,18 +126,25 @@ def tally(tests: Sequence[SuiteTest], reports: Sequence[TrialReport]) -> list[Ta
     tallies: list[Tally] = []
     for test in tests:
         of_test = [report for report in reports if report.key.test == test.name]
-        errors = tuple(report for report in of_test if report.error)
-        outcomes: dict[str, dict[TrialKey, TrialOutcome]] = {}
-        for report in of_test:
-            for outcome in report.outcomes:
-                outcomes.setdefault(outcome.name, {})[report.key] = outcome
-        accepted = None
-        if of_test and not errors:
-            accepted = test.decide([report.holds for report in of_test])
-        tallies += [Tally(test.name, n, each, (), accepted) for n, each in outcomes.items()]
-        if errors:
-            tallies.append(Tally(test.name, "", {}, errors))
+        accepted = claim = None
+        if of_test and not any(report.error for report in of_test):
+            claim = test.rate(len(of_test))
+            accepted = claim.judge([report.holds for report in of_test])
+        tallies += tallies_of(test.name, of_test, accepted, claim)
     return tallies
+
+
+def tallies_of(
+    test: str, reports: Sequence[TrialReport], accepted: bool | None, claim: RateTest | None
+) -> list[Tally]:
+    """Return a tally for each expectation of a test, and one of the trials that couldn't be run."""
+    outcomes: dict[str, dict[TrialKey, TrialOutcome]] = {}
+    for report in reports:
+        for outcome in report.outcomes:
+            outcomes.setdefault(outcome.name, {})[report.key] = outcome
+    tallies = [Tally(test, name, each, (), accepted, claim) for name, each in outcomes.items()]
+    errors = tuple(report for report in reports if report.error)
+    return [*tallies, Tally(test, "", {}, errors)] if errors else tallies
 
 
 class PairedChange(NamedTuple):
@@ -187,10 +201,20 @@ class PairedChange(NamedTuple):
         """The expectation with its test."""
         return f"{self.name} of {self.test}"
 
+    @property
+    def differs(self) -> bool:
+        """Whether any verdict does."""
+        return bool(self.worse or self.better)
+
     def words(self) -> str:
         """Return in how many trials it differs, in which, and whether that may be chance."""
+        keys = self.worse or self.better
+        return f"{self.brief()}: {listed(keys)}" if keys else self.brief()
+
+    def brief(self) -> str:
+        """Return in how many trials it differs, and whether that may be chance."""
         pairs = counted(self.pairs, "trial")
-        if not self.worse and not self.better:
+        if not self.differs:
             return f"the same verdict in all {pairs}"
         numbers = {"worse": len(self.worse), "better": len(self.better)}
         parts = [f"{word} in {number}" for word, number in numbers.items() if number]
@@ -198,8 +222,7 @@ class PairedChange(NamedTuple):
         if self.units == "home":
             text += f", in {self.worse_units} homes worse and in {self.better_units} better"
         doubt = "" if self.direction else ", not shown for other trials"
-        text += f" (p = {self.p_holm:.2g}{doubt})"
-        return f"{text}: {listed(self.worse or self.better)}"
+        return f"{text} (p = {self.p_holm:.2g}{doubt})"
 
     def nearer(self) -> str:
         """Return by how much less it holds."""
@@ -362,6 +385,8 @@ class Gate:
         coverage: The requirements and what covers them.
         trend: By build of the history, oldest first: how often each expectation held, of how many.
         notes: What was left out, and the like.
+        cost: How many trials were run, and what they took.
+        expected: The tests that are expected to fail.
     """
 
     build: str
@@ -372,6 +397,8 @@ class Gate:
     coverage: Sequence[RequirementCoverage] = ()
     trend: Mapping[str, Mapping[Place, tuple[int, int]]] = field(default_factory=dict)
     notes: Sequence[str] = ()
+    cost: str = ""
+    expected: frozenset[str] = frozenset()
 
     @cached_property
     def change_of(self) -> Mapping[Place, PairedChange]:
@@ -391,14 +418,15 @@ class Gate:
     def blocking(self) -> list[Tally]:
         """What speaks against a release.
 
-        Without another build that is all that fails; else what is clearly worse, what fails and
-        didn't, and what can't be run.
+        Without another build that is all that fails unexpectedly; else what is clearly worse, what
+        fails and didn't, and what can't be run.
         """
         failing = {(each.test, each.name) for each in self.before if each.fails}
         found = []
         for each in self.tallies:
             place = each.test, each.name
             is_known = place in failing and each.verdict != BROKEN
+            is_known |= each.test in self.expected
             change = self.change_of.get(place)
             if (each.fails and not is_known) or (change is not None and change.direction < 0):
                 found.append(each)
@@ -406,117 +434,44 @@ class Gate:
 
     @property
     def known(self) -> list[Tally]:
-        """What fails with both builds, and isn't clearly worse."""
+        """What fails with both builds and isn't clearly worse, or is expected to fail."""
         return [each for each in self.tallies if each.fails and each not in self.blocking]
+
+    @property
+    def known_as(self) -> str:
+        """Why that doesn't speak against a release."""
+        return f"fails with {self.against}, too" if self.against else "fails as expected"
 
     @property
     def passes(self) -> bool:
         """Whether nothing speaks against a release."""
         return not self.blocking
 
-    def headline(self) -> str:
-        """Return the verdict in one sentence."""
-        name = self.build or "the build"
-        number = len([each for each in self.tallies if each.name])
-        tests = counted(number, "expectation")
-        trials = len({key for each in self.tallies for key in _trials(each)})
-        after = f"after {counted(trials, 'trial')}"
-        if not self.passes:
-            broken = len({each.test for each in self.blocking if each.verdict == BROKEN})
-            worse = len([each for each in self.blocking if each.name])
-            is_one = worse == 1
-            what = "fails" if is_one else "fail"
-            if self.against:
-                what = f"{'is' if is_one else 'are'} worse than with {self.against}"
-            parts = [f"{worse} of {tests} {what}"] if worse else []
-            parts += [f"{counted(broken, 'test')} can't be run"] if broken else []
-            return f"{name} doesn't pass: {' and '.join(parts)}, {after}"
-        if self.against and self.changes:
-            than = f"is shown to be worse than with {self.against}"
-            known = f", {len(self.known)} of them failing with both" if self.known else ""
-            return f"{name} passes: none of {tests} {than}{known}, {after}"
-        held = sum(each.verdict == HELD for each in self.tallies)
-        return f"{name} passes: {held} of {tests} held, {after}"
-
-    def sentences(self, hints: Mapping[Tally, str] | None = None) -> Iterator[str]:
-        """Yield what the verdict rests on, what else differs, and what can't be told.
-
-        Args:
-            hints: How to see failures.
-        """
+    def details(self, hints: Mapping[Tally, str]) -> Iterator[str]:
+        """Yield what failed and how, and how to see it."""
         for each in self.blocking:
             change = self.change_of.get((each.test, each.name))
             yield each.sentence()
             if change is not None:
                 yield f"  compared with {self.against}: {change.words()}"
-            if hints and hints.get(each):
+            if hints.get(each):
                 yield f"  {hints[each]}"
-        yield from self.summary()
         for each in self.known:
-            yield f"fails with {self.against}, too: {each.sentence()}"
-
-    def reason(self, each: Tally) -> str:
-        """Return why something speaks against a release: by the comparison, if there is one."""
-        change = self.change_of.get((each.test, each.name))
-        return each.sentence() if change is None else f"{each.title}: {change.words()}"
-
-    def summary(self) -> Iterator[str]:
-        """Yield what differs without speaking against a release, and what can't be told."""
-        blocking = {(each.test, each.name) for each in self.blocking}
-        for change in self.changes:
-            is_different = change.worse or change.better
-            if is_different and (change.test, change.name) not in blocking:
-                yield f"{change.title}: {change.words()}"
-            elif change.is_narrower and not is_different:
-                yield f"{change.title}: {change.nearer()}"
-        if self.against:
-            yield self._unseen()
-        yield from self._requirements()
-        yield from self.notes
-
-    def _unseen(self) -> str:
-        """Return what the comparison can't tell."""
-        if not self.changes:
-            return f"no trial of {self.against} is the same: nothing is compared"
-        pairs = sum(change.pairs for change in self.changes)
-        if any(change.worse or change.better for change in self.changes):
-            return (
-                f"{counted(pairs, 'pair')} of verdicts were compared with {self.against}; p values"
-                f" are exact, and corrected for {counted(len(self.changes), 'expectation')} (Holm)"
-            )
-        units = min(change.pairs for change in self.changes)
-        rate = percent(1 - ERROR ** (1 / units))
-        return (
-            f"all {counted(pairs, 'verdict')} are those of {self.against}; what differs in less"
-            f" than {rate} of trials may have gone unseen"
-        )
-
-    def _requirements(self) -> Iterator[str]:
-        if not self.coverage:
-            return
-        by_verdict: dict[str, list[str]] = {}
-        for row in self.coverage:
-            by_verdict.setdefault(row.verdict, []).append(row.requirement)
-        held = len(by_verdict.pop(HELD, []))
-        parts = [f"{held} of {counted(len(self.coverage), 'requirement')} held"]
-        parts += [f"{verdict}: {', '.join(ids)}" for verdict, ids in by_verdict.items()]
-        yield "; ".join(parts)
+            yield f"{self.known_as}: {each.sentence()}"
 
     def content(self) -> dict[str, Any]:
         """Return it as plain JSON data."""
         return {
-            "verdict": self.headline(),
             "passes": self.passes,
             "build": self.build,
             "against": self.against,
-            "says": list(self.sentences()),
             "expectations": [
                 {
                     "test": each.test,
                     "expectation": each.name,
                     "covers": sorted(each.covers),
                     "verdict": each.verdict,
-                    "trials": len(each.outcomes) + len(each.errors),
+                    "trials": each.trials,
                     "held": each.held,
                     "failed": [key.label for key in each.failed],
                     "rate": list(each.rate),
@@ -546,7 +501,3 @@ class Gate:
             },
             "notes": list(self.notes),
         }
-
-
-def _trials(tally: Tally) -> list[TrialKey]:
-    return [*tally.outcomes, *(report.key for report in tally.errors)]

@@ -4,8 +4,11 @@ pytest loads it by the entry point of the package; nothing else in Fleet2D impor
 """
 
 import functools
+import time
 import traceback
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +16,18 @@ import pytest
 
 if TYPE_CHECKING:
     from fleet2d.testing.claim import Claim
-    from fleet2d.testing.trials import Body
+    from fleet2d.testing.gate import Gate
+    from fleet2d.testing.suite import TrialReport
+    from fleet2d.testing.trials import Body, ClaimResult
 
 PROPERTY = "fleet2d"
 """The property of a test that holds the decision, also in JUnit XML."""
 TRIAL = "trial"
 CLAIM = "fleet2d_claim"  # the attribute of a test function that holds its claim
+DECISION = "fleet2d"
+"""The attribute of a report of a test that holds its trials as plain data, for other processes."""
+KEPT = pytest.StashKey[dict[str, Any]]()
+OUTCOMES = ("passed", "failed", "error", "skipped", "xfailed", "xpassed")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -47,6 +56,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="append",
         default=[],
         help="change the scenario of each trial, such as its robot; again for more",
+    )
+    group.addoption(
+        "--fleet2d-requirements",
+        metavar="FILE",
+        type=Path,
+        help="a YAML file of requirements, ids and texts: those that no test covers are named",
     )
     group.addoption(
         "--fleet2d-shrink",
@@ -81,6 +96,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     body = _body(pyfuncitem)
     problem = ""
     result = None
+    start_s = time.monotonic()
     try:
         claim.prepare()
         result = run_claim(claim, body)
@@ -89,6 +105,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     if result is None:
         pytest.fail(problem, pytrace=False)
     pyfuncitem.user_properties.append((PROPERTY, result.text))
+    pyfuncitem.stash[KEPT] = _decision(result, body, time.monotonic() - start_s)
     if not result.holds:
         tries = pyfuncitem.config.getoption("--fleet2d-shrink")
         text = explain(result, body, _folder(pyfuncitem), pyfuncitem.nodeid, tries)
@@ -144,13 +161,110 @@ def _folder(item: pytest.Function) -> Path:
     return Path(folder or ".fleet2d")
 
 
-def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Print the decision on each test with several runs."""
-    reports = (report for of_kind in terminalreporter.stats.values() for report in of_kind)
-    calls = [report for report in reports if getattr(report, "when", None) == "call"]
-    decided = [(report.nodeid, dict(report.user_properties).get(PROPERTY)) for report in calls]
-    lines = [f"{test}: {text}" for test, text in decided if text not in (None, "held", "failed")]
-    if lines:
-        terminalreporter.section("trials")
-        for line in sorted(lines):
-            terminalreporter.line(line)
+def _decision(result: "ClaimResult", body: "Body", wall_s: float) -> dict[str, Any]:
+    """Return what came of a claim as plain data."""
+    from fleet2d.testing.suite import key_of, outcomes_of
+
+    rate = result.claim.rate
+    trials = []
+    for trial in result.trials:
+        _, home, seed = key_of("", trial.variant)
+        outcomes = outcomes_of(trial, body, may_be_untested=result.claim.may_be_untested)
+        plain = [asdict(replace(each, content={})) for each in outcomes]
+        trials.append([home, seed, plain, trial.simulated_s])
+    claim = [rate.seeds, rate.holds, rate.error]
+    return {"trials": trials, "accepted": result.holds, "claim": claim, "wall_s": wall_s}
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Add what came of the claim of a test to its report."""
+    outcome = yield
+    if hasattr(getattr(item, "obj", None), CLAIM):
+        setattr(outcome.get_result(), DECISION, item.stash.get(KEPT, {}))  # type: ignore[attr-defined]
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Print the answer of the tests with trials, if there are any."""
+    reports = {}
+    for outcome in OUTCOMES:
+        for report in terminalreporter.stats.get(outcome, ()):
+            is_last = getattr(report, "when", "") == "call" or outcome in ("error", "skipped")
+            if is_last and hasattr(report, DECISION) and report.when != "teardown":
+                reports[report.nodeid] = outcome, report
+    if reports:
+        from fleet2d.errors import InputError
+        from fleet2d.testing.answer import answer
+
+        terminalreporter.section("what the trials show")
+        try:
+            terminalreporter.line(str(answer(_gate(reports, config))))
+        except InputError as error:  # of the requirements
+            terminalreporter.line(f"error: {error}")
+
+
+def _gate(reports: dict[str, tuple[str, Any]], config: pytest.Config) -> "Gate":
+    """Return the gate of the tests of a session, which have no build.
+
+    Raises:
+        InputError: The requirements can't be read, or lack one that a test covers.
+    """
+    from fleet2d.configuration.problems import counted
+    from fleet2d.testing.answer import cost_of
+    from fleet2d.testing.claim import rate_test
+    from fleet2d.testing.gate import Gate, Tally, cover, read_requirement_list, tallies_of
+    from fleet2d.testing.suite import TrialKey, TrialReport
+
+    tallies: list[Tally] = []
+    notes: list[str] = []
+    skipped: Counter[str] = Counter()
+    every: list[TrialReport] = []
+    wall_s = 0.0
+    for test, (outcome, report) in reports.items():
+        decision = getattr(report, DECISION)
+        if outcome == "skipped":
+            skipped[_reason(report)] += 1
+        elif not decision:
+            broken = TrialReport(TrialKey(test, "", 0), error=_reason(report))
+            tallies += tallies_of(test, [broken], None, None)
+        else:
+            trials = _trials(test, decision)
+            claim = rate_test(*decision["claim"])
+            tallies += tallies_of(test, trials, decision["accepted"], claim)
+            every += trials
+            wall_s += decision["wall_s"]
+            if decision["accepted"] and outcome in ("xpassed", "failed"):
+                notes.append(f"{test} held, though it is expected to fail")
+    notes += [f"{counted(number, 'test')} skipped: {why}" for why, number in skipped.items()]
+    path = config.getoption("--fleet2d-requirements")
+    requirements = None if path is None else read_requirement_list(path)
+    return Gate(
+        "",
+        tallies,
+        coverage=cover(tallies, requirements),
+        notes=notes,
+        cost=cost_of(every, wall_s),
+        expected=frozenset(test for test, (outcome, _) in reports.items() if outcome == "xfailed"),
+    )
+
+
+def _trials(test: str, decision: dict[str, Any]) -> "list[TrialReport]":
+    """Return the trials of a test from plain data."""
+    from fleet2d.testing.suite import TrialKey, TrialOutcome, TrialReport
+
+    found = []
+    for home, seed, plain, simulated_s in decision["trials"]:
+        outcomes = tuple(TrialOutcome(**{**p, "covers": tuple(p["covers"])}) for p in plain)
+        key = TrialKey(test, home, seed)
+        found.append(TrialReport(key, outcomes, simulated_s=simulated_s))
+    return found
+
+
+def _reason(report: Any) -> str:
+    """Return why a test was skipped or couldn't be run, in one line."""
+    text = report.longrepr
+    if isinstance(text, tuple):  # of a skipped test: file, line, and reason
+        return str(text[2]).removeprefix("Skipped: ")
+    crash = getattr(text, "reprcrash", None)
+    message = str(text if crash is None else crash.message).removeprefix("Failed: ")
+    return message.strip().partition("\n")[0]

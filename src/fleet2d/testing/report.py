@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from fleet2d.expectations.verdict import amount
+from fleet2d.testing.answer import answer, headline
 from fleet2d.testing.claim import percent
 from fleet2d.testing.gate import HELD, NOT_RUN, Gate, PairedChange, Tally, listed
 from fleet2d.viewing.page_data import POLICY, write_file
@@ -45,7 +46,7 @@ def write_report(
     Raises:
         InputError: The file can't be written.
     """
-    title = html.escape(gate.headline())
+    title = html.escape(headline(gate))
     kind = "good" if gate.passes else "bad"
     parts = [
         "<!doctype html>",
@@ -66,10 +67,9 @@ def write_report(
 
 
 def _says(gate: Gate) -> Iterator[str]:
-    against = [f"<strong>{html.escape(gate.reason(each))}</strong>" for each in gate.blocking]
-    items = [*against, *map(html.escape, gate.summary())]
-    if items:
-        yield f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>"
+    """Yield the sentences of the answer after the verdict."""
+    items = map(html.escape, answer(gate).sentences[1:])
+    yield f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>"
 
 
 def _coverage(gate: Gate) -> Iterator[str]:
@@ -135,8 +135,8 @@ def _failures(
         if not tallies:
             continue
         yield f"<h2>{title}</h2>"
-        if tallies is gate.known:
-            yield f"<p>This fails with {html.escape(gate.against)}, too.</p>"
+        if title == "Known":
+            yield f"<p>This {html.escape(gate.known_as)}.</p>"
         for each in tallies:
             yield f"<h3>{html.escape(each.title)}</h3><p>{html.escape(each.sentence())}</p>"
             if len(each.failed) > 1:
@@ -154,9 +154,8 @@ def _all(gate: Gate) -> Iterator[str]:
     rows = []
     for each in gate.tallies:
         low, high = each.rate
-        number = len(each.outcomes) + len(each.errors)
         cells = [_cell(gate.short[each.test]), _cell(each.name), _verdict(each.verdict)]
-        cells.append(_cell(f"{each.held} of {number}"))
+        cells.append(_cell(f"{each.held} of {each.trials}"))
         cells.append(_cell(f"{percent(low)} to {percent(high)}" if each.outcomes else ""))
         rows.append(cells)
     yield "<h2>All expectations</h2>"

@@ -24,7 +24,7 @@ from fleet2d.scenario.model import Scenario
 from fleet2d.studies.api import open_crew
 from fleet2d.studies.executors import TaskQueue, WorkerTask, by_home, cores, run_tasks
 from fleet2d.studies.simulator import describe_error
-from fleet2d.testing.claim import HOME, Claim, Variant, rate_test
+from fleet2d.testing.claim import HOME, Claim, RateTest, Variant, rate_test
 from fleet2d.testing.search import claimed_test, claimed_tests
 from fleet2d.testing.trials import ASSERT, Body, Trial, TrialResult, asserts, run_trial
 
@@ -86,6 +86,13 @@ class TrialKey(NamedTuple):
 NO_TRIAL = TrialKey("", "", 0)
 
 
+def key_of(test: str, variant: Variant) -> TrialKey:
+    """Return the key of a trial of a test."""
+    labels = {n: v for n, v in variant.labels.items() if n != "seed" and v is not None}
+    home = ", ".join(str(v) if n == HOME else f"{n} {v}" for n, v in labels.items())
+    return TrialKey(test, home, variant.seed)
+
+
 @dataclass(frozen=True)
 class TrialOutcome:
     """What came of an expectation in a trial.
@@ -122,12 +129,14 @@ class TrialReport:
         outcomes: The outcomes of its expectations.
         error: The error that ended it; empty if there was none.
         wall_s: Its wall time [s].
+        simulated_s: Its simulated time [s].
     """
 
     key: TrialKey
     outcomes: tuple[TrialOutcome, ...] = ()
     error: str = ""
     wall_s: float = 0.0
+    simulated_s: float = 0.0
 
     @property
     def holds(self) -> bool:
@@ -193,19 +202,9 @@ class SuiteTest:
             variants += [Variant(scenario, labels).with_seed(seed) for seed in self.seeds]
         return variants
 
-    def decide(self, held: Sequence[bool]) -> bool | None:
-        """Return whether trials, in order, show what the test claims; None if they are too few.
-
-        A scenario claims that all hold.
-        """
-        rate = self.claim().rate if self.function else rate_test(len(held))
-        failures = 0
-        for number, holds in enumerate(held[: rate.seeds], 1):
-            failures += not holds
-            decided = rate.decide(number, failures)
-            if decided is not None:
-                return decided
-        return None
+    def rate(self, trials: int) -> RateTest:
+        """Return what it claims of so many trials: a scenario claims that all hold."""
+        return self.claim().rate if self.function else rate_test(trials)
 
     def body(self) -> Body:
         """Return what a trial does."""
@@ -213,12 +212,7 @@ class SuiteTest:
 
     def keys(self) -> list[TrialKey]:
         """Return its trials, in order."""
-        return [self._key(variant) for variant in self.variants()]
-
-    def _key(self, variant: Variant) -> TrialKey:
-        labels = {n: v for n, v in variant.labels.items() if n != "seed" and v is not None}
-        home = ", ".join(str(v) if n == HOME else f"{n} {v}" for n, v in labels.items())
-        return TrialKey(self.name, home, variant.seed)
+        return [key_of(self.name, variant) for variant in self.variants()]
 
     def fingerprint(self) -> str:
         """Return a digest of all that the test is without the build."""
@@ -378,12 +372,14 @@ class SuiteJob:
         start_s = time.perf_counter()
         try:
             result = self.run(task)
-            outcomes = _outcomes(test, result)
+            is_lenient = bool(test.function) and test.claim().may_be_untested
+            outcomes = outcomes_of(result, test.body(), may_be_untested=is_lenient)
         except Fleet2DError as error:
             return TrialReport(task.key, error=str(error))
         except Exception as error:  # noqa: BLE001 - of the user's test; reported
             return TrialReport(task.key, error=describe_error(error))
-        return TrialReport(task.key, outcomes, wall_s=time.perf_counter() - start_s)
+        wall_s = time.perf_counter() - start_s
+        return TrialReport(task.key, outcomes, "", wall_s, result.simulated_s)
 
     def run(self, task: SuiteTask, out: Path | None = None) -> TrialResult:
         """Run a trial, and store it if there is a directory for it.
@@ -398,10 +394,11 @@ class SuiteJob:
         return run_trial(self._ready[place][task.trial], test.body(), out=out)
 
 
-def _outcomes(test: SuiteTest, result: TrialResult) -> tuple[TrialOutcome, ...]:
+def outcomes_of(
+    result: TrialResult, body: Body, *, may_be_untested: bool = False
+) -> tuple[TrialOutcome, ...]:
     """Return the outcomes of the expectations of a trial, and of its asserts."""
     expected = result.variant.scenario.expect
-    may_be_untested = bool(test.function) and test.claim().may_be_untested
     outcomes = [
         _outcome(each.verdict, each.covers or _covers(expected, each.name))
         for each in result.results
@@ -411,7 +408,7 @@ def _outcomes(test: SuiteTest, result: TrialResult) -> tuple[TrialOutcome, ...]:
     outcomes += [TrialOutcome(f.name, None if f.untested else False, True, f.text) for f in others]
     if may_be_untested:
         outcomes = [replace(o, fails=o.fails and o.holds is not None) for o in outcomes]
-    if test.function and not others and asserts(test.body()):
+    if body is not Trial.run and not others and asserts(body):
         outcomes.append(TrialOutcome(ASSERT, True, False, "the asserts held"))
     return tuple(outcomes)
 

@@ -234,6 +234,11 @@ class TrialResult:
     untested: str = ""
 
     @property
+    def simulated_s(self) -> float:
+        """The simulated time [s]."""
+        return self.steps * self.variant.scenario.simulation.step.total_seconds()
+
+    @property
     def margin(self) -> float:
         """The smallest margin of all expectations, -1 to 1; 1 without expectations."""
         margins = [result.margin for result in (*self.results, *self.failures)]
