@@ -1,11 +1,14 @@
 """Files of a folder that others may have written: names, links, replacement, and the lock."""
 
 import os
+import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
+from tests.scenes import process
 
 from fleet2d.errors import RunDirectoryError
 from fleet2d.storage import files
@@ -15,6 +18,7 @@ from fleet2d.storage.files import (
     path_in,
     refuse_links,
     replacing,
+    scratch_folder,
     write_atomically,
 )
 
@@ -187,3 +191,24 @@ def test_a_folder_that_is_there_is_not_replaced(tmp_path: Path, kind: str) -> No
     with pytest.raises(FileExistsError), new_folder(path):
         raise AssertionError
     assert ["bag"] == [entry.name for entry in tmp_path.iterdir()]
+
+
+def test_the_scratch_folder_of_a_killed_process_is_removed_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    code = (
+        "import os, signal, sys; from fleet2d.storage.files import scratch_folder\n"
+        "with scratch_folder('homes-') as folder:\n"
+        "    (folder / 'home').write_text('walls')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    killed = process("-c", code, TMPDIR=str(tmp_path))
+    (left,) = tmp_path.iterdir()
+    (tmp_path / "homes-of-another").mkdir()  # without our lock
+
+    with scratch_folder("homes-") as first, scratch_folder("homes-") as second:
+        assert (-signal.SIGKILL, False) == (killed.returncode, left.exists())
+        assert first.is_dir()
+        assert second.is_dir()
+    assert ["homes-of-another"] == [path.name for path in tmp_path.iterdir()]

@@ -13,6 +13,7 @@ import platform
 import shutil
 import stat
 import struct
+import tempfile
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -32,6 +33,7 @@ else:
 
 PARTIAL = ".partial"
 """Suffix of a file's name until the file is complete."""
+SCRATCH_LOCK = "in-use.lock"
 
 _FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
@@ -323,6 +325,46 @@ class FolderLock:
             self.path.unlink()
         os.close(self._handle)
         self._handle = -1
+
+
+@contextmanager
+def scratch_folder(prefix: str) -> Iterator[Path]:
+    """Yield a temporary folder, which is removed at the end of the context.
+
+    If the process is killed before, the next one that makes a folder with this prefix removes it.
+
+    Example:
+        >>> with scratch_folder("fleet2d-doctest-") as folder:
+        ...     folder.is_dir()
+        True
+        >>> folder.exists()
+        False
+    """
+    _remove_abandoned(prefix)
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=prefix))
+        try:
+            lock = FolderLock(folder, SCRATCH_LOCK)
+        except (RunDirectoryError, FileNotFoundError):  # another process took it for abandoned
+            continue
+        break
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        lock.release()
+
+
+def _remove_abandoned(prefix: str) -> None:
+    """Remove the scratch folders of this user whose process is no longer there."""
+    if not HAS_LOCKS:
+        return
+    for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+        with suppress(OSError, RunDirectoryError):
+            if folder.lstat().st_uid == os.getuid() and (folder / SCRATCH_LOCK).exists():
+                lock = FolderLock(folder, SCRATCH_LOCK)
+                shutil.rmtree(folder, ignore_errors=True)
+                lock.release()
 
 
 # Kind, bytes of the description, bytes of the content, checksum of all three and of both sizes.

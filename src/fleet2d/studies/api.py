@@ -8,13 +8,13 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.model import Scenario
+from fleet2d.storage.files import scratch_folder
 from fleet2d.studies.design import home_key
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import (
@@ -147,8 +147,7 @@ def open_crew(executor: ExecutorName | Executor, workers: int | None = None) -> 
         InputError: There is no executor of that name.
     """
     count = workers or cores()
-    with TemporaryDirectory(prefix="fleet2d-homes-", ignore_cleanup_errors=True) as folder:
-        plans = Path(folder)
+    with scratch_folder("fleet2d-homes-") as plans:
         match executor:
             case "local":
                 crew = Crew(LocalExecutor(count), count, plans=plans)
