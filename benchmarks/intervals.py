@@ -256,7 +256,7 @@ def main() -> None:
     parser.add_argument("--others", action="store_true", help="other shapes of data")
     options = parser.parse_args()
     studies = options.studies
-    shapes = OTHERS if options.others else SHAPES
+    shapes = list(OTHERS if options.others else SHAPES)
     SHAPES.update(OTHERS)
     head = [
         "homes", *map(str, HOMES), "40, nested", "40, crossed", "three at once", "a false claim",

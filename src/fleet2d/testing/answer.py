@@ -206,7 +206,9 @@ def _missed(gate: Gate) -> str:
     assert claim is not None, "only what was judged is told"
     name = gate.short[each.test]
     if claim.holds < 1:
-        return f"{name} can't tell {percent(claim.holds)} from {percent(claim.alternative)}"
+        rates = f"{percent(claim.holds)} from {percent(claim.alternative)}"
+        more = "up to four times as many would halve that difference"
+        return f"{name} can't tell {rates} in {counted(claim.seeds, 'trial')}; {more}"
     number = _units(each)
     kind = "trial" if number == each.trials else "home"
     shown = _least_shown(each)
