@@ -221,6 +221,9 @@ REACH_S = 1200
 TAKES_UP = 4
 MIN_EPISODE_S = 30  # minimum duration of an episode that was recorded with at least as much
 END = "end"
+NO_SLEEP_S = (
+    60  # a recorded day that ends with no more sleep than this ends up, or out for the night
+)
 
 
 class RecordedDay(NamedTuple):
@@ -335,7 +338,7 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
         next_wake: When the next day begins [s].
 
     Returns:
-        The episodes until `next_wake`, without a gap; the last one is sleep.
+        The episodes until `next_wake`, without a gap; the last one is sleep, or a night out.
     """
     d = first
     i = 0
@@ -356,7 +359,9 @@ def draw_recorded(recording: Recording, first: int, draws: Draws, next_wake: int
             day = recording.days[d]
             shift = now - day.begins[i + 1]
         i += 1
-    if now < next_wake:
+    if i == len(day.activities) - 1 and day.end - day.begins[-1] <= NO_SLEEP_S:
+        result[-1] = result[-1]._replace(end=next_wake)
+    elif now < next_wake:
         result.append(Episode(SLEEP, now, next_wake))
     elif result[-1].activity != SLEEP:
         result[-1] = result[-1]._replace(activity=SLEEP)

@@ -245,8 +245,13 @@ class StudyDirectory:
         """Return the scenario of a variant, with its seed.
 
         Raises:
-            RunDirectoryError: The study has no such variant.
+            RunDirectoryError: The study has no such variant, or its variants are no runs.
         """
+        if not self.storage.exists(SCENARIOS):
+            raise RunDirectoryError(
+                f"the variants of {self.location} are no runs of scenarios: the command that made"
+                " them makes them again"
+            )
         rows = self.plan().filter(variant=number)
         if not len(rows):
             raise RunDirectoryError(f"{self.location} has no variant {number}")

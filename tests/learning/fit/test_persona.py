@@ -121,6 +121,24 @@ def test_a_known_life_is_found_again_and_kept_to(life: Timeline) -> None:
     assert distances(real, rooms, len(life.places)).share < 0.03
 
 
+def test_nights_away_are_lived_away() -> None:
+    minutes = np.zeros((20, DAY_MINUTES), np.int16)  # days in the living room
+    minutes[:, 23 * 60 :] = 1
+    minutes[:, : 7 * 60] = 1
+    for first in range(3, 20, 5):  # out from 18:00 to 18:00 two days later
+        minutes[first : first + 3].ravel()[18 * 60 : 66 * 60] = 2
+    labels = ("tv", "living_room"), ("sleep", "bedroom"), ("away", "away")
+    states = tuple(ActivityPlace(*label) for label in labels)
+    timeline = Timeline(states, minutes, minutes.repeat(60, axis=1), None)
+    days = find_days(timeline)
+    assert list(range(19)) == [day.number for day in days]  # the last ends out of the log
+    fitted = fit_persona(timeline, days)
+    away = sample_persona(fitted, timeline, 300)[1] == timeline.places.index("away")
+    night = away[:, 2 * 60 : 5 * 60]
+    assert (night.all(axis=1) | ~night.any(axis=1)).all()
+    assert away.mean() == pytest.approx((minutes == 2).mean(), abs=0.08)
+
+
 def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_path: Path) -> None:
     fitted = fit_persona(life, find_days(life), "fitted to: a, b")
     file = tmp_path / "persona.yaml"

@@ -11,8 +11,8 @@ from tests.learning.transfer.homes import write_home
 from tests.scenes import Cli
 from tests.thorough import THOROUGH
 
-from fleet2d.errors import RunDirectoryError
-from fleet2d.learning.transfer import driver
+from fleet2d.errors import RunDirectoryError, ScenarioError
+from fleet2d.learning.transfer import driver, sources
 from fleet2d.learning.transfer.driver import COLUMNS, run_transfer
 from fleet2d.learning.transfer.report import compared
 from fleet2d.learning.transfer.specification import read_plan
@@ -149,3 +149,39 @@ def test_the_small_example_tells_its_result_of_real_homes(examples: Path, fleet2
         dict.fromkeys(s.partition(",")[0] for s in sentences)
     )
     assert (examples / "small" / "presence.png").exists()
+
+
+def test_people_who_fit_into_no_home_are_left_out_with_their_cells(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fleet2d: Cli
+) -> None:
+    check = sources.check_dataset
+
+    def finds_no_room(content: Any, *arguments: Any, **keys: Any) -> None:
+        if content["name"] == "simulated":
+            raise ScenarioError("no home has a room for them")
+        check(content, *arguments, **keys)
+
+    monkeypatch.setattr(sources, "check_dataset", finds_no_room)
+    settings = {**yaml.safe_load(file.read_text()), "tasks": ["room in 60 min"], "days": [0]}
+    settings["arms"] = ["real", "both"]
+    odd = tmp_path / "odd.yaml"
+    odd.write_text(yaml.safe_dump(settings))
+    code, _, err = fleet2d("transfer", odd, "--out", tmp_path / "out")
+    assert (2, True) == (code, "simulated: no home has a room for them" in err)
+
+    odd.write_text(yaml.safe_dump({**settings, "skip": "unfit"}))
+    for _ in range(2):
+        code, out, err = fleet2d("transfer", odd, "--out", tmp_path / "out")
+        assert 0 == code, err
+        assert "left out: simulated: no home has a room for them (2 cells)" in err
+        assert out.splitlines()[-1].startswith("2 of 2 cells, 2 left out")
+
+    odd.write_text(yaml.safe_dump({**settings, "arms": ["both"], "skip": "unfit"}))
+    code, _, err = fleet2d("transfer", odd, "--out", tmp_path / "none")
+    assert (2, True) == (code, "no model can be trained and scored" in err)
+
+
+def test_a_cell_is_no_run_that_can_be_repeated(made: Study, fleet2d: Cli) -> None:
+    code, _, err = fleet2d("study", "rerun", made.location, "0")
+    assert 2 == code
+    assert "are no runs of scenarios" in err

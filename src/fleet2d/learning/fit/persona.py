@@ -22,7 +22,7 @@ from fleet2d.learning.fit.timeline import (
 from fleet2d.logs.log import AWAY, LogError
 from fleet2d.logs.placement import USUAL_ROOMS
 from fleet2d.routines.persona import Persona
-from fleet2d.routines.planner import RecordedDay, parse_day, write_day
+from fleet2d.routines.planner import NO_SLEEP_S, RecordedDay, parse_day, write_day
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
 
 BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
@@ -40,6 +40,7 @@ SIT = (
     "breakfast",
     "lunch",
     "dinner",
+    "supper",
     "snack",
     "music",
     "rest",
@@ -373,9 +374,9 @@ def _recorded_day(timeline: Timeline, day: LivedDay, names: Sequence[str]) -> Re
                 entries.append((begin + at, "sleep" if state in asleep else names[state]))
         entries.append((end, "sleep"))
     ordered = sorted(dict(entries).items())
-    last = [entry for entry in ordered if entry[0] < next_wake - 60]
+    last = [entry for entry in ordered if entry[0] < next_wake - NO_SLEEP_S]
     if last[-1][1] != "sleep":
-        last.append((next_wake - 60, "sleep"))
+        last.append((next_wake - NO_SLEEP_S, "sleep"))
     changes = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
     begins, activities = zip(*changes, strict=True)
     return RecordedDay(tuple(begins), tuple(activities), next_wake)

@@ -268,7 +268,7 @@ class LivedDay(NamedTuple):
         bed: Its end.
         next_wake: The beginning of the next day.
         awake: The known stretches from `wake` to `bed`.
-        up: The stretches out of bed in the night after it.
+        up: The stretches out of bed in the night after it; of a night away, all of it.
     """
 
     number: int
@@ -286,10 +286,11 @@ def sleep_states(timeline: Timeline) -> set[int]:
 
 
 def find_days(timeline: Timeline) -> list[LivedDay]:
-    """Return the days whose night before and night after are known."""
+    """Return the days whose night before and night after are known, at home or away."""
     flat = timeline.minutes.ravel()
     asleep = np.isin(flat, list(sleep_states(timeline)))
     nights = _nights(asleep, len(timeline.minutes))
+    nights |= _nights_away(timeline, nights)
     days = []
     for number in range(len(timeline.minutes)):
         before, after = nights.get(number - 1), nights.get(number)
@@ -325,6 +326,31 @@ def _nights(asleep: Bool, days: int) -> dict[int, tuple[int, int]]:
         if -1 <= number < days and end - begin > longest[1] - longest[0]:
             nights[number] = (begin, end)
     return nights
+
+
+def _nights_away(
+    timeline: Timeline, nights: Mapping[int, tuple[int, int]]
+) -> dict[int, tuple[int, int]]:
+    """Return begin and end [min] of the nights in which the person is never at home.
+
+    They are as long as the median night at home, so that days end when they usually do.
+    """
+    if not nights:
+        return {}
+    hours = [
+        (begin - number * DAY_MINUTES, end - number * DAY_MINUTES)
+        for number, (begin, end) in nights.items()
+    ]
+    bed, wake = np.median(hours, axis=0).astype(int).tolist()
+    away = [i for i, state in enumerate(timeline.states) if state.place == AWAY]
+    is_away = np.isin(timeline.minutes.ravel(), away)
+    found = {}
+    for number in range(-1, len(timeline.minutes)):
+        begin = max(number * DAY_MINUTES + bed, 0)
+        end = number * DAY_MINUTES + wake
+        if number not in nights and end <= len(is_away) and is_away[begin:end].all():
+            found[number] = begin, end
+    return found
 
 
 def _runs(flat: I16, begin: int, end: int, midnight: int) -> tuple[Stretch, ...]:

@@ -41,10 +41,10 @@ def transfer(
 
     plan = read_plan(source)
     location = out or Path(default_location(plan.name))
-    left_out = sum(plan.unfit.values())
     for words, count in plan.unfit.items() if not quiet else ():
         typer.echo(f"left out: {printable(words)} ({counted(count, 'cell')})", err=True)
     if dry_run:
+        left_out = sum(plan.unfit.values())
         typer.echo(f"{counted(len(plan.cells), 'cell')}, {left_out} left out")
         return
     with (
@@ -54,6 +54,7 @@ def transfer(
     ):
         counts = run_transfer(plan, location, crew, changed=changed, observer=observer)
     study = open_study(location)
+    left_out = sum(plan.unfit.values())
     if counts.complete:
         for sentence in write_report(study, location):
             if not quiet:

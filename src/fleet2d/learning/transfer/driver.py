@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
+from fleet2d.configuration.problems import counted
+from fleet2d.errors import ScenarioError
 from fleet2d.learning.transfer.learners import Forecast, forecast
 from fleet2d.learning.transfer.presence import presence_forecast
 from fleet2d.learning.transfer.sources import PRESENCE, Sources
@@ -147,7 +149,8 @@ def run_transfer(
         observer: Follows the progress.
 
     Raises:
-        InputError: The folder can't be used, holds other results, or people don't fit into homes.
+        InputError: The folder can't be used, holds other results, or people don't fit into homes;
+            with `skip`, if that leaves no cell.
         KeyboardInterrupt: Ctrl-C; cells that are scored are stored.
     """
     import polars as pl
@@ -190,9 +193,17 @@ def run_transfer(
         ]
         sources = Sources(plan, folder)
         unfit = sources.make(sources.names([task.cell for task in tasks]), crew)
-        for words in unfit.values():
-            observer.on_note(f"left out, with the cells that learn from it: {words}")
-        tasks = [task for task in tasks if unfit.keys().isdisjoint(sources.needed(task.cell))]
+        for name, words in unfit.items():
+            learning = [task for task in tasks if name in sources.needed(task.cell)]
+            tasks = [task for task in tasks if task not in learning]
+            plan.unfit[words] = len(learning)
+            observer.on_note(f"left out: {words} ({counted(len(learning), 'cell')})")
+            frame = frame.filter(~pl.col(VARIANT).is_in([task.number for task in learning]))
+        if not len(frame):
+            raise ScenarioError("\n".join(["no model can be trained and scored", *unfit.values()]))
+        if unfit:
+            _write_plan(directory, plan, frame)
+            missing = frame.filter(~pl.col(VARIANT).is_in(complete.implode()))
         observer.on_start(Counts(len(frame), len(frame) - len(missing), 0), crew.workers)
         queue = TaskQueue(by_home(tasks))
         job = CellJob(sources)

@@ -124,7 +124,12 @@ def table(study: Study, task: str) -> list[str]:
 
 
 def _has(study: Study, task: str, arm: str) -> bool:
-    return bool(len(study.complete.filter(task=task, arm=arm)))
+    """Return whether another arm was tested beside one."""
+    import polars as pl
+
+    of_task = study.complete.filter(task=task)
+    others = of_task.filter(pl.col("arm") != arm)
+    return bool(len(others.join(of_task.filter(arm=arm), on=["home", "learner", "days"])))
 
 
 def _compared_cells(row: dict[str, Any], task: str) -> list[str]:

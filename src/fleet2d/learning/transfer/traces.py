@@ -30,7 +30,7 @@ UNKNOWN = -1
 CLASSES = ("out", "sleep", "toilet", "wash", "food", "leisure", "other")
 # A name is of the first class with a word that begins one of its words.
 WORDS = {
-    "food": "dish cook prep breakfast lunch dinner snack meal eat drink food",
+    "food": "dish cook prep breakfast lunch dinner supper snack meal eat drink food",
     "sleep": "sleep nap",
     "toilet": "toilet",
     "wash": "wash shower bath groom hygiene brush teeth dress",
