@@ -27,9 +27,9 @@ from unittest.mock import patch
 
 import fleet2d
 from fleet2d.artifacts import store
-from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.store import RunStore, TableWriter
 from fleet2d.artifacts.unfinished import UnfinishedRun
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.engine.checkpoint import CheckpointWriter
 
 

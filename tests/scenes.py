@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 import fleet2d
-from fleet2d.engine.simulation import directory_of
+from fleet2d.engine.access import directory_of
 from fleet2d.runs.run import Run
 
 Cli = Callable[..., tuple[int, str, str]]

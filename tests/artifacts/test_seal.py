@@ -18,8 +18,9 @@ from tests.thorough import THOROUGH, examples
 
 import fleet2d
 from fleet2d.artifacts.manifest import FORMAT, Manifest, canonical
-from fleet2d.artifacts.seal import digest_table, run_digest, verify_run
+from fleet2d.artifacts.seal import digest_table, run_digest
 from fleet2d.artifacts.table import Column, TableSpec
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 from fleet2d.runs.run import open_run
 

@@ -15,7 +15,7 @@ from fleet2d import Algorithm, Behavior, History, Home, Present
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.kernels import Bool
-from fleet2d.runs.run import read_layer
+from fleet2d.runs.layers import read_layer
 
 HERE = f"{TESTS.as_posix()}/engine/test_costs"
 RUG = shapely.box(2.8, 2.3, 4.2, 3.9)  # between most of the living room and the kitchen

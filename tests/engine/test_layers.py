@@ -18,7 +18,7 @@ from fleet2d import Algorithm, Behavior, History, Home, Metric, Present
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, Fleet2DError, InputError
 from fleet2d.kernels import I64, half_sine
-from fleet2d.runs.run import layer_names, layer_steps, read_layer
+from fleet2d.runs.layers import layer_names, layer_steps, read_layer
 
 HERE = f"{TESTS.as_posix()}/engine/test_layers"
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)

@@ -21,8 +21,8 @@ from tests.thorough import THOROUGH, some
 import fleet2d
 from fleet2d import Algorithm
 from fleet2d.artifacts import arrow
-from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.entities.plan import data_of
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 from fleet2d.interventions import Decide, Put, Replan

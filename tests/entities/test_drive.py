@@ -16,8 +16,9 @@ from tests.thorough import some
 import fleet2d
 from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
 from fleet2d.configuration.components import components
-from fleet2d.entities.drive import Differential, Holonomic, Trapezoidal, breakpoints, estimate
+from fleet2d.entities.drive import Differential, breakpoints, estimate
 from fleet2d.entities.robots.approach import way_seconds
+from fleet2d.entities.robots.drives import Holonomic, Trapezoidal
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.kernels import TURN, time_route
 from fleet2d.scenario.compose import compose

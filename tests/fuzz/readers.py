@@ -22,7 +22,7 @@ from tests.scenes import flat_document, scenario
 
 import fleet2d
 from fleet2d.algorithms.algorithm import load_learned
-from fleet2d.artifacts.seal import verify_run
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.configuration.trust import running_code
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.learning.fit.perception import read_detections

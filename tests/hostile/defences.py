@@ -182,7 +182,7 @@ FOLDERS = [
     ),
     Defence(
         "files that are no part of a run are listed",
-        "artifacts.seal",
+        "artifacts.verification",
         "return sorted(map(printable, names - own))",
         "return []",
         "hostile/test_forged_runs.py::test_all_that_is_not_part_of_the_run_is_listed",
@@ -249,21 +249,21 @@ STORED = [
     ),
     Defence(
         "tables are as the manifest says",
-        "artifacts.seal",
+        "artifacts.verification",
         "return record == stored",
         "return True",
         "hostile/test_forged_runs.py::test_a_rewritten_table_under_a_new_seal_is_noticed",
     ),
     Defence(
         "files are as they were sealed",
-        "artifacts.seal",
-        'return "" if _file_record(path) == record else "was changed"',
+        "artifacts.verification",
+        'return "" if file_record(path) == record else "was changed"',
         'return ""',
         "artifacts/test_seal.py::test_any_change_of_bytes_is_noticed_and_its_file_named",
     ),
     Defence(
         "the manifest is as it was sealed",
-        "artifacts.seal",
+        "artifacts.verification",
         "elif fields[name] != seal.fields[name]:",
         "elif False:",
         "artifacts/test_seal.py::test_a_changed_field_is_named",
@@ -516,7 +516,7 @@ TERMINAL = [
     ),
     Defence(
         "names of foreign files have no escapes",
-        "artifacts.seal",
+        "artifacts.verification",
         "return sorted(map(printable, names - own))",
         "return sorted(names - own)",
         "hostile/test_forged_runs.py::test_names_of_foreign_files_reach_no_terminal_unescaped",

@@ -23,7 +23,7 @@ from tests.scenes import everything
 from tests.thorough import some
 
 import fleet2d
-from fleet2d.artifacts.seal import verify_run
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.engine.repeat import reproduce, resume
 from fleet2d.errors import Fleet2DError, RunDirectoryError
 from fleet2d.live.exporters import Selection, exporter

@@ -19,7 +19,8 @@ from tests.thorough import some
 
 import fleet2d
 from fleet2d.artifacts.manifest import Manifest
-from fleet2d.artifacts.seal import digest_table, make_seal, run_digest, verify_run
+from fleet2d.artifacts.seal import digest_table, make_seal, run_digest
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.engine.repeat import reproduce
 from fleet2d.errors import ArtifactError, RunDirectoryError
 from fleet2d.runs.run import open_run

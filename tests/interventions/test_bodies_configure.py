@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fleet2d
-from fleet2d.engine.simulation import interventions_of
+from fleet2d.engine.access import interventions_of
 from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.interventions import Configure
 

@@ -9,7 +9,7 @@ from tests.entities.robots.robots import home_with
 from tests.scenes import path, run, table
 
 from fleet2d import Simulation
-from fleet2d.engine.simulation import measured
+from fleet2d.engine.access import measured
 from fleet2d.metrics.household import TERMS, has_time
 from fleet2d.runs.run import Run
 

@@ -6,7 +6,7 @@ import pytest
 from tests.scenes import Cli, scenario
 
 import fleet2d
-from fleet2d.engine.simulation import evidence_of
+from fleet2d.engine.access import evidence_of
 from fleet2d.errors import InputError
 from fleet2d.viewing.figures import draw_failure, draw_moment, draw_stretch
 from fleet2d.viewing.film import write_film

@@ -9,7 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import fleet2d
-from fleet2d.artifacts.seal import verify_run
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.errors import InputError
 from fleet2d.viewing.page_data import PageData
 from fleet2d.viewing.page_server import page_app

@@ -90,6 +90,10 @@ class Column:
 
 Columns = dict[Column, Any]
 """Columns and their values, which make a table and rows of it."""
+LAYER_PREFIX = "layer."
+"""The beginning of the names of tables that hold layers."""
+ALL_CELLS = -1
+"""Row and column of the entry that holds the fill value: of all cells without an entry."""
 STEP = Column("step", "step", description="step at which the row takes effect")
 TIME = Column("time", "time", description="local time")
 

@@ -87,7 +87,7 @@ def run_with_progress(simulation: "Simulation", *, quiet: bool = False) -> "Run"
         with watched():
             return simulation.run() if quiet else _run_with_bar(simulation)
     except KeyboardInterrupt:
-        from fleet2d.engine.simulation import directory_of
+        from fleet2d.engine.access import directory_of
 
         directory = directory_of(simulation)
         assert directory is not None
@@ -281,7 +281,7 @@ def _reproduce(directory: Path, *, trust: bool) -> None:
 
 def _compare_with_seal(directory: Path) -> None:
     """Check that the files of a stored run are unchanged, without running anything."""
-    from fleet2d.artifacts.seal import verify_run
+    from fleet2d.artifacts.verification import verify_run
 
     result = verify_run(directory)
     for name in result.foreign:

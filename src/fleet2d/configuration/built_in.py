@@ -34,8 +34,8 @@ COMPONENTS: dict[str, dict[str, str]] = {
     },
     "drive": {
         "differential": "fleet2d.entities.drive:Differential",
-        "holonomic": "fleet2d.entities.drive:Holonomic",
-        "trapezoidal": "fleet2d.entities.drive:Trapezoidal",
+        "holonomic": "fleet2d.entities.robots.drives:Holonomic",
+        "trapezoidal": "fleet2d.entities.robots.drives:Trapezoidal",
     },
     "evidence_source": {
         "live": "fleet2d.entities.entity:LiveDetections",

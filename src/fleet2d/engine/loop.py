@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from fleet2d.algorithms.history import Log
 from fleet2d.configuration.trust import may_run_code, running_code
 from fleet2d.engine.basis import Watcher
-from fleet2d.engine.power import follow_charge
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import InputError, blame
@@ -132,6 +131,8 @@ def _decide(state: State, row: int, step: int) -> bool:
         actor.decide(situation)
         _follow_plan(state, row)
     if actor.charge is not None:
+        from fleet2d.engine.power import follow_charge  # few robots have a battery
+
         follow_charge(state.interventions, actor, step)
     for watcher in state.steering:
         if row in watcher.steered:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import filecmp
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
@@ -13,19 +14,21 @@ from typing import Any
 import numpy as np
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, LEARNED_NAME, SLOW, Manifest
-from fleet2d.artifacts.seal import verify_run
 from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import FOLDER, UnfinishedRun, remove_leftovers
+from fleet2d.artifacts.verification import verify_run
 from fleet2d.configuration.trust import content_of_run, stored_code
 from fleet2d.engine.basis import changed_inputs
 from fleet2d.engine.checkpoint import NO_CHECKPOINT, Checkpoint, UnusableCheckpointError
 from fleet2d.engine.expectations import TABLE
-from fleet2d.engine.simulation import Simulation, catch_up, reopened
+from fleet2d.engine.intervention_queue import is_from_outside
+from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
 from fleet2d.expectations.expectation import Expectation
 from fleet2d.expectations.verdict import Verdict
 from fleet2d.runs.run import Run, open_run
 from fleet2d.scenario.load import load_scenario
+from fleet2d.scenario.model import Scenario
 from fleet2d.storage.files import path_in, refuse_links
 
 # The beginning of the note about the messages of a live run, which its repetition doesn't get.
@@ -373,3 +376,46 @@ def _reopen(root: Path, unfinished: UnfinishedRun, *, trust: bool) -> tuple[Simu
             remark = f"continuing from {run.time:%Y-%m-%d %H:%M:%S}, step {run.step}"
     catch_up(run, manifest.interventions)
     return run, remark
+
+
+def reopened(
+    scenario: Scenario,
+    store: RunStore,
+    unfinished: UnfinishedRun,
+    checkpoint: Checkpoint | None,
+) -> Simulation:
+    """Return an unfinished run in its directory, at its checkpoint; see `fleet2d.resume`.
+
+    Args:
+        scenario: The scenario of the run.
+        store: The store of its directory, not opened.
+        unfinished: The journal and checkpoint of the run, locked.
+        checkpoint: Where to continue; None: start from the first step.
+
+    Raises:
+        UnusableCheckpointError: The checkpoint can't be read; nothing is written then.
+        ArtifactError: The journal is damaged, or the directory can't be written.
+    """
+    began = time.perf_counter()
+    run = Simulation.__new__(Simulation)
+    run._prepare(scenario, store)
+    if checkpoint is None:
+        store.reopen(unfinished, None)
+        run._store_plan()
+        run._setup_s = time.perf_counter() - began
+        return run
+    state = checkpoint.read(run._constants)
+    store.manifest = checkpoint.manifest
+    store.manifest.resumed.append(checkpoint.commit.step)
+    store.reopen(unfinished, checkpoint.commit)
+    run._take(state)
+    run._setup_s, run._loop.simulate_s, run._loop.save_s = checkpoint.wall_s
+    assert run._keeper is not None
+    run._keeper.resume(run.step)
+    return run
+
+
+def catch_up(simulation: Simulation, interventions: Sequence[Mapping[str, Any]]) -> None:
+    """Repeat the interventions that were requested after the checkpoint of the run."""
+    outside = [record for record in interventions if is_from_outside(record)]
+    simulation._repeat(outside[len(simulation._state.interventions.requests) :])

@@ -12,18 +12,17 @@ from fleet2d.configuration.problems import check_known
 from fleet2d.engine.basis import Basis
 from fleet2d.engine.cameras import Cameras, SightSetup
 from fleet2d.engine.change_queue import ChangeQueue
-from fleet2d.engine.collisions import BlockedWays, Clearance
 from fleet2d.engine.interrupt import WATCHED_EVENTS, Interruptions
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.layers import LayerBook, add_layers
 from fleet2d.engine.learners import Learners
-from fleet2d.engine.power import schedule_failures
 from fleet2d.engine.recorder import Recorder
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import EventStream, InView, Recall, State
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.home_object import Door
+from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import ComponentError, PlacementError, ScenarioError, blame, errors_as
 from fleet2d.floorplan.home import Home
 from fleet2d.interventions.intervention import causes_errors
@@ -33,6 +32,7 @@ from fleet2d.scenario.model import Scenario
 from fleet2d.sight.fov import LineOfSight
 
 if TYPE_CHECKING:
+    from fleet2d.engine.collisions import BlockedWays, Clearance
     from fleet2d.engine.conversations import Conversations
     from fleet2d.engine.encounters import Encounters
     from fleet2d.engine.yielding import Yielding
@@ -62,8 +62,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
     names = [*(actor.name for actor in basis.actors), *scenario.objects]
     yielding = _yielding(basis)
     watchers = [
-        Clearance(basis.users, basis.robots),
-        BlockedWays(basis),
+        *_collisions(basis),
         *yielding,
         *user_cameras,
         *cameras,
@@ -95,13 +94,23 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
         group.owner.in_view = InView(state, group)
     _remember(state, basis)
     state.wait_for(state.requested)
-    schedule_failures(state, scenario, clock, seed)
+    _schedule_failures(state, scenario, clock, seed)
     if scenario.script:
         _schedule_script(state, scenario)
     for name, expected in scenario.expect.items():
         with _locate_errors(scenario, f"expect.{name}"):
             state.expect(scenario, name, expected.that, 0)
     return state
+
+
+def _collisions(basis: Basis) -> "list[Clearance | BlockedWays]":
+    """Return what lets bodies wait for each other; nothing if none gives way."""
+    gives_way = any(robot.gives_way is not None for robot in basis.scenario.robots.values())
+    if not gives_way and basis.scenario.simulation.people_block is None:
+        return []
+    from fleet2d.engine.collisions import BlockedWays, Clearance  # few runs need them
+
+    return [Clearance(basis.users, basis.robots), BlockedWays(basis)]
 
 
 def _yielding(basis: Basis) -> "list[Yielding]":
@@ -130,6 +139,22 @@ def _conversations(basis: Basis, interventions: InterventionQueue) -> "list[Conv
     from fleet2d.engine.conversations import Conversations  # few runs need them
 
     return [Conversations(basis, interventions)]
+
+
+def _schedule_failures(state: State, scenario: Scenario, clock: Clock, seed: int) -> None:
+    """Schedule what fails by itself: robots, their cameras, sensors."""
+    robots = scenario.robots.values()
+    sensors = [item for item in scenario.objects.values() if isinstance(item, Sensor)]
+    causes = [
+        *(robot.power for robot in robots),
+        *(camera.fails for robot in robots for camera in robot.eyes.values()),
+        *(sensor.fails for sensor in sensors),
+    ]
+    if all(cause is None for cause in causes):
+        return
+    from fleet2d.engine.power import schedule_failures  # few runs need it
+
+    schedule_failures(state, scenario, clock, seed)
 
 
 def _schedule_script(state: State, scenario: Scenario) -> None:

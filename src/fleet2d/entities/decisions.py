@@ -16,10 +16,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from fleet2d.configuration.units import micros
-from fleet2d.entities import giving_way
 from fleet2d.entities.behavior import (
     DOOR_WAIT,
     Actor,
@@ -30,13 +29,16 @@ from fleet2d.entities.behavior import (
     holds,
 )
 from fleet2d.entities.body import Pose
-from fleet2d.entities.giving_way import GivesWay, Surroundings, WaitForPeople
 from fleet2d.entities.place import Point, RoomChoice, lies_in
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.power import EMPTY
 from fleet2d.errors import ComponentError, InputError, NoWayError, PlacementError, blame
 from fleet2d.floorplan.placed_objects import Posture
 from fleet2d.runtime.events import EventKind
+
+if TYPE_CHECKING:
+    from fleet2d.entities.entity import GivesWay
+    from fleet2d.entities.giving_way import Surroundings, WaitForPeople
 
 Ask = Callable[[Behavior, Situation], Plan | None]
 
@@ -208,7 +210,9 @@ class Arbiter:
         interrupted, step, interrupts, kept_out = self._interrupted.pop(number)
         if kept_out != now.actor.kept_out:
             return None  # its way may lead through a room that the body keeps out of now
-        plan = giving_way.resumed(now.plan(), interrupted, step)
+        from fleet2d.entities.giving_way import resumed  # few runs need it
+
+        plan = resumed(now.plan(), interrupted, step)
         if plan is not None:
             plan.interrupts = interrupts
         return plan
@@ -615,9 +619,11 @@ class DecidingActor(Actor):
     @property
     def _just_waited(self) -> int:
         """The steps after a wait within which another one counts as its continuation."""
-        return micros(giving_way.REPEATED_WAIT) // self.clock.step_us + 1
+        from fleet2d.entities.giving_way import REPEATED_WAIT  # few robots need it
 
-    def give_way(self, now: Situation, person: str, surroundings: Surroundings) -> None:
+        return micros(REPEATED_WAIT) // self.clock.step_us + 1
+
+    def give_way(self, now: Situation, person: str, surroundings: "Surroundings") -> None:
         """Stop in front of a person who is in the way; go round after a while, or give up.
 
         Args:
@@ -625,6 +631,8 @@ class DecidingActor(Actor):
             person: The name of the person.
             surroundings: Where people are.
         """
+        from fleet2d.entities.giving_way import WaitForPeople
+
         step = now.step
         just = self._just_waited
         since = self._waited[0] if step <= self._waited[1] else step

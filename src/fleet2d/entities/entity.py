@@ -1,20 +1,20 @@
 """Users and robots as a scenario has them, and what robots perceive without simulated sight."""
 
 from collections.abc import Mapping, Sequence
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from fleet2d.configuration.components import Component, OneOf
+from fleet2d.configuration.components import Component, OneOf, Settings
 from fleet2d.configuration.problems import problem_at
-from fleet2d.configuration.units import Length, PeerAddress, Speed, TurnRateDeg
+from fleet2d.configuration.units import Length, PeerAddress, PositiveDuration, Speed, TurnRateDeg
 from fleet2d.entities.behavior import Actor, Behavior, LightHours
 from fleet2d.entities.body import Body, BodySettings, KeepsOut
 from fleet2d.entities.drive import Differential, Drive
 from fleet2d.entities.equipment import Battery, Localization
-from fleet2d.entities.giving_way import GivesWay
 from fleet2d.entities.keep_out import KeepOutRules, KeptOutField
 from fleet2d.entities.power import Power
 from fleet2d.interactions.answers import AnswersField
@@ -145,6 +145,20 @@ class User(Entity):
     def eyes(self) -> dict[str, Camera]:
         """The user's field of view, if there is one."""
         return {} if self.camera is None else {"camera": self.camera}
+
+
+class GivesWay(Settings):
+    """Keep clear of people: wait before them, in doorways as elsewhere; go round, or give up.
+
+    Attributes:
+        distance: Gap between the bodies below which it doesn't drive nearer [m].
+        patience: How long it waits before it goes round, by 0.1 m where there is no more room.
+        gives_up: How long it waits where there is no way round before it skips the stop.
+    """
+
+    distance: Length = Field(default=0.4, ge=0, le=3)
+    patience: PositiveDuration = timedelta(seconds=10)
+    gives_up: PositiveDuration = timedelta(minutes=2)
 
 
 class Robot(Entity):

@@ -12,13 +12,12 @@ from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from fleet2d import kernels
-from fleet2d.configuration.components import Settings
-from fleet2d.configuration.units import Length, PositiveDuration, micros
+from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.body import Arrangement, Body, Track
+from fleet2d.entities.entity import GivesWay
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
@@ -137,20 +136,6 @@ REPEATED_WAIT = timedelta(seconds=15)
 # which it counts as touching [m].
 PASSING_GAP_M = 0.1
 TOUCHING_GAP_M = 0.03
-
-
-class GivesWay(Settings):
-    """Keep clear of people: wait before them, in doorways as elsewhere; go round, or give up.
-
-    Attributes:
-        distance: Gap between the bodies below which it doesn't drive nearer [m].
-        patience: How long it waits before it goes round, by 0.1 m where there is no more room.
-        gives_up: How long it waits where there is no way round before it skips the stop.
-    """
-
-    distance: Length = Field(default=0.4, ge=0, le=3)
-    patience: PositiveDuration = timedelta(seconds=10)
-    gives_up: PositiveDuration = timedelta(minutes=2)
 
 
 class Surroundings(NamedTuple):

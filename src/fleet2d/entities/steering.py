@@ -15,8 +15,8 @@ import numpy as np
 from fleet2d.configuration.units import micros
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.body import Body
-from fleet2d.entities.drive import Holonomic, Trapezoidal
 from fleet2d.entities.plan import Plan
+from fleet2d.entities.robots.drives import Holonomic, Trapezoidal
 from fleet2d.kernels import I64, TURN, UNIT, cosine, sine
 
 # Within a piece the speed is constant, and the way straight.

@@ -20,7 +20,8 @@ from pydantic_core import PydanticCustomError
 from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.trust import running_code
-from fleet2d.engine.simulation import Simulation, stop
+from fleet2d.engine.access import stop
+from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import Fleet2DError, InputError, errors_as, extra, os_errors_as
 from fleet2d.inputs import open_input, within
 from fleet2d.live import questions

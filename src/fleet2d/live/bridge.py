@@ -24,8 +24,9 @@ import shapely
 
 from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import suggest
+from fleet2d.engine.access import add_note
 from fleet2d.engine.loop import deferred_interrupt
-from fleet2d.engine.simulation import Simulation, add_note
+from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.live.goals import Goals, GoalState, Sender
 from fleet2d.live.library_errors import libraries_told

@@ -6,38 +6,17 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema
+from pydantic import model_validator
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import problem, suggest
+from fleet2d.configuration.schema_forms import SchemaForms
 from fleet2d.configuration.units import Duration, PositiveDuration, format_duration
 from fleet2d.floorplan.rooms.room import PASSED_THROUGH
 from fleet2d.routines import distributions
 from fleet2d.routines.distributions import Distribution
 from fleet2d.runtime.clock import SECOND
-
-FORMS: dict[str, dict[str, Any]] = {
-    "text": {"type": "string"},
-    "number": {"type": "number"},
-    "pair": {"type": "array", "minItems": 2, "maxItems": 2},
-    "extension": {"type": "object", "description": "a mapping that extends another"},
-}
-
-
-class SchemaForms:
-    """Lists the short forms of a field: ``Annotated[Period, SchemaForms("pair")]``."""
-
-    def __init__(self, *forms: Literal["text", "number", "pair", "extension"]) -> None:
-        self.forms = forms
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Add the forms to the schema."""
-        return {"anyOf": [handler(schema), *(FORMS[form] for form in self.forms)]}
-
 
 SettingsType = TypeVar("SettingsType", bound=Settings)
 

@@ -19,12 +19,12 @@ from fleet2d.bounds import MEMBERS, PERSONA_VALUES
 from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import did_you_mean, problem, problem_at, shown, suggest
+from fleet2d.configuration.schema_forms import SchemaForms
 from fleet2d.configuration.units import OnDays, PositiveDuration, Share, named_path
 from fleet2d.errors import errors_as
 from fleet2d.routines.activity import (
     AnyDurationDistribution,
     DurationDistribution,
-    SchemaForms,
     find_activity,
 )
 from fleet2d.routines.persona import AnyPersona, Dates, Timing, YearEvent, values_in

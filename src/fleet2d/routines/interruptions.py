@@ -9,6 +9,7 @@ from pydantic import Field
 
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem
+from fleet2d.configuration.schema_forms import SchemaForms
 from fleet2d.configuration.units import Duration, Share, TimeOfDay
 from fleet2d.kernels import CHANCE_BITS, QUANTILE_BITS, Interruptions
 from fleet2d.routines import planner
@@ -16,7 +17,6 @@ from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
     DurationDistribution,
-    SchemaForms,
     bundled,
     seconds,
 )

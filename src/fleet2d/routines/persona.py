@@ -23,13 +23,13 @@ from fleet2d.configuration import units
 from fleet2d.configuration.components import Settings, count, once
 from fleet2d.configuration.documents import read_document
 from fleet2d.configuration.problems import check_known, problem, problem_at, shown, suggest
+from fleet2d.configuration.schema_forms import SchemaForms
 from fleet2d.configuration.units import Duration, Length, OnDays, PositiveDuration, Share, TimeOfDay
 from fleet2d.errors import errors_as, extra
 from fleet2d.routines.activity import (
     Activity,
     AnyDurationDistribution,
     DurationDistribution,
-    SchemaForms,
     bundled,
     catalogue,
     find_activity,

@@ -1,4 +1,4 @@
-"""Reading a run back: its manifest, tables and layers, checked against their digests."""
+"""Reading a run back: its manifest and tables, checked against their digests."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, Manifest, start_of
 from fleet2d.artifacts.seal import digest_table, record_of_file, run_digest
@@ -29,10 +26,6 @@ if TYPE_CHECKING:
     from fleet2d.artifacts.store import RunStore
     from fleet2d.floorplan.plan import FloorPlan
     from fleet2d.runs.trajectory import Trajectory
-
-LAYER_PREFIX = "layer."
-ALL_CELLS = -1
-"""Row and column of the entry that holds the fill value: of all cells without an entry."""
 
 
 class Tables(Mapping[str, "pa.Table"]):
@@ -357,60 +350,3 @@ def _state_notes(root: Path, manifest: Manifest) -> list[str]:
     if names := sorted(path.name for path in root.glob(f"*.parquet{PARTIAL}")):
         notes.append(f"cut off and not readable: {printable(', '.join(names))}")
     return notes
-
-
-def layer_names(run: Run) -> list[str]:
-    """Return the names of the layers that a run stored."""
-    return [name.removeprefix(LAYER_PREFIX) for name in run.tables if name.startswith(LAYER_PREFIX)]
-
-
-def layer_steps(run: Run, name: str) -> list[int]:
-    """Return the steps after which a layer was stored, in order.
-
-    Raises:
-        ArtifactError: The run stored no such layer.
-    """
-    table = _layer_table(run, name)
-    begins = table["row"].to_numpy() == ALL_CELLS  # the first row of each step
-    return [int(step) for step in table["step"].to_numpy()[begins]]
-
-
-def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
-    """Return a stored layer: (rows, columns), NaN where a float has no value.
-
-    Args:
-        run: The run.
-        name: The layer's name.
-        step: One of `layer_steps`; None for the last.
-
-    Raises:
-        ArtifactError: The run stored no such layer, or not at that step, or it is damaged.
-    """
-    steps = layer_steps(run, name)
-    if not steps:
-        raise ArtifactError(f"the layer {name!r} was never stored")
-    if step is None:
-        step = steps[-1]
-    if step not in steps:
-        listed = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
-        raise ArtifactError(
-            f"the layer {name!r} was not stored at step {step}; stored steps: {listed}"
-        )
-    table = _layer_table(run, name)
-    at_step = table["step"].to_numpy() == step
-    columns = (table[key] for key in ("row", "column", "value"))
-    row, column, value = (each.to_numpy(zero_copy_only=False)[at_step] for each in columns)
-    lattice = run.plan.lattice
-    inside = (row < lattice.rows) & (column < lattice.columns) & (row >= 0) & (column >= 0)
-    if not inside[1:].all() or row[0] != ALL_CELLS:
-        raise ArtifactError(f"the layer {name!r} doesn't fit the floor plan of the run")
-    values = np.full((lattice.rows, lattice.columns), value[0])
-    values[row[1:], column[1:]] = value[1:]
-    return values
-
-
-def _layer_table(run: Run, name: str) -> Any:
-    if f"{LAYER_PREFIX}{name}" not in run.tables:
-        names = suggest(name, layer_names(run), "It has")
-        raise ArtifactError(f"the run stored no layer {name!r}{names}")
-    return run.tables[f"{LAYER_PREFIX}{name}"]

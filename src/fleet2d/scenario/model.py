@@ -31,6 +31,7 @@ from fleet2d.configuration.problems import (
     problem,
     problem_at,
 )
+from fleet2d.configuration.schema_forms import SchemaForms
 from fleet2d.configuration.units import (
     Duration,
     PositiveDuration,
@@ -47,7 +48,6 @@ from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.interactions.interaction import Interaction
 from fleet2d.interventions.intervention import Entry
 from fleet2d.metrics.metric import Metric
-from fleet2d.routines.activity import SchemaForms
 from fleet2d.runtime.clock import Clock, Sun
 from fleet2d.runtime.local_time import Zone, rules_of, span_us, zone_of
 from fleet2d.sight.camera import SightSettings

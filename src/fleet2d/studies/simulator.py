@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, Literal
 
+from fleet2d.engine.access import results_so_far
 from fleet2d.engine.basis import input_files as input_files
-from fleet2d.engine.simulation import Simulation, results_so_far, run
+from fleet2d.engine.simulation import Simulation, run
 from fleet2d.errors import ComponentError
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.memory import peak_memory_mb

@@ -12,7 +12,8 @@ from typing import Any
 
 from fleet2d.artifacts.store import ArtifactSettings
 from fleet2d.configuration.problems import counted
-from fleet2d.engine.simulation import Simulation, evidence_of
+from fleet2d.engine.access import evidence_of
+from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.parse import read_requirements

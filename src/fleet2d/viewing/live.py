@@ -17,7 +17,8 @@ from fleet2d.algorithms.algorithm import RoomDistribution
 from fleet2d.algorithms.presence.belief import Presence
 from fleet2d.configuration.documents import parse_yaml
 from fleet2d.configuration.trust import running_code
-from fleet2d.engine.simulation import Simulation, interventions_of, may_run_code
+from fleet2d.engine.access import interventions_of, may_run_code
+from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import Fleet2DError, InputError, PlacementError

@@ -11,13 +11,9 @@ from starlette.routing import Route
 
 from fleet2d.artifacts.manifest import plain
 from fleet2d.configuration.trust import running_code
+from fleet2d.engine.access import directory_of, interventions_of, may_run_code
 from fleet2d.engine.repeat import branch, repeat_until
-from fleet2d.engine.simulation import (
-    Simulation,
-    directory_of,
-    interventions_of,
-    may_run_code,
-)
+from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 from fleet2d.viewing.contract import BRANCH_ORDER, LIVE_ORDER, BranchOrder, LiveSession, read_body

@@ -10,15 +10,16 @@ import numpy as np
 
 from fleet2d import __version__
 from fleet2d.artifacts.manifest import plain
-from fleet2d.artifacts.table import categories
+from fleet2d.artifacts.table import LAYER_PREFIX, categories
 from fleet2d.configuration.units import micros, parse_duration
-from fleet2d.engine.simulation import Simulation, interventions_of
+from fleet2d.engine.access import interventions_of
+from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError, errors_as
 from fleet2d.floorplan.slow_area import SlowArea
 from fleet2d.kernels import I64, Bool
 from fleet2d.palette import body_color
-from fleet2d.runs.run import LAYER_PREFIX, Run
+from fleet2d.runs.run import Run
 from fleet2d.runs.verdicts import verdict_line, verdicts_of, violations_of
 from fleet2d.runtime.clock import TWILIGHT, Clock, Sun
 from fleet2d.runtime.events import EventKind

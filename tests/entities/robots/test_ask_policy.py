@@ -8,7 +8,7 @@ from tests.entities.robots.test_interact import ana, events_of, home
 from tests.scenes import digests, run
 
 from fleet2d import Simulation
-from fleet2d.engine.simulation import run_until_asked, situation_of
+from fleet2d.engine.access import run_until_asked, situation_of
 from fleet2d.entities.robots.ask_policy import ASK_COLUMNS, AskPolicy
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.kernels import F32, Bool

@@ -16,7 +16,7 @@ from tests.scenes import run
 
 import fleet2d
 from fleet2d import Simulation
-from fleet2d.engine.simulation import run_until_asked, situation_of
+from fleet2d.engine.access import run_until_asked, situation_of
 from fleet2d.entities.robots.policy import COLUMNS, NEVER, Policy, SightingMemory
 from fleet2d.errors import ComponentError, InputError, PlacementError, ScenarioError
 from fleet2d.interventions import Send

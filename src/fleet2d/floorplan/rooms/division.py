@@ -19,10 +19,10 @@ from fleet2d.floorplan.mesh import Segment, build_mesh
 from fleet2d.floorplan.rooms.doorways import (
     DoorLine,
     fit_lines,
-    narrow_borders,
     open_borders,
     rooms_beside,
 )
+from fleet2d.floorplan.rooms.narrow_borders import narrow_borders
 from fleet2d.floorplan.rooms.room import (
     NO_ROOM,
     LabelledRegion,

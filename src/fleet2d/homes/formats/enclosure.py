@@ -7,7 +7,7 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.floorplan.rooms.doorways import MAX_WALL_M, TOUCH_M
+from fleet2d.homes.formats.passages import MAX_WALL_M, TOUCH_M
 from fleet2d.kernels import F64
 
 # Widths of gaps in walls that are closed in turn to find what they enclose [m], none of them that

@@ -18,17 +18,7 @@ from fleet2d.floorplan.files import validate
 from fleet2d.floorplan.native import ObjectUse
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, Portal, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.rooms.doorways import (
-    BORDER_M,
-    MIN_APART_M,
-    NEAR_M,
-    TOUCH_M,
-    DoorLine,
-    Passage,
-    door_axes,
-    find_passage,
-    shared_borders,
-)
+from fleet2d.floorplan.rooms.doorways import MIN_APART_M, DoorLine
 from fleet2d.floorplan.rooms.room import PRIORITY, UNKNOWN, room_type, usual_type
 from fleet2d.homes.formats.enclosure import (
     draws_walls,
@@ -38,6 +28,15 @@ from fleet2d.homes.formats.enclosure import (
     unnamed_space,
     wall_gaps,
     within_walls,
+)
+from fleet2d.homes.formats.passages import (
+    BORDER_M,
+    NEAR_M,
+    TOUCH_M,
+    Passage,
+    door_axes,
+    find_passage,
+    shared_borders,
 )
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order

@@ -16,7 +16,8 @@ from pettingzoo import ParallelEnv
 from fleet2d.configuration.documents import Document
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import parse_duration
-from fleet2d.engine.simulation import Simulation, measured, run_until_asked, situation_of
+from fleet2d.engine.access import measured, run_until_asked, situation_of
+from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.behavior import Situation
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.robots.policy import LearnedBehavior

@@ -12,12 +12,14 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.patches import Wedge
 from numpy.typing import NDArray
 
+from fleet2d.artifacts.table import LAYER_PREFIX
 from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import TURN, Reach
 from fleet2d.palette import TEXT_COLOR, VIEW_EDGE
-from fleet2d.runs.run import LAYER_PREFIX, Run, layer_steps, read_layer
+from fleet2d.runs.layers import layer_steps, read_layer
+from fleet2d.runs.run import Run
 from fleet2d.sight.cached_fov import Flashlight
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.sight.fov import FieldOfView, VisibleRegion
