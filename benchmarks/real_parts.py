@@ -1,18 +1,20 @@
 """What real parts cost: replayed detections, live runs, programs of other languages, exports.
 
-    python benchmarks/real_parts.py [replay] [scripts] [process] [live] [export]
+    python benchmarks/real_parts.py [replay] [scripts] [process] [live] [ros] [export]
 
 Without a name, all of them. Times are processor times of this process unless it says otherwise. A
 live run shares the machine with all else that runs: its load is printed beside.
 """
 
 import argparse
+import itertools
 import json
 import multiprocessing
 import os
 import socket
 import statistics
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -154,6 +156,60 @@ def live(_: Path) -> None:
         print(f"live: {took / seconds:.2%} of a core (must 3); {bridge.notes()[0]}")
 
 
+def drive(port: int, robots: int, latencies: "multiprocessing.Queue[float]") -> None:
+    """Hear all topics of robots by ROS 2, drive one, and tell how late its odometry shows that."""
+    from fleet2d.live.ros.types import RosTypes
+    from fleet2d.live.ros.zenoh_node import ZenohNode
+
+    node = ZenohNode(RosTypes("jazzy"), port=port)
+    moves = threading.Event()
+
+    def hear_odometry(message: dict[str, Any]) -> None:
+        if message["twist"]["twist"]["linear"]["x"]:
+            moves.set()
+
+    def ignore(*_: Any) -> None:
+        pass
+
+    node.subscribe("/clock", "rosgraph_msgs/msg/Clock", ignore, ignore)
+    node.subscribe("/tf", "tf2_msgs/msg/TFMessage", ignore, ignore)
+    for number in range(robots):
+        heard = ignore if number else hear_odometry
+        node.subscribe(f"/r{number}/odom", "nav_msgs/msg/Odometry", heard, ignore)
+        node.subscribe(f"/r{number}/scan", "sensor_msgs/msg/LaserScan", ignore, ignore)
+    send = node.publisher("/r0/cmd_vel", "geometry_msgs/msg/Twist")
+    for number in itertools.count():
+        time.sleep(1.5 + number % 7 / 70)  # the robot stands again, and steps begin at any moment
+        moves.clear()
+        sent = time.perf_counter()
+        send({"linear": {"x": 0.05 if number % 2 else -0.05}})
+        if moves.wait(1):
+            latencies.put(time.perf_counter() - sent)
+
+
+def ros(_: Path) -> None:
+    """Measure what ten robots cost beside the run at 10 Hz, and how late a command shows."""
+    from fleet2d.live.ros.ros2 import Ros2Peer
+
+    port, seconds = 17_447, 40
+    content = base(1, users={"ana": {"type": "live"}})
+    content["simulation"] |= {"step": "100 ms", "duration": f"{seconds} s"}
+    content["robots"] = {f"r{number}": {"behaviors": [{"type": "live"}]} for number in range(10)}
+    alone = timed(Bridge(fleet2d.Simulation(content), [open_peer("udp://127.0.0.1:0")]).run)
+    peer = Ros2Peer(port=port, path="jazzy")
+    context = multiprocessing.get_context("spawn")  # threads of zenoh don't survive a fork
+    latencies = context.Queue()
+    other = context.Process(target=drive, args=(port, 10, latencies), daemon=True)
+    other.start()
+    bridge = Bridge(fleet2d.Simulation(content), [peer])
+    took = timed(bridge.run)
+    other.terminate()
+    print(f"ros: {(took - alone) / seconds:.1%} of a core beside the run (must 15)")
+    times = [latencies.get() for _ in range(latencies.qsize())]
+    percentiles("ros: command until odometry, steps of 100 ms (must 105)", times)
+    percentiles("ros: of it because the machine began a step late", list(bridge.lateness_s))
+
+
 def export_month(folder: Path) -> None:
     """Time the export of the base month to MCAP."""
     run = fleet2d.run(base(30))
@@ -168,6 +224,7 @@ MEASURES = {
     "scripts": scripts,
     "process": process,
     "live": live,
+    "ros": ros,
     "export": export_month,
 }
 

@@ -82,8 +82,11 @@ class ZenohNode:
                 endpoint = f"tcp/127.0.0.1:{port}"
         try:
             session = self._zenoh.open(self._config("peer", connects=endpoint))
-        except self._zenoh.ZError as error:
-            raise InputError(f"ros2://{host}:{port}: {error}") from None
+        except self._zenoh.ZError:
+            raise InputError(
+                f"ros2://{host}:{port}: no router of zenoh answers there: start one, such as"
+                " ros2 run rmw_zenoh_cpp rmw_zenohd"
+            ) from None
         return session, False
 
     def _config(self, mode: str, *, listens: str = "", connects: str = "") -> Any:
