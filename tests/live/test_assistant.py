@@ -302,11 +302,14 @@ def test_components_are_listed_by_part_and_briefly() -> None:
 def test_a_client_uses_the_tools(place: Workspace) -> None:
     mcp = pytest.importorskip("mcp", reason="the extra mcp is not installed")
 
-    async def use() -> tuple[set[str], Any, Any, list[Any]]:
+    async def use() -> tuple[set[str], Any, list[Any], list[Any]]:
         async with mcp.Client(server(place.folder)) as client:
             tools = {tool.name for tool in (await client.list_tools()).tools}
             done = await client.call_tool("run", {"scenario": "home.yaml", "out": "first"})
-            wrong = await client.call_tool("read", {"name": "../secret.yaml"})
+            wrong = [
+                await client.call_tool("read", {"name": "../secret.yaml"}),
+                await client.call_tool("run", {"scenario": "home.yaml", "name": "first"}),
+            ]
             more = [
                 await client.call_tool("stays", {"run": "first", "who": "ana"}),
                 await client.get_prompt("scenario_from_words", {"words": "a couple and a robot"}),
@@ -323,5 +326,6 @@ def test_a_client_uses_the_tools(place: Workspace) -> None:
     assert json.loads(manifest.contents[0].text)["steps"] == 10800
     assert picture.contents[0].mime_type == "image/png"
     assert json.loads(done.content[0].text)["steps"] == 10800
-    assert wrong.is_error
-    assert "leads out of the folder" in wrong.content[0].text
+    assert all(answer.is_error for answer in wrong)
+    assert "leads out of the folder" in wrong[0].content[0].text
+    assert "Extra inputs are not permitted" in wrong[1].content[0].text

@@ -469,12 +469,8 @@ def server(folder: Path) -> Any:
     with extra("mcp", "assistants need the SDK of the Model Context Protocol"):
         from mcp.server.mcpserver import Image, MCPServer
         from mcp.server.mcpserver.exceptions import ToolError
+        from mcp.server.mcpserver.tools import Tool
     place = Workspace(folder)
-    app = MCPServer(
-        "fleet2d",
-        instructions="Simulate homes with people and robots. Write a scenario (a YAML file), check"
-        " it, run it, and ask its tables. `components` lists what a scenario may contain.",
-    )
 
     def picture(run: str) -> Image:
         """Draw the home and the ways of a run."""
@@ -497,8 +493,21 @@ def server(folder: Path) -> Any:
 
         return answer
 
-    for tool in tools:
-        app.tool(name=tool.__name__.removeprefix("list_"))(told(tool))
+    def strict(tool: Callable[..., Any]) -> Tool:
+        """Refuse arguments that the tool doesn't have: the SDK would ignore them."""
+        made = Tool.from_function(told(tool), name=tool.__name__.removeprefix("list_"))
+        arguments = made.fn_metadata.arg_model
+        arguments.model_config["extra"] = "forbid"
+        arguments.model_rebuild(force=True)
+        made.parameters["additionalProperties"] = False
+        return made
+
+    app = MCPServer(
+        "fleet2d",
+        instructions="Simulate homes with people and robots. Write a scenario (a YAML file), check"
+        " it, run it, and ask its tables. `components` lists what a scenario may contain.",
+        tools=[strict(tool) for tool in tools],
+    )
     app.prompt(title="A scenario from a sentence")(scenario_from_words)
     app.resource("fleet2d://{run}/manifest", mime_type="application/json")(told(place.manifest))
     app.resource("fleet2d://{run}/picture", mime_type="image/png")(told(place.picture))
