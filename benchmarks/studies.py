@@ -25,7 +25,7 @@ from fleet2d.runtime.memory import free_memory_of_polars
 from fleet2d.studies.api import open_crew
 from fleet2d.studies.driver import check_study, run_study
 from fleet2d.studies.executors import Crew, LocalExecutor, SerialExecutor, WorkerTask
-from fleet2d.studies.population import HomeFeatures
+from fleet2d.studies.lives import HomeFeatures
 from fleet2d.studies.reader import open_study
 from fleet2d.studies.results import VariantResult, result_of
 from fleet2d.studies.simulator import VariantOutcome

@@ -15,14 +15,9 @@ from fleet2d.configuration.documents import Document
 from fleet2d.errors import Fleet2DError, RunDirectoryError, ScenarioError
 from fleet2d.learning.datasets.specification import plan_dataset
 from fleet2d.studies.design import Design, build_design
-from fleet2d.studies.population import (
-    Draw,
-    DrawSettings,
-    PopulationAxis,
-    bedrooms_needed,
-    find_lives,
-    members_of,
-)
+from fleet2d.studies.households import bedrooms_needed, members_of
+from fleet2d.studies.lives import Draw, DrawSettings
+from fleet2d.studies.population import PopulationAxis, find_lives
 from fleet2d.studies.specification import read_specification
 
 BASE = {"extends": "bundled:paper", "simulation": {"duration": "2 min"}}

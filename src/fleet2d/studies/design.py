@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,9 @@ from fleet2d.scenario.load import scenario_of
 from fleet2d.scenario.model import Scenario
 from fleet2d.studies.axes import Choice, Label, key_path
 from fleet2d.studies.executors import Crew
+from fleet2d.studies.lazy import LazySequence
+from fleet2d.studies.lives import MAX_SEED
 from fleet2d.studies.population import (
-    MAX_SEED,
     FleetLives,
     PopulationAxis,
     find_lives,
@@ -159,7 +160,7 @@ class AxisPlan(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LifeChanges(Sequence[Document]):
+class LifeChanges(LazySequence[Document]):
     """The scenario change of each life, made when it is needed.
 
     Attributes:
@@ -174,14 +175,8 @@ class LifeChanges(Sequence[Document]):
         """Return the number of lives."""
         return len(self.lives)
 
-    @overload
-    def __getitem__(self, index: int) -> Document: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Document]: ...
-    def __getitem__(self, index: int | slice) -> Document | list[Document]:
+    def item(self, index: int) -> Document:
         """Return the change of a life."""
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
         return _change_of(self.lives[index], self.place)
 
 

@@ -24,17 +24,15 @@ from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.load import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
 from fleet2d.studies.executors import Crew
-from fleet2d.studies.population import (
+from fleet2d.studies.households import members_of, personas_of
+from fleet2d.studies.lives import (
     MAX_SEED,
     SEED_STEP,
     Draw,
     DrawSettings,
     FleetLife,
-    LifeFinder,
-    left_out_words,
-    members_of,
-    personas_of,
 )
+from fleet2d.studies.population import LifeFinder, left_out_words
 
 # folders beside those of the splits
 PARTS = "unfinished"

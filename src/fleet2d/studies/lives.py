@@ -1,0 +1,425 @@
+"""Lives: homes with their own people, settings and seeds, each drawn by its number.
+
+Lives are drawn one after the other, so a larger population begins with the same lives.
+"""
+
+import io
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from fleet2d.bounds import FILE_BYTES, read_bytes
+from fleet2d.configuration.components import Settings
+from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.units import InputPath
+from fleet2d.errors import ScenarioError, errors_as, extra
+from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.studies.axes import (
+    AnyAxis,
+    Axis,
+    Choice,
+    Label,
+    SyntheticAxis,
+    key_path,
+)
+from fleet2d.studies.conditions import Condition, Range, condition_words, fulfils, read_condition
+from fleet2d.studies.households import bedrooms_needed, members_of, personas_of
+from fleet2d.studies.lazy import LazySequence
+
+MAX_SEED = 1 << 31
+SEED_STEP = 1_000_003  # between the seeds of two populations, larger than a population
+FEATURES = ("people", "rooms", "bedrooms", "area_m2")
+"""Columns of what a home and its household are."""
+HOME, HOUSEHOLD, HAS, BEDROOMS, AREA = "home", "household", "has", "bedrooms", "area_m2"
+FIT = "fit"
+SIZE_UNITS = ((BEDROOMS, "bedrooms"), (AREA, "m2"))
+# Bedrooms beyond those that a household needs, and of how many households in a hundred: in England
+# and Wales in 2011, 26 % had as many as the bedroom standard asks for and 5 % fewer, counted as 0;
+# 37 % had two or more, counted as 2 (Census 2011, and English Housing Survey 2010-11).
+SPARE_BEDROOMS = ((0, 31), (1, 32), (2, 37))
+MAX_PROGRAMS = 200  # programs of homes that are drawn for a number of bedrooms
+
+
+class HomeFeatures(NamedTuple):
+    """What conditions ask of a home.
+
+    Attributes:
+        rooms: The number of its rooms.
+        bedrooms: The number of its bedrooms.
+        area_m2: Its free floor.
+        kinds: The types of its rooms.
+    """
+
+    rooms: int
+    bedrooms: int
+    area_m2: float
+    kinds: frozenset[str]
+
+
+class DrawSettings(Settings):
+    """What lives are drawn from.
+
+    Attributes:
+        homes: Homes, as axes of a study have them: {synthetic: 40, first: 100}, {floorplans: …}.
+        households: Households: a list of the personas of their members, or of users by name; left
+            out: the users of the base.
+        table: A CSV or Parquet file; each life has a row of it. Its columns are `home` (the label
+            of one), `household` (as works_outside + child), features of a home (bedrooms, rooms,
+            area_m2: a number or a range like 50..80), key paths like robots.astro.speed, and
+            others, which only label a life.
+        weight: The column of the table with the weights of its rows; all are equal if it has no
+            column `weight`.
+        where: Conditions on home, household, people, rooms, bedrooms, area_m2, has (types of
+            rooms), and columns of the table: a value, a list, a range like 3..15. `bedrooms: fit`:
+            enough for the household.
+    """
+
+    homes: tuple[AnyAxis, ...] = Field(min_length=1)
+    households: tuple[tuple[Any, ...] | dict[str, Any], ...] = ()
+    table: InputPath | None = None
+    weight: str = "weight"
+    where: dict[str, Condition] = Field(default={})
+
+    @property
+    def fits(self) -> bool:
+        """Whether homes must have the bedrooms that their households need."""
+        return self.where.get(BEDROOMS) == FIT
+
+
+@dataclass(frozen=True)
+class FleetLife:
+    """A home with its people and settings.
+
+    Attributes:
+        number: Its number, from 0 on.
+        home: Its home.
+        household: Its people, as the settings list them; None: those of the base.
+        varied: The values of `vary`.
+        row: Its row of the table.
+    """
+
+    number: int
+    home: Choice
+    household: Any
+    varied: tuple[Choice, ...]
+    row: Mapping[str, Any]
+
+    @property
+    def changes(self) -> tuple[tuple[tuple[str, ...], Any], ...]:
+        """The (key path, value) pairs that it sets in the scenario."""
+        people = () if self.household is None else ((("users",), members_of(self.household)),)
+        own = tuple((key_path(key), value) for key, value in self.row.items() if "." in key)
+        return (*self.home.changes, *people, *(c for v in self.varied for c in v.changes), *own)
+
+    @property
+    def labels(self) -> dict[str, Label]:
+        """What was drawn for it: home, household, and columns of `vary` and of the table."""
+        (home,) = self.home.labels.values()
+        people = None if self.household is None else " + ".join(personas_of(self.household))
+        labels: dict[str, Label] = {HOME: home, HOUSEHOLD: people}
+        for choice in self.varied:
+            labels |= choice.labels
+        return labels | {k: v for k, v in self.row.items() if k not in (*labels, *FEATURES)}
+
+
+class HomeList(LazySequence[Choice]):
+    """The homes of axes, one after the other; those of synthetic axes are made when needed."""
+
+    def __init__(self, axes: Sequence[Axis]) -> None:
+        """Read what folders and lists hold."""
+        self._parts: list[SyntheticAxis | list[Choice]] = [
+            axis if isinstance(axis, SyntheticAxis) else axis.choices(HOME) for axis in axes
+        ]
+        counts = (len(p.seeds if isinstance(p, SyntheticAxis) else p) for p in self._parts)
+        self._ends = list(accumulate(counts))
+
+    def __len__(self) -> int:
+        """Return the number of homes."""
+        return self._ends[-1]
+
+    @property
+    def listed(self) -> list[int]:
+        """The places of the homes that aren't synthetic: no settings make them fit a household."""
+        starts = [0, *self._ends]
+        return [
+            place
+            for part, start in zip(self._parts, starts, strict=False)
+            if not isinstance(part, SyntheticAxis)
+            for place in range(start, start + len(part))
+        ]
+
+    def item(self, index: int) -> Choice:
+        """Return a home."""
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        number = bisect_right(self._ends, index)
+        part = self._parts[number]
+        place = index - ([0, *self._ends][number])
+        return (
+            part.choice(HOME, part.seeds[place]) if isinstance(part, SyntheticAxis) else part[place]
+        )
+
+
+class Draw:
+    """Draws lives, each by its number, whatever was drawn before.
+
+    Attributes:
+        homes: The homes.
+        facts: Facts of homes that aren't synthetic, by their places; a life whose row or household
+            asks for bedrooms has one of those that fit.
+        table_columns: The columns of the table, without the weights.
+        columns: The columns of labels beside home, household and features.
+    """
+
+    def __init__(
+        self, settings: DrawSettings, vary: Mapping[str, Axis], seed: int, path: str
+    ) -> None:
+        """Read the table, and list the homes.
+
+        Args:
+            settings: What lives are drawn from.
+            vary: Axes of which each life has one value.
+            seed: The seed of all draws.
+            path: The name of their random stream.
+
+        Raises:
+            InputError: The table can't be read, or is wrong, or there are no homes.
+        """
+        self._settings = settings
+        self._seed = seed
+        self._key = int(stream_key(seed, path, "run"))
+        self._home_key = int(stream_key(seed, path, HOME))
+        self.homes = HomeList(settings.homes)
+        self.facts: dict[int, HomeFeatures] = {}
+        self._eligible: dict[tuple[int, int], list[int]] = {}
+        self._varied = {name: axis.choices(name) for name, axis in vary.items()}
+        self._rows, self._ends = _read_table(settings)
+        self.table_columns = tuple(self._rows[0]) if self._rows else ()
+        varied = [column for name, axis in vary.items() for column in axis.columns(name)]
+        own = [c for c in self.table_columns if c not in (HOME, HOUSEHOLD, *FEATURES)]
+        self.columns = (*varied, *own)
+        known = (HOME, HOUSEHOLD, HAS, *FEATURES, *self.columns)
+        for column in settings.where:
+            if column not in known:
+                hint = suggest(column, known, "There are")
+                raise ScenarioError(f"where: lives have no {column!r}{hint}")
+        self._places = self._places_of_rows()
+
+    def _places_of_rows(self) -> dict[str, int]:
+        """Return the place of each home that the table names, by its label.
+
+        Raises:
+            ScenarioError: There is no such home.
+        """
+        if HOME not in self.table_columns:
+            return {}
+        places = {str(next(iter(c.labels.values()))): i for i, c in enumerate(self.homes)}
+        for number, row in enumerate(self._rows, 1):
+            label = str(row[HOME])
+            if label not in places:
+                hint = suggest(label, sorted(places))
+                table = self._settings.table
+                raise ScenarioError(f"{table}, row {number}: there is no home {label!r}{hint}")
+        return places
+
+    @property
+    def asks_homes(self) -> bool:
+        """Whether the facts of homes matter for what is drawn."""
+        return bool({*self._settings.where, *self.table_columns} & {*FEATURES, HAS}) or (
+            self._settings.fits
+            and (bool(self._settings.households) or HOUSEHOLD in self.table_columns)
+        )
+
+    def seed_of(self, number: int) -> int:
+        """Return the seed of a life."""
+        return (self._seed * SEED_STEP + number) % MAX_SEED
+
+    def share_of(self, number: int) -> float:
+        """Return a random number from 0 to 1 of a life, by which it joins a rollout."""
+        key = stream_key(self._seed, "population", "rollout")
+        return Draws(np.uint64(key), number).uniform()
+
+    def life(self, number: int) -> FleetLife:
+        """Draw a life; without a reason for another one, homes are taken in turn."""
+        draws = Draws(np.uint64(self._key), number)
+        place = -1
+        row: Mapping[str, Any] = {}
+        if self._rows:
+            place = bisect_right(self._ends, draws.uniform() * self._ends[-1])
+            row = self._rows[place]
+        household: Any = None
+        if row.get(HOUSEHOLD):
+            household = [name.strip() for name in str(row[HOUSEHOLD]).split("+")]
+        elif self._settings.households:
+            household = draws.choice(self._settings.households)
+        varied = tuple(draws.choice(choices) for choices in self._varied.values())
+        needed = 0
+        if self._settings.fits and household is not None and BEDROOMS not in row:
+            needed = bedrooms_needed(household)
+        of_home = Draws(np.uint64(self._home_key), number)
+        if HOME in row:
+            home = self.homes[self._places[str(row[HOME])]]
+        elif self.facts and (needed or {*row} & {*FEATURES}):
+            home = self.homes[of_home.choice(self._fitting(place, needed))]
+        else:
+            home = self.homes[number % len(self.homes)]
+        return FleetLife(number, _settled(home, row, needed, of_home), household, varied, row)
+
+    def _fitting(self, row: int, needed: int) -> list[int]:
+        """Return the places of homes that a row of the table and a household can have.
+
+        Raises:
+            ScenarioError: There is none.
+        """
+        key = row, needed
+        if key not in self._eligible:
+            asked = {c: v for c, v in self._rows[row].items() if c in FEATURES} if row >= 0 else {}
+            self._eligible[key] = [
+                place
+                for place in range(len(self.homes))
+                if place not in self.facts
+                or (
+                    self.facts[place].bedrooms >= needed
+                    and all(_is_like(c, getattr(self.facts[place], c), v) for c, v in asked.items())
+                )
+            ]
+            if not self._eligible[key]:
+                words = ", ".join(f"{column} {value}" for column, value in asked.items())
+                words = words or f"{needed} bedrooms, as a household needs"
+                where = f"{self._settings.table}, row {row + 1}: " if asked else ""
+                raise ScenarioError(f"{where}no home has {words}")
+        return self._eligible[key]
+
+    def left_out(self, life: FleetLife, facts: HomeFeatures | None) -> str:
+        """Return the condition that a life doesn't meet, empty if it meets all.
+
+        Args:
+            life: The life.
+            facts: Those of its home; None: conditions on homes aren't asked.
+        """
+        labels = life.labels | ({} if facts is None else feature_labels(life.household, facts))
+        for column, condition in self._settings.where.items():
+            if facts is not None and column == HAS:
+                kinds = condition if isinstance(condition, tuple) else (condition,)
+                if lacking := [kind for kind in kinds if kind not in facts.kinds]:
+                    return f"no {lacking[0]}"
+            elif column in labels and condition != FIT and not fulfils(labels[column], condition):
+                return f"{column} is not {condition_words(condition)}"
+        return ""
+
+
+def _is_like(column: str, fact: Any, asked: Any) -> bool:
+    """Return whether a home is as a row of the table says; a single area is rounded too finely."""
+    condition = read_condition(asked)
+    is_area = column == AREA and not isinstance(condition, Range)
+    return asked is None or is_area or fulfils(fact, condition)
+
+
+def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) -> Choice:
+    """Return a synthetic home with the bedrooms and the area of its row, or for its household."""
+    if not home.changes:
+        return home
+    (keys, plan), *others = home.changes
+    if keys != ("floorplan",) or plan.get("type") != "synthetic":
+        return home
+    new: dict[str, Any] = {}
+    for key in (BEDROOMS, AREA):
+        if row.get(key) is not None:
+            value = _within(read_condition(row[key]), draws)
+            new[key] = int(value) if key == BEDROOMS else round(value, 1)
+    if needed and not {BEDROOMS, AREA} & {*plan, *new}:
+        weights = [weight for _, weight in SPARE_BEDROOMS]
+        spare = bisect_right(list(accumulate(weights)), draws.below(sum(weights)))
+        new = _program(needed + SPARE_BEDROOMS[spare][0], plan, draws.below(MAX_SEED - 1))
+    if not new:
+        return home
+    (label,) = home.labels.values()
+    size = ", ".join(f"{new[key]:g} {unit}" for key, unit in SIZE_UNITS if key in new)
+    changes = ((keys, {**plan, **new}), *others)
+    return Choice({HOME: f"{label} ({size})"}, changes)  # another home of that seed is another one
+
+
+def _within(condition: Any, draws: Draws) -> float:
+    """Draw a number of a range; a number is itself."""
+    if not isinstance(condition, Range):
+        return float(condition)
+    if condition.low.is_integer() and condition.high.is_integer():
+        return condition.low + draws.below(int(condition.high - condition.low) + 1)
+    return condition.low + draws.uniform() * (condition.high - condition.low)
+
+
+def _program(bedrooms: int, plan: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """Return the bedrooms of a synthetic home, and an area that homes of so many have."""
+    from fleet2d.homes.synthetic.program import (
+        MAX_ROOMS_PER_TYPE,
+        Choices,
+        Style,
+        Wishes,
+        settle_wishes,
+    )
+
+    beds = min(bedrooms, MAX_ROOMS_PER_TYPE)
+    style = Style(edition=plan.get("edition", 1))
+    wishes = Wishes(bathrooms=plan.get("bathrooms"), garage=plan.get("garage"))
+    for number in range(MAX_PROGRAMS):
+        settled = settle_wishes(wishes, Choices(seed, f"program {number}"), style)
+        if settled.bedrooms == beds:
+            return {BEDROOMS: beds, AREA: settled.area_m2}
+    return {BEDROOMS: beds}
+
+
+def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[float]]:
+    """Return the rows of a table without their weights, and the running sums of these.
+
+    Raises:
+        InputError: It can't be read, has no such column, or weights that can't be.
+    """
+    if settings.table is None:
+        return [], []
+    with extra("study", "tables of a population need polars"):
+        import polars as pl
+    path = settings.table
+    content = io.BytesIO(read_bytes(path, FILE_BYTES))
+    read = pl.read_parquet if path.suffix == ".parquet" else pl.read_csv
+    with errors_as(ScenarioError, str(path), of=pl.exceptions.PolarsError):
+        frame = read(content)
+    weight = settings.weight
+    if weight not in frame.columns and "weight" in settings.model_fields_set:
+        raise ScenarioError(f"{path} has no column {weight!r}{suggest(weight, frame.columns)}")
+    if not len(frame):
+        raise ScenarioError(f"{path} has no rows")
+    rows = frame.drop(weight, strict=False).to_dicts()
+    weights = frame[weight].to_list() if weight in frame.columns else [1.0] * len(rows)
+    for number, value in enumerate(weights, 1):
+        is_number = isinstance(value, int | float) and math.isfinite(value)
+        if not is_number or value < 0:
+            raise ScenarioError(
+                f"{path}, row {number}: the {weight} is {value!r}: expected 0 or a positive number"
+            )
+    ends = list(accumulate(map(float, weights)))
+    if not 0 < ends[-1] < math.inf:
+        raise ScenarioError(
+            f"{path}: the {weight} of all rows is {ends[-1]:g}: no row can be drawn"
+        )
+    for row in rows:
+        for key, value in row.items():
+            if isinstance(value, str) and "." in key and (path.parent / value).is_file():
+                row[key] = str((path.parent / value).absolute())  # such as a log
+    return rows, ends
+
+
+def feature_labels(household: Any, facts: HomeFeatures) -> dict[str, Label]:
+    """Return the labels of the features of a life."""
+    people = None if household is None else len(members_of(household))
+    return {
+        "people": people,
+        "rooms": facts.rooms,
+        BEDROOMS: facts.bedrooms,
+        AREA: facts.area_m2,
+    }
