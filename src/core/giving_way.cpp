@@ -198,6 +198,20 @@ std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end
     return places;
 }
 
+std::vector<Disc> standing(Timelines& timelines, i64 row, i64 step, i64 steps, View<const i64> reach) {
+    std::vector<Disc> discs;
+    for (i64 body = 0; body < timelines.bodies(); ++body) {
+        if (body == row) continue;
+        for (const i64 at : {step, step + steps}) {
+            if (!rests(timelines, body, at, at + steps)) continue;
+            const BodyPose pose = timelines.pose(body, at);
+            if (pose.away == 0) discs.push_back({{pose.x, pose.y}, reach[body]});
+            break;
+        }
+    }
+    return discs;
+}
+
 bool rests(Timelines& timelines, i64 body, i64 step, i64 end) {
     const OwnedWindow window = timelines.window(body, body + 1, step, end);
     const auto stays = [](const std::vector<i64>& values) {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 
+#include "detours.hpp"
 #include "legs.hpp"
 #include "meetings.hpp"
 
@@ -70,6 +71,10 @@ struct Search {
 // as `reach` (bodies,) to them in the steps from `step` to `end`.
 std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,
                                 const Search& search, View<const i64> reach);
+
+// Where others stand for so many steps from a step on, or else from the end of them on: by body, the middle and the
+// distance in `reach` (bodies,).
+std::vector<Disc> standing(Timelines& timelines, i64 row, i64 step, i64 steps, View<const i64> reach);
 
 // Whether a body doesn't leave its place in the steps from `step` to `end` - 1.
 bool rests(Timelines& timelines, i64 body, i64 step, i64 end);

@@ -152,6 +152,14 @@ RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners) {
     return graph;
 }
 
+std::vector<i64> corners_seen_from(const Mesh& mesh, const RouteGraph& graph, Point at) {
+    const i64 triangle = locate(mesh, at.x, at.y);
+    if (triangle == OUTSIDE) return {};
+    Finder finder{mesh, graph.corners(), graph.node_of_vertex};
+    const View<const i32> seen = finder.from_point(at, triangle);
+    return {seen.begin(), seen.end()};
+}
+
 std::vector<Point> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal) {
     const i64 start_triangle = locate(mesh, start.x, start.y), goal_triangle = locate(mesh, goal.x, goal.y);
     if (start_triangle == OUTSIDE || goal_triangle == OUTSIDE) return {};

@@ -43,6 +43,9 @@ RouteGraph build_route_graph(const Mesh& mesh, const Corners& corners);
 // Ties go to the lower node: nodes are sorted by position, so the path depends on the walls only.
 std::vector<Point> find_route(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal);
 
+// The corners that a taut string from a point can reach, in no particular order; none from outside the space.
+std::vector<i64> corners_seen_from(const Mesh& mesh, const RouteGraph& graph, Point at);
+
 // Points as rows, (points, 2).
 inline View<const i64, 2> rows_of(const std::vector<Point>& points) {
     const i64* first = points.empty() ? nullptr : &points.front().x;

@@ -1071,6 +1071,23 @@ class Routes:
             None where there is no way, or an end isn't strictly inside the space.
         """
 
+    def around(self, ax: int, ay: int, bx: int, by: int, discs: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64] | None:
+        """
+        Return the shortest path from (ax, ay) to (bx, by) round some discs, int64 (n, 2).
+
+        It bends at corners of the space, and at those of octagons around the discs. From a start within a disc it leads away.
+
+        Args:
+            ax: Position of its begin [lattice units].
+            ay: Position of its begin [lattice units].
+            bx: Position of its end [lattice units].
+            by: Position of its end [lattice units].
+            discs: x and y of the middle of each, and a distance that the path stays above [lattice units], int64 (n, 3).
+
+        Returns:
+            None where there is no way, or an end isn't strictly inside the space.
+        """
+
     @property
     def leg_start(self) -> numpy.typing.NDArray[numpy.int32]:
         """
@@ -1088,6 +1105,26 @@ class Routes:
     def __getstate__(self) -> tuple[Any, ...]: ...
 
     def __setstate__(self, arg: tuple[Mesh, tuple[Any, ...]], /) -> None: ...
+
+def place_beside(part_of_cell: numpy.typing.NDArray[numpy.int32], part: int, room_of_cell: numpy.typing.NDArray[numpy.int16], room: int, place: tuple[int, int], start: tuple[int, int], slack: int, discs: numpy.typing.NDArray[numpy.int64]) -> tuple[int, int] | None:
+    """
+    Return the centre of the clear cell nearest to a place.
+
+    Of several that are about as near, it is the one nearest to where the body comes from.
+
+    Args:
+        part_of_cell: int32 (rows, columns), the part of its space of each cell.
+        part: The part in which the cell must be.
+        room_of_cell: int16 (rows, columns), the room of each cell.
+        room: The room in which the cell must be; below 0: any.
+        place: The place [lattice units].
+        start: Where the body comes from [lattice units].
+        slack: By how much other cells may be farther from the place than the nearest one [lattice units].
+        discs: As for `Routes.around`.
+
+    Returns:
+        (x, y) [lattice units]; None where no cell is clear.
+    """
 
 def distance(ax: int, ay: int, bx: int, by: int) -> float:
     """Return the distance of two lattice points [lattice units]."""
@@ -1567,6 +1604,19 @@ class Timelines:
             from_: x and y from where it goes [lattice].
             search: How many cells to each side it looks, at every so many of them, and for how many places.
             reach: int64 (bodies,), how near the others may come to a place [lattice].
+        """
+
+    def standing(self, row: int, step: int, steps: int, reach: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Return where others stand, int64 (n, 3): x, y and how far to stay away from each [lattice].
+
+        They stand for so many steps from a step on, or have stopped by the end of those, and stay then.
+
+        Args:
+            row: The body from which they are others.
+            step: The step.
+            steps: How many.
+            reach: int64 (bodies,), how far to stay away from each [lattice].
         """
 
     def window(self, first: int, end: int) -> Window:

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "../routes.hpp"
+#include "../detours.hpp"
 #include "mesh.hpp"
 
 namespace fleet2d {
@@ -17,6 +17,9 @@ public:
     // The points of the shortest path; none where there is none, or an end isn't strictly inside the space.
     std::vector<Point> find(Point start, Point goal) { return known_.find(mesh_, graph_, start, goal); }
 
+    // The same round discs, without what was found before.
+    std::vector<Point> around(Point start, Point goal, const std::vector<Disc>& discs) const;
+
     nb::object owner() const { return owner_; }
     const RouteGraph& graph() const { return graph_; }
 
@@ -26,5 +29,8 @@ private:
     RouteGraph graph_;
     KnownRoutes known_;
 };
+
+// Discs of rows (n, 3): x, y and the distance to keep. Raises ValueError: the rows are none of discs near homes.
+std::vector<Disc> discs_of(View<const i64, 2> rows);
 
 }  // namespace fleet2d

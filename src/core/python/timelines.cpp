@@ -189,6 +189,27 @@ public:
         return Array<i64, 2>::copy_of(rows_of(places));
     }
 
+    Array<i64, 2> standing(i64 row, i64 step, i64 steps, View<const i64> reach) {
+        require(0 < steps && steps <= FAR, "steps must be 1 or more");
+        require(reach.size() == timelines_.bodies() && all_in_range(reach, 0, FAR),
+                "reach must be (bodies,), and small");
+        for (i64 body = 0; body < timelines_.bodies(); ++body) {
+            check_known(body, step);
+            check(body, step + 2 * steps);
+        }
+        const std::vector<Disc> discs = fleet2d::standing(timelines_, row, step, steps, reach);
+        auto rows = Array<i64, 2>::empty({static_cast<i64>(discs.size()), 3});
+        i64 i = 0;
+        for (const Disc& disc : discs) {
+            const View<i64, 2> values = rows;
+            values(i, 0) = disc.at.x;
+            values(i, 1) = disc.at.y;
+            values(i, 2) = disc.reach;
+            ++i;
+        }
+        return rows;
+    }
+
     bool rests(i64 body, i64 first, i64 end) {
         require(first < end, "end must be after first");
         check_known(body, first);
@@ -623,6 +644,16 @@ Args:
     from_: x and y from where it goes [lattice].
     search: How many cells to each side it looks, at every so many of them, and for how many places.
     reach: int64 (bodies,), how near the others may come to a place [lattice].)")
+        .def("standing", &OwnedTimelines::standing, "row"_a, "step"_a, "steps"_a, "reach"_a,
+             R"(Return where others stand, int64 (n, 3): x, y and how far to stay away from each [lattice].
+
+They stand for so many steps from a step on, or have stopped by the end of those, and stay then.
+
+Args:
+    row: The body from which they are others.
+    step: The step.
+    steps: How many.
+    reach: int64 (bodies,), how far to stay away from each [lattice].)")
         .def("window", &OwnedTimelines::window, "first"_a, "end"_a,
              "Return the runs of equal pose of all bodies in the steps from `first` to `end` - 1.")
         .def("runs", &OwnedTimelines::runs, "body"_a, "first"_a, "end"_a,

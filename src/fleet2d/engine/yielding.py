@@ -59,7 +59,7 @@ LEAST_GAP_M = 0.01
 # Places to step aside to: how far away they may be [m], the distance between them [cells], and how
 # many are tried; and the number of directions in which it passes somebody who stands.
 NEAR_M = 1.2
-FAR_M = 5.0
+FAR_M = 3.0
 ASIDE_CELLS = 4
 ASIDE_TRIES = 12
 VIAS = 8
@@ -257,6 +257,7 @@ class Yielding(Watcher):
         self._near = lattice(PASSING_GAP_M)
         self._least = lattice(LEAST_GAP_M)
         self._nothing = np.zeros_like(self._near)
+        self._reach = self._near + SUB  # with room to move
         self._alone = np.full(touch.shape, OWN, np.uint8)
         both = np.zeros_like(self._alone)
         self._counts = both.copy()
@@ -383,10 +384,13 @@ class Yielding(Watcher):
     def _swap(self, row: int, other: int, step: int) -> None:
         """Let the other one of two robots yield for a while."""
         pair = min(row, other), max(row, other)
-        if pair in self._swapped:
-            del self._swapped[pair]
-        else:
+        swapped_until = self._swapped.get(pair)
+        if swapped_until is None:
             self._swapped[pair] = step + self._steps(SWAPPED_FOR)
+        elif step - (swapped_until - self._steps(SWAPPED_FOR)) < self._steps(DEADLOCK):
+            return  # else two robots that are both blocked would swap it there and back
+        else:
+            del self._swapped[pair]
         for key in ((row, other), (other, row)):
             self._patience.pop(key, None)
             self._pauses.pop(key[0], None)
@@ -398,6 +402,9 @@ class Yielding(Watcher):
         """Return other plans for a robot, or for the one that it meets at a step; none to go on."""
         row = now.actor.row
         if self._goes_first(row, other, now.step):
+            round_it = self._by_waiting(now, at, other) if self._rests(other, now.step) else None
+            if round_it is not None:
+                return [(now, self._noted(now, other, round_it))]
             return [(now, self._blocked(now, at, other, self._stop(now)))]
         stays = self._hit_at_rest(now, self._everybody[row])
         if stays is None:
@@ -647,18 +654,9 @@ class Yielding(Watcher):
 
     def _standing(self, now: Situation) -> I64:
         """Return where others stand, or will have stopped; and the distances to keep, (n, 3)."""
-        number = self._number[now.actor.row]
-        lattice = now.actor.home.plan.lattice
-        cell = int(lattice.units_per_m * lattice.cell)
-        end = now.step + self._steps(FREE_FOR)
-        rows = []
-        for other in self._actors:
-            at = now.step if self._rests(other.row, now.step) else end
-            x, y, _, away = self._bodies.pose_at(other.row, at)
-            if other.row == now.actor.row or away or not self._rests(other.row, at):
-                continue
-            rows.append((x, y, int(self._near[number, other.row]) + cell))
-        return np.array(rows, np.int64).reshape(-1, 3)
+        row = now.actor.row
+        reach = self._reach[self._number[row]]
+        return self._bodies.timelines.standing(row, now.step, self._steps(FREE_FOR), reach)
 
     def _stop_of(self, actor: DecidingActor, step: int) -> LatticePoint | None:
         """Return where a body stops after a step, or is; None if it walks at random."""

@@ -32,14 +32,15 @@ from fleet2d.kernels import (
     Continued,
     Legs,
     Yielder,
+    strictly_inside,
     turn_between,
 )
 from fleet2d.runtime.events import EventKind
 
-# So many cells nearest to a place are tried first; of those that are farther by so many cells at
-# most, it takes the one nearest to the body.
-NEAREST_CELLS = 400
+# Of the free cells that are by so many cells farther from a place than the nearest one at most, it
+# takes the one nearest to the body.
 NEARLY_CELLS = 3
+ANY_ROOM = -1
 Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
 
 
@@ -273,19 +274,19 @@ class RoutesAround:
 
     def __init__(self, body: Body, people: I64) -> None:
         self._body = body
-        self._people = people
+        self.people = people
 
     def clear(self, points: I64) -> Bool:
         """Return which of some points, int64 (n, 2), are far enough from all of them."""
-        away = points[:, None] - self._people[:, :2]
-        return ((away * away).sum(axis=2) > self._people[:, 2] ** 2).all(axis=1)
+        away = points[:, None] - self.people[:, :2]
+        return ((away * away).sum(axis=2) > self.people[:, 2] ** 2).all(axis=1)
 
     @cached_property
     def cost(self) -> I32:
         """int32 (rows, columns), CLOSED near them."""
         xs, ys = self._body.home.plan.lattice.centre_axes()
         cost = np.zeros(self._body.space.part_of_cell.shape, np.int32)
-        for x, y, reach in self._people.tolist():
+        for x, y, reach in self.people.tolist():
             rows, columns = (
                 slice(*np.searchsorted(axis, [middle - reach, middle + reach + 1]).tolist())
                 for axis, middle in ((ys, y), (xs, x))
@@ -297,18 +298,9 @@ class RoutesAround:
     def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
         """Return a route between two lattice points, or None if none keeps clear."""
         space = self._body.space
-        shortest = None if space.shortest is None else space.route(start, goal)
-        if shortest is not None and self._is_clear(shortest):
-            return shortest
+        if space.shortest is not None and strictly_inside(space.mesh, *start):
+            return space.shortest.around(*start, *goal, self.people)
         return route_by_cost(space, self.cost, start, goal)
-
-    def _is_clear(self, route: I64) -> bool:
-        """Return whether all legs of a route are far enough from all of them."""
-        begin, legs = route[:-1, None], np.diff(route, axis=0)[:, None].astype(np.float64)
-        to = self._people[:, :2] - begin
-        along = (to * legs).sum(axis=2) / np.maximum((legs * legs).sum(axis=2), 1)
-        away = to - np.clip(along, 0, 1)[..., None] * legs
-        return bool(((away * away).sum(axis=2) > self._people[:, 2] ** 2).all())
 
 
 def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Note] = ()) -> Plan:
@@ -551,17 +543,14 @@ def beside(
     Of several that are about as near, it is the one nearest to the body.
     """
     plan = actor.home.plan
-    xs, ys = plan.lattice.centre_axes()
-    room = int(plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]) if in_room else None
-    for most in (NEAREST_CELLS, actor.space.part_of_cell.size):
-        cells = actor.space.by_distance(*goal, most, actor.part, room)
-        places = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], axis=-1)
-        places = places[detour.clear(places)]
-        if len(places):
-            away = np.hypot(*(places - goal).T)
-            near = places[away <= away[0] + NEARLY_CELLS * SUB]
-            x, y = near[np.argmin(((near - actor.state.position) ** 2).sum(axis=1))].tolist()
-            return x, y
-        if len(cells) < most:
-            return None
-    return None
+    room = int(plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]) if in_room else ANY_ROOM
+    return kernels.place_beside(
+        actor.space.part_of_cell,
+        actor.part,
+        plan.room_of_cell,
+        room,
+        goal,
+        actor.state.position,
+        NEARLY_CELLS * SUB,
+        detour.people,
+    )
