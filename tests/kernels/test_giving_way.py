@@ -166,3 +166,17 @@ def test_places_aside_are_the_nearest_that_nobody_comes_near_to() -> None:
         assert [tuple(place) for place in places.tolist()] == slow.places_aside(parts, 1, start, search, ways)  # fmt: skip
         found += len(places) > 0
     assert 10 < found
+
+
+def test_who_stands_is_at_rest_now_or_will_have_stopped() -> None:
+    reach = np.arange(100, 103)
+    for _, timelines, _, step in scenes(60):
+        for steps in (1, 3, 9):
+            expected = []
+            for other in (1, 2):
+                for at in (step, step + steps):
+                    poses = timelines.poses(np.arange(at, at + steps))[:, other]
+                    if (poses[:, :2] == poses[0, :2]).all():
+                        expected.append([*poses[0, :2].tolist(), int(reach[other])])
+                        break
+            assert timelines.standing(0, step, steps, reach).tolist() == expected
