@@ -1,4 +1,4 @@
-"""Moments of a run that are worth a look: found by the run itself, for the page and the report."""
+"""Moments of a run that are worth a look: found by the run itself, for the page."""
 
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
