@@ -131,8 +131,12 @@ def test_one_home_is_a_fleet_whose_answer_says_so(tmp_path: Path) -> None:
     assert (None, None, "1 robots are too few") == (median["low"], median["high"], median["doubt"])
 
 
-def test_a_fleet_alone_compares_nothing_not_even_its_seeds(tmp_path: Path) -> None:
+def test_a_fleet_alone_compares_nothing_not_even_its_seeds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     _, study = run(fleet(2), tmp_path / "fleet")
+    assert {"p1", "p99"}.isdisjoint(study.answer.table[0])
+    monkeypatch.setattr("fleet2d.studies.fleet.FEWEST", 2)
     assert "There is nothing to compare: the table has the means." in study.answer.sentences
     assert {"p1", "p99"} <= {*study.answer.table[0]}
 

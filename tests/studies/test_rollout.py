@@ -1,5 +1,6 @@
 """Rollouts: stages, guards, and intervals that hold on all days however often one looks."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from fleet2d.studies.intervals import two_sample_interval
 from fleet2d.studies.reader import Study
 from fleet2d.studies.report import write_report
 from fleet2d.studies.rollout import RolloutAnswer, looks_of
+from fleet2d.studies.sentences import number
 from fleet2d.studies.simulator import execute
 from fleet2d.studies.specification import Bounds, Rollout, read_specification
 
@@ -63,6 +65,31 @@ def test_the_answer_tells_stages_guards_and_the_truth(small: Study) -> None:
     found = RolloutAnswer(small)
     assert "sightings.ana" in found.looks
     assert {"number", "truth", "mean without it"} <= {*found.table.columns}
+
+
+def test_a_stop_is_told_beside_what_would_have_been(small: Study) -> None:
+    found = RolloutAnswer(small)
+    guards = {"distance.astro": Bounds(most=5)}
+    found.settings = found.settings.model_copy(update={"guards": guards})
+    found.stop = "distance.astro", found.looks["distance.astro"][0]
+    text = " ".join(found.sentences)
+    assert "It is stopped after 2026-01-06 by the guard of distance.astro" in text
+    assert "and at most +5 is allowed" in text
+    (gone_on,) = re.findall(r"Had it gone on, distance.astro would be (.*) (\w+) on (.*) for", text)
+    rows = small.polars("daily").filter(metric="distance.astro", day=3).collect()
+    with_it, without = (rows.filter(rollout=side)["value"].mean() for side in ("with", "without"))
+    size = number(abs(with_it - without))
+    side = "higher" if with_it > without else "lower"
+    assert (size, side, "2026-01-08") == gone_on
+
+
+def test_where_all_robots_have_the_change_none_are_compared(small: Study) -> None:
+    found = RolloutAnswer(small)
+    found._begins = np.full(6, 1)
+    found.days = [1]
+    assert "On 2026-01-06 all 6 robots with a distance.astro have the change: none to compare." in (
+        " ".join(found.sentences)
+    )
 
 
 def test_the_report_has_one_figure_of_the_rollout(small: Study, tmp_path: Path) -> None:

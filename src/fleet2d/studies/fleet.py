@@ -361,7 +361,7 @@ def with_fleet(study: StudyAnswers, answer: Conclusion) -> Conclusion:
     else:
         sentences.append(f"Percentiles and groups take {FEWEST} robots or more.")
     table = answer.table
-    if compared is None:
+    if compared is None and robots >= FEWEST:
         table = tuple(_percentile_row(study, name) for name in study.metrics[: len(answer.table)])
     return replace(answer, sentences=(*sentences, *answer.sentences[-1:]), table=table)
 

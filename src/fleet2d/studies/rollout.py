@@ -233,16 +233,37 @@ class RolloutAnswer:
         elif self.settings.guards:
             texts.append(self._not_stopped())
         last = self.stop[1].day if self.stop else self.days[-1] + 1
-        for metric in self.settings.watch:
-            look = next(each for each in self.looks[metric] if each.day == last)
-            true = f"{number(abs(look.truth))} {_side(look.truth)}"
-            texts.append(
-                f"On {self.date_of(last)} {metric} is {self._known(look)} for the"
-                f" {look.treated:,} robots with the change than for the {look.others:,} without."
-                f" The simulator knows that it is {true} by the change: without it these robots"
-                f" would have {number(look.without)}."
-            )
+        texts += [self._watched(metric, last) for metric in self.settings.watch]
+        if self.stop is not None:
+            texts.append(self._had_it_gone_on(self.stop[0]))
         return texts
+
+    def _watched(self, metric: str, day: int) -> str:
+        """Return what is known of a metric on a day, and what is true."""
+        look = next(each for each in self.looks[metric] if each.day == day)
+        on = f"On {self.date_of(day)}"
+        if not look.treated:
+            return f"{on} no robot with the change has a {metric}."
+        if look.others:
+            known = (
+                f"{metric} is {self._known(look)} for the {look.treated:,} robots with the change"
+                f" than for the {look.others:,} without"
+            )
+        else:
+            known = f"all {look.treated:,} robots with a {metric} have the change: none to compare"
+        return (
+            f"{on} {known}. The simulator knows that it is {_size(look.truth)} by the change:"
+            f" without it these robots would have {number(look.without)}."
+        )
+
+    def _had_it_gone_on(self, metric: str) -> str:
+        """Return what the stages after a stop would have done, as runs have them all."""
+        without, treated = self._values[metric]
+        (look,) = looks_of(without, treated, self._begins, LEVEL, [without.shape[1] - 1])
+        return (
+            f"Had it gone on, {metric} would be {_size(look.truth)} on {self.date_of(look.day)} for"
+            f" {look.treated:,} robots."
+        )
 
     def _not_stopped(self) -> str:
         """Return which guards didn't stop the rollout, and which never could have."""
@@ -259,7 +280,7 @@ class RolloutAnswer:
         return " ".join(parts)
 
     def _known(self, look: RolloutLook) -> str:
-        size = f"{number(abs(look.difference))} {_side(look.difference)}"
+        size = _size(look.difference)
         if math.isnan(look.low):
             return f"{size} (how much in all robots can't be told from so few)"
         return f"{size} (difference {look.low:.3g} to {look.high:.3g}, on any day)"
@@ -337,8 +358,10 @@ class RolloutAnswer:
         return figure
 
 
-def _side(difference: float) -> str:
-    return "lower" if difference < 0 else "higher"
+def _size(difference: float) -> str:
+    if not difference:
+        return "no different"
+    return f"{number(abs(difference))} {'lower' if difference < 0 else 'higher'}"
 
 
 def with_rollout(study: StudyAnswers, answer: Conclusion) -> Conclusion:
