@@ -88,7 +88,8 @@ def test_failures_are_printed_and_end_in_one(fleet2d: Cli) -> None:
     code, out, err = fleet2d("study", "run", "speeds.yaml", *SERIAL)
     assert 1 == code
     assert "0 of 2 variants complete" in out
-    assert "variant 0 failed" in err
+    assert "variants 0, 1 failed: algorithms.own failed" in err
+    assert err.count("failed:") == 1
     assert "no more" in err
     _, _, err = fleet2d("study", "report", "studies/speeds")
     assert "no complete variant: 2 failed, see fleet2d study status" in err

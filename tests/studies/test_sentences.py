@@ -120,7 +120,14 @@ ODD: dict[str, tuple[MadeUp, str]] = {
         of_homes(old=[1, 2, 3, 4], new=[2, None, None, 4]),
         "2 complete variants lack score",
     ),
-    "missing in a method": (of_homes(old=[1, 2], new=[None, None]), "2 complete variants lack"),
+    "missing in a method": (
+        of_homes(old=[1, 2], new=[None, None]),
+        "Can't be told: score with method = new, as none of its variants has it.",
+    ),
+    "missing in one of three": (
+        of_homes(old=[1, 2], new=[2, 3], newer=[None, None]),
+        "score with method = newer, as none of its variants has it.",
+    ),
     "missing in all": (of_homes(old=[None, None], new=[None, None]), "Can't be told: "),
     "no number": (of_homes(old=[1, 2, 3], new=[math.nan, math.inf, 3]), "2 complete variants lack"),
     "70 % are zero": (
@@ -175,6 +182,21 @@ def test_a_study_that_names_no_comparison_compares_what_can_be_judged(tmp_path: 
     _, alone = run(small(axes={}), tmp_path / "alone")
     assert "There is nothing to compare" in alone.answer.sentences[0]
     assert "sightings" in " ".join(row["number"] for row in alone.answer.table)
+
+
+def test_a_value_that_failed_everywhere_is_named_without_being_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from fleet2d import Algorithm\n"
+        "class Fails(Algorithm):\n"
+        "    def update(self, history, state):\n        raise ValueError('no more')\n"
+    )
+    fails = {"algorithms.own": {"type": f"{tmp_path}/mine.py:Fails", "period": "1 min"}}
+    axes = {METHOD: {"options": {"old": {SPEED: 0.3}, "new": fails}}}
+    _, study = run(small(axes=axes), tmp_path / "study")
+    text = " ".join(study.answer.sentences)
+    assert "with method = new, as none of its variants is complete" in text
+    assert "3 of 6 variants have no result, most often because: algorithms.own failed" in text
+    assert "There is nothing to compare" not in text
 
 
 def test_a_study_that_goes_on_with_another_fleet_answers_for_that_one(tmp_path: Path) -> None:

@@ -95,14 +95,14 @@ def run(  # noqa: PLR0913 - options of the command line
         counts = run_study(
             checked, location, crew, fail_fast=fail_fast, changed=changed, observer=observer
         )
+    if counts.failed:
+        _print_failures(location)
     if as_json:
         facts = {"study": location, **vars(counts), "missing": counts.missing}
         _print(json.dumps({"answer": open_study(location).answer.content, **facts}))
     elif not quiet:
         _print(f"{counts.complete} of {counts.total} variants complete in {location}\n")
         _print(open_study(location).answer)
-    if counts.failed:
-        _print_failures(location)
     if counts.failed or counts.missing:
         raise typer.Exit(1)
 
@@ -297,11 +297,17 @@ def _print_plan(checked: "CheckedStudy", crew: "Crew") -> None:
 def _print_failures(location: str) -> None:
     from fleet2d.studies.reader import open_study
 
-    failed = open_study(location).failures.to_dicts()
-    for row in failed[:MAX_LINES]:
-        _print(f"variant {row['variant']} failed: {row['error']}", err=True)
-    if len(failed) > MAX_LINES:
-        _print(f"… {len(failed) - MAX_LINES} more", err=True)
+    failed = open_study(location).failures
+    reasons: dict[str, list[int]] = {}
+    for number, error in failed.select("variant", "error").iter_rows():
+        reasons.setdefault(error, []).append(number)
+    for error, numbers in list(reasons.items())[:MAX_LINES]:
+        shown = ", ".join(map(str, numbers[:MAX_LINES]))
+        more = f", … {len(numbers)} in all" if len(numbers) > MAX_LINES else ""
+        plural = "s" if len(numbers) > 1 else ""
+        _print(f"variant{plural} {shown}{more} failed: {error}", err=True)
+    if len(reasons) > MAX_LINES:
+        _print(f"… {len(reasons) - MAX_LINES} more reasons", err=True)
 
 
 def _row_of(study: "Study", variant: str) -> dict[str, Any]:

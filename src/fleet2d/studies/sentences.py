@@ -17,6 +17,8 @@ from fleet2d.studies.answers import MAX_P, Comparison, StudyAnswers, judged
 from fleet2d.studies.intervals import ENOUGH_UNITS, LEVEL, plural
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from fleet2d.studies.specification import PairedComparison
 
 MAX_METRICS = 12
@@ -184,6 +186,7 @@ class StudyAnswer:
             except InputError as error:
                 found.append(error)
         corrected = iter(judged([c for each in found if isinstance(each, list) for c in each]))
+        self._lacking = [self._values_without(c) for c in self.asked]
         self.tables: list[list[Comparison] | InputError] = [
             each if isinstance(each, InputError) else list(itertools.islice(corrected, len(each)))
             for each in found
@@ -202,16 +205,32 @@ class StudyAnswer:
         for name in judged_numbers or study.metrics:
             firsts.setdefault(name.partition(".")[0], name)
         for metric in list(firsts.values())[:MAX_METRICS]:
-            for axis in self._varying(metric, populations=False):
+            for axis in self._varying(study.variants, populations=False):
                 if axis in study.meta.features:
                     continue  # no two robots differ by one of them alone
                 values = study.with_metric(metric)[axis].drop_nulls()
-                yield PairedComparison(metric=metric, against={axis: values[0]})
+                if len(values):
+                    yield PairedComparison(metric=metric, against={axis: values[0]})
 
-    def _varying(self, metric: str, *, populations: bool) -> list[str]:
-        """Return the axes, or the populations, with several values in variants with a metric."""
+    def _values_without(self, c: "PairedComparison") -> list[str]:
+        """Return why a comparison lacks values of its axis, in words."""
         study = self._study
-        frame = study.with_metric(metric)
+        (axis,) = c.against
+        is_known = axis in study.columns and c.metric in study.metrics
+        if not is_known or not study.counts.complete:
+            return []
+        known = {None, *study.with_metric(c.metric)[axis]}
+        complete = {*study.complete[axis]}
+        return [
+            f"{c.metric} with {axis} = {text_of(value)}, as none of its variants"
+            f" {'has it' if value in complete else 'is complete'}"
+            for value in study.variants[axis].unique(maintain_order=True)
+            if value not in known
+        ]
+
+    def _varying(self, frame: "pl.DataFrame", *, populations: bool) -> list[str]:
+        """Return the axes, or the populations, with several values in some variants."""
+        study = self._study
         return [
             column
             for column in study.columns
@@ -232,7 +251,7 @@ class StudyAnswer:
         if not study.counts.complete:
             sentences = [self._nothing(), self._cost()]
         else:
-            if not self.asked:
+            if not self.comparisons:
                 table = [self._mean(metric) for metric in study.metrics[:MAX_METRICS]]
             sentences = list(filter(None, [*self._findings(), self._left_out(), self._cost()]))
         return Conclusion(study.meta.description or study.meta.name, tuple(sentences), tuple(table))
@@ -240,16 +259,23 @@ class StudyAnswer:
     def _nothing(self) -> str:
         study = self._study
         counts = study.counts
-        reasons = Counter(study.variants.filter(status="failed")["error"].to_list())
-        why = "".join(f", most often because: {reason}" for reason, _ in reasons.most_common(1))
+        missing = f"; {counts.missing} have not run" if counts.missing else ""
         return (
             f"Nothing can be told, as no variant is complete: of {counts.total} variants"
-            f" {counts.failed} failed{why}; {counts.missing} have not run."
+            f" {counts.failed} failed{self._why_failed()}{missing}."
         )
+
+    def _why_failed(self) -> str:
+        """Return the most frequent reason of failures, as the end of a clause."""
+        failed = self._study.variants.filter(status="failed")
+        reasons = Counter(failed["error"].to_list())
+        return "".join(f", most often because: {reason}" for reason, _ in reasons.most_common(1))
 
     def _findings(self) -> Iterator[str]:
         """Yield what was found, for whom, and what can't be told."""
-        if not self.asked:
+        if not self._study.metrics:
+            yield "Nothing can be told, as no variant has a metric that is a number."
+        elif not self.asked:
             yield "There is nothing to compare: the table has the means."
         many = len(self.comparisons)
         clear = sorted((c for c in self.comparisons if c.is_clear), key=lambda c: c.p_holm)
@@ -265,7 +291,11 @@ class StudyAnswer:
         if same:
             parts = [f"{c.metric} with {self._sides(c)}" for c in same]
             yield f"The same in every pair: {listed(parts, 'comparison')}."
-        problems = [str(error) for error in self.tables if isinstance(error, InputError)]
+        problems = []
+        for lacking, table in zip(self._lacking, self.tables, strict=True):
+            problems += lacking
+            if isinstance(table, InputError) and not lacking:
+                problems.append(str(table))
         if open_ones or problems:
             parts = [*(self._unclear(c) for c in open_ones), *problems]
             yield f"Can't be told: {listed(parts, 'comparison')}."
@@ -307,9 +337,10 @@ class StudyAnswer:
         """Return in which homes and other groups a difference is the other way round."""
         study = self._study
         (axis, _), *within = c.labels.items()
-        varying = self._varying(c.metric, populations=True)
+        frame = study.with_metric(c.metric)
+        varying = self._varying(frame, populations=True)
         kinds = [kind for kind in varying if kind != study.columns[-1]] or varying
-        kinds += self._varying(c.metric, populations=False)
+        kinds += self._varying(frame, populations=False)
         sign = 1 if c.difference > 0 else -1
         parts = []
         for kind in (each for each in kinds if each not in c.labels):
@@ -330,7 +361,8 @@ class StudyAnswer:
         counts = study.counts
         parts = []
         if counts.total > counts.complete:
-            parts += [f"{counts.total - counts.complete} of {counts.total} variants have no result"]
+            lost = f"{counts.total - counts.complete} of {counts.total} variants have no result"
+            parts.append(lost + self._why_failed())
         for metric in dict.fromkeys(c.metric for c in self.asked):
             known = study.with_metric(metric) if metric in study.metrics else ()
             if lacking := counts.complete - len(known):
