@@ -47,6 +47,13 @@ def test_few_units_tell_only_a_direction(seeds: int, words: str) -> None:
     assert "in four of five studies 29 seeds show a difference of" in answer.sentences[-1]
 
 
+def test_a_pilot_of_a_study_that_compares_nothing_says_so() -> None:
+    tried = pilot(axes={}, compare=[], replicates=3)
+    tried.run(Crew(SerialExecutor()))
+    sentences = tried.answer(workers=1).sentences
+    assert "It compares nothing; from 29 seeds on it tells means with intervals." == sentences[-1]
+
+
 def test_a_pilot_without_time_says_that_it_can_not_tell() -> None:
     tried = pilot(replicates=9)
     tried.run(Crew(SerialExecutor(), batch_s=0.0), seconds=0)

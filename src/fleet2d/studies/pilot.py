@@ -107,7 +107,11 @@ class Pilot(StudyAnswers):
         sizes = {kind: self.whole[kind].n_unique() for kind in self.populations}
         kind = next((kind for kind, count in sizes.items() if count > 1), "seed")
         enough = {**sizes, kind: max(sizes[kind], ENOUGH_UNITS)}
-        found = StudyAnswer(self).comparisons
+        study = StudyAnswer(self)
+        if not study.asked:
+            means = f"from {ENOUGH_UNITS} {plural(kind)} on it tells means with intervals"
+            return Conclusion(question, (cost, f"It compares nothing; {means}."))
+        found = study.comparisons
         parts = [part for c in found if (part := self._detects(c, enough))]
         shown = f"in four of five studies {enough[kind]} {plural(kind)} show"
         if parts:

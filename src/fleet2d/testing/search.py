@@ -6,7 +6,7 @@ import math
 import random
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -147,6 +147,16 @@ class TryTask(WorkerTask):
 
     point: dict[str, Any] = field(default_factory=dict)
     seed: int = 0
+
+
+def _stretch(values: Sequence[float]) -> str:
+    """Return sorted values as text: the ends, and how many runs had them.
+
+    >>> _stretch([0.5]), _stretch([0.2, 0.3, 0.4])
+    ('0.5 (1 run)', '0.2 to 0.4 (3 runs)')
+    """
+    ends = dict.fromkeys(f"{value:.4g}" for value in (values[0], values[-1]))
+    return f"{' to '.join(ends)} ({counted(len(values), 'run')})"
 
 
 @dataclass
@@ -298,7 +308,7 @@ class FailureSearch(TaskQueue):
             bad = [point[name] for point in failing]
             good = sorted(point[name] for point in self.points)
             sides = [v for v in good if v < min(bad)], [v for v in good if v > max(bad)]
-            parts = [f"{v[0]:.4g} to {v[-1]:.4g} ({len(v)} runs)" for v in sides if v]
+            parts = [_stretch(values) for values in sides if values]
             lines += [f"{name}: {', '.join(parts)}"] if parts else []
         for name, choices in self._job.space.choices.items():
             tried = {point[name] for point in self.points} - {point[name] for point in failing}
