@@ -140,7 +140,7 @@ def test_power_says_how_many_seeds_detect_an_effect(fleet2d: Cli) -> None:
     assert [SPEED, "seed"] == rows[0].split()
     code, out, _ = fleet2d(*arguments)
     assert (0, [SPEED, "seed", "detectable"]) == (code, out.splitlines()[1].split())
-    assert ["0.6", "5"] == out.splitlines()[2].split()[:2]
+    assert ["0.6", "29"] == out.splitlines()[2].split()[:2]
 
 
 def test_power_needs_a_comparison_that_the_study_has(fleet2d: Cli) -> None:

@@ -48,7 +48,7 @@ def test_few_units_tell_only_a_direction(seeds: int, words: str) -> None:
 
 
 def test_a_pilot_of_a_study_that_compares_nothing_says_so() -> None:
-    tried = pilot(axes={}, compare=[], replicates=3)
+    tried = Pilot(check_study(small(axes={}, replicates=3)))
     tried.run(Crew(SerialExecutor()))
     sentences = tried.answer(workers=1).sentences
     assert "It compares nothing; from 29 seeds on it tells means with intervals." == sentences[-1]

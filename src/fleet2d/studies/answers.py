@@ -13,6 +13,7 @@ from fleet2d.errors import InputError
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.studies.directory import COMPLETE, FAILED, Counts, Meta
 from fleet2d.studies.intervals import (
+    ENOUGH_UNITS,
     LEVEL,
     POWER,
     UNLIMITED,
@@ -30,10 +31,10 @@ if TYPE_CHECKING:
 
 
 MAX_P = 1 - LEVEL  # below which a difference is clear
-FEW_UNITS = 5  # the smallest size of a study whose power is told
 NOISE = 1e-9  # shares of the variance up to here are rounding errors
 RESIDUAL = "residual"
-SIZES = (2, 3, 5, 8, 10, 15, 20, 30, 50, 100)  # of studies, in units of a kind
+OTHER_SIZES = (2, 3, 5, 10, 20, 30, 50, 100)  # of studies whose power is told, in seeds
+SIZES = (ENOUGH_UNITS, 50, 100, 200, 500, 1000)  # the same in homes: fewer tell no amounts
 
 
 def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
@@ -238,7 +239,7 @@ class StudyAnswers:
         Returns:
             With an effect: for each value of the axis and each number of the other units, how many
             units of the first kind are needed, null if no number is enough. Without: for each value
-            and size, the column `detectable`.
+            and size, the column `detectable`. Sizes are those that tell amounts.
 
         Raises:
             InputError: There is no such metric, axis or value, or less than two units.
@@ -254,13 +255,14 @@ class StudyAnswers:
             if not spread.units:
                 continue
             first, *others = spread.units
-            for counts in itertools.product(SIZES, repeat=len(others)):
+            for counts in itertools.product(OTHER_SIZES, repeat=len(others)):
                 sizes = dict(zip(others, counts, strict=True))
                 label = {axis: value, **sizes}
                 if effect is not None:
-                    rows.append({**label, first: spread.needed(effect, first, power, units=sizes)})
+                    needed = spread.needed(effect, first, power, units=sizes)
+                    rows.append({**label, first: needed and max(needed, ENOUGH_UNITS)})
                     continue
-                for count in SIZES[SIZES.index(FEW_UNITS) :]:
+                for count in SIZES:
                     detectable = spread.detectable({**sizes, first: count}, power)
                     rows.append({**label, first: count, "detectable": detectable})
         if not rows:
