@@ -10,8 +10,8 @@ from fleet2d.testing.answer import answer, headline
 from fleet2d.testing.claim import percent
 from fleet2d.testing.gate import HELD, NOT_RUN, Gate, PairedChange, Tally, listed
 from fleet2d.viewing.page_data import POLICY, write_file
+from fleet2d.viewing.report import STYLE
 
-STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 MAX_BUILDS = 12
 """Builds of the history in the page: the newest."""
 LOOK = """

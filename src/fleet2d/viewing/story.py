@@ -1,4 +1,4 @@
-"""Moments of a run that are worth a look: found by the run itself, for the page."""
+"""Moments of a run that are worth a look: found by the run itself, for the page and the report."""
 
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
