@@ -8,7 +8,8 @@ FOLDER has the logs of CASAS, UCI ADL A, and Kasteren A and C. A day is describe
 need no names of activities: how often and how long somebody is where. A persona is fitted to every
 other day of a home, lives in the bundled home, and as many of its days are compared with the days
 between; then the other way round, so that each real day is compared once. Bundled personas are
-compared with all real days, and with those of the home that has a sensor in every room.
+compared with all real days, and with those of the home that has a sensor in every room. For
+comparison, the days of each real home beside those of the others.
 
 The classifier is a random forest. It is cross-validated by day (five folds) and by home (trained on
 the other homes): 0.5 is guessing, 1 means that every day is told. Then the features by which it
@@ -184,13 +185,13 @@ def show(name: str, found: dict[str, Any]) -> None:
     """Print the areas, and the three features that give simulated days away most."""
     by_home = f", by home {found['by home']:.2f}" if "by home" in found else ""
     print(
-        f"{name}: {found['real']} real, {found['simulated']} simulated days; area by day"
+        f"{name}: {found['real']} days beside {found['simulated']}; area by day"
         f" {found['by day']:.2f}{by_home}"
     )
     worst = sorted(found["features"].items(), key=lambda item: -item[1])
     for feature, worth in worst[:3]:
         real, made = found["medians"][feature]
-        print(f"    {feature}: {worth:.3f}; median {real:.2f} real, {made:.2f} simulated")
+        print(f"    {feature}: {worth:.3f}; medians {real:.2f} and {made:.2f}")
 
 
 def main() -> None:
@@ -215,6 +216,10 @@ def main() -> None:
             [part for part in real if part.home == EVERY_ROOM], people, options.seed
         ),
     }
+    for name in HOMES:
+        own = [part for part in real if part.home == name]
+        others = [part for part in real if part.home != name]
+        results[f"{name} beside the other real homes"] = areas(own, others, options.seed)
     for name, found in results.items():
         show(name, found)
     if options.json:

@@ -128,6 +128,7 @@ LOADS: Mapping[str, float] = {
     "dress": 0.8,
     "talk": 0.8,
     "dinner": 0.5,
+    "supper": 0.5,
     "read": 0.5,
     "games": 0.5,
     "tv": 0.3,

@@ -38,6 +38,7 @@ _MEANINGS: tuple[tuple[str, RoomChoice], ...] = (
     ("hall", ("hall", "hallway")),
     ("sleeping", ("bedroom",)),
     ("breakfast lunch dinner snack", ("kitchen",)),
+    ("supper", ("living_room",)),
 )
 USUAL_ROOMS = {label: rooms for labels, rooms in _MEANINGS for label in labels.split()}
 """Meanings of the labels of known data sets, rooms and activities: rooms to be tried in turn."""

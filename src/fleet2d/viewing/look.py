@@ -72,7 +72,7 @@ ACTIVITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
         ),
         "Meals": (
             "#cf8344",
-            ("drink", "breakfast", "cook", "dinner", "lunch", "snack", "dishes", "eat"),
+            ("drink", "breakfast", "cook", "dinner", "supper", "lunch", "snack", "dishes", "eat"),
         ),
         "Work, school": ("#8a7ab5", ("work_at_home", "homework", "computer", "study")),
         "Leisure": (
