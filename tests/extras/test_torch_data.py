@@ -1,11 +1,14 @@
 """Windows for PyTorch, and data sets loaded by the library of the Hugging Face Hub."""
 
 import itertools
+import re
+import runpy
 from pathlib import Path
 
 import pytest
 from tests.learning.datasets.small import SOURCE, make
 
+from fleet2d.learning.datasets.reader import open_dataset
 from fleet2d.learning.datasets.tasks import windows
 
 torch = pytest.importorskip("torch", reason="torch isn't installed")
@@ -60,6 +63,25 @@ def test_fresh_windows_have_no_end_and_other_people() -> None:
 
     assert 120 == len(first)  # of three runs, though the split has one
     assert first != other
+
+
+def test_a_recurrent_reference_is_trained_and_scored(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    benchmark = Path(__file__).parents[2] / "benchmarks" / "gru.py"
+    monkeypatch.setattr("sys.argv", ["gru.py", str(folder), "--epochs", "3"])
+    made = runpy.run_path(str(benchmark), run_name="__main__")
+
+    out = capsys.readouterr().out
+    first, *_, last = re.findall(r"epoch \d: log loss ([\d.]+)", out)
+    assert float(last) < float(first)
+    assert {"routine", "learned", "gru"} <= {line.split()[0] for line in out.splitlines()}
+
+    # Persons are read alike alone, and beside one of a home with more places and windows.
+    one, other = sorted(windows(open_dataset(folder), "train"), key=lambda w: len(w.places))[::2]
+    network = made["train"]([one, other], 1, 0)
+    (alone, _), (both, _) = (next(made["read"](network, parts)) for parts in ([one], [one, other]))
+    assert torch.allclose(alone[0], both[0, : len(one.places), : alone.shape[2]], atol=1e-5)
 
 
 def test_the_hubs_library_loads_each_table(folder: Path, tmp_path: Path) -> None:
