@@ -21,9 +21,10 @@ from fleet2d.engine import loop
 from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.collisions import Clearance
 from fleet2d.engine.encounters import Encounters
-from fleet2d.engine.layers import LayerBook, SeenArea
+from fleet2d.engine.layers import LayerBook
 from fleet2d.engine.learners import Learners
 from fleet2d.engine.recorder import Recorder
+from fleet2d.engine.seen_area import SeenArea
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.body import Bodies
