@@ -12,7 +12,7 @@ import fleet2d as package
 from fleet2d.runs.run import open_run
 from fleet2d.viewing import demo
 
-DAY = ("simulation.duration=1 d", "metrics={sightings: {}, distance: {}}")
+DAY = ("simulation.duration=1 d", "metrics={sightings: {}, distance: {}, time_to_find: {}}")
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +43,17 @@ def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
     total, *parts = map(int, re.findall(r"\d+", requests))
     assert total == sum(parts)
     assert f"Astro found Cleo in {events.count('found')} of 1 searches." in sentences
+
+
+def test_a_search_that_ended_at_somebody_else_is_no_find() -> None:
+    ends = ["found", "false", "found", "gave_up"]
+    searches = [{"robot": "astro", "user": "cleo", "end": end} for end in ends]
+    others = [{"robot": "bolt", "user": "cleo", "end": "found"}]
+
+    (sentence,) = demo._searches("astro", [*searches, *others])
+
+    said = "Astro found Cleo in 2 of 4 searches, and took somebody else for Cleo in 1."
+    assert said == sentence
 
 
 def test_sentence_tells_how_wrong_beliefs_were_at_first_and_at_the_end() -> None:

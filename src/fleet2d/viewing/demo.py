@@ -77,17 +77,13 @@ def sentences(run: "Run") -> Iterator[str]:
             yield f"{_title(robot)} drove {metres[robot]:,.0f} m a day."
         own = [event for event in events if event["entity"] == robot]
         yield from _requests(robot, own)
-        yield from _searches(robot, own)
+        yield from _searches(robot, _rows(run, "time_to_find", ["robot", "user", "end"]))
 
 
 def _learning(run: "Run") -> Iterator[str]:
     """Yield how wrong the beliefs about each user were at first, and how wrong at the end."""
-    configured = run.manifest["scenario"]["metrics"]
-    name = next((name for name in configured if configured[name]["type"] == "ltp_error"), None)
-    if name is None or name not in run.tables:
-        return
     errors: dict[str, list[float]] = {}
-    for row in run.tables[name].select(["user", "tv"]).to_pylist():
+    for row in _rows(run, "ltp_error", ["user", "tv"]):
         if row["user"] in run.manifest["entities"]["users"]:
             errors.setdefault(row["user"], []).append(row["tv"])
     if not errors or any(len(of_user) < 2 for of_user in errors.values()):
@@ -112,13 +108,28 @@ def _requests(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
         yield f"{_title(robot)} asked {asked} times: {listed}."
 
 
-def _searches(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield how often a robot found whom it searched."""
-    counts = Counter((event["event"], event["detail"]) for event in events)
-    for (event, user), searches in counts.items():
-        if event == EventKind.FIND_BEGINS:
-            found = counts[EventKind.FOUND, user]
-            yield f"{_title(robot)} found {_title(user)} in {found} of {searches} searches."
+def _searches(robot: str, searches: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Yield how often a robot really found whom it searched, and took somebody else for them."""
+    ends: dict[str, Counter[str]] = {}
+    for search in searches:
+        if search["robot"] == robot:
+            ends.setdefault(search["user"], Counter())[search["end"]] += 1
+    for user, counts in ends.items():
+        name = _title(user)
+        sentence = f"{_title(robot)} found {name} in {counts['found']} of {counts.total()} searches"
+        if counts["false"]:
+            sentence += f", and took somebody else for {name} in {counts['false']}"
+        yield f"{sentence}."
+
+
+def _rows(run: "Run", kind: str, columns: list[str]) -> list[dict[str, Any]]:
+    """Return the rows of the table of the first metric of a type; none if nothing measured it."""
+    configured = run.manifest["scenario"]["metrics"]
+    name = next((name for name in configured if configured[name]["type"] == kind), None)
+    if name is None or name not in run.tables:
+        return []
+    rows: list[dict[str, Any]] = run.tables[name].select(columns).to_pylist()
+    return rows
 
 
 def _result(run: "Run", kind: str) -> dict[str, Any]:
