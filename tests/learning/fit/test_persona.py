@@ -137,6 +137,7 @@ def test_nights_away_are_lived_away() -> None:
     night = away[:, 2 * 60 : 5 * 60]
     assert (night.all(axis=1) | ~night.any(axis=1)).all()
     assert away.mean() == pytest.approx((minutes == 2).mean(), abs=0.08)
+    assert "7 nights away are slept at home" in fit_persona(timeline, days, model="laws").notes[-1]
 
 
 def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_path: Path) -> None:

@@ -105,6 +105,9 @@ def fit_persona(
     names = _names(timeline)
     fitter = _Fitter(timeline, names, min(day.wake for day in days))
     kinds, notes = _kinds_of_days(timeline, days)
+    away = [day for day in days if any(up.length == day.next_wake - day.bed for up in day.up)]
+    if away and model == "laws":
+        notes.append(f"{len(away)} nights away are slept at home: choose the model `recorded`")
     templates: dict[str, dict[str, Any]] = {}
     log: list[RecordedDay] = []
     for name, (on, members) in kinds.items():
