@@ -184,6 +184,22 @@ def test_each_requirement_has_the_worst_verdict_and_none_covers_some() -> None:
         cover(tally([TEST], reports(set())), {"REQ-9": "flies"})
 
 
+def test_a_test_without_trials_is_not_run_and_what_it_covers_is_not_uncovered(
+    fleet2d: Cli,
+) -> None:
+    head = "simulation: {start: 2026-01-05, duration: 2 min, seed: 1}\nfloorplan: bundled\n"
+    robots = "robots: {astro: {type: patrol, dwell: 10 s}}\n"
+    for name in ("a", "b"):
+        expect = f"expect: {{{name}: {{that: eventually(moving(astro)), covers: [REQ-{name}]}}}}\n"
+        Path(f"{name}.yaml").write_text(head + robots + expect)
+    code, out, _ = fleet2d("test", ".", "--budget", "1", "--junit", "results.xml")
+
+    assert code == 0
+    assert "1 of 2 expectations held." in out
+    assert "1 of 2 requirements held; not run: REQ-b." in out
+    assert "b of b.yaml (REQ-b): not run" in Path("results.xml").read_text()
+
+
 def test_a_python_test_with_a_rate_is_judged_by_it(fleet2d: Cli) -> None:
     Path("home.yaml").write_text(
         "simulation: {start: 2026-01-05, duration: 2 min, seed: 1}\nfloorplan: bundled\n"

@@ -170,7 +170,8 @@ def _requirements(gate: Gate) -> str:
 def _untold(gate: Gate, ordered: Sequence[Tally]) -> str:
     """Return what these trials can't tell, how many more would, and what was left out."""
     parts = [_unseen(gate, ordered)] if gate.against else [_missed(gate), *_undecided(gate)]
-    text = "; ".join([*filter(None, parts), *gate.notes])
+    notes = [listed(gate.notes, "note")] if gate.notes else []
+    text = "; ".join([*filter(None, parts), *notes])
     return f"{text}." if text else ""
 
 
@@ -228,8 +229,8 @@ def _unseen(gate: Gate, ordered: Sequence[Tally]) -> str:
     pairs = sum(change.pairs for change in gate.changes)
     if any(change.differs for change in gate.changes):
         text = (
-            f"{counted(pairs, 'pair')} of verdicts were compared with {gate.against}; p values are"
-            f" exact, and corrected for {counted(len(gate.changes), 'expectation')} (Holm)"
+            f"The verdicts of {counted(pairs, 'pair')} were compared with {gate.against}; p values"
+            f" are exact, and corrected for {counted(len(gate.changes), 'expectation')} (Holm)"
         )
         more = (_more(gate, each) for each in ordered)
         return "; ".join([text, *filter(None, more)][:2])

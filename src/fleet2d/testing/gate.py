@@ -39,6 +39,7 @@ class Tally:
         errors: The trials that couldn't be run, or broke.
         accepted: Whether the claim of its test was accepted; None if trials are too few for that.
         claim: What its test claims; None if none of its trials could be judged.
+        declared: The requirements that its scenario says it covers.
     """
 
     test: str
@@ -47,17 +48,18 @@ class Tally:
     errors: tuple[TrialReport, ...] = ()
     accepted: bool | None = True
     claim: RateTest | None = None
+    declared: frozenset[str] = frozenset()
 
     @property
     def title(self) -> str:
         """The expectation with its test, and with what it covers."""
-        covers = sorted({r for outcome in self.outcomes.values() for r in outcome.covers})
-        return f"{self.name} of {self.test}" + (f" ({', '.join(covers)})" if covers else "")
+        covers = f" ({', '.join(sorted(self.covers))})" if self.covers else ""
+        return f"{self.name} of {self.test}{covers}"
 
     @property
     def covers(self) -> frozenset[str]:
         """The requirements that it covers."""
-        return frozenset(r for outcome in self.outcomes.values() for r in outcome.covers)
+        return self.declared.union(*(outcome.covers for outcome in self.outcomes.values()))
 
     @property
     def trials(self) -> int:
@@ -75,6 +77,8 @@ class Tally:
         """What is to be said of it, as one of `RANKING`."""
         if self.errors:
             return BROKEN
+        if not self.outcomes:
+            return NOT_RUN
         if self.accepted is None:
             return UNDECIDED
         if self.failed and not self.accepted:
@@ -108,6 +112,8 @@ class Tally:
             what = f"{self.test} can't be run in {len(self.errors)} of {number}"
             return f"{what}, first in {first.key.label}: {first.error}"
         failed = self.failed
+        if self.verdict == NOT_RUN:
+            return f"{self.title}: not run"
         if not failed:
             return f"{self.title}: {self.verdict} in {number}"
         worst = failed[0]
@@ -126,12 +132,23 @@ def tally(tests: Sequence[SuiteTest], reports: Sequence[TrialReport]) -> list[Ta
     tallies: list[Tally] = []
     for test in tests:
         of_test = [report for report in reports if report.key.test == test.name]
+        if not of_test and not test.function:
+            tallies += _not_run(test)
         accepted = claim = None
         if of_test and not any(report.error for report in of_test):
             claim = test.rate(len(of_test))
             accepted = claim.judge([report.holds for report in of_test])
         tallies += tallies_of(test.name, of_test, accepted, claim)
     return tallies
+
+
+def _not_run(test: SuiteTest) -> list[Tally]:
+    """Return the tallies of a scenario of which no trial was run."""
+    expected = test.variants()[0].scenario.expect
+    return [
+        Tally(test.name, name, {}, accepted=None, declared=frozenset(each.covers))
+        for name, each in expected.items()
+    ]
 
 
 def tallies_of(

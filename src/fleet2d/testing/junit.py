@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 from fleet2d.errors import InputError, os_errors_as
 from fleet2d.storage.files import write_atomically
-from fleet2d.testing.gate import UNDECIDED, UNTESTED, Gate, Tally
+from fleet2d.testing.gate import NOT_RUN, UNDECIDED, UNTESTED, Gate, Tally
 
 # Characters that XML 1.0 can't contain.
 _ILLEGAL = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -66,7 +66,7 @@ def _add_case(suite: ET.Element, gate: Gate, each: Tally, time_s: float, hint: s
     elif each in gate.known:
         message = f"{gate.known_as}: {says}"
         ET.SubElement(case, "skipped", message=_xml_text(message))
-    elif each.verdict in (UNTESTED, UNDECIDED):
+    elif each.verdict in (UNTESTED, UNDECIDED, NOT_RUN):
         ET.SubElement(case, "skipped", message=_xml_text(says))
 
 
