@@ -374,5 +374,5 @@ def with_rollout(study: StudyAnswers, answer: Conclusion) -> Conclusion:
         return Conclusion(answer.question, (*answer.sentences, f"{error}."), answer.table)
     day = found.stop[1].day if found.stop else found.days[-1] + 1
     rows = found.table.filter(date=str(found.date_of(day))).to_dicts()
-    end = [s for s in answer.sentences if s.startswith(("Clear", "No difference", "It took"))]
+    end = [s for s in answer.sentences if s.startswith(("Clear", "It took"))]
     return Conclusion(answer.question, (*found.sentences, *end), tuple(rows))
