@@ -247,6 +247,13 @@ def test_a_statistician_says_the_same_of_the_same_table(shape: str, homes: int) 
     assert ("which is better" in text) == (comparison.outcome == "better")
 
 
+def test_a_long_table_says_how_many_rows_are_left_out() -> None:
+    rows = tuple({"number": f"m{n}", "mean": 0.5} for n in range(14))
+    assert str(Conclusion("", ("Done.",), rows)).endswith("m11     0.5\n… and 2 more rows")
+    assert "<p>… and 2 more rows</p>" in Conclusion("", ("Done.",), rows)._repr_html_()
+    assert "more row" not in str(Conclusion("", ("Done.",), rows[:12]))
+
+
 def test_p_values_of_several_methods_are_those_of_holm() -> None:
     study = of_homes(old=[0.0] * 30, a=NOISE + 2, b=NOISE + 0.5, c=NOISE + 0.4)
     found = StudyAnswer(study).comparisons

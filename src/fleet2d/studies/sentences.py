@@ -65,14 +65,22 @@ class Conclusion:
                 "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
                 for row in (head, *rows)
             )
-            lines += ["", *(line.rstrip() for line in padded)]
+            lines += ["", *(line.rstrip() for line in padded), *self._rest]
         return "\n".join(lines)
+
+    @property
+    def _rest(self) -> list[str]:
+        """How many rows a text doesn't show, if any."""
+        more = len(self.table) - MAX_ROWS
+        return [f"… and {counted(more, 'more row')}"] if more > 0 else []
 
     def _repr_html_(self) -> str:
         """Return it for notebooks and pages."""
         parts = [f"<h3>{html.escape(self.question)}</h3>"] if self.question else []
         parts += [f"<p>{html.escape(' '.join(self.sentences))}</p>"]
-        return "".join([*parts, html_table(*cells_of(self.table[:MAX_ROWS])) if self.table else ""])
+        if self.table:
+            parts.append(html_table(*cells_of(self.table[:MAX_ROWS])))
+        return "".join([*parts, *(f"<p>{rest}</p>" for rest in self._rest)])
 
 
 def is_missing(value: Any) -> bool:

@@ -177,10 +177,10 @@ def _decision(result: "ClaimResult", body: "Body", wall_s: float) -> dict[str, A
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+def pytest_runtest_makereport(item: pytest.Item, call: "pytest.CallInfo[None]") -> Iterator[None]:
     """Add what came of the claim of a test to its report."""
     outcome = yield
-    if hasattr(getattr(item, "obj", None), CLAIM):
+    if call.when != "teardown" and hasattr(getattr(item, "obj", None), CLAIM):
         setattr(outcome.get_result(), DECISION, item.stash.get(KEPT, {}))  # type: ignore[attr-defined]
 
 
@@ -189,8 +189,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     reports = {}
     for outcome in OUTCOMES:
         for report in terminalreporter.stats.get(outcome, ()):
-            is_last = getattr(report, "when", "") == "call" or outcome in ("error", "skipped")
-            if is_last and hasattr(report, DECISION) and report.when != "teardown":
+            if hasattr(report, DECISION):
                 reports[report.nodeid] = outcome, report
     if reports:
         from fleet2d.errors import InputError
