@@ -84,8 +84,9 @@ def cost_of(reports: Sequence[TrialReport], wall_s: float, builds: int = 1) -> s
 def _rank(gate: Gate, each: Tally) -> tuple[bool, bool, int, float]:
     """Return what sorts expectations: first what speaks against the build, the most often."""
     share = len(each.failed) / max(1, each.trials)
-    is_known = each not in gate.known
-    return each not in gate.blocking, is_known, RANKING.index(each.verdict), -share
+    is_harmless = each not in gate.blocking
+    is_unknown = each not in gate.known
+    return is_harmless, is_unknown, RANKING.index(each.verdict), -share
 
 
 def _name(gate: Gate, each: Tally) -> str:

@@ -449,7 +449,7 @@ class Gate:
                 found.append(each)
         return found
 
-    @property
+    @cached_property
     def known(self) -> list[Tally]:
         """What fails with both builds and isn't clearly worse, or is expected to fail."""
         return [each for each in self.tallies if each.fails and each not in self.blocking]
