@@ -129,9 +129,12 @@ def _depth(outcome: TrialOutcome) -> tuple[bool, float]:
 
 def tally(tests: Sequence[SuiteTest], reports: Sequence[TrialReport]) -> list[Tally]:
     """Return a tally for each expectation of each test that was run."""
+    by_test: dict[str, list[TrialReport]] = {}
+    for report in reports:
+        by_test.setdefault(report.key.test, []).append(report)
     tallies: list[Tally] = []
     for test in tests:
-        of_test = [report for report in reports if report.key.test == test.name]
+        of_test = by_test.get(test.name, [])
         if not of_test and not test.function:
             tallies += _not_run(test)
         accepted = claim = None
