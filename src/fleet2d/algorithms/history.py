@@ -86,7 +86,8 @@ class BodyPoses:
     """Poses of one body, one entry per step; columns are computed on demand."""
 
     def __init__(self, home: Home, runs: Window) -> None:
-        self._home, self._runs = home, runs
+        self._home = home
+        self._runs = runs
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -225,7 +226,8 @@ class Log:
             motions: The motions of the bodies.
             activities: What users do.
         """
-        self.home, self.clock = home, clock
+        self.home = home
+        self.clock = clock
         self.index = {name: row for row, name in enumerate(names)}
         self.activities = activities
         self.answers: Sequence[AnswerRecord] = ()  # how people answered: truth

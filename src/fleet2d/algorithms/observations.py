@@ -241,7 +241,9 @@ class Observations:
             blocks: Consecutive ones, with the columns of observations; joined on demand.
             activities: What users do.
         """
-        self._plan, self._rooms, self._activities = plan, rooms, activities
+        self._plan = plan
+        self._rooms = rooms
+        self._activities = activities
         self._blocks = blocks or [SightingTable.of_rows(np.empty((0, OBSERVATION), np.int64))]
 
     def __len__(self) -> int:

@@ -330,7 +330,8 @@ class TwoStageTiming(TimingPolicy):
         no = 0.4 * self.prior
         self.has_time = np.full((HOURS, rooms), yes)
         self.has_none = np.full((HOURS, rooms), no)
-        self.agrees, self.declines = yes, no
+        self.agrees = yes
+        self.declines = no
 
     def learn(self, asked: Asked) -> None:
         """Count whether the person had time, and whether she agreed."""

@@ -320,7 +320,8 @@ class UnfinishedRun:
 
     def __init__(self, directory: Path) -> None:
         """Create no file yet: `begin` and `resume` do."""
-        self.directory, self.folder = directory, directory / FOLDER
+        self.directory = directory
+        self.folder = directory / FOLDER
         self._lock: FolderLock | None = None
         self._journal: FrameWriter | None = None
         self._tables: dict[str, _LoggedTable] = {}  # in the journal

@@ -514,7 +514,8 @@ def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemor
     waiting = np.zeros_like(old.waiting)
     for c, (begin, length) in enumerate(old.waiting.tolist()):
         places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
-        backlog[c, :length], waiting[c, 1] = old.backlog[c, places], length
+        backlog[c, :length] = old.backlog[c, places]
+        waiting[c, 1] = length
     return SightMemory(old.noticed, old.seen, about, backlog, waiting)
 
 

@@ -188,7 +188,9 @@ class ChangeQueue:
     """
 
     def __init__(self, basis: Basis) -> None:
-        self.home, self.clock, self._actors = basis.home, basis.clock, basis.actors
+        self.home = basis.home
+        self.clock = basis.clock
+        self._actors = basis.actors
         objects = basis.scenario.objects
         self.doors = {name: item for name, item in objects.items() if isinstance(item, Door)}
         self.names = list(self.doors)

@@ -142,7 +142,8 @@ class CheckpointWriter:
             clock: The clock of the run.
             describe: Returns the constants of the run by name, and the header of a checkpoint.
         """
-        self._store, self._describe = store, describe
+        self._store = store
+        self._describe = describe
         self._day = max(1, DAY_US // clock.step_us)
         every = settings.checkpoint
         self._every = max(1, micros(every) // clock.step_us) if isinstance(every, timedelta) else 0

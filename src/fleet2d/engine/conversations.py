@@ -71,7 +71,9 @@ class Conversations(Watcher):
             basis: The basis of the run.
             interventions: By which people switch robots off.
         """
-        self.actors, self.users, self._clock = basis.actors, basis.bodies.users, basis.clock
+        self.actors = basis.actors
+        self.users = basis.bodies.users
+        self._clock = basis.clock
         self.queues: dict[int, RequestQueue] = {}
         self.answers: dict[int, Answers] = {}
         self.attitudes: dict[tuple[int, int], AttitudeState] = {}

@@ -63,8 +63,13 @@ class RunExpectations(Watcher):
         queue: InterventionQueue,
     ) -> None:
         self.entries: dict[str, ActiveExpectation] = {}
-        self._run, self.actors, self.bodies, self.clock = run, run.actors, run.bodies, run.clock
-        self._scenario, self._sensors, self._queue = scenario, sensors, queue
+        self._run = run
+        self.actors = run.actors
+        self.bodies = run.bodies
+        self.clock = run.clock
+        self._scenario = scenario
+        self._sensors = sensors
+        self._queue = queue
         self._sensor_names = [] if sensors is None else sensors.names
         self._gauges: dict[str, Gauge] = {}
         self._events: list[Event] = []
@@ -157,7 +162,8 @@ class RunExpectations(Watcher):
         block = SignalBlock(self.first, end, bodies, home, observations, states, events)
         for gauge in self._gauges.values():
             gauge.take(block)
-        self._run.first, self._events = end, rest
+        self._run.first = end
+        self._events = rest
 
     # Judging
 

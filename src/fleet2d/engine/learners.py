@@ -87,11 +87,14 @@ class Learners:
     """
 
     def __init__(self, basis: Basis) -> None:
-        self.home, self.clock, self.seed = basis.home, basis.clock, basis.seed
+        self.home = basis.home
+        self.clock = basis.clock
+        self.seed = basis.seed
         self.store = basis.store if basis.scenario.artifacts.outputs else None
         algorithms = basis.scenario.algorithms
         metrics = basis.scenario.metrics
-        self.users, self.robots = tuple(basis.scenario.users), tuple(basis.scenario.robots)
+        self.users = tuple(basis.scenario.users)
+        self.robots = tuple(basis.scenario.robots)
         self.outputs: dict[str, Any] = {}
         self.fresh: dict[str, Any] = {}
         self.replaced: dict[str, Any] = {}

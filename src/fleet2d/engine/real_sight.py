@@ -47,7 +47,8 @@ class RealSight(Cameras):
         rows = np.zeros((len(sightings), SIGHTING), np.int64)
         places = np.array([(s.x, s.y) for s in sightings])
         points = np.rint(places * lattice.units_per_m) if source.relative else None
-        rows[:, Column.STEP], rows[:, Column.USER] = step, UNKNOWN_TRUTH
+        rows[:, Column.STEP] = step
+        rows[:, Column.USER] = UNKNOWN_TRUTH
         rows[:, Column.IDENTITY] = [index[sighting.user] for sighting in sightings]
         rows[:, [Column.X, Column.Y]] = lattice.to_lattice(places) if points is None else points
         rows[:, Column.HEADING] = [sighting.heading for sighting in sightings]

@@ -64,8 +64,12 @@ class SeenArea(Watcher):
             every: Number of steps between two looks; each look counts for this many steps.
             bin_steps: Steps in a bin of exposure, for `take_bins`; 0: no bins.
         """
-        self.robot, self.row, self.every, self._patches = robot, robot.row, every, patches
-        self._bodies, self._bin_steps = bodies, bin_steps
+        self.robot = robot
+        self.row = robot.row
+        self.every = every
+        self._patches = patches
+        self._bodies = bodies
+        self._bin_steps = bin_steps
         plan = robot.home.plan
         lattice = plan.lattice
         step_us = robot.clock.step_us

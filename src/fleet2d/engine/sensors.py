@@ -52,7 +52,8 @@ class Sensors(Watcher):
     def __init__(self, basis: Basis, doors: Sequence[str]) -> None:
         home = basis.home
         step_us = basis.clock.step_us
-        self.home, self.users = home, basis.bodies.users
+        self.home = home
+        self.users = basis.bodies.users
         self.stuck: dict[str, SensorFault] = {}
         self._readings: list[tuple[int, SensorReading]] = []  # not collected yet
         self.sensors: dict[str, Sensor] = {}
@@ -67,7 +68,8 @@ class Sensors(Watcher):
                     sensor.watch(list(doors).index(sensor.of))
                 sensor.start(home, step_us)
                 self.sensors[name] = sensor
-        self.names, sensors = list(self.sensors), self.sensors.values()
+        self.names = list(self.sensors)
+        sensors = self.sensors.values()
         self.rooms = [sensor.room or sensor.place(home) for sensor in sensors]
         self.words = [sensor.words for sensor in sensors]
         self._states = {n: SensorState(s.hold_us() // step_us) for n, s in self.sensors.items()}

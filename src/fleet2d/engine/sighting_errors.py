@@ -64,7 +64,8 @@ def sight_events(
         losses = np.append(losses, last + patience) if is_lost else losses
         events += [(max(step, first), identity, USER_LOST) for step in losses.tolist()]
         events += [(step, identity, USER_SEEN) for step in returns.tolist()]
-        memory.noticed[identity], memory.seen[identity] = last, not is_lost
+        memory.noticed[identity] = last
+        memory.seen[identity] = not is_lost
     return sorted(events)
 
 
@@ -177,7 +178,8 @@ class SightingErrors:
         is_kept = rows[:, Column.USER] != RETRACTED
         differs = not is_kept.all() or bool((rows[:, Column.IDENTITY] != identities).any())
         if differs:
-            memory.noticed[:], memory.seen[:] = before.noticed, before.seen
+            memory.noticed[:] = before.noticed
+            memory.seen[:] = before.seen
         return rows[is_kept], differs
 
     def _change(self, c: int, rows: I64, looks: I64, body: PoseColumns, memory: SightMemory) -> I64:
@@ -255,4 +257,5 @@ def _write(rows: I64, old: CameraSightings, new: CameraSightings, lattice: Latti
     if new.heading is not old.heading:
         heading = np.rint(new.heading * (TURN / (2 * math.pi)))
         rows[:, Column.HEADING] = heading.astype(np.int64) % TURN
-    rows[:, Column.POSTURE], rows[:, Column.IDENTITY] = new.posture, new.user
+    rows[:, Column.POSTURE] = new.posture
+    rows[:, Column.IDENTITY] = new.user

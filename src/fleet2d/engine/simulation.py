@@ -111,7 +111,8 @@ class Simulation:
         self, scenario: Scenario, store: RunStore, interventions: Sequence[Mapping[str, Any]] = ()
     ) -> None:
         """Set up all but the directory."""
-        self.scenario, simulation = scenario, scenario.simulation
+        self.scenario = scenario
+        simulation = scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
         self.clock = simulation.clock
         self._store = store
@@ -786,7 +787,8 @@ class Simulation:
         return simulation
 
     def _take(self, state: State) -> None:
-        self._state, self._store = state, state.store
+        self._state = state
+        self._store = state.store
         state.wait_for(state.requested)  # not for events that only listeners of another run await
 
     def _header(self) -> dict[str, Any]:
@@ -857,8 +859,10 @@ class Simulation:
         scenario["simulation"]["seed"] = self.seed
         if self.clock.zone is not None:
             scenario["simulation"]["time_zone"] = self.clock.zone.record
-        manifest.scenario, manifest.seed = scenario, self.seed
-        manifest.step_us, manifest.start = self.clock.step_us, self.clock.start.isoformat()
+        manifest.scenario = scenario
+        manifest.seed = self.seed
+        manifest.step_us = self.clock.step_us
+        manifest.start = self.clock.start.isoformat()
         users = list(self.scenario.users)
         robots = list(self.scenario.robots)
         manifest.entities = Entities(users=users, robots=robots)
@@ -884,7 +888,8 @@ class Simulation:
         simulated_s = self.step * self.clock.step_us / 1e6
         manifest.steps = self.step
         manifest.simulated_s = simulated_s
-        manifest.metrics, manifest.wall_s = dict(results), self._wall_s
+        manifest.metrics = dict(results)
+        manifest.wall_s = self._wall_s
         manifest.add_inputs([file for each in self._state.watchers for file in each.files])
         manifest.interventions = queue.done if self.done else queue.records
         speedup = pace.speedup_until(simulated_s) if pace else 0.0

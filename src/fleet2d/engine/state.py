@@ -253,7 +253,8 @@ class State:
     def wait_for(self, kinds: frozenset[str]) -> None:
         """Let spans end at events of these kinds, besides those that components wait for."""
         listened = frozenset[str]().union(*(kinds for _, kinds in self.events.listeners))
-        self.requested, self.awaited = kinds, kinds | self.interventions.kinds | listened
+        self.requested = kinds
+        self.awaited = kinds | self.interventions.kinds | listened
         self.events.awaited = self.awaited
         awaited = self.awaited | self.learners.awaited
         for watcher in self.watchers:

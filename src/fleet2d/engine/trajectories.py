@@ -76,8 +76,10 @@ class Samples:
         rows[:, :, 1] = np.arange(len(bodies))
         if self._every == 1:
             block = bodies.block(first, end)
-            rows[:, :, 2], rows[:, :, 3] = block.x.T, block.y.T
-            rows[:, :, 4], rows[:, :, 5] = block.heading.T, block.away.T
+            rows[:, :, 2] = block.x.T
+            rows[:, :, 3] = block.y.T
+            rows[:, :, 4] = block.heading.T
+            rows[:, :, 5] = block.away.T
         else:
             rows[:, :, 2:] = bodies.poses(steps)
         if rows.size:

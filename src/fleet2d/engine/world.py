@@ -48,8 +48,10 @@ class EngineWorld:
     """A run at the step of an intervention; see `fleet2d.interventions.intervention`."""
 
     def __init__(self, state: State, step: int) -> None:
-        self._state, self.step = state, step
-        self.home, self.clock = state.home, state.changes.clock
+        self._state = state
+        self.step = step
+        self.home = state.home
+        self.clock = state.changes.clock
         self.doors: Sequence[str] = state.changes.names
         sensors = state.find(Sensors)
         self.sensors: Mapping[str, Sensor] = {} if sensors is None else sensors.sensors
@@ -144,7 +146,9 @@ class EngineWorld:
 
     def drive(self, actor: DecidingActor) -> None:
         """Let a body follow only plans from outside from now on, not its behaviors."""
-        actor.behaviors, actor.arbiter, actor.order = [], Arbiter([]), None
+        actor.behaviors = []
+        actor.arbiter = Arbiter([])
+        actor.order = None
         self._state.driven.add(actor.row)
         actor.decide_again(self.step)
 

@@ -383,14 +383,16 @@ class Body:
 
     def join(self, bodies: Bodies, row: int) -> None:
         """Become one of the bodies of a run, whose clock and poses it uses from then on."""
-        self._bodies, self.row = bodies, row
+        self._bodies = bodies
+        self.row = row
 
     @property
     def state(self) -> Pose:
         """Where it is at the present step."""
         bodies = self._bodies
         if bodies is not None and self._state_step != bodies.step:
-            self._state, self._state_step = bodies.pose_at(self.row, bodies.step), bodies.step
+            self._state = bodies.pose_at(self.row, bodies.step)
+            self._state_step = bodies.step
         return self._state
 
     @state.setter

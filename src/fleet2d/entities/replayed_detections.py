@@ -119,7 +119,8 @@ class ReplayedDetections(EvidenceSource, LogKeys):
             else units.to_lattice(places)
         )
         heading = np.floor(np.nan_to_num(turns[used]) * TURN + 0.5).astype(np.int64) % TURN
-        rows[:, Column.STEP], rows[:, Column.IDENTITY] = step[used], identity[used]
+        rows[:, Column.STEP] = step[used]
+        rows[:, Column.IDENTITY] = identity[used]
         rows[:, Column.USER] = UNKNOWN_TRUTH
         rows[:, [Column.X, Column.Y]] = rows[:, [Column.TRUE_X, Column.TRUE_Y]] = points
         rows[:, Column.HEADING] = rows[:, Column.TRUE_HEADING] = heading

@@ -108,7 +108,8 @@ class RoomView:
         self.window = (slice(y0, y1), slice(x0, x1))
         self.inside = largest_part(plan.room_of_cell[self.window] == room.index)
         self.pocket = int(POCKET_M2 / lattice.cell**2)
-        self._whole, doors = whole[self.window], doors[self.window]
+        self._whole = whole[self.window]
+        doors = doors[self.window]
         self._may_hold = self._whole & self.inside & ~doors
         self._from_doors = squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1]
         reach = max(1, count_cells(lattice.cell, WALL_REACH))

@@ -100,13 +100,16 @@ class Layer:
         source: Callable[[], NDArray[Any]] | None = None,
     ) -> None:
         """Make a layer filled with its initial value, or one whose values come from `source`."""
-        self.name, self.settings = name, settings
+        self.name = name
+        self.settings = settings
         self.fill: float = settings.fill
-        self.unit, self.description = settings.unit, settings.description
+        self.unit = settings.unit
+        self.description = settings.description
         self.store = settings.store
         self.every = settings.every
         self.dtype: np.dtype[Any] = np.dtype(settings.dtype)
-        self._plan, self._source = plan, source
+        self._plan = plan
+        self._source = source
         shape = (plan.lattice.rows, plan.lattice.columns)
         if source is None:
             self._values: NDArray[Any] = np.full(shape, settings.fill, self.dtype)

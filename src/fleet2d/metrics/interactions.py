@@ -350,7 +350,9 @@ def _consider(request: OpenRequest, step: int, life: _LifeOfPeriod) -> None:
         chance *= answers.chance(stage, now, request.state)
     value = chance * interaction.value_after(now.time - life.time(request.wanted.step))
     if value > request.best:
-        request.best, request.best_at, request.chance = value, step, chance
+        request.best = value
+        request.best_at = step
+        request.chance = chance
 
 
 def _numbers(requests: list[OpenRequest]) -> dict[str, float]:

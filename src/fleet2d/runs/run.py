@@ -325,7 +325,8 @@ def _is_at(path: Path, root: Path) -> bool:
 
 def _end_at_commit(root: Path, manifest: Manifest, step: int) -> list[str]:
     """Let the manifest of an unfinished run end at its last commit; return a note about it."""
-    manifest.steps, manifest.simulated_s = step, step * manifest.step_us / 1e6
+    manifest.steps = step
+    manifest.simulated_s = step * manifest.step_us / 1e6
     states = {
         "running": "is unfinished: it crashed, or is still going on",
         "failed": "failed",

@@ -98,7 +98,9 @@ class PathReader:
             ArtifactError: The run stored no key frames or damaged ones, or there is no such body.
         """
         self.clock = run.clock
-        self._run, self._plan, self._entity = run, plan, entity
+        self._run = run
+        self._plan = plan
+        self._entity = entity
         if "key_frames" not in run.tables:
             raise ArtifactError(
                 "the run stored no key frames: run it with artifacts.key_frames=true"
@@ -181,7 +183,8 @@ class PathReader:
                 )
         at = steps - step
         out.x[:], out.y[:] = poses.x[at], poses.y[at]
-        out.heading[:], out.away[:] = poses.heading[at], poses.away[at]
+        out.heading[:] = poses.heading[at]
+        out.away[:] = poses.away[at]
 
 
 @contextmanager

@@ -434,7 +434,8 @@ class FrameWriter:
         Raises:
             OSError: The file can't be written.
         """
-        self.path, self.end = path, start
+        self.path = path
+        self.end = start
         self._kinds = form.kinds
         self._buffer: list[bytes] = []
         self._size = 0  # bytes in the buffer
@@ -484,7 +485,9 @@ class FrameWriter:
 
     def undo(self) -> None:
         """Remove all frames since the last commit, as after a failed write."""
-        self._buffer, self._size, self._written = [], 0, self.end
+        self._buffer = []
+        self._size = 0
+        self._written = self.end
         with suppress(OSError):  # readers ignore what is cut off
             os.ftruncate(self._handle, self.end)
             os.lseek(self._handle, self.end, os.SEEK_SET)

@@ -216,10 +216,10 @@ def _missed(gate: Gate) -> str:
     shown = _least_shown(each)
     text = f"What fails in less than {percent(1 - shown)} of {kind}s may have gone unseen"
     target = next((rate for rate in RATES if rate > shown), None)
-    more = None if target is None else seeds_for(1.0, target)
-    if target is None or more is None:
+    needed = None if target is None else seeds_for(1.0, target)
+    if target is None or needed is None:
         return text
-    more_of = f"{counted(more - number, f'more {kind}')} of {name}"
+    more_of = f"{counted(needed - number, f'more {kind}')} of {name}"
     return f"{text}: {more_of} would show what fails in {percent(1 - target)}"
 
 

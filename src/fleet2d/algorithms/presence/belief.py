@@ -84,7 +84,9 @@ class Presence:
         self.time = time
         self.track = track
         self.names = (*self.users, ANYONE)
-        self._home, self._away, self._interval = home, away, interval
+        self._home = home
+        self._away = away
+        self._interval = interval
         rows = len(self.names)
         if home.ndim != 2 or home.shape[0] != rows or away.shape != (rows,):
             raise ComponentError(

@@ -194,7 +194,8 @@ class Estimator(Component):
             users: Number of users.
             half_life: Days after which a day counts half; None: all days count equally.
         """
-        self.rooms, self.users = rooms, users
+        self.rooms = rooms
+        self.users = users
         self.counts = DayCounts((users + 1, self.width(rooms)), half_life)
 
     def width(self, rooms: int) -> int:

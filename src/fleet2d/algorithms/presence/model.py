@@ -59,7 +59,9 @@ class Model(Component):
             users: Names of the users.
             start: Local time at which the run begins; each bin of evidence has its own.
         """
-        self.rooms, self.users, self.day = len(home.rooms), len(users), start.toordinal()
+        self.rooms = len(home.rooms)
+        self.users = len(users)
+        self.day = start.toordinal()
 
     def observe(self, evidence: Evidence) -> tuple[F64, F64]:
         """Process the next bins of evidence; return the belief after each bin.

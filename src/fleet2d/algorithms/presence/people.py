@@ -230,7 +230,10 @@ class People:
             count: Number of people.
             longest: Largest number of consecutive bins with equal evidence that are merged.
         """
-        self.layout, self.prior, self.count, self.longest = layout, prior, count, longest
+        self.layout = layout
+        self.prior = prior
+        self.count = count
+        self.longest = longest
         self.total = layout.no_moments(count)
         self.model = model_of(self.total, layout, prior)
         self.now = self.day_start = np.repeat(layout.anywhere[None], count, axis=0)

@@ -116,7 +116,8 @@ class FixFollower:
     def __init__(self, actor: Actor, fixes: Fixes, gap_us: int, gaps: str) -> None:
         self.actor = actor
         self.fixes = fixes
-        self.gap_us, self.gaps = gap_us, gaps
+        self.gap_us = gap_us
+        self.gaps = gaps
         self.fastest = FASTEST_M_S * actor.home.plan.lattice.units_per_m
         self.unknown_us = self.gap_count = self.implausible = self.around = 0
         self.top_speed = 0.0
@@ -229,7 +230,8 @@ class RoomFollower:
     """
 
     def __init__(self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool) -> None:
-        self.actor, self.visits = actor, visits
+        self.actor = actor
+        self.visits = visits
         self.at_once = at_once
         self.step_us = actor.clock.step_us
         self.walks = self.hurried = self.implausible = 0

@@ -258,7 +258,8 @@ class KnownHome:
     """
 
     def __init__(self, person: "ResidentBehavior", actor: Actor) -> None:
-        self._person, self._actor = person, actor
+        self._person = person
+        self._actor = actor
         self._last = kernels.LastStint()
         # The number of each place and of each activity's name, in the order of their first use.
         self._seats: dict[Seat, int] = {}  # `_last` refers to them

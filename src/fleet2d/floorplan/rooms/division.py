@@ -534,9 +534,11 @@ def label_rooms(
     first = len(merged)
     sizes = np.bincount(labels.of_cell[free], minlength=first + labels.rests)[first:]
     rank = np.empty(first + labels.rests + 1, np.int64)  # its last entry serves -1
-    rank[:first], rank[-1] = np.arange(first), NO_ROOM
+    rank[:first] = np.arange(first)
+    rank[-1] = NO_ROOM
     order = np.argsort(-sizes, kind="stable")
-    rank[first + order], sizes = first + np.arange(labels.rests), sizes[order]
+    rank[first + order] = first + np.arange(labels.rests)
+    sizes = sizes[order]
     painted = rank[labels.of_cell]
     lines = [passages.segments[link.line] for link in chambers.links]
     neighbors = _neighbors(lattice, painted, lines)
