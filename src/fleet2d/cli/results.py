@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 _LOADED = time.perf_counter()
-UNIT_WIDTH = 12  # of units, whose words may go on in further lines
+# The width of units, whose words may go on in further lines.
+UNIT_WIDTH = 12
 LONGEST = 10_000  # characters of a line
 
 

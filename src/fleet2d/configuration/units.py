@@ -139,7 +139,8 @@ PeerAddress = Annotated[str, AfterValidator(_checked_peer_address)]
 
 
 MAX_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
-MAX_DIGITS = 400  # of a number: fractions with very many digits would fill the memory
+# A number has at most so many digits, as fractions with very many would fill the memory.
+MAX_DIGITS = 400
 MICROSECOND = timedelta(microseconds=1)
 
 # Exponents are short on purpose: Fraction("1e999999999") would fill the memory.

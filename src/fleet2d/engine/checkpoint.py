@@ -37,7 +37,8 @@ COMMIT_S = 2.0
 COMPUTING_S = 10.0
 WAITING_S = 60.0
 SHARE = 40
-PURPOSE = "checkpoint of a run"  # of its signature
+# What the signature of a checkpoint is for.
+PURPOSE = "checkpoint of a run"
 
 
 class UnusableCheckpointError(ArtifactError):

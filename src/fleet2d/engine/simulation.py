@@ -55,7 +55,8 @@ if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
     from fleet2d.expectations.verdict import Verdict
 
-PURPOSE = "saved simulation"  # of the signature of a file
+# What the signature of a file is for.
+PURPOSE = "saved simulation"
 
 
 class Simulation:

@@ -26,7 +26,8 @@ EARLIEST_US = -2_208_988_800_000_000
 LATEST_US = 7_258_118_400_000_000
 """The years 1900 and 2200 [us since 1970]."""
 
-MAX_TIMESTAMP_NS = 8e18  # of nanoseconds since 1970
+# The largest number of nanoseconds since 1970 that is a time.
+MAX_TIMESTAMP_NS = 8e18
 QUARTER_HOUR_US = 900_000_000
 SINCE_1970_S = 1e8
 """Fewer seconds count from the beginning of the log."""

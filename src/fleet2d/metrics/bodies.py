@@ -20,7 +20,8 @@ from fleet2d.runtime.events import EventKind
 
 RestPlace = tuple[float, float]
 
-MAX_PLACES = 4  # places per user in the closing table
+# The number of places per user in the closing table.
+MAX_PLACES = 4
 
 
 class Distance(Metric):

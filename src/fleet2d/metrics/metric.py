@@ -105,7 +105,8 @@ def columns_of(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str,
     return dict(zip(names, columns, strict=True)) if rows else None
 
 
-SEPARATOR = " · "  # between the parts of the name of a number
+# It stands between the parts of the name of a number.
+SEPARATOR = " · "
 
 
 def flat(result: Any, name: str = "") -> list[tuple[str, Any]]:

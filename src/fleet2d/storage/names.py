@@ -7,7 +7,8 @@ to write the same letters there is one, and expectations read it as it is.
 
 import unicodedata
 
-MOST_BYTES = 100  # of a name in UTF-8: names of files, of which it is a part, have 255 at most
+# The length of a name in UTF-8; names of files, of which it is a part, have at most 255 bytes.
+MOST_BYTES = 100
 
 
 def problem_of(name: str) -> str | None:

@@ -33,8 +33,10 @@ if TYPE_CHECKING:
 MAX_P = 1 - LEVEL  # below which a difference is clear
 NOISE = 1e-9  # shares of the variance up to here are rounding errors
 RESIDUAL = "residual"
-OTHER_SIZES = (2, 3, 5, 10, 20, 30, 50, 100)  # of studies whose power is told, in seeds
-SIZES = (ENOUGH_UNITS, 50, 100, 200, 500, 1000)  # the same in homes: fewer tell no amounts
+# The sizes of studies whose power is told, in seeds.
+OTHER_SIZES = (2, 3, 5, 10, 20, 30, 50, 100)
+# The same in homes; fewer tell no amounts.
+SIZES = (ENOUGH_UNITS, 50, 100, 200, 500, 1000)
 
 
 def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:

@@ -32,7 +32,8 @@ ExecutorName = Annotated[
     typer.Option(help="Where the workers are; serial: in this process, for a debugger."),
 ]
 Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store of a study.")]
-MAX_LINES = 10  # of a list that is printed
+# The number of lines of a list that are printed.
+MAX_LINES = 10
 MANY_VARIANTS = 20_000
 PIVOTED = 4  # columns of a table of two kinds of units, such as homes and seeds
 IDENTITY_START = 6

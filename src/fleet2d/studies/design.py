@@ -127,8 +127,10 @@ NOT_APPLICABLE = -1
 MAX_VARIANTS = 1_000_000
 WITH, WITHOUT = "with", "without"
 """Labels of runs of a rollout: with the change from its stage on, and without it."""
-TRIED_FIRST = 100  # combinations of the first life of a population
-SEEDS_APART = 1_048_583  # between replicates of a life, so that no other life has one of its seeds
+# The number of combinations of the first life that are checked before any home is built.
+TRIED_FIRST = 100
+# The distance between the seeds of replicates of a life, so that no two lives share a seed.
+SEEDS_APART = 1_048_583
 SWITCHES = ("key_frames", "observations", "events", "decisions")
 """Keys of `artifacts` that are named after their tables."""
 

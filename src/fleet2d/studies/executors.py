@@ -31,7 +31,8 @@ from typing import Any, NamedTuple, Protocol
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runtime.memory import peak_memory_mb, rare_collections
 
-MAX_ATTEMPTS = 3  # of a task whose worker dies each time
+# How often a task is tried whose worker dies each time.
+MAX_ATTEMPTS = 3
 MAX_BATCH = 100  # tasks that a worker gets at once
 BATCH_S = 1.0  # after which a worker returns the results of its tasks so far
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together

@@ -26,10 +26,13 @@ if TYPE_CHECKING:
 PERCENTS = (1, 5, 25, 50, 75, 95, 99)
 WORST_SHARE = 0.01
 DEPTH = 2
-CUTS = 15  # places at which a number may be cut
-SMALLEST_SHARE = 0.05  # of the robots, in a group
+# The number of places at which a number may be cut.
+CUTS = 15
+# The share of the robots that a group has at least.
+SMALLEST_SHARE = 0.05
 MAX_NAMED = 3  # runs that a sentence names
-FEWEST = 4 * ENOUGH_UNITS  # robots: two groups in each half of the homes
+# The number of robots that two groups in each half of the homes need.
+FEWEST = 4 * ENOUGH_UNITS
 
 
 def features_of(study: StudyAnswers) -> list[str]:

@@ -33,7 +33,8 @@ ENOUGH_UNITS = math.ceil(math.log(1 - LEVEL) / math.log(1 - RARE))  # that 95 % 
 MINOR = 0.1  # share of the variance of the mean up to which few units of a further level do
 ROUNDING = 1e-9  # differences up to here, relative to the values, are rounding errors
 MIN_FREEDOM = 2.0  # below which the skewness of units can't be estimated
-WIDER = 0.75  # weight of the wider one of the ends of Hall and of Student's t
+# The weight of the wider one of the ends of Hall and of Student's t.
+WIDER = 0.75
 MIN_SKEWNESS = 1e-6  # below which Hall's transformation is the identity
 
 

@@ -33,7 +33,8 @@ from fleet2d.studies.households import bedrooms_needed, members_of, personas_of
 from fleet2d.studies.lazy import LazySequence
 
 MAX_SEED = 1 << 31
-SEED_STEP = 1_000_003  # between the seeds of two populations, larger than a population
+# The distance between the seeds of two populations, larger than a population.
+SEED_STEP = 1_000_003
 FEATURES = ("people", "rooms", "bedrooms", "area_m2")
 """Columns of what a home and its household are."""
 HOME, HOUSEHOLD, HAS, BEDROOMS, AREA = "home", "household", "has", "bedrooms", "area_m2"
@@ -43,7 +44,8 @@ SIZE_UNITS = ((BEDROOMS, "bedrooms"), (AREA, "m2"))
 # and Wales in 2011, 26 % had as many as the bedroom standard asks for and 5 % fewer, counted as 0;
 # 37 % had two or more, counted as 2 (Census 2011, and English Housing Survey 2010-11).
 SPARE_BEDROOMS = ((0, 31), (1, 32), (2, 37))
-MAX_PROGRAMS = 200  # programs of homes that are drawn for a number of bedrooms
+# How many programs of homes are drawn to find one with a number of bedrooms.
+MAX_PROGRAMS = 200
 
 
 class HomeFeatures(NamedTuple):

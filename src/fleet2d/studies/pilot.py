@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from fleet2d.studies.specification import PairedComparison
 
 PILOT_S = 60.0
-PILOT_UNITS = 12  # combinations of home, people and seed
+# The number of combinations of home, people and seed in a pilot.
+PILOT_UNITS = 12
 RESERVE = 0.9  # share of pilots whose variance is not too small, after it
 MAX_OTHERS = 2  # values that are compared with the reference
 

@@ -41,10 +41,14 @@ from fleet2d.studies.lives import (
     HomeFeatures,
 )
 
-MAX_DRAWS = 20  # lives that are drawn for each that is kept, before conditions are too narrow
-FEW_HOMES = 8  # up to here starting workers costs more than it saves
-MAX_PROBLEMS = 10  # reasons in one report
-MAX_NAMED = 5  # lives or variants that are named beside the first one of a reason
+# So many lives are drawn for each that is kept, before conditions are too narrow.
+MAX_DRAWS = 20
+# Up to so many homes, starting workers costs more than it saves.
+FEW_HOMES = 8
+# The number of reasons in one report.
+MAX_PROBLEMS = 10
+# The number of lives or variants that are named beside the first one of a reason.
+MAX_NAMED = 5
 
 
 class PopulationAxis(Axis, DrawSettings):

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from fleet2d.studies.reader import Study
 
 
-MAX_VALUES = 12  # of an axis that are listed
+# The number of values of an axis that are listed.
+MAX_VALUES = 12
 MAX_SHARES = 3  # sources of the variance of a metric
 # from how many characters on names are shortened, and to how many
 LONG_NAME = 16

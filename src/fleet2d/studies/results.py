@@ -27,9 +27,11 @@ VARIANT = "variant"
 RESULTS = "results"
 TABLES = "tables"
 PART_ROWS = 5_000  # results of a part
-PART_BYTES = 64_000_000  # of its tables, in memory
+# The size of the tables of a part, in memory.
+PART_BYTES = 64_000_000
 FLUSH_EVERY_S = 1.0  # maximum loss if the process is killed, unless writing takes long
-FLUSH_SHARE = 0.05  # of the time may be spent on writing
+# The share of the time that may be spent on writing.
+FLUSH_SHARE = 0.05
 ROWS_PER_GROUP = 250_000
 _TEXTS = ("identity", "status", "digest", "error", "trace")
 _SECONDS = {"setup_s": "setup", "simulate_s": "simulate", "wall_s": "total"}

@@ -39,7 +39,8 @@ Settings = Mapping[str, Any]
 """A point of the space: for each dimension a number, or the index of a choice."""
 
 _AXIS: TypeAdapter[Any] = TypeAdapter(AnyAxis)
-RANDOM_SHARE = 0.25  # of the budget, before the search is guided
+# The share of the budget that is spent before the search is guided.
+RANDOM_SHARE = 0.25
 MIN_RANDOM_POINTS = 10
 CANDIDATES = 64
 

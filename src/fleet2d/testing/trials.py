@@ -38,7 +38,8 @@ SCALES = {"m": 1.0, "m/s": 0.5, "share": 0.1, "s": 60.0, "times": 1.0}
 LASTING = ("always(", "never(", "at_most(")
 """Expectations that fail at the first step of a violation; others fail at their deadline."""
 NOTHING_TESTED = "nothing is tested: there is no expectation, and no assert"
-MAX_HOMES = 32  # in memory
+# The number of homes in memory.
+MAX_HOMES = 32
 NOTHING = ArtifactSettings(
     trajectories="off",
     key_frames=False,

@@ -14,7 +14,8 @@ from fleet2d.runtime.events import EventKind
 
 Point = tuple[float, float]
 Shape = TypeVar("Shape")
-MAX_BODY_BYTES = 4_096  # of a request with an order
+# The size of a request with an order.
+MAX_BODY_BYTES = 4_096
 
 
 def read_body(

@@ -17,7 +17,8 @@ from fleet2d.runtime.clock import DAY_S
 
 ANYONE = "anyone"
 AWAY = "away"
-HOURS = 168  # of a week, from Monday 00:00
+# The hours of a week, from Monday 00:00.
+HOURS = 168
 SUM_ERROR = 1e-6  # largest deviation of a distribution's sum from one
 
 

@@ -16,7 +16,8 @@ from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, resampled
 
 EXACT = 1 << 40
-REPLICATES = 200  # of the bootstrap
+# The number of replicates of the bootstrap.
+REPLICATES = 200
 MIN_DAYS = 2  # fewest days that say anything about how much days differ
 LN_2 = 0.6931471805599453
 ROOT_HALF = 0.7071067811865476

@@ -26,7 +26,8 @@ ORDERS = 5  # models with 0 to 4 periods
 SPANS = 1.5  # periods that the data must span before one is considered
 # Forecasts are clipped to MIN_PROBABILITY … 1 - MIN_PROBABILITY before they are scored.
 MIN_PROBABILITY = 1e-6
-RECENT = 0.5  # weight of an order's log loss a day later: periods found early are often wrong
+# The weight of an order's log loss a day later, as periods found early are often wrong.
+RECENT = 0.5
 UNIT = 1 << 30
 
 

@@ -121,7 +121,8 @@ def _rank(kind: str) -> int:
 
 NOT_FREE = -1
 TO_CENTRE = UNITS_PER_CELL // 2 + 1
-MANY_CORNERS = 1000  # of a shape for which it is worth while to look which way it lies
+# The number of corners from which on it pays to look which way a shape lies.
+MANY_CORNERS = 1000
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,8 @@ OF_PROGRAMS = re.compile(
 )
 USUAL_DOOR_M = 0.85
 CURVE_STEPS = 16
-WALL_M = 0.1  # of walls that are drawn as lines
+# The thickness of walls that are drawn as lines [m].
+WALL_M = 0.1
 
 
 class Svg(FileSource):

@@ -56,7 +56,8 @@ if TYPE_CHECKING:
 
 
 CARD = "README.md"
-MAX_VALUES = 12  # of a distribution in a row
+# The number of values of a distribution in a row.
+MAX_VALUES = 12
 TABLES = {
     "runs": "a row for each run: split, home, household, what was varied, seed, digest",
     "rooms": "a row for each room of the home of a run: kind, area, middle",
@@ -225,7 +226,8 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
 
 PLAN = "plan.txt"
 UNFIT = "unfit"  # the runs that are left out
-MAX_REASONS = 20  # that an error lists
+# The number of reasons that an error lists.
+MAX_REASONS = 20
 # Runs that are planned at a time: they are what a data set of any size keeps in memory.
 BLOCK_RUNS = 512
 

@@ -43,7 +43,8 @@ Scores = dict[str, tuple[dict[str, float], int]]
 """By model: its numbers by metric, and the number of cases that were scored."""
 TUNED = "learned, tuned"
 SMOOTHING = 1.0  # added to each count of a baseline
-MAX_PARTS = 20  # of a split that are scored each
+# The number of parts of a split that are scored each.
+MAX_PARTS = 20
 # of an interval: what its ends are named, after the name of what they enclose
 LOWER_END = " lower end"
 UPPER_END = " upper end"

@@ -12,7 +12,8 @@ from fleet2d.kernels import TRACE_FEATURES, PlaceNetwork
 from fleet2d.learning.datasets.windows import Windows, joined
 
 FLOOR = 1e-6
-FACTORS = tuple(k / 10 for k in range(16))  # of the correction, of which fine-tuning tries each
+# The factors of the correction that fine-tuning tries.
+FACTORS = tuple(k / 10 for k in range(16))
 CAUTION = 0.05  # log loss that a factor of 0 or of 2 must gain
 # By gap: lowest log loss for simulated people who were left out, a persona at a time.
 TRUST = (1.0, 0.9, 0.85, 0.8, 0.75, 0.55)

@@ -38,7 +38,8 @@ UNKNOWN = frozenset({"", "unknown", "none", "null"})
 GROUPS = 10
 SIGNIFICANCE = 0.05  # the largest p value of a likelihood ratio test with which a factor is used
 MIN_IDENTIFIED = 20  # minimum number of detections with an identity to fit recognition to
-MAX_ROWS = 60  # of a curve by distance
+# The number of rows of a curve by distance.
+MAX_ROWS = 60
 
 
 @dataclass(frozen=True)

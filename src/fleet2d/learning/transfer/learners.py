@@ -14,8 +14,10 @@ STRIDE = 5  # minutes between moments that are learned from and tested
 HISTORY = 180  # minutes before the first moment
 LONGEST = 2 * DAY_MINUTES  # the time since a room was visited is cut here [min]
 SHORT = 15  # minutes of the shorter of the two times whose shares of rooms are features
-FLOOR = 0.02  # of the probability is shared by all outcomes, also those never seen
-OWN_WEIGHT = 10.0  # of a home's own moments among others
+# The part of the probability that all outcomes share, also those never seen.
+FLOOR = 0.02
+# The weight of a home's own moments among others.
+OWN_WEIGHT = 10.0
 CATEGORICAL = (0, 1)
 SETTINGS: dict[str, dict[str, Any]] = {
     "usual": {"max_iter": 20, "learning_rate": 0.2, "max_leaf_nodes": 15, "min_samples_leaf": 20},

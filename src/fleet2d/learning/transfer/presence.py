@@ -15,7 +15,8 @@ from fleet2d.metrics.rtp_score import log_loss, top_k
 from fleet2d.runtime.clock import DAY_S
 
 SETTINGS = TrainingSettings(hidden=16, epochs=6, trust=(1.0,) * TRUSTS)
-OWN_REPEATS = 3  # of a home's own windows among others
+# How often a home's own windows count among others.
+OWN_REPEATS = 3
 
 
 def of_days(parts: Sequence[Windows], days: I64) -> list[Windows]:

@@ -43,7 +43,8 @@ ARMS: dict[str, str] = {
 """What each arm is trained on."""
 WITHOUT_OWN = ("real", "simulated", "both", "survey")
 WITH_OWN = ("real", "own", "tuned", "both", "fitted", "markov", "copied")
-FIT_DAYS = 3  # the least of which a persona is fitted
+# The number of days to which a persona is fitted at least.
+FIT_DAYS = 3
 Learner = Literal["usual", "regularised"]
 
 

@@ -37,8 +37,10 @@ WORDS = {
     "leisure": "tv relax read computer work study music rest game hobby phone talk play spare party"
     " homework",
 }
-KNOWN_SHARE = 0.5  # of a day that counts
-MICROSECONDS = 60_000_000  # of a minute
+# The share of a day that must be known for it to count.
+KNOWN_SHARE = 0.5
+# The microseconds of a minute.
+MICROSECONDS = 60_000_000
 
 
 @dataclass(frozen=True)

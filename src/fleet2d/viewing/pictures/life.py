@@ -336,7 +336,8 @@ MAX_OPACITY = 0.4  # the highest opacity of presence, at which the plan stays le
 HALF_OPACITY_TIME = 4.0
 MAX_LEGS = 3_000  # drawn of a body
 CANDIDATES = 60  # moments to compare when a view is chosen
-MAX_PLACES = 260  # places of sightings that are drawn; more would hide the plan
+# The number of places of sightings that are drawn, as more would hide the plan.
+MAX_PLACES = 260
 CLEAR_M = 0.5  # twice the space between a name and a robot
 FAR_APART_M = 2.0
 RIM_COLOR = "#ffffffb0"  # around names

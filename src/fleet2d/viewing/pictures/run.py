@@ -50,7 +50,8 @@ from fleet2d.viewing.pictures.life import (
 )
 
 BINS = DAY_MINUTES  # coloured intervals of a day
-MARKS = 288  # intervals of a day with a mark, whose height is the share of sightings
+# The number of intervals of a day with a mark, whose height is the share of sightings.
+MARKS = 288
 GAPS_UP_TO = 75  # days; of longer runs, rows have no gaps between them
 # The height of a mark where somebody was seen all the time, as a share of the row.
 MARK_PART = 0.5
