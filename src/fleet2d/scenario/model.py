@@ -166,7 +166,7 @@ class SimulationSettings(Settings):
         step: The length of a step.
         seed: The seed of all random draws; null: one is drawn and stored.
         max_span: The maximum number of steps computed at once. It doesn't change results.
-        ghosts: Bodies pass through each other; if false, robots yield to people and to each other.
+        ghosts: Bodies pass through each other; else robots yield to people and to each other.
         right_of_way: Which of two robots yields.
         people_block: How long a person waits for another body in the way before going round it;
             null: people walk on, and robots keep out of their way.
@@ -181,7 +181,7 @@ class SimulationSettings(Settings):
     step: PositiveDuration = timedelta(seconds=1)
     seed: int | None = Field(default=None, ge=0, lt=2**63)
     max_span: int | None = Field(default=None, ge=1)
-    ghosts: bool = True
+    ghosts: bool = False
     right_of_way: OneOf[RightOfWay] = Listed()
     people_block: PositiveDuration | None = Field(default=None, examples=["3 s"])
     speedup: float | None = Field(default=None, ge=0.001)
