@@ -1,4 +1,4 @@
-"""How near a robot comes to people when it drives, with and without `gives_way`.
+"""How near a robot comes to people when it drives: as a ghost, by yielding, and with `gives_way`.
 
     python benchmarks/gives_way.py [--days 7] [--seeds 1]
 
@@ -28,6 +28,11 @@ SCENARIO = {
     "algorithms": {"ltp": None},
     "metrics": {"ltp_error": None},
 }
+ROBOTS = {
+    "ghost": "simulation.ghosts=true",
+    "yields": "simulation.ghosts=false",
+    "gives_way": "robots.astro.gives_way={}",
+}
 
 
 def main() -> None:
@@ -36,16 +41,14 @@ def main() -> None:
     parser.add_argument("--days", type=int, default=7)
     parser.add_argument("--seeds", type=int, default=1, help="from 4 on")
     options = parser.parse_args()
-    print("seed  gives_way   nearer than 0.75 m   nearer than 0.35 m")
+    print("seed  robot       nearer than 0.75 m   nearer than 0.35 m")
+    duration = f"simulation.duration={options.days} d"
     for seed in range(4, 4 + options.seeds):
-        for gives_way in (None, {}):
-            astro = {"astro": {"gives_way": gives_way}}
-            run = fleet2d.run(
-                SCENARIO, f"simulation.duration={options.days} d", robots=astro, seed=seed
-            )
+        for name, change in ROBOTS.items():
+            run = fleet2d.run(SCENARIO, duration, change, seed=seed)
             cells = [approaches(run, near_m) for near_m in NEAR_M]
             text = "   ".join(f"{count:8} ({met} met)" for count, met in cells)
-            print(f"{seed:4}  {'off' if gives_way is None else 'on':9} {text}")
+            print(f"{seed:4}  {name:9} {text}")
 
 
 def approaches(run: Run, near_m: float) -> tuple[int, int]:
