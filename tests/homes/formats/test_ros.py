@@ -295,18 +295,34 @@ def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path: Path) -> 
     assert named.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
 
 
-@pytest.mark.parametrize("ground", [254, 240, 215])
-def test_ground_around_the_home_is_refused_with_what_to_type(tmp_path: Path, ground: int) -> None:
+@pytest.mark.parametrize("ground", [255, 240, 215])
+@pytest.mark.parametrize("settings", [{}, {"unknown_grey": "none"}, {"unknown_grey": "ground"}])
+def test_ground_as_light_as_the_floor_is_refused_without_a_key_that_would_not_help(
+    tmp_path: Path, ground: int, settings: dict
+) -> None:
     pixels = np.full((60, 80), ground, np.uint8)
     pixels[20:40, 20:40] = OCCUPIED
+    if settings.get("unknown_grey") == "ground":
+        settings = {"unknown_grey": ground}
 
-    message = refusal(write(tmp_path, pixels))
+    message = refusal(write(tmp_path, pixels), **settings)
 
     assert "it is the ground around the home" in message
-    assert f"floorplan.unknown_grey={ground}" in message
-    with pytest.raises(FloorPlanError, match="fill what is outside with grey 205") as caught:
-        read_ros(write(tmp_path, pixels), unknown_grey=ground)
-    assert "set floorplan.unknown_grey" not in str(caught.value)
+    assert "Fill what is outside with grey 205" in message
+    assert "set floorplan.unknown_grey" not in message
+
+
+def test_ground_that_is_darker_than_the_floor_is_refused_with_what_to_type(tmp_path: Path) -> None:
+    pixels = np.full((60, 80), 230, np.uint8)
+    pixels[20:58, 10:70] = OCCUPIED
+    pixels[22:56, 12:68] = FREE
+    path = write(tmp_path, pixels)
+
+    message = refusal(path, unknown_grey="none")
+    plan = read_ros(path, unknown_grey=230)
+
+    assert "set floorplan.unknown_grey=230" in message
+    assert 34 * 56 * 0.05**2 == pytest.approx(plan.area_m2)
 
 
 @pytest.mark.parametrize("name", ["aws_small_house", "turtlebot3_house"])

@@ -178,11 +178,14 @@ class PictureSource(OccupancySource):
         if float(edge.buffer(raw.pixel / 4).intersection(free.exterior).length) < length / 2:
             return free
         grey, share = picture.edge_grey()
-        advice = f"if that is unknown, set floorplan.unknown_grey={grey}"
-        if self.unknown_grey == grey:
+        # What was taken for unknown is no longer free.
+        lighter = picture.greys[::-1][raw.free] > grey
+        if not lighter.all() and np.count_nonzero(lighter) * raw.pixel**2 >= FLOOR_M2:
+            advice = f"if that is unknown, set floorplan.unknown_grey={grey}"
+        else:
             advice = (
-                "that is set already, but no floor is lighter: fill what is outside with grey 205,"
-                " or crop it away"
+                "no shade tells it from the floor. Fill what is outside with grey 205, or crop it"
+                " away; a drawing of walls is read by `type: image`"
             )
         raise FloorPlanError(
             "the free space runs along most of the edge of the picture: it is the ground around the"
