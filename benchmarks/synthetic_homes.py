@@ -1,8 +1,8 @@
 """How close generated homes come to real plans, and how long one takes.
 
-    python benchmarks/synthetic_homes.py PLANS [--edition 1 2] [--variety 1] [--homes N] [--plans N]
+    python benchmarks/synthetic_homes.py PLANS [--variety 1] [--homes N] [--plans N]
         [--check] [--figure P] [--json J]
-    python benchmarks/synthetic_homes.py faults [--edition 1 2] [--homes 60] [--first SEED]
+    python benchmarks/synthetic_homes.py faults [--homes 60] [--first SEED]
 
 PLANS is a folder of plans, of which the first 1,000 by name are read. Where it has an INDEX.tsv, as
 that of HouseExpo has, the kinds `empty` (no rooms), `tiny` (one room of a few metres) and `big` (no
@@ -40,7 +40,7 @@ TOLERANCE_M = 0.1
 # One use under two names.
 SAME = {"toilet": "bathroom", "child_room": "bedroom", "guest_room": "bedroom", "hall": "hallway"}
 CORRIDORS = {"hallway", "hall", "entryway", "lobby", "corridor"}
-OUTLINES = ("longest side [m]", "aspect ratio", "share of box")
+OUTLINES = ("longest side [m]", "aspect ratio")
 SIZES_OF = ("living_room", "kitchen", "dining_room", "bedroom", "bathroom", "office", "garage")
 
 # The way from the front door to the living room leads through no others.
@@ -48,6 +48,7 @@ WAYS = {"entryway", "hallway", "living_room", "dining_room", "kitchen"}
 HALL_M = (1.0, 1.6)
 BATHROOM_M2 = (3.0, 9.0)
 WINDOW_M = 0.8
+MAX_SHARES = {"living_room": 0.5, "kitchen": 0.25}
 ROUNDING = 0.051  # of lengths and areas on cells of 5 cm
 
 Values = dict[str, list[float]]
@@ -58,19 +59,14 @@ CELL_M = 0.05
 def main() -> None:
     arguments = _arguments()
     if arguments.plans_folder == Path("faults"):
-        for edition in arguments.edition:
-            count_faults(edition, range(arguments.first, arguments.first + arguments.homes))
+        count_faults(range(arguments.first, arguments.first + arguments.homes))
         return
     real = measures(_plans(arguments.plans_folder, arguments.plans))
-    editions = {
-        edition: _compare(real, {"edition": edition, "variety": arguments.variety}, arguments)
-        for edition in arguments.edition
-    }
+    report, synthetic = _compare(real, {"variety": arguments.variety}, arguments)
     if arguments.json:
-        reports = {edition: report for edition, (report, _) in editions.items()}
-        arguments.json.write_text(json.dumps(reports, indent=1) + "\n", encoding="utf-8")
+        arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     if arguments.figure:
-        draw(real, {edition: values for edition, (_, values) in editions.items()}, arguments.figure)
+        draw(real, synthetic, arguments.figure)
 
 
 def _compare(
@@ -116,6 +112,7 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
         for name in (
             "convexity of rooms", "corridor share", "doorways", "doorway width [m]",
             "doors with a leaf", "degree of rooms", "wall corners", "outline corners",
+            "compactness",
             *(f"{measure}, {size}" for measure in OUTLINES for size in ("<= 200 m2", "> 200 m2")),
         )
     }  # fmt: skip
@@ -134,8 +131,7 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
         size = "> 200 m2" if plan.area_m2 > 200 else "<= 200 m2"
         x0, y0, x1, y1 = plan.bounds
         short, long = sorted((x1 - x0, y1 - y0))
-        filled = plan.area_m2 / (short * long)
-        for measure, value in zip(OUTLINES, (long, long / short, filled), strict=True):
+        for measure, value in zip(OUTLINES, (long, long / short), strict=True):
             found[f"{measure}, {size}"].append(value)
         inner = [door for door in plan.doorways if len(set(door.rooms)) == 2]
         found["doorway width [m]"] += [door.width_m for door in inner]
@@ -146,24 +142,27 @@ def measures(plans: Iterable[FloorPlan]) -> Values:
             found["degree of rooms"] += [
                 float(sum(room.index in pair for pair in pairs)) for room in plan.rooms
             ]
-        found["wall corners"].append(_corners(plan, outer=False))
-        found["outline corners"].append(_corners(plan, outer=True))
+        shape = shapely.union_all(plan.polygons)
+        outline = _outline(shape, plan.lattice.units_per_m)
+        found["wall corners"].append(_corners(shape, TOLERANCE_M * plan.lattice.units_per_m))
+        found["outline corners"].append(_corners(outline, 0.2 * plan.lattice.units_per_m))
+        found["compactness"].append(outline.area / shapely.envelope(outline).area)
     return {name: values for name, values in found.items() if values}
 
 
-def count_faults(edition: int, seeds: Sequence[int]) -> None:
+def count_faults(seeds: Sequence[int]) -> None:
     """Print how many homes have which fault, and the processor time of a furnished home."""
     counts: Counter[str] = Counter()
     seconds = []
     faulty = 0
     for seed in seeds:
         start = time.process_time()
-        plan = Synthetic(seed=seed, edition=edition, furnish=True).plan()
+        plan = Synthetic(seed=seed, furnish=True).plan()
         seconds.append(time.process_time() - start)
         found = set(faults(plan))
         counts.update(found)
         faulty += bool(found)
-    print(f"edition {edition}: {faulty} of {len(seeds)} homes have faults")
+    print(f"{faulty} of {len(seeds)} homes have faults")
     for fault, number in counts.most_common():
         print(f"  {number:3} {fault}")
     print(f"  {1e3 * statistics.median(seconds):.0f} ms of processor time for a furnished home")
@@ -171,15 +170,8 @@ def count_faults(edition: int, seeds: Sequence[int]) -> None:
 
 def faults(plan: FloorPlan) -> Iterator[str]:
     """Yield the faults of a home."""
-    kinds = [room.type for room in plan.rooms]
-    living = [room.index for room in plan.rooms if "living_room" in room.labels]
-    front = plan.room_at(*plan.entrance) if plan.entrance else None
-    reached = {front.index} if front is not None else set()
-    for _ in plan.rooms:
-        pairs = [door.rooms for door in plan.doorways if reached & set(door.rooms)]
-        reached |= {i for pair in pairs for i in pair if kinds[i] in WAYS}
-    if not reached & set(living):
-        yield "the way to the living room leads through a garage, storage or private room"
+    yield from faults_of_ways(plan)
+    yield from faults_of_sizes(plan)
     outside = outside_of(plan)
     for room in plan.rooms:
         cells = plan.room_of_cell == room.index
@@ -191,11 +183,34 @@ def faults(plan: FloorPlan) -> Iterator[str]:
             width = 2 * CELL_M * float(ndimage.distance_transform_edt(np.pad(cells, 1)).max())
             if not HALL_M[0] - 2 * ROUNDING <= width <= HALL_M[1] + 2 * ROUNDING:
                 yield f"a hall outside of {HALL_M[0]} to {HALL_M[1]} m"
+
+
+def faults_of_ways(plan: FloorPlan) -> Iterator[str]:
+    """Yield what is wrong with the ways to the living room."""
+    kinds = [room.type for room in plan.rooms]
+    front = plan.room_at(*plan.entrance) if plan.entrance else None
+    reached = {front.index} if front is not None else set()
+    for _ in plan.rooms:
+        pairs = [door.rooms for door in plan.doorways if reached & set(door.rooms)]
+        reached |= {i for pair in pairs for i in pair if kinds[i] in WAYS}
+    if kinds.index("living_room") not in reached:
+        yield "the way to the living room leads through a garage, storage or private room"
+    if {"living_room", "garage"} in [{kinds[i] for i in door.rooms} for door in plan.doorways]:
+        yield "a garage that opens to the living room"
+
+
+def faults_of_sizes(plan: FloorPlan) -> Iterator[str]:
+    """Yield what is wrong with the areas of the rooms."""
+    area_of = {room.type: room.area_m2 for room in plan.rooms}
+    living = area_of["living_room"]
+    for room in plan.rooms:
         if room.type == "bathroom" and not BATHROOM_M2[0] <= room.area_m2 <= BATHROOM_M2[1]:
             yield f"a bathroom outside of {BATHROOM_M2[0]:g} to {BATHROOM_M2[1]:g} m2"
-    others = [room.area_m2 for room in plan.rooms if room.type != "garage"]
-    if max(plan.rooms[i].area_m2 for i in living) < max(others):
-        yield "a room larger than the living room"
+        if room.type != "garage" and room.area_m2 > living:
+            yield "a room larger than the living room"
+    for kind, most in MAX_SHARES.items():
+        if "bedroom" in area_of and area_of.get(kind, 0.0) > most * plan.area_m2:
+            yield f"a {kind} of more than {most:.0%} of the home"
 
 
 def outside_of(plan: FloorPlan) -> NDArray[np.bool_]:
@@ -214,23 +229,17 @@ def convexity(plan: FloorPlan, room: int) -> float:
     return len(rows) / float(shapely.MultiPoint(np.concatenate(corners)).convex_hull.area)
 
 
-def _corners(plan: FloorPlan, *, outer: bool) -> float:
-    """Return how many corners the walls have, or the home as seen from outside."""
-    unit = plan.lattice.units_per_m
-    shape = shapely.union_all(plan.polygons)
-    if outer:  # walls and doorways closed, niches of front doors cut off
-        shape = shape.buffer(0.2 * unit, join_style="mitre").buffer(-0.7 * unit, join_style="mitre")
-        shape = shape.buffer(0.5 * unit, join_style="mitre")
-        parts = shapely.get_parts(shape)
-        shape = shapely.Polygon(max(parts, key=lambda part: part.area).exterior)
-    simple = shapely.simplify(shape, (0.2 if outer else TOLERANCE_M) * unit)
-    return float(
-        sum(
-            len(ring.coords) - 1
-            for part in shapely.get_parts(simple)
-            for ring in (part.exterior, *part.interiors)
-        )
-    )
+def _outline(shape: Any, unit: float) -> shapely.Polygon:
+    """Return a home as seen from outside: walls and doorways closed, its front door's niche cut."""
+    shape = shape.buffer(0.2 * unit, join_style="mitre").buffer(-0.7 * unit, join_style="mitre")
+    parts = shapely.get_parts(shape.buffer(0.5 * unit, join_style="mitre"))
+    return shapely.Polygon(max(parts, key=lambda part: part.area).exterior)
+
+
+def _corners(shape: Any, tolerance: float) -> float:
+    """Return how many corners a shape has."""
+    rings = shapely.get_rings(shapely.simplify(shape, tolerance))
+    return float(sum(len(ring.coords) - 1 for ring in rings))
 
 
 def ks_distance(first: Sequence[float], second: Sequence[float]) -> float:
@@ -243,28 +252,26 @@ def ks_distance(first: Sequence[float], second: Sequence[float]) -> float:
     return float(np.abs(shares[0] - shares[1]).max())
 
 
-def draw(real: Values, editions: dict[int, Values], path: Path) -> None:
-    """Draw the distributions of real plans and of each edition, one panel a measure."""
+def draw(real: Values, synthetic: Values, path: Path) -> None:
+    """Draw the distributions of real plans and synthetic homes, one panel a measure."""
     from matplotlib.figure import Figure
 
     from fleet2d.viewing.pictures.floorplan import drawing_style
 
-    names = [name for name in real if all(name in values for values in editions.values())]
-    colors = dict(zip(editions, ("#c8452f", "#2f6fc8"), strict=False))
+    names = [name for name in real if name in synthetic]
     columns = 5
     rows = -(-len(names) // columns)
     with drawing_style():
         figure = Figure(figsize=(2.9 * columns, 2.2 * rows), dpi=110, layout="constrained")
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
-            drawn = [(real[name], "#3b4048", "real")]
-            drawn += [(v[name], colors[e], f"edition {e}") for e, v in editions.items()]
+            drawn = ((real[name], "#3b4048", "real"), (synthetic[name], "#2f6fc8", "synthetic"))
             for values, color, label in drawn:
                 ordered = np.sort(values)
                 shares = np.arange(1, len(ordered) + 1) / len(ordered)
                 axes.step(ordered, shares, color=color, label=label)
-            distances = [f"{ks_distance(real[name], v[name]):.2f}" for v in editions.values()]
-            axes.set_title(f"{name}  KS {', '.join(distances)}", fontsize=9)
+            distance = ks_distance(real[name], synthetic[name])
+            axes.set_title(f"{name}  KS {distance:.2f}", fontsize=9)
             axes.set_xlim(0, 1.05 * float(np.percentile([*real[name]], 98)) + 1)
             axes.tick_params(labelsize=7)
             if not number:
@@ -314,7 +321,6 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "plans_folder", type=Path, metavar="PLANS", help="folder of plans; or faults"
     )
-    parser.add_argument("--edition", type=int, choices=(1, 2), nargs="+", default=[1])
     parser.add_argument("--variety", type=float, default=0.0)
     parser.add_argument("--plans", type=int, default=1000, help="the most real plans to read")
     parser.add_argument("--homes", type=int, default=1000)

@@ -367,10 +367,9 @@ def _program(bedrooms: int, plan: Mapping[str, Any], seed: int) -> dict[str, Any
     )
 
     beds = min(bedrooms, MAX_ROOMS_PER_TYPE)
-    style = Style(edition=plan.get("edition", 1))
     wishes = Wishes(bathrooms=plan.get("bathrooms"), garage=plan.get("garage"))
     for number in range(MAX_PROGRAMS):
-        settled = settle_wishes(wishes, Choices(seed, f"program {number}"), style)
+        settled = settle_wishes(wishes, Choices(seed, f"program {number}"), Style())
         if settled.bedrooms == beds:
             return {BEDROOMS: beds, AREA: settled.area_m2}
     return {BEDROOMS: beds}

@@ -27,12 +27,12 @@ from fleet2d.homes.synthetic.source import Synthetic
 SEEDS = some(range(60), 3)
 # They change when the generator draws other homes; then stored runs can't be reproduced.
 DIGESTS = {
-    0: "d54386c96cfb23b2",
-    1: "32955f2916b507a0",
-    7: "790d7635f1cf6377",
-    12: "f1d2e03033b31163",
-    133: "2ac8a2f4349c8bd4",
-    2147483648: "b6c926f14c3804f5",
+    0: "42e0fa15519d2021",
+    1: "0c7080dd776aa053",
+    7: "0fa7614fa4cef15d",
+    12: "df3c6dc2f4a03095",
+    133: "17ecde2844dcb812",
+    2147483648: "95d8e3671f7f3d88",
 }
 PRIVATE = {"bedroom", "bathroom", "toilet", "wardrobe"}
 
@@ -97,13 +97,19 @@ def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed: i
 def test_rooms_are_of_sensible_shapes_and_the_kitchen_is_by_where_people_eat(seed: int) -> None:
     house = house_of(seed)
     assert not boxes_overlap(house.boxes)
-    for box in house.boxes:
-        assert min(box.clear) >= 20 * SIZES[house.briefs[box.room].kind].side
+    for index, brief in enumerate(house.briefs):
+        # A room may have a corridor or a niche; its largest part is as wide as its type needs.
+        boxes = [box for box in house.boxes if box.room == index]
+        largest = max(boxes, key=lambda box: box.clear_area)
+        assert min(largest.clear) >= 20 * SIZES[brief.kind].side
+        assert all(min(box.clear) >= 18 for box in boxes)
     halls = sum(b.clear_area for b in house.boxes if house.briefs[b.room].kind == "hallway")
-    assert halls <= MAX_CORRIDOR_SHARE[1] * sum(box.clear_area for box in house.boxes)
+    assert halls <= MAX_CORRIDOR_SHARE * sum(box.clear_area for box in house.boxes)
     plan = home(seed)
-    kinds = [{plan.rooms[i].type for i in door.rooms} for door in plan.doorways]
-    assert {"kitchen", "living_room"} in kinds or {"kitchen", "dining_room"} in kinds
+    kinds = [
+        {label for i in door.rooms for label in plan.rooms[i].labels} for door in plan.doorways
+    ]
+    assert any("kitchen" in k and k & {"living_room", "dining_room"} for k in kinds)
     baths = [room.area_m2 for room in plan.rooms if room.type == "bathroom"]
     assert max(baths) < plan.room("living_room_0").area_m2
 
@@ -128,7 +134,7 @@ def test_area_and_rooms_are_as_requested(area: float, bedrooms: int, bathrooms: 
         types = [room.type for room in plan.rooms]
         assert area == pytest.approx(plan.area_m2, rel=0.05)
         assert (bedrooms, bathrooms) == (types.count("bedroom"), types.count("bathroom"))
-        assert {"living_room", "kitchen"} <= set(types)
+        assert {"living_room", "kitchen"} <= {label for room in plan.rooms for label in room.labels}
 
 
 @pytest.mark.parametrize("outline", ["rectangle", "L", "T", "U"])
@@ -139,11 +145,11 @@ def test_outline_is_the_requested_one(outline: str) -> None:
 
 
 def test_widths_and_open_plan_are_as_requested() -> None:
+    settings = {"area_m2": 130, "bedrooms": 3, "door_width": 0.9, "corridor_width": 1.4}
+    halls = []
     for seed in range(6):
-        settings = {"area_m2": 130, "bedrooms": 3, "door_width": 0.9, "corridor_width": 1.4}
         house = generate(seed, Wishes(130, 3), Style(None, True, 28, 18))
-        halls = [b for b in house.boxes if house.briefs[b.room].kind == "hallway"]
-        assert {28} == {min(box.clear) for box in halls}
+        halls += [b for b in house.boxes if house.briefs[b.room].kind == "hallway"]
         plan = home(seed, open_plan=True, **settings)
         for door in plan.doorways:
             types = {plan.rooms[index].type for index in door.rooms}
@@ -152,6 +158,7 @@ def test_widths_and_open_plan_are_as_requested() -> None:
             if types <= {"living_room", "dining_room", "kitchen"} and door.name != "front_door":
                 assert not door.leaf
                 assert door.width_m > 1.5
+    assert {28} == {min(box.clear) for box in halls}
 
 
 def test_other_settings_leave_the_home_of_a_seed_as_it_is_where_they_agree_with_it() -> None:

@@ -11,7 +11,6 @@ import shapely
 from fleet2d.errors import FloorPlanError
 from fleet2d.homes.synthetic.plans import RoomLayout, draw_layout
 from fleet2d.homes.synthetic.program import (
-    MAX_ROOMS_PER_TYPE,
     SIZES,
     WIDE_FROM_M2,
     Brief,
@@ -39,9 +38,10 @@ from fleet2d.homes.synthetic.slicing import (
 from fleet2d.runtime.determinism import sum_in_order
 
 # The largest cost that taste adds to a passage and to a layout, at a variety of 1.
-LINK_TASTE = 1
+LINK_TASTE = 2
 LAYOUT_TASTE = 12
 JAMB = 2  # minimum distance of a door from the corner of a room [units]
+STUB = 4  # length of wall that is left beside openings of an open plan [units]
 
 
 class Gap(NamedTuple):
@@ -83,21 +83,21 @@ _COSTS: dict[str, dict[str, float]] = {
     },
     "garage": {
         "laundry": 0, "entryway": 0.3, "hallway": 0.3, "storage": 1, "kitchen": 0.8,
-        "dining_room": 2.5, "living_room": 3,
     },
 }  # fmt: skip
 _PAIRS = {(a, b): cost for a, row in _COSTS.items() for b, cost in row.items()}
-# As in old flats; only where edition 2 varies.
+# As in old flats; only where homes vary.
 _RARE_PAIRS = {
     ("bathroom", "kitchen"): 1.5,
     ("toilet", "kitchen"): 2.0,
     ("bedroom", "kitchen"): 2.5,
 }
 COSTS: Prices = _PAIRS | {(b, a): cost for (a, b), cost in _PAIRS.items()}
-# Rooms through which the way to other rooms may lead; in edition 2, through those of service only
-# to others of service.
-_PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen", "laundry", "garage")
-_SERVICE = ("laundry", "garage", "storage", "gym")
+# Rooms through which the way to other rooms may lead; through those of service only to others of
+# service.
+_PASSABLE = ("entryway", "hallway", "living_room", "dining_room", "kitchen")
+_PASSABLE_SERVICE = ("laundry", "garage")
+_SERVICE = (*_PASSABLE_SERVICE, "storage", "gym")
 # Between these a passage needs no jambs: a corridor of 1 m may end in a door of 0.9 m.
 _WITHOUT_JAMBS = {"hallway", "entryway", "living_room", "dining_room", "kitchen"}
 _SOCIAL = ("living_room", "dining_room", "kitchen")
@@ -112,7 +112,6 @@ class Widths:
         bath: To bathrooms, toilets and small rooms.
         corridor: Clear width of hallways.
         open_plan: Whether living, dining and kitchen are open to each other.
-        stub: Length of wall that is left beside their openings.
         prices: The cost of a passage by the types of its two rooms.
     """
 
@@ -120,7 +119,6 @@ class Widths:
     bath: int
     corridor: int
     open_plan: bool
-    stub: int
     prices: Prices
 
     def of(self, kinds: set[str]) -> int:
@@ -135,7 +133,7 @@ RoomLinks = dict[tuple[int, int], tuple[float, Wall]]
 """The cost of a passage between two rooms, and the wall that it is in, by their indices."""
 
 
-def link_rooms(layout: RoomLayout, best: RoomLinks, edition: int = 1) -> tuple[list[Wall], float]:
+def link_rooms(layout: RoomLayout, best: RoomLinks) -> tuple[list[Wall], float]:
     """Return the tree of links that joins all rooms at the lowest cost, and that cost.
 
     Prim's algorithm from the entryway, else the living room. Nobody has to pass through a private
@@ -154,7 +152,7 @@ def link_rooms(layout: RoomLayout, best: RoomLinks, edition: int = 1) -> tuple[l
             (price, pair, wall)
             for pair, (price, wall) in best.items()
             if (pair[0] in reached) != (pair[1] in reached)
-            and _passable(layout.briefs, *(pair if pair[0] in reached else pair[::-1]), edition)
+            and _passable(layout.briefs, *(pair if pair[0] in reached else pair[::-1]))
         ]
         if not candidates:
             raise MisfitError
@@ -165,10 +163,10 @@ def link_rooms(layout: RoomLayout, best: RoomLinks, edition: int = 1) -> tuple[l
     return links, cost
 
 
-def _passable(briefs: Sequence[Brief], through: int, to: int, edition: int) -> bool:
+def _passable(briefs: Sequence[Brief], through: int, to: int) -> bool:
     """Return whether the way to a room may lead through another."""
-    if edition == 2 and briefs[through].kind in _SERVICE:
-        return briefs[through].kind in _PASSABLE and briefs[to].kind in _SERVICE
+    if briefs[through].kind in _SERVICE:
+        return briefs[through].kind in _PASSABLE_SERVICE and briefs[to].kind in _SERVICE
     if briefs[to].kind in ("kitchen", "dining_room"):  # these belong to the living space
         return briefs[through].kind in _SOCIAL
     return briefs[through].kind in _PASSABLE or briefs[to].partner == through
@@ -254,7 +252,7 @@ def _opening(
     """Return the jambs of an opening without a door, or None for a door."""
     if kinds <= set(_SOCIAL):
         if widths.open_plan:
-            return wall.low + widths.stub, wall.high - widths.stub
+            return wall.low + STUB, wall.high - STUB
         if choices.chance(30):
             return None
         width = min(choices.between(28, 56), wall.length - 8)
@@ -274,31 +272,30 @@ def _opening(
 
 # Rooms that need a window, and the length of outer wall that it takes [units].
 _LIT = {"bedroom": 24, "living_room": 30, "kitchen": 16, "dining_room": 20, "office": 20}
-# Largest part of a home that is corridor, and the part from which on it costs points, by edition.
-MAX_CORRIDOR_SHARE = {1: 0.15, 2: 0.35}
-COSTLY_CORRIDOR_SHARE = {1: 0.06, 2: 0.25}
+# Largest part of a home that is corridor, and the part from which on it costs points.
+MAX_CORRIDOR_SHARE = 0.35
+COSTLY_CORRIDOR_SHARE = 0.25
 # A longer corridor, as in a hotel, costs points; the longest is refused [units].
 LONG_CORRIDOR = 150
 MAX_CORRIDOR = 300
-# Smallest and largest bathroom of edition 2 [m²].
+# Smallest and largest bathroom [m²].
 BATHROOM_M2 = (3.05, 8.8)
 # Narrower open air between two parts of a home is a crack, not a court [units].
 MIN_COURT = 28
 # Largest ratio of the home's length to its width.
-MAX_ASPECT = {1: 2.8, 2: 2.3}
+MAX_ASPECT = 2.3
 # From this ratio on it costs points, and how many.
-LONG_ASPECT = {1: 1.5, 2: 1.5}
-LONG_COST = {1: 4, 2: 12}
+LONG_ASPECT = 1.5
+LONG_COST = 12
 _COMFORTABLE_RATIO = 1.45
 
 
-def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float:
+def shape_cost(layout: RoomLayout, ease: float) -> float:
     """Return how far the rooms' shapes are from comfortable ones.
 
     Args:
         layout: The rooms.
         ease: Factor by which rooms and corridors may be longer than usual.
-        edition: Of the generator.
 
     Raises:
         MisfitError: One is unacceptable.
@@ -324,32 +321,30 @@ def shape_cost(layout: RoomLayout, ease: float, edition: int) -> float:
     x0, y0 = min(b.x0 for b in layout.boxes), min(b.y0 for b in layout.boxes)
     x1, y1 = max(b.x1 for b in layout.boxes), max(b.y1 for b in layout.boxes)
     short, long = sorted((x1 - x0, y1 - y0))
-    if long > MAX_ASPECT[edition] * short:
+    if long > MAX_ASPECT * short:
         raise MisfitError
-    cost += LONG_COST[edition] * max(long / short - LONG_ASPECT[edition], 0.0)
+    cost += LONG_COST * max(long / short - LONG_ASPECT, 0.0)
     halls = [box for box in layout.boxes if layout.briefs[box.room].kind == "hallway"]
     areas = [sum_in_order(box.clear_area for box in boxes) for boxes in (halls, layout.boxes)]
     corridor = areas[0] / areas[1]
-    if corridor > MAX_CORRIDOR_SHARE[edition]:
+    if corridor > MAX_CORRIDOR_SHARE:
         raise MisfitError
-    return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE[edition], 0.0)
+    return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE, 0.0)
 
 
-def light_cost(layout: RoomLayout, outer: Sequence[Wall], edition: int = 1) -> float:
-    """Return how badly rooms lack windows.
+def check_light(layout: RoomLayout, outer: Sequence[Wall]) -> None:
+    """Refuse rooms without the outer wall that they need for a window.
 
     Raises:
-        MisfitError: A bedroom or the living room has none; in edition 2, any room that needs one.
+        MisfitError: There is such a room.
     """
     lit = set()
     for wall in outer:
         room = layout.room_inside(wall)
         if wall.length >= _LIT.get(layout.briefs[room].kind, 0):
             lit.add(room)
-    dark = [b.kind for room, b in enumerate(layout.briefs) if b.kind in _LIT and room not in lit]
-    if "bedroom" in dark or "living_room" in dark or (dark and edition == 2):
+    if any(b.kind in _LIT and room not in lit for room, b in enumerate(layout.briefs)):
         raise MisfitError
-    return 1.5 * len(dark)
 
 
 def check_sizes(layout: RoomLayout) -> None:
@@ -422,21 +417,19 @@ def outline_kind(turns: Sequence[bool]) -> str | None:
 
 # Layouts are drawn until this many are good …
 ENOUGH_LAYOUTS = 4
-# Ducts of edition 2: range of the sides [units], probability in a rectangle of a room [%], least
-# side of that, and the least distance from passages [units].
+# Ducts: range of the sides [units], probability in a rectangle of a room [%], least side of that,
+# and the least distance from passages [units].
 SHAFT_SIDE = (6, 16)
-SHAFT_PERCENT = 24
+SHAFT_PERCENT = 12
 SHAFT_ROOM_SIDE = 34
 SHAFT_CLEARANCE = 12
-# Ranges of the width of corridors [units] of edition 2, and their weights.
+# Ranges of the width of corridors [units], and their weights.
 CORRIDORS = (((20, 24), 40), ((25, 28), 40), ((29, 32), 20))
 # … and at most this many.
 MAX_LAYOUTS = 480
-# By how many bedrooms lists of homes from `LARGE_M2` on differ from the first, by quarters of them.
-OTHER_BEDROOMS = (0, 1, -1, 0)
-LARGE_M2 = 150.0
-# Layouts drawn in vain before a new list of rooms is drawn.
+# Layouts drawn in vain before a new list of rooms is drawn, and before what was not requested is.
 PATIENCE = 20
+REDRAW = 80
 FRONT_DOOR = 19  # 0.95 m
 # Clear space before the front door [units].
 APPROACH = 30
@@ -487,31 +480,31 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     """
     decided = settle_wishes(wishes, Choices(seed, "wishes"), style)
     used = style
-    is_wide = style.edition == 2 and (decided.area_m2 or 0.0) >= WIDE_FROM_M2
+    area = decided.area_m2 or 0.0
+    is_wide = area >= WIDE_FROM_M2
     prices = _tastes(Choices(seed, "taste"), style)
     widths = _style(style, Choices(seed, "style"), is_wide, prices)
     # A plain outline is only a first try; a requested outline is binding.
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
     briefs: list[Brief] = []
-    beds = decided.bedrooms or 0
     for number in range(MAX_LAYOUTS):
         if number % PATIENCE == 0 and not candidates:
-            if number >= MAX_LAYOUTS // 4 and wishes.garage is None:
-                decided = replace(decided, garage=False)
-            if style.edition == 2 and wishes.bedrooms is None and beds:
-                decided = replace(decided, bedrooms=_other_bedrooms(decided, beds, number))
+            if number and number % REDRAW == 0:
+                # The area stays at first, so that large homes don't get rarer.
+                anew = wishes if number >= MAX_LAYOUTS // 2 else replace(wishes, area_m2=area)
+                decided = settle_wishes(anew, Choices(seed, f"wishes {number}"), style)
             choices = Choices(seed, f"rooms {number // PATIENCE}")
             if number >= MAX_LAYOUTS * 3 // 4:  # rare rooms fit into no layout
-                less = style.variety // 2 if style.edition == 2 else 0
-                used = replace(style, variety=less, edition=1)
+                used = replace(style, variety=style.variety // 2)
+                is_wide = False
                 widths = replace(widths, prices=COSTS)
-            briefs = choose_rooms(decided, choices, used)
+            briefs = choose_rooms(decided, choices, used, is_wide)
         usual = "rectangle" if plain and number < 2 * PATIENCE else None
         request = LayoutRequest(
-            briefs, decided.area_m2 or 0.0, widths.corridor, style.outline or usual, used.edition
+            briefs, decided.area_m2 or 0.0, widths.corridor, style.outline or usual
         )
-        limit = MAX_ACCESS_COST + LINK_TASTE * used.edition * used.variety / 100
+        limit = MAX_ACCESS_COST + LINK_TASTE * used.variety / 100
         # Rooms may be longer than usual after some tries.
         ease = 1.0 + 0.1 * min(number // (2 * PATIENCE), 3)
         with suppress(MisfitError):
@@ -528,20 +521,12 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     raise FloorPlanError(_failure(decided, style))
 
 
-def _other_bedrooms(decided: Wishes, beds: int, number: int) -> int:
-    """Return a number of bedrooms near `beds` that may fit where layouts were drawn in vain."""
-    if (decided.area_m2 or 0.0) >= LARGE_M2:
-        return min(max(beds + OTHER_BEDROOMS[4 * number // MAX_LAYOUTS], 1), MAX_ROOMS_PER_TYPE)
-    fewer = max(number - MAX_LAYOUTS // 4 + PATIENCE, 0) // PATIENCE
-    return min(beds, max(beds - fewer, decided.bathrooms or 1))
-
-
 def _tastes(choices: Choices, style: Style) -> Prices:
     """Return costs of passages to which those of one family's taste are added."""
     if not style.variety:
         return COSTS
-    most = LINK_TASTE * style.edition * style.variety
-    pairs = _PAIRS | (_RARE_PAIRS if style.edition == 2 else {})
+    most = LINK_TASTE * style.variety
+    pairs = _PAIRS | _RARE_PAIRS
     prices = {pair: cost + choices.below(most) / 100 for pair, cost in pairs.items()}
     return prices | {(b, a): cost for (a, b), cost in prices.items()}
 
@@ -549,16 +534,13 @@ def _tastes(choices: Choices, style: Style) -> Prices:
 def _style(style: Style, choices: Choices, is_wide: bool, prices: Prices) -> Widths:
     """Return the widths of a home; all are drawn, so that setting one leaves the others as is."""
     open_plan = choices.chance(45)
-    corridor = choices.between(20, 26)
-    door = choices.choice((16, 17, 18))
+    narrow = choices.between(20, 26)
     bath = choices.choice((14, 15, 16))
-    if style.edition == 2:
-        corridor = choices.between(*choices.weighted(CORRIDORS)) if is_wide else corridor
-        door = choices.choice((15, 15, 16, 16, 17, 18, 20))
+    corridor = choices.between(*choices.weighted(CORRIDORS)) if is_wide else narrow
+    door = choices.choice((15, 15, 16, 16, 17, 18, 20))
     door = style.door or door
     open_plan = open_plan if style.open_plan is None else style.open_plan
-    stub = 4 * style.edition - 4
-    return Widths(door, min(bath, door), style.corridor or corridor, open_plan, stub, prices)
+    return Widths(door, min(bath, door), style.corridor or corridor, open_plan, prices)
 
 
 def _judge(
@@ -569,23 +551,22 @@ def _judge(
     Raises:
         MisfitError: It is not a home.
     """
-    shape = shape_cost(layout, ease, request.edition)
+    shape = shape_cost(layout, ease)
     if boxes_overlap(layout.boxes):
         raise MisfitError
-    if request.edition == 2:
-        check_sizes(layout)
+    check_sizes(layout)
     walls = inner_walls(layout.boxes)
     possible = _best_links(layout, walls, widths)
-    links, access = link_rooms(layout, possible, request.edition)
+    links, access = link_rooms(layout, possible)
     if access > limit:
         raise MisfitError
     outer = outer_walls(layout.boxes, walls)
-    light = light_cost(layout, outer, request.edition)
+    check_light(layout, outer)
     rank, _ = _front_wall(layout, outer)
     corners = outline_corners(layout.boxes)
     if not corners or (request.outline and outline_kind(corners) != request.outline):
         raise MisfitError
-    cost = shape + 2 * access + light + 2 * rank + 0.15 * max(len(corners) - 8, 0)
+    cost = shape + 2 * access + 2 * rank + 0.4 * max(len(corners) - 8, 0)
     return _Candidate(layout, possible, links, widths, cost)
 
 
@@ -597,9 +578,8 @@ def _finish(best: _Candidate, choices: Choices, style: Style) -> House:
     """
     links = add_loops(best, choices)
     layout = replace(best.layout, boxes=turn_boxes(best.layout.boxes, choices.below(8)))
-    if style.edition == 2:
-        layout = merge_rooms(layout, links, choices, style.variety)
-        links = [wall for wall in links if len(set(layout.rooms(wall))) == 2]
+    layout = merge_rooms(layout, links, choices, style.variety)
+    links = [wall for wall in links if len(set(layout.rooms(wall))) == 2]
     # The turned walls, for the same pairs of boxes.
     inner = inner_walls(layout.boxes)
     pairs = {frozenset((wall.first, wall.second)) for wall in links}
@@ -608,23 +588,28 @@ def _finish(best: _Candidate, choices: Choices, style: Style) -> House:
     spare = wall.length - FRONT_DOOR
     low = wall.low + (spare // 2 if spare < 30 else choices.between(4, spare - 4))
     front_door = Gap(wall, low, low + FRONT_DOOR, True)
-    shafts = draw_shafts(layout, [*gaps, front_door], choices) if style.edition == 2 else []
+    shafts = draw_shafts(layout, [*gaps, front_door], choices)
     return House(layout.briefs, layout.boxes, gaps, front_door, shafts)
 
 
-# Probability [%] that a room of edition 2 is part of one that it opens to: an alcove, or a living
+# Probability [%] that a room is part of one that it opens to: an alcove, or a living
 # room with a passage.
 _MERGED = {
-    ("hallway", "living_room"): 55, ("entryway", "living_room"): 65, ("hallway", "entryway"): 35,
-    ("dining_room", "living_room"): 25, ("dining_room", "kitchen"): 25,
-    ("kitchen", "living_room"): 12, ("wardrobe", "bedroom"): 70, ("storage", "kitchen"): 40,
-    ("laundry", "kitchen"): 35, ("laundry", "bathroom"): 50,
+    ("hallway", "living_room"): 75, ("entryway", "living_room"): 75, ("hallway", "entryway"): 35,
+    ("dining_room", "living_room"): 45, ("dining_room", "kitchen"): 40,
+    ("kitchen", "living_room"): 25, ("wardrobe", "bedroom"): 90, ("storage", "kitchen"): 55,
+    ("laundry", "kitchen"): 55, ("laundry", "bathroom"): 50,
     ("office", "living_room"): 20,
 }  # fmt: skip
 
 
-# Largest area of a room with what is merged into it [units²]; of others that of the living room.
+# Largest area of a room with what is merged into it [units²], or in percent of the home; of others
+# that of the living room.
 MOST_MERGED = {"bathroom": int(BATHROOM_M2[1] * UNITS_PER_M2), "entryway": 14 * UNITS_PER_M2}
+MOST_LIVING_PERCENT = 48
+MOST_KITCHEN_PERCENT = 24
+# A longer corridor isn't merged into another room [units].
+MERGED_CORRIDOR = 160
 
 
 def merge_rooms(
@@ -632,16 +617,21 @@ def merge_rooms(
 ) -> RoomLayout:
     """Draw which rooms are one with another that they open to, so that not all are rectangles."""
     room_of = [box.room for box in layout.boxes]
+    kept_apart = _kept_apart(layout, links)
     areas = room_areas(layout)
     living = _living_area(layout, areas)
+    most = MOST_MERGED | {
+        "kitchen": min(living, sum(areas) * MOST_KITCHEN_PERCENT // 100),
+        "living_room": sum(areas) * MOST_LIVING_PERCENT // 100,
+    }
     for wall in links:
         pair = room_of[wall.first], room_of[wall.second]
         for part, whole in (pair, pair[::-1]):
             kinds = layout.briefs[part].kind, layout.briefs[whole].kind
             percent = _MERGED.get(kinds, 0) * (100 - variety * 3 // 4) // 100
-            most = MOST_MERGED.get(kinds[1], living)
-            fits = kinds[1] == "living_room" or areas[part] + areas[whole] <= most
-            if part != whole and choices.chance(percent) and fits:
+            if part == whole or part in kept_apart or not choices.chance(percent):
+                continue
+            if areas[part] + areas[whole] <= most.get(kinds[1], living):
                 areas[whole] += areas[part]
                 room_of = [whole if room == part else room for room in room_of]
                 break
@@ -650,6 +640,19 @@ def merge_rooms(
         box._replace(room=kept.index(room)) for box, room in zip(layout.boxes, room_of, strict=True)
     ]
     return RoomLayout([layout.briefs[room] for room in kept], boxes)
+
+
+def _kept_apart(layout: RoomLayout, links: Sequence[Wall]) -> set[int]:
+    """Return long corridors, and the rooms from which one gets to a garage."""
+    corridors = {
+        box.room
+        for box in layout.boxes
+        if layout.briefs[box.room].kind == "hallway" and max(box.clear) > MERGED_CORRIDOR
+    }
+    by_garages = {
+        room for wall in links if "garage" in layout.kinds(wall) for room in layout.rooms(wall)
+    }
+    return corridors | by_garages
 
 
 def draw_shafts(layout: RoomLayout, gaps: Sequence[Gap], choices: Choices) -> list[Rectangle]:

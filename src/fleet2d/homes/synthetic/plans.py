@@ -330,7 +330,7 @@ class Sketch:
         Between two wings it protrudes on one side (`bar`), or is set back there (`court`).
         """
         choices = self.choices
-        step = choices.between(24, 60)
+        step = choices.between(30, 84)
         side = choices.below(2)
         if outline in ("rectangle", "U"):  # a wing's porch makes the U
             return 0, 0
@@ -342,10 +342,10 @@ class Sketch:
             else:
                 out = choices.between(24, 44) * (1 if outline == "bar" else -1)
             return (out, 0) if side else (0, out)
-        low, high = (choices.weighted(((0, 50), (1, 30), (-1, 20))) for _ in range(2))
+        low, high = (choices.weighted(((0, 30), (1, 35), (-1, 35))) for _ in range(2))
         if low == -1 and high == -1:
             low = 0
-        return low * step, high * choices.between(12, 44)
+        return low * step, high * choices.between(24, 64)
 
     def across(self) -> Placing:
         """A long core with a wing at a right angle to it, and the service block at its end."""
@@ -473,7 +473,13 @@ class Sketch:
             boxes += [box.flipped() for other in others for box in other]
             return boxes + choose_squarest(core, areas, (0, 0, length, depth))
 
-        for ratio in choices.shuffled(LENGTH_RATIOS)[:TRIES]:
+        # Most other lengths make a strip too shallow or too deep.
+        total = fsum(self.gross.values())
+        strip_areas = [strip.area(self.gross) for strip in strips]
+        low = max(strip_areas) / MAX_DEPTH
+        high = min(strip_areas) / MIN_DEPTH
+        ratios = [r for r in LENGTH_RATIOS if low <= sqrt(total * r / 100) <= high]
+        for ratio in choices.shuffled(ratios)[:TRIES]:
             with suppress(MisfitError):
                 if is_promising(place(ratio, self.gross), self.briefs):
                     return partial(place, ratio)
@@ -552,9 +558,11 @@ ROOMS_SHARE = 0.992
 # How far the area may be from the requested one, as a share of it, and the tries to get there.
 TOLERANCE = 0.012
 ROUNDS = 7
-# Probabilities [%] of edition 2, by the number of bedrooms up to four: that a home is made of rows,
+# Probabilities [%] by the number of bedrooms up to four: that a home is made of rows,
 # and has rooms on both sides of its core.
-ROWS_PERCENT = {1: 25, 2: 40, 3: 65, 4: 80}
+TWO_WINGS_PERCENT = 65
+INLINE_PERCENT = 20
+ROWS_PERCENT = {1: 5, 2: 10, 3: 25, 4: 40}
 TWO_ROWS_PERCENT = {1: 5, 2: 20, 3: 55, 4: 75}
 
 
@@ -592,20 +600,22 @@ def draw_layout(request: LayoutRequest, choices: Choices) -> RoomLayout:
     """
     if all(brief.kind != "bedroom" for brief in request.briefs):
         return RoomLayout(request.briefs, _studio(request.briefs, choices))
+    bedrooms = sum(brief.kind == "bedroom" for brief in request.briefs)
+    if request.outline in (None, "rectangle") and choices.chance(ROWS_PERCENT[min(bedrooms, 4)]):
+        sketch = Sketch(request, choices)
+        rows = 1 + choices.chance(TWO_ROWS_PERCENT[min(bedrooms, 4)])
+        with suppress(MisfitError):
+            return _place_at_scale(sketch, sketch.rows(rows))
     sketch = Sketch(request, choices)
-    bedrooms = len(sketch.of_kind["bedroom"])
-    may_have_rows = request.edition == 2 and request.outline in (None, "rectangle")
-    if may_have_rows and choices.chance(ROWS_PERCENT[min(bedrooms, 4)]):
-        placing = sketch.rows(1 + choices.chance(TWO_ROWS_PERCENT[min(bedrooms, 4)]))
-    elif sketch.closet is None and bedrooms <= 2 and choices.chance(70 if bedrooms == 1 else 25):
+    if sketch.closet is None and bedrooms <= 2 and choices.chance(35 if bedrooms == 1 else 10):
         placing = sketch.columns()
-    elif bedrooms > 3 and choices.chance(65 if bedrooms < 6 else 90):
+    elif bedrooms > 3 and choices.chance(TWO_WINGS_PERCENT):
         placing = sketch.two_wings()
-    elif choices.chance(65):
+    elif choices.chance(INLINE_PERCENT):
         placing = sketch.inline()
     else:
         placing = sketch.across()
-    return RoomLayout(sketch.briefs, _place_at_scale(placing, sketch.briefs, request.area_m2))
+    return _place_at_scale(sketch, placing)
 
 
 def _studio(briefs: Sequence[Brief], choices: Choices) -> list[Box]:
@@ -623,9 +633,10 @@ def _studio(briefs: Sequence[Brief], choices: Choices) -> list[Box]:
     ]
 
 
-def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -> list[Box]:
+def _place_at_scale(sketch: Sketch, placing: Placing) -> RoomLayout:
     """Place the rooms at the scale at which their clear areas add up to the requested area."""
-    target = area_m2 * UNITS_PER_M2 * ROOMS_SHARE
+    briefs = sketch.briefs
+    target = sketch.request.area_m2 * UNITS_PER_M2 * ROOMS_SHARE
     factor = 1.0
     for _ in range(ROUNDS):
         areas = {i: gross_area(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}
@@ -634,6 +645,6 @@ def _place_at_scale(placing: Placing, briefs: Sequence[Brief], area_m2: float) -
             break
         area = sum_in_order(box.clear_area for box in boxes)
         if abs(area - target) <= TOLERANCE * target:
-            return boxes
+            return RoomLayout(briefs, boxes)
         factor *= target / area
     raise MisfitError

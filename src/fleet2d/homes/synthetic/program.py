@@ -86,7 +86,7 @@ SIZES = {
     "dining_room": Size(6.5, 11.5, 44, 2.4, 2.2),
     "kitchen": Size(4.5, 14, 44, 1.8, 2.3),
     "bedroom": Size(7.5, 16, 44, 2.5, 2.1),
-    "bathroom": Size(3.2, 7, 18, 1.5, 3.0),
+    "bathroom": Size(3.2, 7, 8.6, 1.5, 3.0),
     "toilet": Size(1.6, 2.8, 5, 1.0, 3.0),
     "wardrobe": Size(2.2, 5, 12, 1.2, 3.0),
     "office": Size(6.5, 13, 32, 2.3, 2.1),
@@ -108,20 +108,21 @@ SPREAD: dict[str, tuple[int, int]] = {
     "garage": (72, 130),
 }
 DEFAULT_SPREAD = (78, 130)
-# Of edition 2, whose bedrooms are either small or large, as those of real plans.
+# Of all but small homes; their bedrooms are either small or large, as those of real plans.
 WIDE_SPREAD: dict[str, tuple[int, int]] = {
     "kitchen": (60, 240),
     "bathroom": (50, 120),
     "living_room": (60, 150),
 }
-# Of edition 2: the largest bathroom [m²], and the largest room in percent of the living room.
-MAX_BATHROOM_M2 = 8.6
+# The largest room in percent of the living room.
 MAX_OF_LIVING_ROOM = 90
+# The largest part of a home that is kitchen [%].
+MAX_KITCHEN_SHARE = 22
 WIDE_FROM_M2 = 60.0  # in smaller flats hardly any rooms would fit beside a large one
 SMALL_BEDROOM = (46, 72)
 LARGE_BEDROOM = (95, 145)
 SMALL_BEDROOM_PERCENT = 40
-# Probability of each bedroom of edition 2 to have a wardrobe [%].
+# Probability of each bedroom to have a wardrobe [%].
 WARDROBE_PERCENT = 40
 
 
@@ -167,7 +168,6 @@ class Style:
         corridor: Clear width of corridors [units].
         door: Width of doors between rooms [units].
         variety: How much rooms, links and layouts differ from the usual ones [percent].
-        edition: 2 for homes nearer to real plans; 1 for those that stored runs and models have.
     """
 
     outline: str | None = None
@@ -175,7 +175,6 @@ class Style:
     corridor: int | None = None
     door: int | None = None
     variety: int = 0
-    edition: int = 1
 
 
 def minimum_area(bedrooms: int, bathrooms: int, garage: bool) -> float:
@@ -237,7 +236,7 @@ def settle_wishes(wishes: Wishes, choices: Choices, style: Style) -> Wishes:
         usual = (round(area) + choices.between(-most_off, most_off) + 38) // 66
         beds = min(max(usual, least), 6)
         # Two small bedrooms fit 50 m2, if tightly.
-        full = 0.8 + 0.3 * style.variety / 100 if style.edition == 2 and beds == 2 else 0.8
+        full = 0.8 + 0.3 * style.variety / 100 if beds == 2 else 0.8
         while beds > least and minimum_area(beds, baths, garage) > full * area:
             beds -= 1
         while beds < MAX_ROOMS_PER_TYPE and maximum_area(beds, baths) < area:
@@ -288,7 +287,7 @@ def _base(bedrooms: int, bathrooms: int) -> list[str]:
     return ["living_room", "kitchen", *["bedroom"] * bedrooms, *["bathroom"] * bathrooms]
 
 
-def choose_rooms(wishes: Wishes, choices: Choices, style: Style) -> list[Brief]:
+def choose_rooms(wishes: Wishes, choices: Choices, style: Style, is_wide: bool) -> list[Brief]:
     """Return the rooms of a home, largest uses first, with areas that add up.
 
     Args:
@@ -296,6 +295,7 @@ def choose_rooms(wishes: Wishes, choices: Choices, style: Style) -> list[Brief]:
         choices: The stream to draw from.
         style: The wishes for its shape. With `variety` further rooms may make others smaller than
             typical, up to what their least sizes allow.
+        is_wide: Whether sizes differ widely and bedrooms may have wardrobes.
     """
     variety = style.variety
 
@@ -323,11 +323,11 @@ def choose_rooms(wishes: Wishes, choices: Choices, style: Style) -> list[Brief]:
     for kind, _, _ in OPTIONAL:  # a very large home takes more rooms
         if 0.85 * fsum(SIZES[k].max_area for k in kinds) < total and kinds.count(kind) < 2:
             kinds.append(kind)
-    wardrobes = beds if style.edition == 2 and area >= WIDE_FROM_M2 else 0
+    wardrobes = beds if is_wide else 0
     chosen = [choices.chance(WARDROBE_PERCENT) for _ in range(wardrobes)]
     kinds += ["wardrobe"] * sum(chosen)
     briefs = [Brief(kind, SIZES[kind].typical_area) for kind in kinds]
-    return scale_areas(_assign_partners(briefs, style.edition), total, choices, style.edition)
+    return scale_areas(_assign_partners(briefs), total, choices, is_wide)
 
 
 def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
@@ -342,7 +342,7 @@ def _studio_rooms(area: float, choices: Choices) -> list[Brief]:
     return [Brief("living_room", area - bath - third), Brief("bathroom", bath), Brief(kind, third)]
 
 
-def _assign_partners(briefs: Sequence[Brief], edition: int) -> list[Brief]:
+def _assign_partners(briefs: Sequence[Brief]) -> list[Brief]:
     """Assign bathrooms beyond the first, and wardrobes, to bedrooms."""
     paired = list(briefs)
     beds = [i for i, brief in enumerate(paired) if brief.kind == "bedroom"]
@@ -354,16 +354,14 @@ def _assign_partners(briefs: Sequence[Brief], edition: int) -> list[Brief]:
     for bath, bed in zip(baths[shared:], beds, strict=False):
         paired[bath] = replace(paired[bath], partner=bed)
     for number, wardrobe in enumerate(wardrobes):
-        bed = beds[number % len(beds)] if edition == 2 else beds[0]
-        paired[wardrobe] = replace(paired[wardrobe], partner=bed)
+        paired[wardrobe] = replace(paired[wardrobe], partner=beds[number % len(beds)])
     return paired
 
 
 def scale_areas(
-    briefs: Sequence[Brief], total: float, choices: Choices, edition: int
+    briefs: Sequence[Brief], total: float, choices: Choices, is_wide: bool
 ) -> list[Brief]:
     """Draw areas that add up to `total` [m²] as far as the sizes of the types allow."""
-    is_wide = edition == 2 and total * TYPICAL_AREA_FACTOR >= WIDE_FROM_M2
     spread_of = WIDE_SPREAD if is_wide else SPREAD
     spreads = [spread_of.get(brief.kind, DEFAULT_SPREAD) for brief in briefs]
     if is_wide:
@@ -378,15 +376,15 @@ def scale_areas(
     at = {brief.kind: i for i, brief in enumerate(briefs)}
     # People live in the living room, not in the kitchen.
     usual[at["kitchen"]] = min(usual[at["kitchen"]], 0.9 * usual[at["living_room"]])
+    most = MAX_OF_LIVING_ROOM / 100 * usual[at["living_room"]]
+    usual = [
+        area if brief.kind in ("living_room", "garage") else min(area, most)
+        for area, brief in zip(usual, briefs, strict=True)
+    ]
     sizes = [SIZES[brief.kind] for brief in briefs]
-    if edition == 2:
-        most = MAX_OF_LIVING_ROOM / 100 * usual[at["living_room"]]
-        usual = [
-            area if brief.kind in ("living_room", "garage") else min(area, most)
-            for area, brief in zip(usual, briefs, strict=True)
-        ]
-        baths = SIZES["bathroom"]._replace(max_area=MAX_BATHROOM_M2)
-        sizes = [baths if brief.kind == "bathroom" else SIZES[brief.kind] for brief in briefs]
+    kitchen = sizes[at["kitchen"]]
+    most = max(MAX_KITCHEN_SHARE / 100 * total, kitchen.min_area)
+    sizes[at["kitchen"]] = kitchen._replace(max_area=min(kitchen.max_area, most))
 
     def areas(factor: float) -> list[float]:
         return [

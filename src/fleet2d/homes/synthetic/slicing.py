@@ -292,6 +292,10 @@ class Strip:
     slots: tuple[Slot, ...]
     bays: tuple[int, ...]
 
+    def area(self, areas: Mapping[int, float]) -> float:
+        """Return the area of its rooms [units²]."""
+        return fsum(areas[room] for slot in self.slots for room in slot)
+
     def widths(self, areas: Mapping[int, float], depth: float) -> list[float]:
         """Return the widths of its slots [units] at a depth [units]."""
         sizes = [areas[s[0]] + (areas[s[1]] if len(s) > 1 else 0.0) for s in self.slots]
@@ -300,8 +304,7 @@ class Strip:
 
     def depth(self, areas: Mapping[int, float], length: float) -> int:
         """Return the depth [units] at which it has a length [units]; 0 for none below 12 m."""
-        total = fsum(areas[room] for slot in self.slots for room in slot)
-        depth = total / length if not any(self.bays) else 0.0
+        depth = self.area(areas) / length if not any(self.bays) else 0.0
         low, high = max(20, 20 - min(self.bays)), 240
         if depth:
             return int(depth + 0.5) if low <= depth <= high else 0
@@ -450,14 +453,12 @@ class LayoutRequest:
         area_m2: Area of the free space.
         corridor: Clear width of corridors [units].
         outline: One of `rectangle`, `L`, `T`, `U`, or None for any.
-        edition: Of the generator.
     """
 
     briefs: list[Brief]
     area_m2: float
     corridor: int
     outline: str | None
-    edition: int
 
 
 def is_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:

@@ -123,7 +123,6 @@ class Synthetic(FloorPlanSource):
         corridor_width: Clear width of hallways, 0.9 m to 2 m, rounded to 5 cm.
         door_width: Width of doors between rooms, 0.7 m to 1.2 m, rounded to 5 cm.
         variety: How much rooms and their links differ from the usual ones.
-        edition: 2 for homes nearer to real plans; 1 keeps those of stored runs and models.
 
     Example:
         >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()
@@ -141,7 +140,6 @@ class Synthetic(FloorPlanSource):
     corridor_width: _CorridorWidth | None = None
     door_width: _DoorWidth | None = None
     variety: Share = 0.0
-    edition: Literal[1, 2] = 1
 
     def load(self) -> FloorPlan:
         """Generate the home.
@@ -153,7 +151,7 @@ class Synthetic(FloorPlanSource):
         sizes = (self.corridor_width, self.door_width)
         corridor, door = (None if m is None else int(m * UNITS_PER_M + 0.5) for m in sizes)
         percent = round(self.variety * 100)
-        style = Style(self.outline, self.open_plan, corridor, door, percent, self.edition)
+        style = Style(self.outline, self.open_plan, corridor, door, percent)
         house = generate(self.seed, wishes, style)
         regions = _regions(house)
         doors = [_line(gap) for gap in house.gaps if gap.leaf is not None]
