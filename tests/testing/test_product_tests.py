@@ -97,7 +97,8 @@ def test_each_scenario_of_two_robots_holds_and_fails_for_ghosts(path: Path) -> N
 
     for home in HOMES if THOROUGH else [0]:
         assert [] == failed(home), home
-    assert failed(0, "simulation.ghosts=true")
+    # In some homes the two never meet, even as ghosts.
+    assert any(failed(home, "simulation.ghosts=true") for home in HOMES)
 
 
 def test_there_are_ten_scenarios_of_two_robots_of_at_most_twenty_lines() -> None:

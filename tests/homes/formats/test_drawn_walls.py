@@ -19,7 +19,7 @@ PIXEL = 0.025
 
 @cache
 def drawn(style: str) -> Drawing:
-    return Drawing(load_floorplan("synthetic:5"), style, PIXEL)
+    return Drawing(load_floorplan("synthetic:33"), style, PIXEL)
 
 
 def read(folder: Path, style: str, suffix: str = ".png", **settings: Any) -> FloorPlan:
@@ -67,7 +67,7 @@ def test_thick_frame_around_a_drawing_is_no_wall(tmp_path: Path) -> None:
 
 def test_pixels_as_large_as_lines_leave_all_that_is_dark_wall(tmp_path: Path) -> None:
     path = tmp_path / "flat.png"
-    Drawing(load_floorplan("synthetic:5"), "outlined", 0.05).picture.save(path)
+    Drawing(load_floorplan("synthetic:33"), "outlined", 0.05).picture.save(path)
 
     plain, told = (
         Image.model_construct(path=path, resolution=0.05, cell=None, line_width=width)
