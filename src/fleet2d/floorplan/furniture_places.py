@@ -313,6 +313,11 @@ RADII = (BODY_RADIUS, *NARROW_RADII, THIN_RADIUS)
 CUT_OFF_M2 = 0.25
 """Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
 
+# By how much more than its radius a body's space is shrunk so that rounding can't make it smaller
+# [lattice], and the part of `CUT_OFF_M2` that is less than it in any case.
+ROUNDED = 8
+CERTAIN = 0.75
+
 # The outlines of the space of a body [lattice], by its radius [m].
 BodySpaces = dict[float, list[Polygon]]
 
@@ -390,6 +395,8 @@ class Interior:
 
         def is_open(count: int) -> bool:
             standing = list(chain.from_iterable(solid[: count + 1]))
+            if stays_whole(plan, standing):
+                return True
             for radius in RADII:
                 large = _large(plan, _exact_space(plan, standing, radius))
                 if len(large) > 1:
@@ -534,6 +541,34 @@ def _exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> li
     """Return the space of a body among footprints, exactly as `Space` computes it [lattice]."""
     reach = radius * plan.lattice.units_per_m
     return shrink(plan.polygons, reach, grow_polygons(solid, reach))
+
+
+def stays_whole(plan: FloorPlan, solid: Sequence[Polygon]) -> bool:
+    """Return whether no body has a space besides its largest one that furniture may not cut off.
+
+    A fast check of homes whose walls and furniture are parallel to the axes: there a mitred buffer
+    whose corners are cut is the space of an octagonal body, but for rounding. It is taken a little
+    wider than that, so a passage counts only if it certainly is one.
+
+    Args:
+        plan: The home.
+        solid: The footprints of the objects that bodies can't pass [lattice].
+
+    Returns:
+        False also where this can't tell.
+    """
+    free = shapely.difference(MultiPolygon(plan.polygons), shapely.union_all(solid))
+    for ring in shapely.get_rings(shapely.get_parts(free)):
+        along = np.diff(shapely.get_coordinates(ring), axis=0)
+        if (along != 0).all(axis=1).any():
+            return False
+    unit = plan.lattice.units_per_m
+    for radius in RADII:
+        space = free.buffer(-radius * unit - ROUNDED, join_style="mitre", mitre_limit=1.0)
+        areas = shapely.area(shapely.get_parts(space))
+        if not len(areas) or areas.sum() - areas.max() > CERTAIN * CUT_OFF_M2 * unit**2:
+            return False
+    return True
 
 
 def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
