@@ -55,6 +55,29 @@ def test_grown_cells_are_those_nearer_than_the_radius(
     assert not grown[away > most].any()
 
 
+@quick
+@given(
+    st.tuples(st.integers(-20, 130), st.integers(-20, 90)),
+    st.tuples(st.integers(1, 60), st.integers(1, 60)),
+    st.sampled_from([0.0, 0.2, 0.25]),
+)
+def test_cells_around_a_rectangle_are_those_around_the_same_outline_with_another_corner(
+    low: tuple[int, int], size: tuple[int, int], radius: float
+) -> None:
+    """A fifth corner on a side keeps it from the quick way for rectangles."""
+    lattice = FloorPlan.build("box", BOX).lattice
+    x0, y0 = np.array(low) / 20
+    x1, y1 = np.array([low, size]).sum(axis=0) / 20
+    rectangle = shapely.box(x0, y0, x1, y1)
+    same = shapely.Polygon([(x0, y0), ((x0 + x1) / 2, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+    quick_window, quickly = grown_cells(lattice, rectangle, radius)
+    window, covered = grown_cells(lattice, same, radius)
+
+    assert quick_window == window
+    assert np.array_equal(quickly, covered)
+
+
 def test_standing_cells_are_in_the_space_among_the_furniture(plan: FloorPlan) -> None:
     things = [
         stand_furniture("table", (3.0, 2.0), 512, name="table"),

@@ -477,7 +477,8 @@ class Interior:
         for radius, parts in self._spaces.items():
             # Further by the rounding of a space, so that what is connected here is connected there.
             reach = radius * self.plan.lattice.units_per_m + GRID
-            blocked = shapely.union_all(grow_polygons(solid, reach))
+            grown = grow_polygons(solid, reach)
+            blocked = grown[0] if len(grown) == 1 else shapely.union_all(grown)
             spaces[radius] = []
             for part in parts:
                 pieces = _pieces(part, blocked)

@@ -536,6 +536,9 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     reach = radius * lattice.units_per_m + HALF + SLACK
     a = int(np.ceil(reach))
     b = int(np.ceil(reach * 0.41421357))
+    upright = _upright_rectangle(footprint)
+    if upright is not None:
+        return _cells_by_rectangle(lattice, lattice.to_lattice(upright), a, b)
     octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
     convex: BaseGeometry = footprint
     solid_area = footprint.convex_hull.area * (1 - CONVEX_SLACK)
@@ -558,6 +561,42 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     return window, covered
 
 
+def _upright_rectangle(footprint: Polygon) -> F64 | None:
+    """Return the low and high corner of a rectangle that is parallel to the axes, float64 (2, 2).
+
+    None for another shape.
+    """
+    corners = shapely.get_coordinates(footprint)
+    if len(corners) != 5:
+        return None
+    low = corners.min(axis=0)
+    high = corners.max(axis=0)
+    at_low = corners == low
+    turns = at_low[:-1] != at_low[1:]
+    if not (at_low | (corners == high)).all() or not (turns.sum(axis=1) == 1).all():
+        return None
+    return np.array([low, high])
+
+
+def _cells_by_rectangle(lattice: Lattice, corners: I64, a: int, b: int) -> tuple[Window, Bool]:
+    """Return the cells in a rectangle that is grown by an octagon; see `grown_cells`.
+
+    Args:
+        lattice: The lattice.
+        corners: The low and the high corner of the rectangle [lattice], int64 (2, 2).
+        a: How far the octagon's straight sides are from its middle [lattice].
+        b: Half the length of these sides [lattice].
+    """
+    low, high = corners
+    window = _window(lattice, np.array([low - a, high + a]))
+    xs, ys = (
+        axis[cells] for axis, cells in zip(lattice.centre_axes(), reversed(window), strict=True)
+    )
+    x = np.maximum(np.maximum(low[0] - xs, xs - high[0]), 0)
+    y = np.maximum(np.maximum(low[1] - ys, ys - high[1]), 0)
+    return window, (x <= a)[None, :] & (y <= a)[:, None] & (x[None, :] + y[:, None] <= a + b)
+
+
 def with_approaches(
     plan: FloorPlan, thing: PlacedObject, standing: Bool, others: Iterable[PlacedObject] = ()
 ) -> PlacedObject:
@@ -574,11 +613,11 @@ def with_approaches(
     """
     x0, y0, x1, y1 = thing.footprint.bounds
     near = shapely.box(x0 - SIT_REACH, y0 - SIT_REACH, x1 + SIT_REACH, y1 + SIT_REACH)
-    solid = [
-        other.footprint
-        for other in others
-        if other.blocks != "nothing" and other is not thing and near.intersects(other.footprint)
+    shapes = [
+        other.footprint for other in others if other.blocks != "nothing" and other is not thing
     ]
+    close = shapely.intersects(near, shapes) if shapes else ()
+    solid = [shape for shape, is_close in zip(shapes, close, strict=True) if is_close]
     uses = []
     for use in thing.uses:
         reach = STAND_REACH if use.posture == "stand" else SIT_REACH

@@ -298,9 +298,17 @@ class Strip:
 
     def widths(self, areas: Mapping[int, float], depth: float) -> list[float]:
         """Return the widths of its slots [units] at a depth [units]."""
-        sizes = [areas[s[0]] + (areas[s[1]] if len(s) > 1 else 0.0) for s in self.slots]
-        depths = [depth + bay for bay in self.bays]
-        return [max(a / d, MIN_SLOT_WIDTH) for a, d in zip(sizes, depths, strict=True)]
+        return _slot_widths(self._sizes(areas), depth)
+
+    def _sizes(self, areas: Mapping[int, float]) -> list[tuple[float, int]]:
+        """Return the gross area [units²] and the bay of each slot."""
+        sizes = []
+        for slot, bay in zip(self.slots, self.bays, strict=True):
+            size = areas[slot[0]]
+            if len(slot) > 1:
+                size += areas[slot[1]]
+            sizes.append((size, bay))
+        return sizes
 
     def depth(self, areas: Mapping[int, float], length: float) -> int:
         """Return the depth [units] at which it has a length [units]; 0 for none below 12 m."""
@@ -308,11 +316,12 @@ class Strip:
         low, high = max(20, 20 - min(self.bays)), 240
         if depth:
             return int(depth + 0.5) if low <= depth <= high else 0
-        if fsum(self.widths(areas, low)) < length:
+        sizes = self._sizes(areas)
+        if fsum(_slot_widths(sizes, low)) < length:
             return 0
         while high - low > 1:
             middle = (low + high) // 2
-            if fsum(self.widths(areas, middle)) > length:
+            if fsum(_slot_widths(sizes, middle)) > length:
                 low = middle
             else:
                 high = middle
@@ -342,6 +351,11 @@ class Strip:
     def deepened_at_end(self, depth: int) -> "Strip":
         """Return the strip with its last slot as much deeper [units]."""
         return replace(self, bays=(*self.bays[:-1], self.bays[-1] + depth))
+
+
+def _slot_widths(sizes: Sequence[tuple[float, int]], depth: float) -> list[float]:
+    """Return the widths of slots of some gross areas and bays at a depth [units]."""
+    return [max(size / (depth + bay), MIN_SLOT_WIDTH) for size, bay in sizes]
 
 
 MIN_DEPTH = 44
