@@ -291,6 +291,22 @@ def test_rooms_stays_and_activities_equal_the_truth(name: str, seed: int, tmp_pa
             assert activity == doing
 
 
+def test_the_area_of_an_entity_is_its_room_and_one_without_keeps_its_name(tmp_path: Path) -> None:
+    lines = [
+        "entity_id,area,state,last_changed",
+        "binary_sensor.0x00158d,Kitchen,on,2026-03-02 08:00:00",
+        "binary_sensor.hall_motion,,on,2026-03-02 08:05:00",
+    ]
+    log = read_log(written(tmp_path / "history.csv", lines))
+    assert isinstance(log, ActivityLog)
+    assert [reading.room for reading in log.readings] == ["Kitchen", "binary_sensor.hall_motion"]
+    rooms = fleet2d.load_floorplan().rooms
+    assert map_rooms(log.rooms, {}, rooms) == {
+        "Kitchen": ("kitchen",),
+        "binary_sensor.hall_motion": ("hallway",),
+    }
+
+
 def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path: Path) -> None:
     for name in ("kasteren", "mit", "aras"):
         folder = tmp_path / name

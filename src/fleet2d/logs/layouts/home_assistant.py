@@ -24,8 +24,8 @@ from fleet2d.bounds import JSON_VALUES, LOG_BYTES, LOG_ROWS, check_file, one_lin
 from fleet2d.errors import os_errors_as
 from fleet2d.logs.log import LogError, encoding_of
 
-StateRow = tuple[str, str, datetime, int]
-"""An entity, its state, the time from which it has it, and the number of the row."""
+StateRow = tuple[str, str, datetime, int, str]
+"""An entity, its state, the time from which it has it, the number of the row, and the area."""
 DATABASE = b"SQLite format 3\0"
 """How a database begins."""
 _QUERIES = {
@@ -86,7 +86,7 @@ def read_database(path: Path) -> Iterator[StateRow]:
                     LOG_ROWS.check(number, path, LogError, prefix="more than ")
                 if entity is not None and at is not None:
                     moment = _moment(at, f"{path}, row {number}")
-                    yield str(entity), "" if state is None else str(state), moment, number
+                    yield str(entity), "" if state is None else str(state), moment, number, ""
     except sqlite3.Error as error:
         raise LogError(f"{path} can't be read: {error}") from None
 
@@ -109,7 +109,7 @@ def read_history(path: Path) -> Iterator[StateRow]:
             at = next((state[key] for key in _TIMES if key in state), None)
             if not entity or word is None or at is None:
                 raise LogError(f"{where}: {_EXPECTED}, got {one_line(json.dumps(state))}")
-            yield entity, str(word), _moment(at, where), number
+            yield entity, str(word), _moment(at, where), number, ""
 
 
 def _content(path: Path) -> Any:

@@ -38,6 +38,7 @@ from fleet2d.runtime.local_time import Zone, rules_of, wall_us
 
 _ENTITIES = ("entity_id", "entity", "device", "sensor", "name", "item")
 _VALUES = ("state", "value", "status")
+_AREAS = ("area", "area_name", "area_id", "room", "location")
 _TIMES = ("last_changed", "last_updated", "time", "timestamp", "datetime", "date")
 HEAD = re.compile(
     rf"(?=.*\b(?:{'|'.join(_ENTITIES)})\b)(?=.*\b(?:{'|'.join(_VALUES)})\b)"
@@ -59,6 +60,7 @@ class _StateLine(NamedTuple):
     state: str
     time: datetime
     line: int
+    area: str
 
 
 def read_states(
@@ -71,8 +73,8 @@ def read_states(
 ) -> ActivityLog:
     """Read the states of a home: what switches on shows that somebody is there at that instant.
 
-    Labels are the entities. While a person is not at home, by a `person` or `device_tracker`, it is
-    away.
+    Labels are the areas that a table has, else the entities. While a person is not at home, by a
+    `person` or `device_tracker`, it is away.
 
     Args:
         path: The table, or the database.
@@ -110,7 +112,7 @@ def read_states(
                 absence = len(readings)
                 readings.append(Reading(at, at, AWAY, "", state.line))
         elif word in _ON:
-            readings.append(Reading(at, at, state.entity, "", state.line))
+            readings.append(Reading(at, at, state.area or state.entity, "", state.line))
         elif word not in _OFF:
             others["unavailable" if word in _UNKNOWN else state.entity] += 1
     readings, notes = in_order(readings, path, sort=sort)
@@ -163,13 +165,15 @@ def _table(path: Path) -> Iterator[StateRow]:
     rows = csv.reader(lines, delimiter=mark)
     head = [name.strip().lower() for name in next(rows, [])]
     columns = [_column(head, names) for names in (_ENTITIES, _VALUES, _TIMES)]
+    area = _column(head, _AREAS)
     if min(columns) < 0:
         raise LogError(f"{path}: expected columns like entity_id, state and last_changed in line 1")
     for line, row in enumerate(rows, 2):
-        if len(row) <= max(columns):
+        if len(row) <= max(*columns, area):
             raise LogError(f"{path}, line {line}: expected {len(head)} values, got {len(row)}")
         entity, state, text = (row[column].strip() for column in columns)
-        yield entity, state, parse_time(text, path, line), line
+        place = row[area].strip() if area >= 0 else ""
+        yield entity, state, parse_time(text, path, line), line, place
 
 
 def _column(head: list[str], names: tuple[str, ...]) -> int:
@@ -183,7 +187,7 @@ def _of_years(path: Path, rows: list[StateRow], zone: Zone) -> Zone:
     Raises:
         LogError: This machine has no rules of its time zone.
     """
-    times_us = [wall_us(moment.replace(tzinfo=None)) for _, _, moment, _ in rows] or [0]
+    times_us = [wall_us(moment.replace(tzinfo=None)) for _, _, moment, *_ in rows] or [0]
     with errors_as(LogError, f"{path}: there are no rules of the time zone", of=KeyError):
         return zone.over(min(times_us), max(times_us))
 
@@ -198,7 +202,7 @@ def _local(path: Path, rows: Iterable[StateRow], zone: Zone | str | None) -> Ite
     if isinstance(zone, str):
         with errors_as(LogError, f"{path}: time_zone", of=KeyError):
             rules = rules_of(zone)
-    for entity, state, moment, line in rows:
+    for entity, state, moment, line, area in rows:
         local = moment
         if isinstance(zone, Zone):
             local = zone.at(moment)
@@ -209,4 +213,4 @@ def _local(path: Path, rows: Iterable[StateRow], zone: Zone | str | None) -> Ite
             )
         elif moment.tzinfo is not None:
             local = moment.astimezone(rules).replace(tzinfo=None)
-        yield _StateLine(entity, state, local, line)
+        yield _StateLine(entity, state, local, line, area)
