@@ -79,7 +79,7 @@ export const foundTimes = computed<readonly number[]>(() => foundEvents.value.ma
 
 const SHORTEST_US = 10e6;
 /** While time passes, words change at most this often [ms]: nobody reads faster. */
-const TOLD_MS = 120;
+const TOLD_MS = 200;
 let toldAt = 0;
 
 /**

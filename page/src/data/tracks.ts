@@ -91,6 +91,7 @@ export class Track {
   /** Corners of the way between two moments, x and y in turn, without stretches away. */
   way(fromUs: number, toUs: number): number[] {
     const corners: number[] = [];
+    if (this.empty) return corners;
     const push = (pose: Pose): void => {
       if (!pose.away) corners.push(pose.x, pose.y);
     };

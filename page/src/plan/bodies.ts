@@ -57,7 +57,7 @@ export function drawScene(context: Context, scene: Scene): void {
       if (pose && !pose.away) body.cameras.forEach((camera, i) => drawView(context, scene, pose, camera, i, body.cameras.length));
     }
   }
-  if (shows("ways")) run.bodies.forEach((body) => drawWay(context, scene, body));
+  if (shows("ways")) drawWays(context, scene);
   if (scene.other) drawGhosts(context, scene, poses);
   if (shows("observations")) drawObservations(context, scene, poses);
   for (const body of run.bodies) {
@@ -152,36 +152,66 @@ function drawView(context: Context, scene: Scene, pose: Pose, camera: CameraFact
   drawName(context, colors, camera.name, edge, px + out * Math.cos(-heading), py + out * Math.sin(-heading));
 }
 
-/** The way behind a body fades with its age; the way ahead is dotted. */
-function drawWay(context: Context, scene: Scene, body: BodyFacts): void {
-  const { run, us, frame, selected } = scene;
-  const track = run.tracks.get(body.name);
-  if (!track || track.empty) return;
-  context.strokeStyle = body.color;
-  context.lineJoin = "round";
-  context.lineCap = "round";
-  const begin = Math.max(0, us - BEHIND_US);
-  for (let i = 0; i < FADES && track.movesWithin(begin, us); i++) {
-    const from = us - (BEHIND_US * (FADES - i)) / FADES;
-    context.globalAlpha = 0.6 * ((i + 1) / FADES);
-    context.lineWidth = (body.name === selected ? 4 : 3) * ((i + 2) / (FADES + 1));
-    strokeLine(context, frame, track.way(Math.max(0, from), Math.max(0, from + BEHIND_US / FADES)));
+/**
+ * The ways behind bodies fade with their age; the ways ahead are dashed. Those of one look are one path: in a crowd, a
+ * few long strokes are cheaper than hundreds of short ones.
+ */
+function drawWays(context: Context, scene: Scene): void {
+  const { run, us, selected } = scene;
+  const looks = new Map<string, BodyFacts[]>();
+  for (const body of run.bodies) {
+    const look = body.name === selected ? "selected" : body.color;
+    const alike = looks.get(look);
+    if (alike) alike.push(body);
+    else looks.set(look, [body]);
   }
-  // What a live simulation plans is ahead of its present only.
-  const planned = us >= run.knownUs ? run.ahead.get(body.name) : undefined;
-  context.globalAlpha = 0.7;
-  context.lineWidth = 1.5;
-  context.setLineDash([1, 5]);
-  const end = Math.min(run.presentUs, us + AHEAD_US);
-  if (planned || track.movesWithin(us, end)) strokeLine(context, frame, planned ?? track.way(us, end));
-  context.setLineDash([]);
-  context.lineCap = "butt";
+  context.lineJoin = "round";
+  for (const [look, bodies] of looks) {
+    context.strokeStyle = bodies[0]!.color;
+    context.lineCap = "round";
+    const tracks = bodies.flatMap(({ name }) => run.tracks.get(name) ?? []);
+    const walked = tracks.filter((track) => track.movesWithin(Math.max(0, us - BEHIND_US), us));
+    for (let i = 0; i < FADES && walked.length > 0; i++) {
+      const from = us - (BEHIND_US * (FADES - i)) / FADES;
+      context.globalAlpha = 0.6 * ((i + 1) / FADES);
+      context.lineWidth = (look === "selected" ? 4 : 3) * ((i + 2) / (FADES + 1));
+      const ways = walked.map((track) => track.way(Math.max(0, from), Math.max(0, from + BEHIND_US / FADES)));
+      strokeLines(context, scene.frame, ways);
+    }
+    context.globalAlpha = 0.7;
+    context.lineWidth = 1.5;
+    context.lineCap = "butt";
+    context.setLineDash([2, 4]);
+    strokeLines(context, scene.frame, bodies.map((body) => wayAhead(scene, body)));
+    context.setLineDash([]);
+  }
   context.globalAlpha = 1;
 }
 
-function strokeLine(context: Context, frame: Frame, corners: readonly number[]): void {
+/** What a live simulation plans is ahead of its present only. */
+function wayAhead({ run, us }: Scene, { name }: BodyFacts): readonly number[] {
+  const track = run.tracks.get(name);
+  const planned = us >= run.knownUs ? run.ahead.get(name) : undefined;
+  const end = Math.min(run.presentUs, us + AHEAD_US);
+  return planned ?? (track?.movesWithin(us, end) ? track.way(us, end) : []);
+}
+
+/** Corners of a way that are nearer to each other are one [px]. */
+const FINEST_PX = 1.5;
+
+function strokeLines(context: Context, frame: Frame, lines: readonly (readonly number[])[]): void {
   context.beginPath();
-  for (let i = 0; i < corners.length; i += 2) context.lineTo(frame.ux(corners[i]!), frame.uy(corners[i + 1]!));
+  for (const corners of lines) {
+    let [lastX, lastY] = [Infinity, Infinity];
+    for (let i = 0; i < corners.length; i += 2) {
+      const [x, y] = [frame.ux(corners[i]!), frame.uy(corners[i + 1]!)];
+      const isEnd = i + 2 === corners.length;
+      if (!isEnd && Math.abs(x - lastX) + Math.abs(y - lastY) < FINEST_PX) continue;
+      if (i === 0) context.moveTo(x, y);
+      else context.lineTo(x, y);
+      [lastX, lastY] = [x, y];
+    }
+  }
   context.stroke();
 }
 

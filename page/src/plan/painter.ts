@@ -74,7 +74,8 @@ export class PlanPainter {
     };
     const poses = posesAt(run, us);
     const names = shows("names") ? this.placeNames(stage, poses, us) : [];
-    this.paintBase(stage, us, shows("names"));
+    // Lamps of a crowd change at every frame: like words, they follow several times a second while time passes.
+    this.paintBase(stage, state.told.value, shows("names"));
     context.clearRect(0, 0, width, height);
     drawKeptOut(context, run, state.selected.value, frame, colors.value);
     if (shows("beliefs")) drawBeliefs(context, run, frame, us);

@@ -1,17 +1,17 @@
-/** Figures that were drawn before, turned to where they look: in a crowd, one copy is cheaper than eight shapes. */
+/** Figures that were drawn before, as they look somewhere: in a crowd, one copy is cheaper than eight shapes. */
 
 import { drawPerson, drawRobot, type Look, type Posture } from "./figures";
 
 type Context = CanvasRenderingContext2D;
 
-/** Steps are shown in so many phases. */
-const PHASES = 8;
+/** Steps and turns are shown in so many phases: a copy that needn't be turned or scaled is the cheapest one. */
+const PHASES = 4;
+const TURNS = 72;
 /** A figure reaches this far from its middle [radii]: who lies is longest. */
 const REACH = 4.2;
-/** Larger figures are drawn anew, as they would be coarse when turned [px]. */
+/** Larger figures are drawn anew, as their phases would be seen [px]. */
 const LARGEST_PX = 26;
-const SHARPER = 2;
-const MOST_SPRITES = 600;
+const MOST_SPRITES = 2000;
 
 const sprites = new Map<string, HTMLCanvasElement>();
 
@@ -30,41 +30,49 @@ export interface Figure {
 }
 
 export function drawFigure(context: Context, figure: Figure): void {
-  const { x, y, heading, radius, posture } = figure;
-  context.save();
-  context.translate(x, y);
-  context.scale(1, -1);
-  context.rotate(heading);
-  if (radius > LARGEST_PX) drawShapes(context, figure, figure.step);
-  else {
-    const reach = (posture === "lie" ? REACH : REACH / 2) * radius;
-    context.drawImage(spriteOf(figure, reach), -reach, -reach, 2 * reach, 2 * reach);
+  const { x, y, radius } = figure;
+  if (radius > LARGEST_PX) {
+    context.save();
+    context.translate(x, y);
+    drawTurned(context, figure);
+    context.restore();
+    return;
   }
-  context.restore();
+  const ratio = window.devicePixelRatio || 1;
+  const sprite = spriteOf(figure, ratio);
+  const reach = sprite.width / 2;
+  context.drawImage(sprite, Math.round(x * ratio - reach) / ratio, Math.round(y * ratio - reach) / ratio, sprite.width / ratio, sprite.width / ratio);
 }
 
-function spriteOf(figure: Figure, reach: number): HTMLCanvasElement {
-  const { color, radius, posture } = figure;
-  const ratio = SHARPER * (window.devicePixelRatio || 1);
+function spriteOf(figure: Figure, ratio: number): HTMLCanvasElement {
+  const { color, radius, posture, heading } = figure;
   const phase = Math.round(figure.step * PHASES);
-  const key = `${color} ${posture} ${phase} ${radius.toFixed(1)} ${ratio}`;
+  const turn = Math.round((heading * TURNS) / (2 * Math.PI)) % TURNS;
+  const key = `${color} ${posture} ${phase} ${turn} ${radius.toFixed(1)} ${ratio}`;
   let sprite = sprites.get(key);
   if (!sprite) {
     if (sprites.size >= MOST_SPRITES) sprites.clear();
+    const reach = (posture === "lie" ? REACH : REACH / 2) * radius;
     sprite = document.createElement("canvas");
-    sprite.width = Math.ceil(2 * reach * ratio);
+    sprite.width = 2 * Math.ceil(reach * ratio);
     sprite.height = sprite.width;
     const context = sprite.getContext("2d")!;
+    context.translate(sprite.width / 2, sprite.width / 2);
     context.scale(ratio, ratio);
-    context.translate(reach, reach);
-    drawShapes(context, figure, phase / PHASES);
+    drawTurned(context, { ...figure, step: phase / PHASES, heading: (turn * 2 * Math.PI) / TURNS });
     sprites.set(key, sprite);
   }
   return sprite;
 }
 
+function drawTurned(context: Context, figure: Figure): void {
+  context.scale(1, -1);
+  context.rotate(figure.heading);
+  drawShapes(context, figure);
+}
+
 /** Draw in pixels, x where the figure looks. Shapes are given in metres: here a metre is a pixel. */
-function drawShapes(context: Context, { color, radius, posture }: Figure, step: number): void {
+function drawShapes(context: Context, { color, radius, posture, step }: Figure): void {
   const look: Look = { color, radius, step };
   if (posture === null) drawRobot(context, look, null, 2);
   else drawPerson(context, { ...look, radius: 1.1 * radius }, posture, 2);
