@@ -17,6 +17,7 @@ from tests.live.scenes import LIVE, place
 import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.live import Bridge, open_peer
+from fleet2d.live.ros import ros2
 from fleet2d.live.ros.node import LATCHED, ActionStatus
 from fleet2d.live.ros.ros2 import Ros2Peer, domain_of_environment, parse_place
 from fleet2d.live.ros.types import NAVIGATE, RosTypes
@@ -114,6 +115,14 @@ class Beside:
         self.bridge._stop()
         self.thread.join(timeout=20)
         return self.runs[0]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def without_ros() -> Iterator[None]:
+    """Have runs speak the protocol of `rmw_zenoh` where ROS is installed, too, as in `.ci/ros`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ros2, "is_rclpy_there", lambda: False)
+        yield
 
 
 @pytest.fixture(scope="module")
