@@ -63,7 +63,7 @@ describe("lanes of requests", async () => {
   for (const [step, event, detail] of happened) run.events.add(step, step * run.clock.stepUs, robot, event, "", detail);
   const lanes = lanesOf(run, "0:", null);
   const words = (text: string, step: number): string =>
-    lanes.find((lane) => lane.label === `${robot}: ${text}`)!.words(step * run.clock.stepUs);
+    lanes.find((lane) => lane.label === `${run.label(robot)}: ${text}`)!.words(step * run.clock.stepUs);
 
   it("last from when a request came up to what came of it", () => {
     expect([599, 600, 1504, 1505].map((step) => words("pill ana", step))).toEqual(

@@ -403,11 +403,11 @@ class Tasks:
         self.page.wait_for_selector("[aria-label='x of key_frames over the run'] canvas")
 
     def reason_of_a_decision(self) -> None:
-        self.click(".label .name >> text=/^astro$/")
+        self.click(".label .name >> text=/^Astro$/")
         self.page.wait_for_selector("[data-inspected=astro] dt >> text=behavior")
 
     def follow_a_body(self) -> None:
-        self.click(".label .name >> text=/^ana$/")
+        self.click(".label .name >> text=/^Ana$/")
         self.press("c")
         self.page.wait_for_selector("text=Follow no longer")
 
@@ -514,22 +514,22 @@ def test_times_are_the_home_s_in_every_time_zone(browser: Any, address: str, zon
 
 def test_lanes_fold_are_pinned_hidden_and_filtered(page: Any) -> None:
     labels = page.locator(".label .name")
-    expected = {"Users (1)", "Robots (1)", "ana", "ana does", "astro sees ana"}
+    expected = {"Users (1)", "Robots (1)", "Ana", "Ana does", "Astro sees Ana"}
     until(page, lambda: expected <= set(labels.all_inner_texts()))
-    page.click("[aria-label='Lanes of ana']")
-    until(page, lambda: "ana does" not in labels.all_inner_texts())
+    page.click("[aria-label='Lanes of Ana']")
+    until(page, lambda: "Ana does" not in labels.all_inner_texts())
     page.locator(".label", has_text="astro").first.hover()
-    page.click("[aria-label='Pin astro']")
-    until(page, lambda: "astro" == labels.first.inner_text())
+    page.click("[aria-label='Pin Astro']")
+    until(page, lambda: "Astro" == labels.first.inner_text())
     labels.first.hover()
-    page.click("[aria-label='Hide astro']")
-    until(page, lambda: "astro" not in labels.all_inner_texts())
+    page.click("[aria-label='Hide Astro']")
+    until(page, lambda: "Astro" not in labels.all_inner_texts())
     page.click("text=show 1 hidden")
     page.keyboard.press("Escape")
     page.locator("body").click(position={"x": 300, "y": 10})
     page.keyboard.press("l")
     page.keyboard.type("does")
-    until(page, lambda: ["astro", "Users (1)", "ana does"] == labels.all_inner_texts())
+    until(page, lambda: ["Astro", "Users (1)", "Ana does"] == labels.all_inner_texts())
 
 
 def seconds_in(words: str) -> int:
@@ -546,7 +546,7 @@ def test_marked_range_has_totals_that_fill_it(page: Any) -> None:
     page.mouse.move(box["x"] + box["width"] * 2 / 3, box["y"] + 60, steps=3)
     page.mouse.up()
     page.keyboard.up("Shift")
-    dwelt = page.locator(".totals div:has(dt:text-is('ana')) dd")
+    dwelt = page.locator(".totals div:has(dt:text-is('Ana')) dd")
     until(page, lambda: 3 * 3600 == pytest.approx(seconds_in(dwelt.inner_text()), abs=120))
     page.keyboard.press("Escape")
     page.locator(".totals").wait_for(state="detached")

@@ -93,9 +93,9 @@ def test_stopped_server_is_told_and_what_was_read_stays(browser: Any, run_dir: P
     with page_at(browser, server.address) as page:
         stop()
         page.click("#tab-inspect")
-        page.click(".label .name >> text=/^astro$/")  # why it does so is asked of the server
+        page.click(".label .name >> text=/^Astro$/")  # why it does so is asked of the server
         page.wait_for_selector("text=The server no longer answers: start fleet2d view again")
-        assert page.locator(".label .name >> text=/^ana$/").is_visible()
+        assert page.locator(".label .name >> text=/^Ana$/").is_visible()
 
 
 @pytest.mark.slow
@@ -159,7 +159,7 @@ def test_link_keeps_question_marked_range_and_pinned_lanes(browser: Any, run_dir
         count = page.get_attribute("#ask-answer", "data-count")
         page.keyboard.press("Escape")
         page.locator(".label", has_text="astro").first.hover()
-        page.click("[aria-label='Pin astro']")
+        page.click("[aria-label='Pin Astro']")
         box = page.locator(".lanes").bounding_box()
         page.keyboard.down("Shift")
         page.mouse.move(box["x"] + 100, box["y"] + 60)

@@ -259,6 +259,7 @@ class Question {
     if (this.wanted === "length" && total > 0) return { spans, words: `${durationText(total)} in all, ${durationText(total / this.days(from, to))} a day; ${count}` };
     if (this.wanted === "count") return { spans, words: `${count}, ${rate(spans.length / this.days(from, to))} a day` };
     if (this.wanted === "place") return { spans, words: this.placesOf(spans, count) };
+    if (which && !part) return { spans, words: [this.run.clock.text(spans[0]!.from).slice(0, -3), total > 0 && `for ${durationText(total)}`].filter(Boolean).join(", ") };
     return { spans, words: total > 0 && !part ? `${count}, ${durationText(total)} in all` : count };
   }
 

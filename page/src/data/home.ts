@@ -54,6 +54,11 @@ export class Home {
     return this.facts.rooms[index]?.name ?? "away";
   }
 
+  /** A room as people write it. */
+  roomLabel(index: number): string {
+    return this.labels[index] ?? "away";
+  }
+
   get floors(): readonly Floor[] {
     this.made ??= floorsOf(this);
     return this.made;

@@ -104,8 +104,7 @@ function nextPlace(run: Run, name: string, us: number): string {
   const lane = run.roomsOf(name);
   const i = lastAtMost(lane.from, us) + 1;
   if (i >= lane.from.length) return "";
-  const room = run.home.roomName(lane.value[i]!);
-  return `${room} in ${durationText(lane.from[i]! - us)}`;
+  return `${run.home.roomName(lane.value[i]!)} in ${durationText(lane.from[i]! - us)}`;
 }
 
 export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]; us: number }) {

@@ -225,6 +225,11 @@ export function bodyRadius(frame: Frame, body: BodyFacts, smallest = SMALLEST_PX
 const FIGURE_REACH = 1.35;
 const LYING_REACH = 4;
 
+/** The radius with which somebody is drawn [px]: who lies is long, and so is drawn closer to life, to stay on the bed. */
+function figureRadius({ frame, smallest = SMALLEST_PX }: Pick<Scene, "frame" | "smallest">, body: BodyFacts, use: UseFacts | null): number {
+  return bodyRadius(frame, body, use?.posture === "lie" ? smallest / 2 : smallest);
+}
+
 /** A circle that holds the figure of somebody who is at home [px]; null where nobody is seen. */
 export function figureDisc(scene: Pick<Scene, "run" | "us" | "poses" | "frame" | "smallest">, body: BodyFacts): { x: number; y: number; radius: number } | null {
   const { run, us, poses, frame } = scene;
@@ -233,7 +238,7 @@ export function figureDisc(scene: Pick<Scene, "run" | "us" | "poses" | "frame" |
   const use = usePlace(run, body, pose, us);
   const reach = use?.posture === "lie" ? LYING_REACH : FIGURE_REACH;
   const [x, y] = use ? [frame.x(use.x), frame.y(use.y)] : [frame.ux(pose.x), frame.uy(pose.y)];
-  return { x, y, radius: reach * bodyRadius(frame, body, scene.smallest) };
+  return { x, y, radius: reach * figureRadius(scene, body, use) };
 }
 
 /** Farther than this from a place to use furniture, nobody uses it [m]; the same as in `fleet2d.viewing.postures`. */
@@ -259,9 +264,9 @@ const STEP_MS = 170;
 
 function drawBody(context: Context, scene: Scene, body: BodyFacts, pose: Pose): void {
   const { run, us, frame, colors, selected } = scene;
-  const radius = bodyRadius(frame, body, scene.smallest);
   const { color } = body;
   const use = usePlace(run, body, pose, us);
+  const radius = figureRadius(scene, body, use);
   const x = use ? frame.x(use.x) : frame.ux(pose.x);
   const y = use ? frame.y(use.y) : frame.uy(pose.y);
   const heading = use ? use.heading : angleOf(pose.heading);

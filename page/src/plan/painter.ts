@@ -4,6 +4,7 @@ import { bodyState } from "../panels/Now";
 import type { Layer } from "../data/layers";
 import type { Run } from "../data/run";
 import type { Pose } from "../data/tracks";
+import { doing } from "../data/words";
 import * as state from "../state";
 import { colors, scaleColor } from "../theme";
 import { Backdrop, type Stage } from "./backdrop";
@@ -229,7 +230,11 @@ export class PlanPainter {
     if (!name) return "";
     const us = state.moment.value;
     const now = bodyState(run, name, us);
-    if (now) return [name, now.room, now.activity, now.sees.length > 0 ? `sees ${now.sees.join(", ")}` : ""].filter(Boolean).join(" · ").replaceAll("_", " ");
+    if (now) {
+      const place = run.home.roomLabel(run.home.roomIndex(now.room));
+      const sees = now.sees.length > 0 ? `sees ${now.sees.join(", ")}` : "";
+      return [run.label(name), place, now.activity && doing(now.activity), sees].filter(Boolean).join(" · ");
+    }
     const room = run.facts.home.rooms[run.home.roomIndex(name)];
     if (room) {
       const [x, y] = this.frame!.place(px, py);

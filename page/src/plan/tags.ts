@@ -17,6 +17,8 @@ const SOFT = 8;
 /** Bodies nearer to each other than this share of a radius are on one spot. */
 const TOGETHER = 0.8;
 const EDGE = 2;
+/** The foot of a plan has a line of words, and the scale [px]. */
+const FOOT = 20;
 
 export interface TagScene {
   run: Run;
@@ -62,7 +64,7 @@ export class Tags {
     for (const { x, y, radius } of stacks) taken.push([x - radius, y - radius, x + radius, y + radius]);
     const { width, height } = scene;
     const isFree = (box: Box): boolean =>
-      box[0] > EDGE && box[1] > EDGE && box[2] < width - EDGE && box[3] < height - EDGE && !taken.some((other) => overlap(box, other));
+      box[0] > EDGE && box[1] > EDGE && box[2] < width - EDGE && box[3] < height - FOOT && !taken.some((other) => overlap(box, other));
     return stacks.map((stack) => {
       const name = stack.bodies[0]!.name;
       const words = stack.bodies.length > 1 ? `${scene.run.label(name)} +${stack.bodies.length - 1}` : scene.run.label(name);

@@ -255,6 +255,6 @@ function totalsOf(lane: Lane, from: number, to: number): string {
   return [...time]
     .sort((a, b) => b[1] - a[1])
     .slice(0, 8)
-    .map(([word, us]) => `${word.replaceAll("_", " ")} ${durationText(us)}`)
+    .map(([word, us]) => `${word.replaceAll("_", " ")}: ${durationText(us)}`)
     .join(", ");
 }

@@ -168,15 +168,15 @@ function roomLane(run: Run, name: string, prefix: string, group: Group): Lane {
     const deep = rooms[value]?.deep_color;
     return deep ? (dark.value ? mix(deep, "#16181c", 0.25) : deep) : null;
   };
-  const place = { id: `${prefix}${name}/room`, label: name, subject: name, group, height: 20, isMain: true };
-  return stretchLane(place, () => run.roomsOf(name), color, (value) => run.home.roomName(value));
+  const place = { id: `${prefix}${name}/room`, label: run.label(name), subject: name, group, height: 20, isMain: true };
+  return stretchLane(place, () => run.roomsOf(name), color, (value) => run.home.roomLabel(value));
 }
 
 /** A live run is known once a minute: shorter differences from it may be none. */
 const LIVE_MINIMUM_US = 61e6;
 
 function differenceLane(run: Run, other: Run, name: string, prefix: string, group: Group): Lane {
-  const place = { id: `${prefix}${name}/differs`, label: `${name}: rooms differ`, subject: name, group, height: 10, isMain: true };
+  const place = { id: `${prefix}${name}/differs`, label: `${run.label(name)}: rooms differ`, subject: name, group, height: 10, isMain: true };
   const minimum = Math.min(run.knownUs, other.knownUs) < Infinity ? LIVE_MINIMUM_US : 0;
   const apart = (): Stretches => longerThan(differences(run.roomsOf(name), other.roomsOf(name)), minimum);
   return stretchLane(place, apart, () => colors.value.alarm, () => "another room", () => 1);
@@ -199,7 +199,7 @@ function activityLane(run: Run, name: string, prefix: string, group: Group): Lan
       value: rows.map((row) => code.get(row.detail)!),
     };
   };
-  const place = { id: `${prefix}${name}/activity`, label: `${name} does`, subject: name, group, height: 16 };
+  const place = { id: `${prefix}${name}/activity`, label: `${run.label(name)} does`, subject: name, group, height: 16 };
   return stretchLane(place, stretches, (value) => wordColor(words[value] ?? ""), (value) => words[value] ?? "");
 }
 
@@ -208,7 +208,7 @@ function decisionLane(run: Run, name: string, prefix: string, group: Group): Lan
   const { us, behavior, reason } = run.decisions!.of(name)!;
   const stretches = (): Stretches => ({ from: us, to: us.map((_, i) => us[i + 1] ?? run.presentUs), value: us.map((_, i) => i) });
   const words = (i: number): string => [behavior[i], reason[i]].filter(Boolean).join(": ").replaceAll("_", " ");
-  const place = { id: `${prefix}${name}/decisions`, label: `${name}: behavior`, subject: name, group, height: 16 };
+  const place = { id: `${prefix}${name}/decisions`, label: `${run.label(name)}: behavior`, subject: name, group, height: 16 };
   return stretchLane(place, stretches, (i) => (behavior[i] ? wordColor(behavior[i]!) : null), words);
 }
 
@@ -221,7 +221,7 @@ function sightingLanes(run: Run, prefix: string): Lane[] {
       value: lane.false.map(Number),
     });
     const color = bodyColor(run.body(lane.user)?.color ?? "#0077bb");
-    const label = `${lane.robot} sees ${lane.user || "somebody"}`;
+    const label = `${run.label(lane.robot)} sees ${lane.user ? run.label(lane.user) : "somebody"}`;
     const words = (value: number): string => (value ? "false observation" : "noticed");
     const paint = (value: number): string => (value ? colors.value.alarm : color);
     const place = { id: `${prefix}${lane.robot}/sees/${lane.user}`, label, subject: lane.robot, group: "Robots" as const, height: 12 };
@@ -240,7 +240,7 @@ function eventLane(run: Run, body: BodyFacts, prefix: string, group: Group): Lan
     const row = rows()[lastAtMost(us(), at)];
     return row ? `${shownText(row)} (${run.clock.text(row.us)})` : "";
   };
-  const place = { id: `${prefix}${body.name}/events`, label: `${body.name} events`, subject: body.name, group, height: 12 };
+  const place = { id: `${prefix}${body.name}/events`, label: `${run.label(body.name)} events`, subject: body.name, group, height: 12 };
   return tickLane(place, us, bodyColor(body.color), words);
 }
 
@@ -280,7 +280,7 @@ function requestLanes(run: Run, prefix: string): Lane[] {
         to: requests().map((request) => request.to),
         value: requests().map((request) => request.outcome),
       }));
-      const place = { id: `${prefix}${name}/request/${text}`, label: `${name}: ${text}`, subject: name, group: "Robots" as const, height: 12 };
+      const place = { id: `${prefix}${name}/request/${text}`, label: `${run.label(name)}: ${text}`, subject: name, group: "Robots" as const, height: 12 };
       const lane = stretchLane(place, stretches, (value) => OUTCOME_COLORS[value]!, (value) => OUTCOMES[value]!, (value) => OPEN - value);
       const words = (us: number): string => {
         const request = requests()[lastAtMost(stretches().from, us)];
