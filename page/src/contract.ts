@@ -419,6 +419,7 @@ export const LOOK = {
         "breakfast",
         "cook",
         "dinner",
+        "supper",
         "lunch",
         "snack",
         "dishes",
