@@ -405,7 +405,9 @@ def _worst(study: StudyAnswers, metric: str) -> str:
 
 
 def _groups(study: StudyAnswers, metric: str, against: Mapping[str, Any] | None) -> str:
-    of = f"its difference to {next(iter(against.values()))}" if against else "it"
+    of = metric
+    if against:
+        of = f"the difference of {metric} to {next(iter(against.values()))}"
     found = groups(study, metric, against).sort("mean").to_dicts()
     if not found:
         return f"No group of homes or people was found in which {of} differs."
