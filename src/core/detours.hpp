@@ -1,7 +1,7 @@
 // Detours: shortest ways among walls that keep clear of round bodies, which stand in the way.
 //
-// Each body is an octagon around what has to be kept clear, and a way bends at corners of the space and of octagons. Only
-// bodies that are in the way count: of those that no way has hit so far, nothing is computed.
+// Each body is an octagon around what has to be kept clear, and a way bends at corners of the space and of octagons.
+// Only bodies that are in the way count: of those that no way has hit so far, nothing is computed.
 #pragma once
 
 #include <optional>
@@ -28,9 +28,9 @@ private:
     static i64 squared_gap(Point a, Point b) { return (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y); }
 };
 
-// The points of the shortest way from `start` to `goal` that keeps clear of all discs, by the corners of their octagons;
-// empty where there is none. Both ends are strictly inside the space. From a start that is too near to a disc, the way
-// leads away from it.
+// The points of the shortest way from `start` to `goal` that keeps clear of all discs, by the corners of their
+// octagons; empty where there is none. Both ends are strictly inside the space. From a start that is too near to a
+// disc, the way leads away from it.
 std::vector<Point> find_detour(const Mesh& mesh, const RouteGraph& graph, Point start, Point goal,
                                const std::vector<Disc>& discs);
 

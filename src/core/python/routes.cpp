@@ -127,8 +127,8 @@ Returns:
                     "place must be in a cell");
             require(0 <= slack && slack <= LIMIT, "slack must be in 0 to 2**20");
             const Floor floor{part_of_cell, part, room_of_cell, room};
-            const auto found = place_beside(floor, {place.first, place.second}, {from.first, from.second}, slack,
-                                            discs_of(discs));
+            const auto found =
+                place_beside(floor, {place.first, place.second}, {from.first, from.second}, slack, discs_of(discs));
             return found ? std::optional(std::pair(found->x, found->y)) : std::nullopt;
         },
         "part_of_cell"_a, "part"_a, "room_of_cell"_a, "room"_a, "place"_a, "start"_a, "slack"_a, "discs"_a,
