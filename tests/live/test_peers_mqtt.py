@@ -25,11 +25,21 @@ BROKER = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin"
 @pytest.fixture
 def mosquitto(tmp_path: Path) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
     """Start Mosquitto on a free port."""
-    if BROKER is None:
-        pytest.skip("mosquitto is not installed")
+    port = free_port()
+    with mosquitto_at(port, tmp_path) as process:
+        yield port, process
+
+
+def free_port() -> int:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+        return int(free.getsockname()[1])
+
+
+@contextlib.contextmanager
+def mosquitto_at(port: int, tmp_path: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    if BROKER is None:
+        pytest.skip("mosquitto is not installed")
     config = tmp_path / "mosquitto.conf"
     config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
     process = subprocess.Popen([BROKER, "-c", str(config)], stderr=subprocess.DEVNULL)
@@ -39,7 +49,7 @@ def mosquitto(tmp_path: Path) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]
                 if probe.connect_ex(("127.0.0.1", port)) == 0:
                     break
             time.sleep(0.05)
-        yield port, process
+        yield process
     finally:
         process.terminate()
         process.wait()
@@ -137,12 +147,27 @@ def test_goals_are_withdrawn_when_the_broker_is_gone(
     ]
 
 
-def test_no_broker_is_told() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with pytest.raises(InputError, match=f"mqtt://127.0.0.1:{port}: there is no broker"):
-        open_peer(f"mqtt://127.0.0.1:{port}")
+def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(
+    tmp_path: Path,
+) -> None:
+    port = free_port()
+    told: list[str] = []
+    peer = open_peer(f"mqtt://127.0.0.1:{port}/home")
+    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=5, tell=told.append)
+    thread = threading.Thread(target=bridge.run)
+    thread.start()
+    with mosquitto_at(port, tmp_path):
+        client = Client(port)
+        thread.join()
+        client.close()
+    assert f"mqtt://127.0.0.1:{port}: there is no broker yet; it is tried again" in told[0]
+    assert client.of("home/pose/ana")
+    assert client.of("home/status")[-2:] == ["online", "offline"]
+
+
+def test_an_unknown_host_of_a_broker_is_refused() -> None:
+    with pytest.raises(InputError, match=r"mqtt://no\.such\.host\.invalid:1883: "):
+        open_peer("mqtt://no.such.host.invalid")
 
 
 # Brokers that misbehave

@@ -144,6 +144,11 @@ def lose(post: Post, address: str) -> None:
     post(PeerFault("lost connections", f"{address}: the connection is tried again"))
 
 
+def missing(address: str, server: str) -> PeerFault:
+    """Return the fault of a server that isn't there when a run begins: maybe it comes later."""
+    return PeerFault("lost connections", f"{address}: there is no {server} yet; it is tried again")
+
+
 class Peer:
     """Another program, or a function: it may send messages to a run, and hear of it.
 

@@ -77,7 +77,7 @@ def live(
         for address, peer in opened.items():
             port = getattr(peer, "port", None)
             shown = re.sub(r"//.*@", "//", address)  # without a password
-            tell(f"{shown}: {'connected' if port is None else f'listens at {port}'}")
+            tell(f"{shown}: {'opened' if port is None else f'listens at {port}'}")
         bridge = Bridge(
             simulation, opened, speed, silence_s=silence, keeps_goals=keep_goals, tell=tell
         )

@@ -25,7 +25,7 @@ from fleet2d.configuration.units import parse_peer_address
 from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import InputError, errors_as, extra, os_errors_as, printable
-from fleet2d.live.bridge import LiveStep, Peer, PeerFault, Post, lose, sources_of
+from fleet2d.live.bridge import LiveStep, Peer, PeerFault, Post, lose, missing, sources_of
 from fleet2d.live.goals import GoalStatus
 from fleet2d.live.messages import MAX_BYTES
 from fleet2d.runs.run import Run
@@ -51,7 +51,7 @@ DEVICE_CLASSES = {
 WAIT_S = 5.0
 # So many programs that sent datagrams are told of goals.
 MAX_SENDERS = 16
-# Of more messages before a run, the last ones count.
+# Of more messages before a run, the last ones count; so many are kept for a broker that is gone.
 MAX_EARLY = 1000
 
 
@@ -347,10 +347,10 @@ class MqttPeer(Peer):
         user: str | None = None,
         password: str | None = None,
     ) -> None:
-        """Connect to a broker.
+        """Connect to a broker; where none listens yet, the connection is tried again.
 
         Raises:
-            InputError: There is no broker at the address, it refuses, or it doesn't answer; or
+            InputError: There is no such machine, the broker refuses, or it doesn't answer; or
                 paho-mqtt isn't installed.
         """
         with extra("mqtt", "mqtt:// needs paho-mqtt"):
@@ -365,14 +365,30 @@ class MqttPeer(Peer):
         self._post: Post | None = None
         self._early: deque[bytes] = deque(maxlen=MAX_EARLY)  # what arrives before the run begins
         self._client: Any = Client(CallbackAPIVersion.VERSION2)
+        self._client.max_queued_messages_set(MAX_EARLY)  # while there is no broker
         self._client.username_pw_set(user, password)
         self._client.will_set(f"{prefix}/status", "offline", retain=True)
         self._client.on_connect = self._greet
         self._client.on_subscribe = self._subscribed
         self._client.on_message = lambda *args: self._receive(args[-1].payload)
-        with os_errors_as(InputError, f"{self._address}: there is no broker"):
+        self._is_missing = False
+        try:
             self._client.connect(host, port)
+        except (ConnectionError, TimeoutError):
+            self._is_missing = True
+            self._client.connect_async(host, port)
+        except OSError as error:
+            raise InputError(f"{self._address}: {error.strerror or error}") from error
         self._client.loop_start()
+        if not self._is_missing:
+            self._await_answer()
+
+    def _await_answer(self) -> None:
+        """Wait until the broker takes the subscription.
+
+        Raises:
+            InputError: It refuses, or it doesn't answer.
+        """
         try:
             refusal = self._answers.get(timeout=WAIT_S)
         except queue.Empty:
@@ -414,6 +430,8 @@ class MqttPeer(Peer):
         self._post = post
         while self._early:
             post(self._early.popleft())
+        if self._is_missing:
+            post(missing(self._address, "broker"))
         self._client.on_disconnect = lambda *_: lose(post, self._address)
         for name, item in simulation.scenario.objects.items():
             if isinstance(item, Sensor):

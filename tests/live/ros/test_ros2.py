@@ -1,5 +1,6 @@
 """ROS 2 over zenoh: another node hears the run, drives its robot, and sends, cancels and loses goals."""
 
+import json
 import math
 import os
 import threading
@@ -341,3 +342,37 @@ def test_a_wrong_domain_is_told(text: str, monkeypatch: pytest.MonkeyPatch) -> N
 def test_nothing_at_another_machine_is_told() -> None:
     with pytest.raises(InputError, match=r"ros2://127\.0\.0\.2:9: "):
         open_peer("ros2://127.0.0.2:9")
+
+
+def test_a_router_of_another_machine_that_is_missing_is_told_and_found_once_it_is_there() -> None:
+    from fleet2d.live.ros.zenoh_node import ZenohNode
+
+    port = next(_ports)
+    here = ZenohNode(RosTypes("jazzy"), "127.0.0.2", port)  # no name of this machine
+    assert [note.split(": ")[1] for note in here.notes] == [
+        "no router of zenoh answers there yet; it is tried again"
+    ]
+    router = zenoh_router(f"tcp/127.0.0.2:{port}")
+    there = ZenohNode(RosTypes("jazzy"), "127.0.0.2", port)
+    assert not there.notes
+    heard: list[dict[str, Any]] = []
+    there.subscribe("/clock", TOPICS["/clock"], heard.append, pytest.fail)
+    publish = here.publisher("/clock", TOPICS["/clock"])
+    until = time.monotonic() + 20
+    while not heard and time.monotonic() < until:
+        publish({"clock": {"sec": 1, "nanosec": 0}})
+        time.sleep(0.05)
+    for each in (here, there, router):
+        each.close()
+    assert heard
+
+
+def zenoh_router(endpoint: str) -> Any:
+
+    import zenoh
+
+    config = zenoh.Config()
+    config.insert_json5("mode", '"router"')
+    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)

@@ -4,6 +4,7 @@ Subscribed, for each body: `/NAME/goal_pose` and `/NAME/pose` in the frame `map`
 `/NAME/cmd_vel`. What becomes of a goal is on `/NAME/goal_state`, as JSON.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator
 from functools import cache, partial
@@ -12,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from fleet2d.engine.simulation import Simulation
-from fleet2d.errors import InputError, extra
-from fleet2d.live.bridge import Content, LiveStep, Peer, Post, lose
+from fleet2d.errors import extra
+from fleet2d.live.bridge import Content, LiveStep, Peer, Post, lose, missing
 from fleet2d.live.ros.reading import POSE, TWISTS, contents_of, velocities_of
 from fleet2d.live.ros.topics import RosTopics
 from fleet2d.runs.run import Run
@@ -25,10 +26,10 @@ class RosbridgePeer(Peer):
     """A rosbridge server, such as that of the ROS package `rosbridge_server`."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Connect to a server.
+        """Connect to a server; where there is none yet, the connection is tried again.
 
         Raises:
-            InputError: There is no server at the address, or roslibpy isn't installed.
+            InputError: roslibpy isn't installed.
         """
         with extra("rosbridge", "rosbridge:// needs roslibpy"):
             import roslibpy
@@ -37,11 +38,8 @@ class RosbridgePeer(Peer):
         self._address = f"rosbridge://{host}:{port}"
         _quiet_twisted()
         self._ros = roslibpy.Ros(host=host, port=port)
-        try:
+        with contextlib.suppress(self._library.core.RosTimeoutError):
             self._ros.run(timeout=WAIT_S)
-        except Exception as error:
-            self._ros.close()
-            raise InputError(f"{self._address}: there is no server: {error}") from error
         self._topics: dict[str, Any] = {}
         self._subscribed: list[Any] = []
 
@@ -49,6 +47,8 @@ class RosbridgePeer(Peer):
         """Advertise and subscribe."""
         self._messages = RosTopics(simulation)
         self._simulation = simulation
+        if not self._ros.is_connected:
+            post(missing(self._address, "server"))
         self._ros.on("close", lambda *_: lose(post, self._address))
         for topic in self._messages.all:
             self._advertise(topic.name, topic.type, is_latched=topic.is_latched)
@@ -89,7 +89,9 @@ class RosbridgePeer(Peer):
             self._topics[topic.name].publish(_as_json(message))
 
     def send(self, frame: LiveStep) -> None:
-        """Publish a frame."""
+        """Publish a frame; without a server, roslibpy would keep all of them."""
+        if not self._ros.is_connected:
+            return
         for topic, message in self._messages.of(frame):
             self._topics[topic.name].publish(_as_json(message))
         for goal in frame.goals:

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from fleet2d.errors import InputError, extra
+from fleet2d.errors import extra
 from fleet2d.live.ros.node import LATCHED, USUAL, ActionGoal, Fields, Quality
 from fleet2d.live.ros.types import RosTypes, wire_name
 from fleet2d.live.ros.zenoh_action import ZenohAction
@@ -50,9 +50,10 @@ class ZenohNode:
     ) -> None:
         """Join the graph: by the router at an address, or as the router of this machine.
 
+        Where no router of another machine answers, the connection is tried again.
+
         Raises:
-            InputError: There is no router at an address of another machine, or eclipse-zenoh isn't
-                installed.
+            InputError: eclipse-zenoh isn't installed.
         """
         with extra("ros2", "ros2:// needs eclipse-zenoh and xxhash"):
             import xxhash
@@ -81,21 +82,23 @@ class ZenohNode:
             except self._zenoh.ZError:  # the port is taken: by a router, hopefully
                 endpoint = f"tcp/127.0.0.1:{port}"
         try:
-            session = self._zenoh.open(self._config("peer", connects=endpoint))
+            return self._zenoh.open(self._config("peer", connects=endpoint)), False
         except self._zenoh.ZError:
-            raise InputError(
-                f"ros2://{host}:{port}: no router of zenoh answers there: start one, such as"
-                " ros2 run rmw_zenoh_cpp rmw_zenohd"
-            ) from None
-        return session, False
+            self.notes.append(
+                f"ros2://{host}:{port}: no router of zenoh answers there yet; it is tried again:"
+                " start one, such as ros2 run rmw_zenoh_cpp rmw_zenohd"
+            )
+        return self._zenoh.open(self._config("peer", connects=endpoint, waits=False)), False
 
-    def _config(self, mode: str, *, listens: str = "", connects: str = "") -> Any:
+    def _config(
+        self, mode: str, *, listens: str = "", connects: str = "", waits: bool = True
+    ) -> Any:
         config = self._zenoh.Config()
         values: dict[str, Any] = {
             "mode": mode,
             "connect/endpoints": [connects] if connects else [],
-            "connect/timeout_ms": 3000,
-            "connect/exit_on_failure": True,
+            "connect/timeout_ms": 3000 if waits else -1,
+            "connect/exit_on_failure": waits,
             "listen/endpoints": [listens or "tcp/127.0.0.1:0"],
             "scouting/multicast/enabled": False,
             "scouting/gossip/enabled": True,
