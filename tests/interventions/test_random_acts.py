@@ -299,4 +299,5 @@ def test_no_sequence_of_interventions_makes_a_run_fail(seed: int) -> None:
     run = simulation.run()
     assert "complete" == run.status
     assert applied > 60
-    assert all(" was left out: " in note for note in run.manifest["notes"])
+    expected = (" was left out: ", " walked into it ")  # somebody was put before a robot
+    assert all(any(words in note for words in expected) for note in run.manifest["notes"])

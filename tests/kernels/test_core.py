@@ -433,6 +433,11 @@ def region(x: int = 200, y: int = 200) -> tuple[Any, Any]:
     return right, wall
 
 
+def discs() -> Any:
+    """Return a body that stands."""
+    return np.array([[500, 500, 100]])
+
+
 def corners() -> Corners:
     vertex = np.flatnonzero((MESH.vertices[:, 0] == 500) | (MESH.vertices[:, 0] == 640))
     place = MESH.vertices[vertex]
@@ -604,6 +609,17 @@ CALLS: dict[str, Args] = {
     ),
     "Routes": lambda: (MESH, corners()),
     "Routes.find": lambda: (_core.Routes(MESH, corners()), 100, 500, 1000, 500),
+    "Routes.around": lambda: (_core.Routes(MESH, corners()), 100, 500, 1000, 500, discs()),
+    "place_beside": lambda: (
+        np.zeros((20, 20), np.int32),
+        0,
+        np.zeros((20, 20), np.int16),
+        -1,
+        (100, 100),
+        (50, 60),
+        200,
+        discs(),
+    ),
     "distance": lambda: (1, 2, 3, 4),
     "advance": lambda: (np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), 5),
     "DayPlanner": day_plan,
@@ -785,6 +801,7 @@ CALLS: dict[str, Args] = {
     "Timelines.meeting_on": lambda: (timelines(), 0, track(), kept(1), 3, 9),
     "Timelines.meeting_at_rest": lambda: (timelines(), 0, kept(1), 3, 9),
     "Timelines.rests": lambda: (timelines(), 0, 3, 9),
+    "Timelines.standing": lambda: (timelines(), 0, 3, 2, np.array([300, 300])),
     "Timelines.way_after_a_wait": lambda: (timelines(), 0, 3, np.array([1, 2]), kept(1), 9),
     "Timelines.way_by_a_place": lambda: (
         timelines(),
@@ -1091,6 +1108,7 @@ COUNTS: set[tuple[str, Path_]] = {
     ("Timelines", (0,)),
     ("Timelines.pose", (2,)),
     ("Timelines.poses", (1,)),
+    ("Timelines.standing", (2,)),
     ("Timelines.window", (2,)),
     ("Timelines.runs", (3,)),
 }

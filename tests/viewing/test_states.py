@@ -70,7 +70,7 @@ def test_run_that_starts_at_any_minute_keeps_its_clock(browser: Any, tmp_path: P
 
 @pytest.mark.slow
 def test_ten_robots_on_one_spot_are_ten(browser: Any, tmp_path: Path) -> None:
-    simulation = {**START, "duration": "8 h"}
+    simulation = {**START, "duration": "8 h", "ghosts": True}
     fleet2d.run({**HOME, "simulation": simulation, "robots": TEN}, out=tmp_path / "run")
     at = "#at=2026-01-05T07:00:00"
     with served(tmp_path / "run") as address, page_at(browser, address + at) as page:

@@ -35,7 +35,8 @@ TrackPiece piece_of(const Breakpoints& track) {
 
 namespace {
 
-constexpr i64 FAR = i64{1} << 29;  // where a random walk is, and its headings, are nearer to 0
+constexpr i64 FAR = i64{1} << 29;            // where a random walk is, and its headings, are nearer to 0
+constexpr i64 MOST_STANDING = i64{1} << 20;  // steps for which others stand: a random walk is drawn for so long
 constexpr const char* NO_STATE = "this is no state of timelines";
 
 // A part of a state that isn't an array.
@@ -190,7 +191,7 @@ public:
     }
 
     Array<i64, 2> standing(i64 row, i64 step, i64 steps, View<const i64> reach) {
-        require(0 < steps && steps <= FAR, "steps must be 1 or more");
+        require(0 < steps && steps <= MOST_STANDING, "steps must be from 1 to 2**20");
         require(reach.size() == timelines_.bodies() && all_in_range(reach, 0, FAR),
                 "reach must be (bodies,), and small");
         for (i64 body = 0; body < timelines_.bodies(); ++body) {

@@ -116,7 +116,8 @@ def _searches(robot: str, searches: Sequence[dict[str, Any]]) -> Iterator[str]:
             ends.setdefault(search["user"], Counter())[search["end"]] += 1
     for user, counts in ends.items():
         name = _title(user)
-        sentence = f"{_title(robot)} found {name} in {counts['found']} of {counts.total()} searches"
+        found = counts[EventKind.FOUND]
+        sentence = f"{_title(robot)} found {name} in {found} of {counts.total()} searches"
         if counts["false"]:
             sentence += f", and took somebody else for {name} in {counts['false']}"
         yield f"{sentence}."
