@@ -115,7 +115,11 @@ i64 last_breakpoint(View<const i64> time, i64 moment) {
 
 bool is_traceable(const Breakpoints& track) {
     const auto is_small = [](i64 number, i64 most) { return -most <= number && number <= most; };
-    for (i64 i = 0; i < track.size(); ++i) {
+    const i64 count = track.size();
+    for (const i64 size : {track.x.size(), track.y.size(), track.heading.size(), track.away.size()}) {
+        if (size != count) return false;
+    }
+    for (i64 i = 0; i < count; ++i) {
         if (!is_small(track.time[i], LATEST) || !is_small(track.x[i], FARTHEST) || !is_small(track.y[i], FARTHEST) ||
             !is_small(track.heading[i], FARTHEST)) {
             return false;

@@ -44,7 +44,7 @@ i64 last_breakpoint(View<const i64> time, i64 moment);
 inline constexpr i64 LATEST = i64{1} << 61;
 inline constexpr i64 FARTHEST = i64{1} << 40;
 
-// Whether the times ascend and nothing in the track is too large to be interpolated.
+// Whether all arrays have one length, the times ascend, and nothing is too large to be interpolated.
 bool is_traceable(const Breakpoints& track);
 
 // Write the poses at times begin, begin + step, ... [us] to `out`. The track is traceable.

@@ -75,3 +75,12 @@ def test_charge_rises_to_full_only_at_a_charger_that_works() -> None:
 def test_impossible_battery_is_refused(state: BatteryState) -> None:
     with pytest.raises(ValueError, match="must be"):
         charge_at(track_of([(0, 0, 0, 0)]), state, 0)
+
+
+def test_a_track_whose_arrays_differ_in_length_is_refused() -> None:
+    """A damaged call read headings behind the end of their array."""
+    track = track_of([(10, 100, 0, 0)])
+    for field in ("x", "y", "heading", "away"):
+        damaged = track._replace(**{field: getattr(track, field)[:0]})
+        with pytest.raises(ValueError, match="its arrays have one length"):
+            charge_falls_to(damaged, battery(0.5), 0.1)

@@ -11,7 +11,8 @@ inline constexpr std::size_t border::members_of<BatteryState> = 8;
 namespace {
 
 void check(const Breakpoints& track, const BatteryState& battery) {
-    require(is_traceable(track), "the times of a track must ascend, and all its numbers be small enough");
+    require(is_traceable(track),
+            "the times of a track must ascend, its arrays have one length, and all its numbers be small enough");
     require(0 <= battery.level && battery.level <= 1, "level must be 0 to 1");
     require(-LATEST <= battery.since_us && battery.since_us <= LATEST, "since_us must be at most 2**61");
     const auto is_rate = [](f64 rate) { return 1e-18 < rate && rate <= 1; };  // a moment of a level fits in 64 bits
