@@ -339,11 +339,6 @@ def test_a_wrong_domain_is_told(text: str, monkeypatch: pytest.MonkeyPatch) -> N
         domain_of_environment()
 
 
-def test_nothing_at_another_machine_is_told() -> None:
-    with pytest.raises(InputError, match=r"ros2://127\.0\.0\.2:9: "):
-        open_peer("ros2://127.0.0.2:9")
-
-
 def test_a_router_of_another_machine_that_is_missing_is_told_and_found_once_it_is_there() -> None:
     from fleet2d.live.ros.zenoh_node import ZenohNode
 
