@@ -158,6 +158,7 @@ class ExternalProgram:
     ) -> Answer:
         if blocks:
             content = {**content, "blocks": [[name, len(data)] for name, data in blocks.items()]}
+        self._take_arrived()
         if self._unread:
             raise self._failure(f"wrote {bytes(self._unread[:80])!r} without being asked")
         message = json.dumps(content).encode() + b"\n" + b"".join(blocks.values())
@@ -188,6 +189,13 @@ class ExternalProgram:
             said = f" ({text})" if text else ""
             raise self._failure(f"answered {kind!r}{said} to {content['type']!r}, not {expected!r}")
         return answer
+
+    def _take_arrived(self) -> None:
+        """Take what has arrived since the last answer, so that it isn't taken for the next one."""
+        with contextlib.suppress(Empty):
+            while part := self._parts.get_nowait():
+                self._unread += part
+            self._parts.put(part)  # the end, which the next answer has to meet
 
     def _transfer(self, message: bytes) -> Answer | None:
         """Write a message, and read the answer; return None if the program has ended.
