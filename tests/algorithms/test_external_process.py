@@ -5,6 +5,7 @@ import json
 import pickle
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import fleet2d
 from fleet2d import Algorithm, RoomDistribution
 from fleet2d.configuration.trust import running_code
 from fleet2d.errors import ComponentError, InputError
+from fleet2d.runtime.program import ExternalProgram
 
 PROGRAMS = Path(__file__).parents[2] / "examples" / "programs"
 
@@ -150,6 +152,16 @@ def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: s
 
     assert "algorithms.share" in str(caught.value)
     assert message in str(caught.value)
+
+
+def test_what_comes_between_two_answers_is_not_taken_for_the_next_one(tmp_path: Path) -> None:
+    """A line that came late, of a thread's own, was the answer to the next question."""
+    late = "say({'type': 'none'}); time.sleep(0.05); say({'type': 'none'})"
+    asked = ExternalProgram(program(tmp_path, late), [], 5.0, {})
+    asked.ask({"type": "update"})
+    time.sleep(0.5)
+    with pytest.raises(ComponentError, match="without being asked"):
+        asked.ask({"type": "update"})
 
 
 @pytest.mark.slow
