@@ -221,9 +221,8 @@ REACH_S = 1200
 TAKES_UP = 4
 MIN_EPISODE_S = 30  # minimum duration of an episode that was recorded with at least as much
 END = "end"
-NO_SLEEP_S = (
-    60  # a recorded day that ends with no more sleep than this ends up, or out for the night
-)
+# A recorded day that ends with no more sleep than this ends up, or out for the night [s].
+NO_SLEEP_S = 60
 
 
 class RecordedDay(NamedTuple):

@@ -86,7 +86,7 @@ _COSTS: dict[str, dict[str, float]] = {
     },
 }  # fmt: skip
 _PAIRS = {(a, b): cost for a, row in _COSTS.items() for b, cost in row.items()}
-# As in old flats; only where homes vary.
+# Links that old flats have, and that homes have only where they vary.
 _RARE_PAIRS = {
     ("bathroom", "kitchen"): 1.5,
     ("toilet", "kitchen"): 2.0,
