@@ -13,6 +13,8 @@ from tests.scenes import scenario as of_ghosts
 from tests.thorough import some
 
 import fleet2d
+from fleet2d.engine.yielding import Yielding
+from fleet2d.entities.behavior import Situation
 from fleet2d.errors import ScenarioError
 from fleet2d.runs.run import Run
 from fleet2d.runtime.determinism import Draws
@@ -201,6 +203,40 @@ def test_who_yields_is_a_rule_that_can_be_replaced() -> None:
     assert {"butler"} == yields("low_battery")
     with pytest.raises(ScenarioError, match="low_batery"):
         yields("low_batery")
+
+
+def yielding_of(simulation: fleet2d.Simulation) -> Yielding:
+    """What lets the robots of a run yield."""
+    found = simulation._state.yielding
+    assert found is not None
+    return found
+
+
+def test_the_second_of_two_blocked_robots_does_not_swap_the_right_of_way_back() -> None:
+    """Each of two that blocked the other ended the deadlock, a second apart, and so none did."""
+    robots = {"butler": robot([1, 3]), "guard": robot([4, 3])}
+    yielding = yielding_of(fleet2d.Simulation(scenario("1 min", robots=robots)))
+    before = yielding._first_now(0)
+    yielding._swap(0, 1, 0)
+    yielding._swap(1, 0, 1)
+    assert (yielding._first_now(1) != before).any()
+    yielding._swap(1, 0, 10)
+    assert (yielding._first_now(10) == before).all()
+
+
+def test_who_goes_first_drives_round_another_one_that_stands() -> None:
+    """It stopped before it every two seconds, until the deadlock was ended."""
+    robots = {"butler": robot([1, 3], [4, 3], 60.0), "guard": robot([2, 3])}
+    simulation = fleet2d.Simulation(scenario("1 min", robots=robots))
+    simulation.advance(1)
+    butler = simulation._state.actors[0]
+    now = Situation(butler, simulation.step, (), {})
+    ((_, plan),) = yielding_of(simulation)._plans(now, simulation.step, 1)
+    track = plan.finish().breakpoints
+    goal = butler.home.plan.lattice.point_at((4.0, 3.0))
+    assert (int(track.x[-1]), int(track.y[-1])) == goal
+    stands = (np.diff(track.x) == 0) & (np.diff(track.y) == 0) & (np.diff(track.time) >= 2_000_000)
+    assert not stands[:2].any()
 
 
 # --- Random homes ------------------------------------------------------------------------------
