@@ -25,14 +25,14 @@ from fleet2d.viewing.page_server import PageServer
 from fleet2d.viewing.pictures.run import draw_run
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-DAY = "simulation.duration=1 d"
 CHROMIUM = "/usr/bin/chromium"
 PAGE = {"width": 1440, "height": 900}  # of the still picture of the page [px]
 FILM = {"width": 1368, "height": 1000}  # of a page whose plan is 1,000 pixels wide [px]
 FRAMES_PER_S = 10
+SHOWN_DAY = 15  # of the month: by then the robot knows who is where at which hours
 # What the film shows of the day, and for how many seconds of the film.
 SCENES = ((7.2, 8.4, 9), (17.9, 18.9, 8), (21.5, 23.0, 3))
-STILL_H = 18.75
+STILL_H = 18.65
 
 
 def main() -> None:
@@ -41,28 +41,27 @@ def main() -> None:
     subprocess.run([sys.executable, "-m", "tools.tutorials"], check=True)
     month = fleet2d.run("bundled:family")
     draw_run(month, IMAGES / "month.png")
-    day = fleet2d.run("bundled:family", DAY)
     draw_page(month, IMAGES / "page.png")
-    film_page(day, IMAGES / "day.webp")
-    shown = {"day.webp": day, "month.png": month, "page.png": month}
-    digests = {name: run.digest for name, run in shown.items()}
+    film_page(month, IMAGES / "day.webp")
+    digests = dict.fromkeys(("day.webp", "month.png", "page.png"), month.digest)
     (IMAGES / "digests.json").write_text(json.dumps(digests, indent=2) + "\n", encoding="utf-8")
 
 
 def draw_page(run: Run, path: Path) -> None:
-    """Write a picture of the page of a run, at an evening of its last week."""
-    evening = run.clock.start + timedelta(days=25, hours=STILL_H)
+    """Write a picture of the page of a run, at an evening."""
+    evening = run.clock.start + timedelta(days=SHOWN_DAY - 1, hours=STILL_H)
     (picture,) = pictures_of(run, [f"at={evening:%Y-%m-%dT%H:%M:%S}"], PAGE, "body")
     picture.save(path, optimize=True)
 
 
 def film_page(run: Run, path: Path) -> None:
     """Write a film of the plan on the page: some scenes of a day."""
+    midnight = run.clock.start + timedelta(days=SHOWN_DAY - 1)
     moments = []
     for begin_h, end_h, film_s in SCENES:
         frames = film_s * FRAMES_PER_S
         hours = (begin_h + (end_h - begin_h) * i / frames for i in range(frames))
-        moments += [run.clock.start + timedelta(hours=hour) for hour in hours]
+        moments += [midnight + timedelta(hours=hour) for hour in hours]
     views = [
         f"at={moment:%Y-%m-%dT%H:%M:%S}&show=names,furniture,sight,lights,ways"
         for moment in moments
