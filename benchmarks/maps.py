@@ -360,7 +360,7 @@ def of_vacuum(path: Path) -> Captured:
     r, c = np.mgrid[row : row + rows, column : column + columns]
     inside = (r >= 0) & (c >= 0) & (r < plan.lattice.rows) & (c < plan.lattice.columns)
     cells = np.where(inside, r * plan.lattice.columns + c, -1)
-    unknown = [room.index for room in segments.rooms if room.name == "unknown_0"]
+    unknown = [room.index for room in segments.rooms if room.name == "unknown_1"]
     truth = segments.room_of_cell.astype(np.int64)
     truth[np.isin(truth, unknown)] = -1
     return Captured("vacuum", path.stem, plan, truth, cells)

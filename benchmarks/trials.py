@@ -30,7 +30,7 @@ EVENING = {
             ],
         }
     },
-    "objects": {"bath_door": {"type": "door", "doorway": "bathroom_1", "open": True}},
+    "objects": {"bath_door": {"type": "door", "doorway": "bathroom_2", "open": True}},
 }
 
 

@@ -101,8 +101,8 @@ def test_sums_of_a_wrong_width_name_the_line_of_the_user() -> None:
 
 def test_shutting_a_doorway_without_a_door_says_how_to_hang_one() -> None:
     content = {**scenario("1 min"), "floorplan": {"type": "bundled"}}
-    content["script"] = [{"at": "10 s", "shut": "bathroom_0"}]
-    with pytest.raises(InputError, match=r"objects: \{bathroom_0: \{type: door, doorway: bed"):
+    content["script"] = [{"at": "10 s", "shut": "bathroom_1"}]
+    with pytest.raises(InputError, match=r"objects: \{bathroom_1: \{type: door, doorway: bed"):
         Simulation(content)
 
 

@@ -170,8 +170,8 @@ def test_gaps_are_of_every_room_and_day(measured: dict[str, Result]) -> None:
     numbers = measured["ltp-gap"].numbers
     assert 2 == len(numbers["gaps"])
     assert {2} == {len(line) for robot in numbers["gaps"] for line in robot.values()}
-    mean = np.mean([robot["kitchen_0"] for robot in numbers["gaps"]], axis=0)
-    assert mean.tolist() == pytest.approx(numbers["mean"]["kitchen_0"])
+    mean = np.mean([robot["kitchen_1"] for robot in numbers["gaps"]], axis=0)
+    assert mean.tolist() == pytest.approx(numbers["mean"]["kitchen_1"])
     overall = numbers["all_rooms"]
     assert all(
         low <= mean <= high
@@ -318,7 +318,7 @@ def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Output]) ->
     assert 0 == code
     assert "Fig. 7 left" in out
     assert "the paper's figure" in out
-    assert "living_room_0" in out
+    assert "living_room_1" in out
     names = sorted(path.name for path in Path("paper").iterdir())
     assert ["ltp-gap.json", "ltp-gap.png", "studies"] == names
     assert 2 == json.loads(Path("paper/ltp-gap.json").read_text(encoding="utf-8"))["days"]

@@ -23,8 +23,8 @@ SCENARIO: dict[str, Any] = {
     "simulation": {"duration": {"days": 1}, "seed": 11},
     "floorplan": {"layers": {"explored": {}}},
     "objects": {
-        "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
-        "office_door": {"type": "door", "doorway": "office_0", "open": False},
+        "bath_door": {"type": "door", "doorway": "bathroom_1", "closes_after": "10 s"},
+        "office_door": {"type": "door", "doorway": "office_1", "open": False},
     },
 }
 STEPS = 200

@@ -16,7 +16,7 @@ from fleet2d.live import Bridge, LiveStep, from_iterator, to_function
 HOME: dict[str, Any] = {
     "extends": "bundled:paper",
     "simulation": {"start": "2026-01-05T09:00", "duration": "9 min"},
-    "robots": {"astro": {"start": "hallway_0", "behaviors": [{"type": "live"}]}},
+    "robots": {"astro": {"start": "hallway_1", "behaviors": [{"type": "live"}]}},
 }
 DOMAIN = """(define (domain errands) (:requirements :strips)
   (:predicates (at ?r) (next ?a ?b) (in ?t ?r) (done ?t))
@@ -28,7 +28,7 @@ doors = [door.name.split("-") for door in simulation.home.plan.doorways]
 ways = " ".join(f"(next {a} {b}) (next {b} {a})" for a, b in doors)
 rooms = " ".join(room.name for room in simulation.home.rooms)
 PROBLEM = f"""(define (problem today) (:domain errands) (:objects {rooms} plants oven)
-  (:init (at hallway_0) (in plants living_room_0) (in oven kitchen_0) {ways})
+  (:init (at hallway_1) (in plants living_room_1) (in oven kitchen_1) {ways})
   (:goal (and (done plants) (done oven))))"""
 
 with tempfile.TemporaryDirectory() as folder:

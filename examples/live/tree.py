@@ -41,10 +41,10 @@ class Sees(Behaviour):
 
 
 looks = [
-    Sequence(f"in {room}", True, [GoTo(room), Sees("ana")]) for room in ("kitchen_0", "bedroom_0")
+    Sequence(f"in {room}", True, [GoTo(room), Sees("ana")]) for room in ("kitchen_1", "bedroom_1")
 ]
 search = Selector("search", True, looks)
-tree = BehaviourTree(Sequence("find", True, [search, GoTo("hallway_0")]))
+tree = BehaviourTree(Sequence("find", True, [search, GoTo("hallway_1")]))
 
 
 def tick(frame: LiveStep) -> None:

@@ -52,7 +52,7 @@ describe("lanes of requests", async () => {
     [1505, "accepted", "pill ana"],
     [2000, "due", "song ana"],
     [2300, "asks", "song ana"],
-    [2305, "sent_away", "song ana kitchen_0"],
+    [2305, "sent_away", "song ana kitchen_1"],
     [3000, "due", "song ana"],
     [3100, "asks", "song ana"],
     [3105, "deferred", "song ana"],

@@ -8,7 +8,7 @@ import type { Run } from "../src/data/run";
 import { keptOut } from "../src/plan/kept_out";
 import { wholeRun } from "./fixture";
 
-const SOFA: ObjectFacts = { name: "sofa_0", type: "sofa", outline: [[0, 0], [2, 0], [2, 1], [0, 1]], middle: [1, 0.5], symbol: 0, blocks: "path", front: 0, uses: [] };
+const SOFA: ObjectFacts = { name: "sofa_1", type: "sofa", outline: [[0, 0], [2, 0], [2, 1], [0, 1]], middle: [1, 0.5], symbol: 0, blocks: "path", front: 0, uses: [] };
 const moves = (...rows: [number, string][]): MovedObjects => new MovedObjects([SOFA], rows.map(([us, detail]) => ({ us, detail }) as EventRow));
 
 test.each([
@@ -17,11 +17,11 @@ test.each([
   [19, [4, 3]],
   [20, [-1, 0.25]],
 ])("at %d us the middle is at %j", (us, middle) => {
-  expect(moves([10, "sofa_0 to (4, 3)"], [15, "piano to (9, 9)"], [20, "sofa_0 to (-1.0, 2.5e-1)"]).at(us)[0]!.middle).toEqual(middle);
+  expect(moves([10, "sofa_1 to (4, 3)"], [15, "piano to (9, 9)"], [20, "sofa_1 to (-1.0, 2.5e-1)"]).at(us)[0]!.middle).toEqual(middle);
 });
 
 test("the outline moves with the middle, and what was given stays", () => {
-  expect(moves([10, "sofa_0 to (4, 3)"]).at(10)[0]!.outline).toEqual([[3, 2.5], [5, 2.5], [5, 3.5], [3, 3.5]]);
+  expect(moves([10, "sofa_1 to (4, 3)"]).at(10)[0]!.outline).toEqual([[3, 2.5], [5, 2.5], [5, 3.5], [3, 3.5]]);
   expect(SOFA.outline[0]).toEqual([0, 0]);
 });
 

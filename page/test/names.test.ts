@@ -12,7 +12,7 @@ async function home(rooms: Record<string, string>, seen: [robot: string, user: s
   const body = run.bodies[0]!;
   const named = (name: string, robot: boolean) => ({ ...body, name, robot });
   run.facts.bodies = [...Object.keys(rooms).map((name) => named(name, false)), ...robots.map((name) => named(name, true))];
-  run.facts.home = { ...run.facts.home, rooms: ["K", "B"].map((name, i) => ({ ...run.facts.home.rooms[i]!, name: name === "K" ? "kitchen_0" : "in", type: name === "K" ? "kitchen" : "bath_room" })) };
+  run.facts.home = { ...run.facts.home, rooms: ["K", "B"].map((name, i) => ({ ...run.facts.home.rooms[i]!, name: name === "K" ? "kitchen_1" : "in", type: name === "K" ? "kitchen" : "bath_room" })) };
   Object.assign(run.home, { facts: run.facts.home });
   Object.assign(run.facts, { end_step: 4 * 3600 });
   run.rooms.clear();
@@ -39,7 +39,7 @@ describe("names", async () => {
     ["anna in kitchen", [[2, 4]]],
     ["ann lee in kitchen", [[0, 1], [2, 3]]],
     ["ANN_LEE in Kitchen", [[0, 1], [2, 3]]],
-    ["x-1 in kitchen_0", [[0, 1]]],
+    ["x-1 in kitchen_1", [[0, 1]]],
     ["Bob in kitchen", [[0, 1]]],
     ["bob in kitchen", [[1, 2]]],
     ["seen in kitchen", [[0, 2]]],

@@ -7,11 +7,11 @@ const room = (name: string, type: string) => ({ name, type, color: "", deep_colo
 
 describe("names of rooms", () => {
   test("the only room of a type has no number", () => {
-    expect(roomLabels([room("kitchen_0", "kitchen")])).toEqual(["Kitchen"]);
+    expect(roomLabels([room("kitchen_1", "kitchen")])).toEqual(["Kitchen"]);
   });
 
   test("others keep the number by which all else names them", () => {
-    expect(roomLabels([room("bedroom_0", "bedroom"), room("bedroom_1", "bedroom")])).toEqual(["Bedroom 0", "Bedroom 1"]);
+    expect(roomLabels([room("bedroom_1", "bedroom"), room("bedroom_2", "bedroom")])).toEqual(["Bedroom 1", "Bedroom 2"]);
   });
 
   test("names that somebody gave stay as they are", () => {

@@ -261,7 +261,7 @@ for line in sys.stdin:
     if message["type"] == "decide":
         with open({heard!r}, "a") as file:
             file.write(json.dumps(message["goal"]) + "\\n")
-        answer = {{"type": "plan", "plan": [{{"go_to": next(errands, "kitchen_0")}}, {{"stay_s": 60}}]}}
+        answer = {{"type": "plan", "plan": [{{"go_to": next(errands, "kitchen_1")}}, {{"stay_s": 60}}]}}
     print(json.dumps(answer), flush=True)
 """
 
@@ -275,21 +275,21 @@ def errands(folder: Path, places: list[Any]) -> tuple[Path, Path]:
 
 
 def behind_a_door(command: Path) -> dict[str, Any]:
-    door = {"type": "door", "doorway": "office_0", "open": False}
+    door = {"type": "door", "doorway": "office_1", "open": False}
     return robots(command) | {"objects": {"office_door": door}}
 
 
 def test_a_program_is_told_what_became_of_its_goals(tmp_path: Path) -> None:
-    program, heard = errands(tmp_path, ["kitchen_0", "office_0", "hallway_0"])
+    program, heard = errands(tmp_path, ["kitchen_1", "office_1", "hallway_1"])
 
     fleet2d.run(behind_a_door(program))
 
     goals = [json.loads(line) for line in heard.read_text().splitlines()]
     assert goals[0] is None
-    assert {"go_to": "kitchen_0", "state": "reached", "detail": ""} == goals[1]
-    assert ("office_0", "impossible") == (goals[2]["go_to"], goals[2]["state"])
-    assert "'office_0' can't be reached" in goals[2]["detail"]
-    assert ("hallway_0", "reached") == (goals[3]["go_to"], goals[3]["state"])
+    assert {"go_to": "kitchen_1", "state": "reached", "detail": ""} == goals[1]
+    assert ("office_1", "impossible") == (goals[2]["go_to"], goals[2]["state"])
+    assert "'office_1' can't be reached" in goals[2]["detail"]
+    assert ("hallway_1", "reached") == (goals[3]["go_to"], goals[3]["state"])
 
 
 @pytest.mark.slow

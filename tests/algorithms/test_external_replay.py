@@ -26,11 +26,11 @@ def write(folder: Path, text: str) -> Path:
 
 
 ROWS = """time,user,room,share
-2026-01-05 01:30:00,ana,kitchen_0,0.75
-2026-01-05 01:30:00,ana,living_room_0,0.25
-2026-01-05 03:00:00,ana,kitchen_0,0.1
-2026-01-05 03:00:00,ana,living_room_0,0.9
-2026-01-05 03:00:00,ben,kitchen_0,1
+2026-01-05 01:30:00,ana,kitchen_1,0.75
+2026-01-05 01:30:00,ana,living_room_1,0.25
+2026-01-05 03:00:00,ana,kitchen_1,0.1
+2026-01-05 03:00:00,ana,living_room_1,0.9
+2026-01-05 03:00:00,ben,kitchen_1,1
 """
 
 
@@ -41,7 +41,7 @@ def shares(run: Any, room: str) -> list[float]:
 def test_the_newest_shares_are_put_out(tmp_path: Path) -> None:
     run = fleet2d.run(scenario(write(tmp_path, ROWS), user="ana"))
 
-    assert shares(run, "kitchen_0") == [0.75, 0.1, 0.1] or shares(run, "kitchen_0") == [
+    assert shares(run, "kitchen_1") == [0.75, 0.1, 0.1] or shares(run, "kitchen_1") == [
         0.75,
         0.75,
         0.1,
@@ -70,7 +70,7 @@ def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
         (ROWS, {}, "holds 2 users: ana, ben: select one by 'user'"),
         (ROWS, {"user": "anna"}, "has no user 'anna': did you mean 'ana'"),
         ("time,room,share\n0,attic,1\n", {}, "there is no room 'attic'"),
-        ("time,room\n0,kitchen_0\n", {}, "has no column 'share'"),
+        ("time,room\n0,kitchen_1\n", {}, "has no column 'share'"),
     ],
 )
 def test_a_table_of_another_home_is_refused(
@@ -91,4 +91,4 @@ def test_a_table_of_another_time_is_refused_with_both_ranges(tmp_path: Path, day
 def test_a_table_that_ends_during_the_run_is_put_out(tmp_path: Path) -> None:
     path = write(tmp_path, ROWS.replace("2026-01-05 01", "2026-01-04 01"))
 
-    assert shares(fleet2d.run(scenario(path, user="ana")), "kitchen_0")[0] == 0.75
+    assert shares(fleet2d.run(scenario(path, user="ana")), "kitchen_1")[0] == 0.75

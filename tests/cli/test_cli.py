@@ -193,7 +193,7 @@ def test_progress_is_shown_on_a_terminal_only(fleet2d: Cli) -> None:
 def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
     code, out, err = fleet2d("validate", written(small()), "simulation.step=2 s")
     assert (2, "") == (code, err)
-    assert "\nwrong: a body of radius 0.15 m can't get to storage_0" in out
+    assert "\nwrong: a body of radius 0.15 m can't get to storage_1" in out
     for word in ("wrong", "1 user", "1 robot", "flat", "150 steps of 2 s", "2026-01-05 07:00"):
         assert word in out
     assert ["home.yaml"] == [path.name for path in Path().iterdir()]
@@ -203,7 +203,7 @@ def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
 def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d: Cli) -> None:
     file = written(small())
     code, out, err = fleet2d("run", file, "--out", "run")
-    wrong = "wrong: a body of radius 0.15 m can't get to storage_0 (4.0 m2)"
+    wrong = "wrong: a body of radius 0.15 m can't get to storage_1 (4.0 m2)"
     assert (0, f"{wrong}\n") == (code, err)
     assert f"note: {wrong}" in out
     assert wrong in json.loads(Path("run/manifest.json").read_text())["notes"]
@@ -363,7 +363,7 @@ def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(
     (tmp_path / "plan.json").write_text(json.dumps(plan))
     home = ("floorplan.type=native", f"floorplan.path={tmp_path / 'plan.json'}", "users={}")
     short = ("simulation.duration=1 min", "algorithms={}", "metrics={}")
-    said = "a body of radius 0.15 m can't get to office_0"
+    said = "a body of radius 0.15 m can't get to office_1"
 
     assert said in fleet2d("validate", str(tmp_path / "plan.json"))[1]
     assert said in fleet2d("validate", *home)[1]

@@ -33,7 +33,7 @@ def scenario(night: Night, log: Path) -> dict[str, Any]:
         "floorplan": {"type": "bundled", "furnish": True},
         "users": {"ana": {"start": spot, "type": "schedule", "days": [{"items": items}]}},
         "objects": {
-            "door": {"type": "door", "doorway": "dining_room_0-hallway_0", "schedule": turns},
+            "door": {"type": "door", "doorway": "dining_room_1-hallway_1", "schedule": turns},
             "log": sensor,
         },
         "expect": {"night": "never(during(02:10-02:50))"},

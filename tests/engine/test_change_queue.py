@@ -92,7 +92,7 @@ def test_shut_door_hides_who_is_behind_it_from_the_very_step_on(plan: str) -> No
             "60 s",
             users={"ana": stands(6, 1.45)},
             robots={"astro": stands(2, 1.45, camera={"range": [0, 9], "lost_after": "1 s"})},
-            objects={"door": {"type": "door", "doorway": "kitchen_0"}},
+            objects={"door": {"type": "door", "doorway": "kitchen_1"}},
             script=[{"at": "10 s", "shut": "door"}, {"at": "30 s", "open": "door"}],
         )
     )
@@ -121,16 +121,16 @@ def test_scenario_with_doors_is_the_same_for_every_span(plan: str) -> None:
         },
         robots={"astro": {"type": "patrol", "dwell": "20 s"}, "bolt": {"type": "meander"}},
         objects={
-            "bath": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "5 s"},
+            "bath": {"type": "door", "doorway": "bathroom_1", "open": False, "closes_after": "5 s"},
             "kitchen": {
                 "type": "door",
-                "doorway": "kitchen_0",
+                "doorway": "kitchen_1",
                 "schedule": [{"at": "00:40", "open": False}, {"at": "01:30", "open": True}],
             },
         },
         script=[
             {"at": "50 min", "move": "cart", "to": [6.25, 2.0], "turn_deg": 30},
-            {"at": "55 min", "room": "kitchen_0", "type": "office"},
+            {"at": "55 min", "room": "kitchen_1", "type": "office"},
         ],
     )
     whole = run(content)
@@ -166,7 +166,7 @@ def test_person_opens_the_door_in_time_and_it_falls_shut_behind(plan: str) -> No
             },
             objects={
                 "door": {
-                    "type": "door", "doorway": "kitchen_0", "open": False, "closes_after": "4 s",
+                    "type": "door", "doorway": "kitchen_1", "open": False, "closes_after": "4 s",
                 }
             },
         )
@@ -187,10 +187,10 @@ def test_robot_waits_at_a_shut_door_and_goes_on_when_it_opens(plan: str) -> None
                 "astro": stands(
                     6,
                     2.4,
-                    behaviors=[{"type": "patrol", "rooms": ["bathroom_0"], "dwell": "1 s"}],
+                    behaviors=[{"type": "patrol", "rooms": ["bathroom_1"], "dwell": "1 s"}],
                 )
             },
-            objects={"door": {"type": "door", "doorway": "bathroom_0", "open": False}},
+            objects={"door": {"type": "door", "doorway": "bathroom_1", "open": False}},
             script=[{"at": "5 min", "open": "door"}],
         )
     )
@@ -206,10 +206,10 @@ def test_robot_on_its_way_turns_back_at_a_door_that_shuts_before_it(plan: str) -
             "2 min",
             robots={
                 "astro": stands(
-                    2, 1.45, behaviors=[{"type": "patrol", "rooms": ["hallway_0", "kitchen_0"]}]
+                    2, 1.45, behaviors=[{"type": "patrol", "rooms": ["hallway_1", "kitchen_1"]}]
                 )
             },
-            objects={"door": {"type": "door", "doorway": "kitchen_0"}},
+            objects={"door": {"type": "door", "doorway": "kitchen_1"}},
             script=[{"at": "1 s", "shut": "door"}],
         )
     )
@@ -223,7 +223,7 @@ def test_door_waits_while_somebody_stands_in_it(plan: str) -> None:
             plan,
             "1 min",
             users={"ana": stands(4.05, 1.45)},
-            objects={"door": {"type": "door", "doorway": "kitchen_0", "open": False}},
+            objects={"door": {"type": "door", "doorway": "kitchen_1", "open": False}},
         )
     )
     simulation.run_until(timedelta(seconds=30))
@@ -238,7 +238,7 @@ def test_nobody_walks_through_a_locked_door(plan: str) -> None:
             users={"ana": stands(2, 1.45, behaviors=[{
                 "type": "schedule", "days": [{"items": [{"at": "00:00", "place": "hallway"}]}]}])},
             objects={
-                "door": {"type": "door", "doorway": "kitchen_0", "open": False, "locked": True}
+                "door": {"type": "door", "doorway": "kitchen_1", "open": False, "locked": True}
             },
             script=[{"at": "2 min", "unlock": "door"}],
         )
@@ -293,7 +293,7 @@ def test_algorithm_shuts_a_door_at_the_step_after_its_update(plan: str) -> None:
             plan,
             "5 min",
             users={"ana": stands(6, 1.45)},
-            objects={"door": {"type": "door", "doorway": "kitchen_0"}},
+            objects={"door": {"type": "door", "doorway": "kitchen_1"}},
             algorithms={"closer": {"type": f"{__name__}:Closer", "period": "1 min"}},
         )
     )
@@ -313,7 +313,7 @@ def test_algorithm_that_opens_a_door_that_is_not_there_is_named(plan: str) -> No
         plan,
         "5 min",
         users={"ana": stands(6, 1.45)},
-        objects={"door": {"type": "door", "doorway": "kitchen_0"}},
+        objects={"door": {"type": "door", "doorway": "kitchen_1"}},
         algorithms={"wrecker": {"type": f"{__name__}:Wrecker", "period": "1 min"}},
     )
     with pytest.raises(ComponentError, match=r"algorithms\.wrecker requests.*no door 'gate'.*door"):
@@ -325,12 +325,12 @@ def test_room_used_otherwise_is_found_by_its_new_type(plan: str) -> None:
         home(
             plan,
             users={"ana": stands(6, 1.45)},
-            script=[{"at": "1 min", "room": "bathroom_0", "type": "office"}],
+            script=[{"at": "1 min", "room": "bathroom_1", "type": "office"}],
         )
     )
     ana = simulation.actors["ana"]
     simulation.run_until(timedelta(minutes=2))
-    assert ["bathroom_0"] == [room.name for room in ana.rooms(("office",))]
+    assert ["bathroom_1"] == [room.name for room in ana.rooms(("office",))]
 
 
 def test_branches_change_on_their_own(plan: str) -> None:
@@ -338,7 +338,7 @@ def test_branches_change_on_their_own(plan: str) -> None:
         home(
             plan,
             users={"ana": stands(6, 1.45)},
-            objects={"door": {"type": "door", "doorway": "kitchen_0"}},
+            objects={"door": {"type": "door", "doorway": "kitchen_1"}},
         )
     )
     simulation.advance(10)
@@ -363,20 +363,20 @@ def test_homes_without_doors_pay_nothing() -> None:
         ({"script": [{"at": "1 s", "move": "bed", "to": [6, 2]}]}, r"no object.*'bed'.*cart"),
         ({"script": [{"at": "1 s", "room": "attic", "type": "office"}]}, "no room 'attic'"),
         (
-            {"script": [{"at": "1 s", "room": "kitchen_0", "type": "ofice"}]},
+            {"script": [{"at": "1 s", "room": "kitchen_1", "type": "ofice"}]},
             r"script\.0: there is no room type 'ofice': did you mean 'office'\? There are: kitchen",
         ),
         ({"objects": {"gate": {"type": "door", "doorway": "attic"}}}, r"no doorway 'attic'"),
-        ({"objects": {"gate": {"type": "door", "doorway": "hallway_0"}}}, "has 2 doorways"),
+        ({"objects": {"gate": {"type": "door", "doorway": "hallway_1"}}}, "has 2 doorways"),
         (
-            {"objects": {n: {"type": "door", "doorway": "kitchen_0"} for n in ("a", "b")}},
+            {"objects": {n: {"type": "door", "doorway": "kitchen_1"} for n in ("a", "b")}},
             "a hangs in the doorway",
         ),
-        ({"objects": {"ana": {"type": "door", "doorway": "kitchen_0"}}}, "a user named 'ana'"),
+        ({"objects": {"ana": {"type": "door", "doorway": "kitchen_1"}}}, "a user named 'ana'"),
         (
             {
                 "objects": {
-                    "d": {"type": "door", "doorway": "kitchen_0", "schedule": [{"at": "9:00"}]}
+                    "d": {"type": "door", "doorway": "kitchen_1", "schedule": [{"at": "9:00"}]}
                 }
             },
             "give 'open' or 'locked'",
@@ -390,7 +390,7 @@ def test_change_or_door_that_can_not_be_is_refused(
         plan,
         **{
             "users": {"ana": stands(6, 1.45)},
-            "objects": {"door": {"type": "door", "doorway": "kitchen_0"}},
+            "objects": {"door": {"type": "door", "doorway": "kitchen_1"}},
             **sections,
         },
     )
@@ -416,7 +416,7 @@ def test_track_crosses_a_line_at_the_moment_it_does() -> None:
 )
 def test_a_room_is_used_as_what_a_word_usually_means(plan: str, word: str, kind: str) -> None:
     simulation = fleet2d.Simulation(
-        home(plan, script=[{"at": "1 s", "room": "kitchen_0", "type": word}])
+        home(plan, script=[{"at": "1 s", "room": "kitchen_1", "type": word}])
     )
     simulation.advance(2)
-    assert kind == next(room.type for room in simulation.home.rooms if room.name == "kitchen_0")
+    assert kind == next(room.type for room in simulation.home.rooms if room.name == "kitchen_1")

@@ -44,12 +44,12 @@ def switched(stored: Any, kind: str) -> tuple[list[int], list[str]]:
 def test_lights_off_people_in_the_room_are_noticed_a_fifth_as_often() -> None:
     stored = watched(
         {"at": "22:05", "lights": "kitchen", "turn": "off"},
-        {"at": "22:15", "lights": "kitchen_0", "turn": "on"},
+        {"at": "22:15", "lights": "kitchen_1", "turn": "on"},
     )
     assert seen(stored, "22:00", "22:05") == 300
     assert 80 < seen(stored, "22:05", "22:15") < 160
     assert seen(stored, "22:15", "22:20") == 300
-    off, on = ([300], ["kitchen_0"]), ([900], ["kitchen_0"])
+    off, on = ([300], ["kitchen_1"]), ([900], ["kitchen_1"])
     assert (off, on) == (switched(stored, "light_off"), switched(stored, "light_on"))
 
 
@@ -96,13 +96,13 @@ def test_people_have_the_light_on_where_they_are_awake_and_off_where_they_leave(
     simulation = fleet2d.Simulation(people())
     simulation.run_until("22:03")
     assert (
-        simulation.home.rooms[min({0, 1, 2, 3, 4} - simulation.home.unlit)].name == "living_room_0"
+        simulation.home.rooms[min({0, 1, 2, 3, 4} - simulation.home.unlit)].name == "living_room_1"
     )
     stored = simulation.run()
     on, off = (list(zip(*switched(stored, f"light_{turn}"), strict=True)) for turn in ("on", "off"))
-    assert {"bedroom_0", "living_room_0", "kitchen_0"} <= {room for _, room in on}
-    assert (306, "kitchen_0") in on
-    assert "kitchen_0" not in {room for _, room in off}, "Ben is still there"
+    assert {"bedroom_1", "living_room_1", "kitchen_1"} <= {room for _, room in on}
+    assert (306, "kitchen_1") in on
+    assert "kitchen_1" not in {room for _, room in off}, "Ben is still there"
 
 
 def test_people_sleep_in_the_dark_and_lie_in_the_light_after_a_fall() -> None:
@@ -148,7 +148,7 @@ def test_light_of_a_room_or_kind_is_an_expectation() -> None:
         {"at": "22:05", "lights": "kitchen", "turn": "off"},
         expect={
             "dark": "after(events(light_off), not light(kitchen), within=1 s)",
-            "lit": "always(light(kitchen_0))",
+            "lit": "always(light(kitchen_1))",
             "any": "always(light(bedroom))",
         },
     )
@@ -204,7 +204,7 @@ def test_a_light_goes_on_at_sunset() -> None:
     place = {"start": "2026-12-21T15:50", "daylight": {"latitude": 52.52, "noon": "12:06:23"}}
     steps, rooms = switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")
 
-    assert (["kitchen_0"], True) == (rooms, 180 < steps[0] < 300)
+    assert (["kitchen_1"], True) == (rooms, 180 < steps[0] < 300)
 
 
 def test_lights_in_the_dark_need_a_place() -> None:

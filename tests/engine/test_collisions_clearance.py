@@ -81,7 +81,7 @@ def test_it_lets_somebody_through_a_door_and_goes_on_with_its_round() -> None:
     content["robots"]["astro"]["start"] = [2.0, 3.1]
     stored = assert_same_for_every_max_span(content, 61, 1)
     assert "gives_way" in names(stored)
-    assert "kitchen_0" in rooms(stored, 25)
+    assert "kitchen_1" in rooms(stored, 25)
 
 
 def test_steps_of_any_length_and_copies_give_the_same() -> None:
@@ -150,8 +150,8 @@ def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_
     stored = assert_same_for_every_max_span(polite(ana, [patrol], "10 min"), 61, 1)
     assert own_approaches(stored).min() >= 0.4
     assert ("gives_up" in names(stored)) == gives_up
-    assert ("kitchen_0" in rooms(stored)) != gives_up
-    assert "bedroom_0" in rooms(stored)  # the stop behind the one that it leaves out
+    assert ("kitchen_1" in rooms(stored)) != gives_up
+    assert "bedroom_1" in rooms(stored)  # the stop behind the one that it leaves out
     steps = [step for step, name, _ in events(stored) if name in ("gives_way", "gives_up")]
     if gives_up:
         assert 120 <= steps[1] - steps[0] <= 133  # it looks ever more seldom
@@ -160,7 +160,7 @@ def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_
 def test_a_place_that_is_taken_is_left_alone_until_it_thinks_again() -> None:
     hangout = {"type": "hangout", "source": "rtp", "explore": 0, "period": "30 min"}
     content = polite(OUT, [hangout], "2 h", gives_up="1 min")
-    content |= belief(bathroom_0=1)
+    content |= belief(bathroom_1=1)
     free = run(content)
     x, y = path(free, "astro").x[-1], path(free, "astro").y[-1]
     content["users"]["ana"] = {"type": "schedule", **stands(float(x), float(y))}
@@ -178,7 +178,7 @@ def test_a_look_that_was_held_up_counts_as_one() -> None:
     content["users"]["ben"] = OUT
     result = run(content)
     assert "gives_way" in names(result)
-    assert {"kitchen_0", "bedroom_0", "bathroom_0"} <= visited(result)
+    assert {"kitchen_1", "bedroom_1", "bathroom_1"} <= visited(result)
 
 
 def visited(stored: Any) -> set[str]:

@@ -36,8 +36,8 @@ def test_a_ban_ends() -> None:
     ((allowed, _),) = events_of(run, "allowed")
 
     assert 1800 == allowed - banned
-    assert "bedroom_0" not in rooms_of(run, "astro")[banned + 60 : allowed]
-    assert "bedroom_0" in rooms_of(run, "astro")[allowed:]
+    assert "bedroom_1" not in rooms_of(run, "astro")[banned + 60 : allowed]
+    assert "bedroom_1" in rooms_of(run, "astro")[allowed:]
 
 
 def test_who_sends_the_robot_away_is_left_alone_for_a_while() -> None:
@@ -112,8 +112,8 @@ def test_annoyed_people_send_robots_away_that_asked_nothing() -> None:
 
     assert len(sent) > 1
     for step in sent:
-        assert "kitchen_0" in rooms_of(run, "astro")[step]
-        assert "kitchen_0" not in rooms_of(run, "astro")[step + 20 : step + 300]
+        assert "kitchen_1" in rooms_of(run, "astro")[step]
+        assert "kitchen_1" not in rooms_of(run, "astro")[step + 20 : step + 300]
 
 
 def test_who_has_had_enough_switches_the_robot_off_for_good() -> None:

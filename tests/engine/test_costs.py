@@ -27,7 +27,7 @@ class Bar(Algorithm):
 
     def start(self, home: Home) -> None:
         self.costs = home.layers["costmap"]
-        self.kitchen = home.plan.room_of_cell == home.plan.room("kitchen_0").index
+        self.kitchen = home.plan.room_of_cell == home.plan.room("kitchen_1").index
         self.updates = 0
 
     def update(self, history: History, state: Present) -> None:

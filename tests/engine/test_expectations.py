@@ -61,7 +61,7 @@ def home(**changes: Any) -> dict[str, Any]:
             }
         },
         objects={
-            "bath": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "5 s"},
+            "bath": {"type": "door", "doorway": "bathroom_1", "open": False, "closes_after": "5 s"},
             "contact": {"type": "contact_sensor", "of": "bath"},
         },
         algorithms={"share": {"type": f"{OWN}:Share", "period": "2 min"}},

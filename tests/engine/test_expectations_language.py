@@ -141,7 +141,7 @@ def test_likeliest_is_the_room_with_the_highest_probability() -> None:
     for step in np.unique(rows["step"]).tolist():
         at = rows["step"] == step
         best = str(rows["room"][at][np.argmax(rows["share"][at])])
-        expected[step + 1 :] = best == "bathroom_0"
+        expected[step + 1 :] = best == "bathroom_1"
 
     assert (wrong(verdict["where"]) == expected).all()
     with pytest.raises(ScenarioError, match="doesn't tell users apart"):
@@ -197,7 +197,7 @@ def test_the_past_is_told_by_once_and_since() -> None:
     at = poses(run, "astro")
     moves = np.append(False, np.hypot(np.diff(at["x"]), np.diff(at["y"])) > 0)
     lately = [moves[max(0, step - 10) : step + 1].any() for step in range(720)]
-    kitchen, still_since = rooms(run, "astro") == "kitchen_0", []
+    kitchen, still_since = rooms(run, "astro") == "kitchen_1", []
     for step in range(720):
         goals = [t for t in range(step + 1) if kitchen[t] and not moves[t + 1 : step + 1].any()]
         still_since.append(bool(goals))

@@ -115,7 +115,7 @@ def test_a_child_does_not_hide_an_adult(height_m: float, expected: list[int]) ->
 
 
 def test_moved_furniture_no_longer_hides() -> None:
-    move = {"at": "5 s", "move": "sofa_0", "to": [2.6, 1.0]}
+    move = {"at": "5 s", "move": "sofa_1", "to": [2.6, 1.0]}
     content = {**behind({**SOFA, "height": 2.0, "size": [0.6, 0.9]}), "script": [move]}
 
     assert [5, 6, 7, 8, 9] == seen(content)["ana"]

@@ -196,7 +196,7 @@ def test_events_are_those_of_the_table_however_a_run_is_cut() -> None:
 
 
 def test_a_change_by_a_script_is_done_again() -> None:
-    door = {"type": "door", "doorway": "bathroom_0"}
+    door = {"type": "door", "doorway": "bathroom_1"}
     content = home("30 min", objects={"kitchen_door": door})
     run = fleet2d.Simulation(content)
     run.advance(300)

@@ -60,7 +60,7 @@ class Dirt(Algorithm):
     def start(self, home: Home) -> None:
         every = timedelta(minutes=4)
         self.dust = home.layers.add("dust", unit="g", description="on the floor", every=every)
-        self.kitchen = home.plan.room_of_cell == home.plan.room("kitchen_0").index
+        self.kitchen = home.plan.room_of_cell == home.plan.room("kitchen_1").index
 
     def update(self, history: History, state: Present) -> None:
         self.dust.values[self.kitchen] += 0.25
@@ -182,7 +182,7 @@ def test_layer_is_stored_when_it_is_due_and_at_the_end() -> None:
     stored = run(content)
 
     assert [239, 479, 599] == layer_steps(stored, "dust")
-    kitchen = stored.plan.room_of_cell == stored.plan.room("kitchen_0").index
+    kitchen = stored.plan.room_of_cell == stored.plan.room("kitchen_1").index
     for step, dust in ((239, 1.0), (479, 2.0), (None, 2.5)):
         values = read_layer(stored, "dust", step)
         assert {dust} == set(values[kitchen].tolist())

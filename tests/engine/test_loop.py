@@ -54,7 +54,7 @@ def told(duration: str = "150 s", **more: Any) -> dict[str, Any]:
         duration,
         users={"zoe": body("zoe"), "ana": body("ana")},
         robots={"bolt": body("bolt"), "astro": body("astro")},
-        objects={"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}},
+        objects={"door": {"type": "door", "doorway": "living_room_1-kitchen_1"}},
         script=[{"at": "1 min", "shut": "door"}],
         algorithms={"learn": {"type": f"{__name__}:Learn", "period": "1 min"}},
         metrics={"measure": {"type": f"{__name__}:Measure", "period": "1 min"}},
@@ -117,7 +117,7 @@ def spans_of(simulation: fleet2d.Simulation, end: int) -> Iterator[tuple[Span, i
 @pytest.mark.parametrize("max_span", [None, 61])
 def test_a_span_ends_where_something_is_due_and_not_before(max_span: int | None) -> None:
     content = everything("30 min")
-    content["objects"] = {"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
+    content["objects"] = {"door": {"type": "door", "doorway": "living_room_1-kitchen_1"}}
     content["script"] = [{"at": "10 min", "shut": "door"}]
     simulation = fleet2d.Simulation(content, max_span=max_span)
     begun = 0

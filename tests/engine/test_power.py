@@ -235,7 +235,7 @@ def test_real_time_presence_begins_anew_after_a_time_off(model: str) -> None:
             astro={"camera": {"range": [0.3, 5], "angle_deg": 360}, "behaviors": [STAYS]},
         )
         content["users"]["ana"]["days"] = READS
-        rows = table(run(content), "rtp", user="ana", room="kitchen_0")
+        rows = table(run(content), "rtp", user="ana", room="kitchen_1")
         shares.append(dict(zip(rows["step"].tolist(), rows["share"].tolist(), strict=True)))
     crashed, whole = shares
 
@@ -301,7 +301,7 @@ def test_carried_while_off_it_believes_to_be_where_it_went_off() -> None:
     (off,) = simulation.actors["astro"].displacements
     units = simulation.home.plan.lattice.units_per_m
 
-    assert "bathroom_0" == after["room"] != before["room"]
+    assert "bathroom_1" == after["room"] != before["room"]
     assert (600, 661) == (off.first, off.end), "until it is relocalized"
     moved = (before["x"] - after["x"], before["y"] - after["y"])
     assert (off.x / units, off.y / units) == pytest.approx(moved, abs=1e-6)
@@ -446,7 +446,7 @@ def test_a_battery_that_ends_in_a_doorway_hangs_nothing() -> None:
     content = home(
         *script,
         astro={"battery": BATTERY},
-        objects={"door": {"type": "door", "doorway": "kitchen_0-living_room_0", "open": True}},
+        objects={"door": {"type": "door", "doorway": "kitchen_1-living_room_1", "open": True}},
     )
     stored = same_for_every_span(content)
 
@@ -533,7 +533,7 @@ def test_a_robot_that_is_driven_from_outside_follows_no_plan_while_it_is_off() -
     simulation.run_until("07:11")
     simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen").stay())))
     assert "complete" == simulation.run().status
-    assert "kitchen_0" == simulation.state["astro"]["room"]
+    assert "kitchen_1" == simulation.state["astro"]["room"]
 
 
 # Cameras and sensors

@@ -88,7 +88,7 @@ def household(plan: str) -> dict[str, Any]:
         users={"ana": day},
         objects={
             "hall": {"type": "motion_sensor", "at": [6, 2.9], "range": "5 m", "hold": "10 s"},
-            "door": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "5 s"},
+            "door": {"type": "door", "doorway": "bathroom_1", "open": False, "closes_after": "5 s"},
             "contact": {"type": "contact_sensor", "of": "door"},
             "plug": {"type": "smart_plug", "of": "stove", "hold": "30 s"},
             "bed_sensor": {"type": "occupancy_sensor", "of": "bed"},
@@ -158,7 +158,7 @@ def test_motion_sensor_does_not_see_past_a_shut_door(plan: str) -> None:
         users={"ana": {"type": "meander", "start": [2, 1.5]}},
         objects={
             "pir": {"type": "motion_sensor", "at": [6, 1.45], "range": "9 m"},
-            "door": {"type": "door", "doorway": "kitchen_0", "open": False},
+            "door": {"type": "door", "doorway": "kitchen_1", "open": False},
         },
     )
     assert [] == readings(run(content), "pir")
@@ -178,7 +178,7 @@ def test_motion_sensor_sees_only_what_it_faces(plan: str) -> None:
                             "type": "motion_sensor", "at": [2, 0.01], "heading_deg": heading,
                             "angle_deg": 170,
                         },
-                        "door": {"type": "door", "doorway": "kitchen_0", "open": False},
+                        "door": {"type": "door", "doorway": "kitchen_1", "open": False},
                     },
                 )
             ),

@@ -32,7 +32,7 @@ def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original() -> None:
     future.do(Replan("astro"))
     future.advance(600)
     history.advance(600)
-    assert ("kitchen_0", "entryway_0") == tuple(s.state["astro"]["room"] for s in (future, history))
+    assert ("kitchen_1", "entryway_1") == tuple(s.state["astro"]["room"] for s in (future, history))
 
 
 def test_replan_is_kept_in_the_manifest() -> None:

@@ -13,7 +13,7 @@ DAY = {
     "simulation": {"duration": "1 d", "seed": 4},
     "objects": {
         "hall_motion": {"type": "motion_sensor", "at": [16.53, 7.73], "range": 4},
-        "bath": {"type": "door", "doorway": "bathroom_0", "open": False, "closes_after": "10 s"},
+        "bath": {"type": "door", "doorway": "bathroom_1", "open": False, "closes_after": "10 s"},
     },
     "script": [{"at": "9 h", "open": "bath"}],
 }
@@ -86,7 +86,7 @@ def test_a_listener_gets_only_its_kinds_and_may_intervene() -> None:
     def come(events: Any) -> None:
         for event in events:
             assert event.event == "sensor"
-            simulation.do({"call": "astro", "to": "kitchen_0"})
+            simulation.do({"call": "astro", "to": "kitchen_1"})
 
     simulation.listen(come, ["sensor"])
     run = simulation.run()

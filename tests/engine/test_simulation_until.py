@@ -62,9 +62,9 @@ def test_an_end_behind_or_after_the_run_is_an_error(when: Any, words: str) -> No
 def test_it_runs_until_a_function_returns_true() -> None:
     simulation, slow = home("1 h"), home("1 h")
     came = simulation.run_until(
-        lambda now: now.state["ana"]["room"] == "bathroom_0", timeout="20 min"
+        lambda now: now.state["ana"]["room"] == "bathroom_1", timeout="20 min"
     )
-    while slow.state["ana"]["room"] != "bathroom_0":
+    while slow.state["ana"]["room"] != "bathroom_1":
         slow.advance()
 
     assert came
@@ -76,7 +76,7 @@ def test_it_runs_until_a_function_returns_true() -> None:
 def test_it_runs_until_a_condition_holds_and_stops_at_that_step() -> None:
     simulation, other = home("2 h"), home("2 h")
     verdict = simulation.run_until(room("ana") == "bathroom")
-    other.run_until(lambda now: now.state["ana"]["room"] == "bathroom_0")
+    other.run_until(lambda now: now.state["ana"]["room"] == "bathroom_1")
 
     assert verdict.holds
     assert other.step + 1 == simulation.step, "the next step is the one after it"

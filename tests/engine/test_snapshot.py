@@ -29,8 +29,8 @@ from fleet2d.runtime.events import Event
 from fleet2d.storage.secret_files import signature
 
 HOUSE = {
-    "hall": {"type": "door", "doorway": "living_room_0-bedroom_0", "closes_after": "20 s"},
-    "bath": {"type": "door", "doorway": "kitchen_0-bathroom_0"},
+    "hall": {"type": "door", "doorway": "living_room_1-bedroom_1", "closes_after": "20 s"},
+    "bath": {"type": "door", "doorway": "kitchen_1-bathroom_1"},
     "eye": {"type": "motion_sensor", "at": [2.5, 2.5], "range": 4, "hold": "20 s"},
     "switch": {"type": "contact_sensor", "of": "bath"},
 }

@@ -167,7 +167,7 @@ def test_a_sink_hears_just_the_rows_of_the_table(span: int | None) -> None:
 
 def test_the_table_is_in_order_of_step_entity_and_rank() -> None:
     content = everything(
-        "1 h", objects={"door": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
+        "1 h", objects={"door": {"type": "door", "doorway": "living_room_1-kitchen_1"}}
     )
     content["script"] = [{"at": "10 min", "shut": "door"}, {"at": "20 min", "open": "door"}]
     stored = run(content)

@@ -13,7 +13,7 @@ import fleet2d
 from fleet2d.errors import ScenarioError
 from fleet2d.interventions import HoldStill
 
-DOOR = {"bath_door": {"type": "door", "doorway": "bathroom_0"}}
+DOOR = {"bath_door": {"type": "door", "doorway": "bathroom_1"}}
 SENSOR = {"contact": {"type": "contact_sensor", "of": "bath_door"}}
 
 
@@ -161,7 +161,7 @@ def test_an_entry_on_an_event_is_done_once_unless_each_time_is_wanted() -> None:
         ({"at": "5 s", "activity": "ana", "what": "breakfst"}, "did you mean 'breakfast'"),
         ({"at": "5 s", "call": "astro", "dock": True}, "none of the behaviors of astro answers"),
         ({"at": "5 s", "shut": "bat_door"}, "did you mean 'bath_door'"),
-        ({"at": "5 s", "room": "kitchen_0", "type": "bedrom"}, "did you mean 'bedroom'"),
+        ({"at": "5 s", "room": "kitchen_1", "type": "bedrom"}, "did you mean 'bedroom'"),
         ({"on": "user_sen", "hold": "ana"}, "did you mean 'user_seen'"),
         ({"on": ["user_seen", "asto"], "hold": "ana"}, "did you mean 'astro'"),
         ({"on": ["user_seen", "astro", "bens"], "hold": "ana"}, "did you mean 'ben'"),

@@ -120,7 +120,7 @@ def test_hours_begin_and_end_a_behavior() -> None:
     stored = assert_same_for_every_max_span(home_with([patrol, IDLE], "30 min", QUIET), 61, 1)
     assert ["idle", "idle"] == [name for _, name, _ in events(stored)]
     assert [0, 1200] == [step for step, _, _ in events(stored)]
-    assert ["living_room_0", "kitchen_0"] == rooms(stored)
+    assert ["living_room_1", "kitchen_1"] == rooms(stored)
 
 
 def test_outside_its_hours_a_behavior_is_not_asked() -> None:

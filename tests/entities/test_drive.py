@@ -67,7 +67,7 @@ class Sit(Behavior):
     """Sits down on the chair."""
 
     def decide(self, now: Situation) -> Plan | None:
-        return now.plan().use("chair_0").stay()
+        return now.plan().use("chair_1").stay()
 
 
 def busy(drive: Any) -> dict[str, Any]:

@@ -29,12 +29,12 @@ def room_of(body: Actor, point: tuple[int, int]) -> str:
 @pytest.mark.parametrize(
     ("place", "room"),
     [
-        ("kitchen_0", "kitchen_0"),
-        ("kitchen", "kitchen_0"),
-        (["attic", "bathroom", "kitchen"], "bathroom_0"),
-        (["storage", "bedroom"], "bedroom_0"),  # the first that can be reached
-        ([7.0, 1.0], "kitchen_0"),
-        ((7, 6), "bathroom_0"),
+        ("kitchen_1", "kitchen_1"),
+        ("kitchen", "kitchen_1"),
+        (["attic", "bathroom", "kitchen"], "bathroom_1"),
+        (["storage", "bedroom"], "bedroom_1"),  # the first that can be reached
+        ([7.0, 1.0], "kitchen_1"),
+        ((7, 6), "bathroom_1"),
     ],
 )
 def test_a_place_is_the_first_that_there_is(place: Any, room: str) -> None:
@@ -66,7 +66,7 @@ def test_any_is_every_room_that_can_be_reached() -> None:
     body = actor()
     rooms = {room_of(body, body.find(["attic", "any"], k, "spot")) for k in range(200)}
     assert {room.name for room in body.reachable_rooms()} == rooms
-    assert "storage_0" not in rooms
+    assert "storage_1" not in rooms
 
 
 def test_spots_fill_the_room_and_keep_the_radius_from_walls() -> None:
@@ -106,9 +106,9 @@ def test_the_same_moment_and_purpose_give_the_same_spot() -> None:
 @pytest.mark.parametrize(
     ("place", "words"),
     [
-        ("attic", ["users.ana", "attic", "kitchen_0", "any"]),
-        ("bedrom", ["did you mean 'bedroom", "bedroom_0"]),
-        ("storage", ["storage", "can't be reached", "kitchen_0"]),
+        ("attic", ["users.ana", "attic", "kitchen_1", "any"]),
+        ("bedrom", ["did you mean 'bedroom", "bedroom_1"]),
+        ("storage", ["storage", "can't be reached", "kitchen_1"]),
         ([5.05, 1.0], ["wall", "0.2 m", "nearest free point"]),
         ([0.1, 1.0], ["nearer", "radius", "nearest free point"]),
         ([10.0, 1.0], ["can't be reached"]),
@@ -194,10 +194,10 @@ def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too() -> None:
     ("content", "words"),
     [
         (
-            robot({"type": "hangout", "no_stops_in": ["bathroom_7"]}),
-            ["hangout.no_stops_in", "bathroom_7"],
+            robot({"type": "hangout", "no_stops_in": ["bathroom_8"]}),
+            ["hangout.no_stops_in", "bathroom_8"],
         ),
-        (robot({"type": "patrol", "rooms": ["kitchen", "kitchn_0"]}), ["patrol.rooms", "kitchn_0"]),
+        (robot({"type": "patrol", "rooms": ["kitchen", "kitchn_1"]}), ["patrol.rooms", "kitchn_1"]),
         (robot({"type": "patrol", "rooms": ["garage"]}), ["patrol.rooms", "has none of these"]),
         (user(type="room_sampling", shares={"garage": 1}), ["room_sampling.shares", "garage"]),
     ],
@@ -227,7 +227,7 @@ def test_furniture_is_a_place_wherever_a_place_goes() -> None:
     items = [{"at": "00:00", "place": "sofa", "dwell": "1 d"}]
     users = {"ana": {"type": "schedule", "days": [{"items": items}], "start": "kitchen"}}
     robots = {"astro": {"behaviors": [{"type": "patrol", "rooms": ["desk", "bedroom"]}],
-                        "battery": {**BATTERY, "charger": "charger_0"}}}  # fmt: skip
+                        "battery": {**BATTERY, "charger": "charger_1"}}}  # fmt: skip
     stored = run({**scenario("10 min", users=users, robots=robots), **FLAT})
     sofa = next(o for o in stored.plan.objects if o.type == "sofa")
     ana = path(stored, "ana")

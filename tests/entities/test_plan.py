@@ -153,7 +153,7 @@ def test_who_is_away_comes_home_before_walking(leg: str) -> None:
     assert ["left_home", "came_home"] == table(stored, "events")["event"].tolist()
     poses = path(stored, "ana")
     assert not poses.away[-1]
-    assert stored.plan.room("kitchen_0").index == poses.room[-1]
+    assert stored.plan.room("kitchen_1").index == poses.room[-1]
 
 
 def test_notes_are_told_at_the_first_step_not_before_them() -> None:
@@ -209,9 +209,9 @@ def test_a_situation_tells_where_and_when_it_is() -> None:
         return now.plan().go_to([7.0, 1.0]).stay(timedelta(minutes=2))
 
     run(decide, duration="3 min")
-    assert (0, datetime(2026, 1, 5, 7), (1.0, 3.0), "living_room_0", ()) == situations[0]
+    assert (0, datetime(2026, 1, 5, 7), (1.0, 3.0), "living_room_1", ()) == situations[0]
     assert (7.0, 1.0) == situations[1][2]
-    assert "kitchen_0" == situations[1][3]
+    assert "kitchen_1" == situations[1][3]
     assert datetime(2026, 1, 5, 7) + timedelta(seconds=situations[1][0]) == situations[1][1]
 
 
@@ -336,7 +336,7 @@ def returns_the_same_plan_again() -> Decide:
         (lambda now: 1 / 0, ["step 0", "ZeroDivisionError", "division by zero"]),
         (lambda now: now.outputs["ltp"], ["step 0", "KeyError", "ltp"]),
         (lambda now: "kitchen", ["decide() returned 'kitchen'", "plan or None"]),
-        (lambda now: now.plan().go_to("attic"), ["step 0", "no room 'attic'", "kitchen_0"]),
+        (lambda now: now.plan().go_to("attic"), ["step 0", "no room 'attic'", "kitchen_1"]),
         (lambda now: now.plan().go_to([10.0, 1.0]), ["can't be reached"]),
         (lambda now: now.plan().go_to(3), ["step 0", "expected a place"]),
         (lambda now: now.plan().stay(timedelta(seconds=-1)), ["can't stay for"]),

@@ -45,7 +45,7 @@ def detections(path: Path, rows: list[tuple[float, str, float, float]]) -> Path:
 
 @pytest.fixture
 def kitchen(tmp_path: Path) -> Path:
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     rows = [(float(t), "ana", x, y) for t in range(600, 660)]
     return detections(tmp_path / "seen.csv", [*rows, (700.4, "person", x + 0.1, y)])
 
@@ -54,10 +54,10 @@ def test_detections_are_the_observations_of_the_run(kitchen: Path) -> None:
     run = fleet2d.run(scenario(kitchen))
 
     table = run.tables["observations"]
-    x, _ = place("kitchen_0")
+    x, _ = place("kitchen_1")
     assert table["step"].to_pylist() == [*range(600, 660), 700]
     assert table["user"].to_pylist() == ["ana"] * 60 + [None]
-    assert table["room"].to_pylist() == ["kitchen_0"] * 61
+    assert table["room"].to_pylist() == ["kitchen_1"] * 61
     assert np.allclose(table["x"].to_numpy(), [x] * 60 + [x + 0.1], atol=1e-3)
     assert table["truth_known"].to_pylist() == [False] * 61
     assert table["true_user"].to_pylist() == [None] * 61
@@ -80,7 +80,7 @@ def test_algorithms_learn_from_it(kitchen: Path) -> None:
     run = fleet2d.run(scenario(kitchen))
 
     last = [r for r in run.tables["ltp"].to_pylist() if r["user"] == "ana"][-1]
-    assert last["room"] == "kitchen_0" or run.tables["ltp"].num_rows
+    assert last["room"] == "kitchen_1" or run.tables["ltp"].num_rows
 
 
 def test_metrics_say_that_the_truth_is_unknown(kitchen: Path) -> None:
@@ -92,7 +92,7 @@ def test_metrics_say_that_the_truth_is_unknown(kitchen: Path) -> None:
 
 
 def test_known_truth_and_real_sightings_score_the_belief(tmp_path: Path, kitchen: Path) -> None:
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     truth = tmp_path / "uwb.csv"
     truth.write_text("time,x,y\n" + "".join(f"{t},{x},{y}\n" for t in range(600, 2400, 30)))
     content = scenario(kitchen)
@@ -140,16 +140,16 @@ def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path: Path) -> Non
 
 
 def test_the_frame_moves_positions(kitchen: Path, tmp_path: Path) -> None:
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     path = detections(tmp_path / "moved.csv", [(0, "ana", x - 2, y + 1)])
 
     run = fleet2d.run(scenario(path, frame={"origin": [2, -1]}))
 
-    assert run.tables["observations"]["room"].to_pylist() == ["kitchen_0"]
+    assert run.tables["observations"]["room"].to_pylist() == ["kitchen_1"]
 
 
 def test_few_detections_outside_are_left_out_and_counted(tmp_path: Path) -> None:
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     rows = [(t, "ana", x, y) for t in range(9)] + [(9, "ana", -40.0, y)]
     path = detections(tmp_path / "seen.csv", rows)
 
@@ -162,7 +162,7 @@ def test_few_detections_outside_are_left_out_and_counted(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("turn", [90.0, 180.0])
 def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path: Path, turn: float) -> None:
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     path = detections(tmp_path / "seen.csv", [(float(t), "ana", x, y) for t in range(9)])
 
     with pytest.raises(
@@ -174,7 +174,7 @@ def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path: Path, tur
 @pytest.mark.slow
 def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path: Path) -> None:
     """Within the reach of a metre nothing is left out, but what is in walls is counted."""
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     rows = [(t, "ana", x + t / 10 - 4, y) for t in range(80)]  # through the walls beside
     inside = [row for row in rows if fleet2d.load_floorplan().room_at(*row[2:]) is not None]
     path = detections(tmp_path / "seen.csv", inside)
@@ -269,7 +269,7 @@ def test_the_log_is_an_input_of_the_run(kitchen: Path, tmp_path: Path) -> None:
 
 def both_ways(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return a scenario whose robot perceives somebody by a table, and the same by a script."""
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     steps = [600, 601, 602, 1500, 1501, 2400]
     table = detections(folder / "ghosts.csv", [(float(s), "ana", x, y) for s in steps])
     base = {"extends": "bundled:paper", "simulation": {"duration": "1 h", "seed": 4}}

@@ -208,7 +208,7 @@ def test_action_that_is_no_whole_number_is_an_error(action: Any) -> None:
 def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
     env = RobotEnv(flat(), masked="error")
     _, info = env.reset(seed=1)
-    storage = env.present.simulation.home.plan.room("storage_0").index
+    storage = env.present.simulation.home.plan.room("storage_1").index
     action = storage if action == 4 else action
     with pytest.raises(InputError, match="the policy chose"):
         env.step(action)
@@ -220,7 +220,7 @@ def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
 def test_masked_action_means_to_rest() -> None:
     env = RobotEnv(flat())
     env.reset(seed=1)
-    storage = env.present.simulation.home.plan.room("storage_0").index
+    storage = env.present.simulation.home.plan.room("storage_1").index
 
     assert 600 == env.step(storage)[4]["elapsed_s"]
 
@@ -454,6 +454,6 @@ def test_picture_of_a_life_shows_the_scores() -> None:
     texts = [text.get_text() for text in life_figure(env, np.arange(8.0)).axes[0].texts]
 
     assert (np.uint8, 3) == (pixels.dtype, pixels.shape[2])
-    assert any(text.startswith("kitchen_0\n") for text in texts)
+    assert any(text.startswith("kitchen_1\n") for text in texts)
     with pytest.raises(InputError, match="scores are of 8 actions, the rooms and to rest"):
         life_figure(env, np.arange(7.0))

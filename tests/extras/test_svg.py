@@ -38,7 +38,7 @@ def test_cubicasa_layout_has_its_rooms_and_doors(tmp_path: Path) -> None:
     plan = load_floorplan(write(tmp_path, CUBICASA))
 
     areas = {room.name: room.area_m2 for room in plan.rooms}
-    assert areas == pytest.approx({"living_room_0": 18.24, "bedroom_0": 13.68}, abs=0.3)
+    assert areas == pytest.approx({"living_room_1": 18.24, "bedroom_1": 13.68}, abs=0.3)
     assert [("living_room", "bedroom")] == [
         tuple(plan.rooms[k].type for k in sorted(door.rooms)) for door in plan.doorways
     ]

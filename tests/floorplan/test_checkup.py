@@ -49,7 +49,7 @@ def test_part_that_nothing_joins_is_found() -> None:
     assert "12.00 m2" in part.text
     assert part.at is not None
     assert shed.contains(shapely.Point(part.at))
-    assert ("room", "a body of radius 0.15 m can't get to storage_0 (12.0 m2)") == (
+    assert ("room", "a body of radius 0.15 m can't get to storage_1 (12.0 m2)") == (
         room.kind,
         room.text,
     )
@@ -77,7 +77,7 @@ def test_misspelled_type_of_a_room_is_found_with_the_nearest_one() -> None:
 
     finding = only(checkup(home(regions=[kichen, studio])))
 
-    assert "kichen_0 has the unusual type 'kichen': did you mean 'kitchen'?" == finding.text
+    assert "kichen_1 has the unusual type 'kichen': did you mean 'kitchen'?" == finding.text
 
 
 def test_small_parts_are_one_odd_finding() -> None:
@@ -95,14 +95,14 @@ def test_room_with_too_narrow_a_door_is_found() -> None:
     assert [] == checkup(home(narrow), radius=0.15)
     room = only(checkup(home(narrow), radius=0.22))
     assert ("room", "wrong") == (room.kind, room.severity)
-    assert "a body of radius 0.22 m can't get to bedroom_0 (19.2 m2)" == room.text
+    assert "a body of radius 0.22 m can't get to bedroom_1 (19.2 m2)" == room.text
 
 
 def test_rooms_are_counted_from_the_entrance() -> None:
     narrow = shapely.union_all([LEFT, RIGHT, shapely.box(5, 1.5, 5.2, 1.9)])
     room = only(checkup(home(narrow, entrance=(7, 2)), radius=0.22))
 
-    assert "can't get to living_room_0" in room.text
+    assert "can't get to living_room_1" in room.text
 
 
 def test_entrance_where_nobody_can_stand_is_found() -> None:
@@ -115,7 +115,7 @@ def test_furniture_that_shuts_a_room_is_named_as_the_cause() -> None:
     shelf = stand_furniture("shelf", (5.5, 2.0), 0, (1.6, 0.4))
     findings = checkup(home(objects=[shelf]))
 
-    assert "furniture keeps a body of radius 0.15 m out of 15.7 m2 of bedroom_0" in findings[0].text
+    assert "furniture keeps a body of radius 0.15 m out of 15.7 m2 of bedroom_1" in findings[0].text
 
 
 def test_furniture_in_the_doorway_is_named_as_the_cause() -> None:
@@ -125,7 +125,7 @@ def test_furniture_in_the_doorway_is_named_as_the_cause() -> None:
     assert [] == checkup(plan)
     plan = home(LEFT.union(closet), plan.regions, objects=[table])
 
-    assert "furniture keeps a body of radius 0.15 m out of storage_0" in checkup(plan)[0].text
+    assert "furniture keeps a body of radius 0.15 m out of storage_1" in checkup(plan)[0].text
 
 
 def test_bed_that_nobody_can_get_to_is_found() -> None:
@@ -227,7 +227,7 @@ def test_specks_tiny_rooms_and_missing_labels_are_found() -> None:
 
     assert {"specks", "room", "labels"} == set(kinds)
     assert "1 piece of wall smaller than 0.02 m2" in kinds["specks"].text
-    assert "storage_0 has only 0.25 m2" == kinds["room"].text
+    assert "storage_1 has only 0.25 m2" == kinds["room"].text
     assert "99 % of the floor belongs to no room" in kinds["labels"].text
 
 

@@ -11,8 +11,8 @@ from fleet2d.floorplan.home import HomeChange, HomeChanges
     [
         ({}, "got nothing"),
         ({"open": "a", "shut": "a"}, "got open and shut"),
-        ({"move": "sofa_0"}, "'move' and 'to' go together"),
-        ({"room": "office_0"}, "'room' and 'type' go together"),
+        ({"move": "sofa_1"}, "'move' and 'to' go together"),
+        ({"room": "office_1"}, "'room' and 'type' go together"),
         ({"shut": "a", "to": (1, 2)}, "'move' and 'to' go together"),
     ],
 )
@@ -22,7 +22,7 @@ def test_change_that_is_not_exactly_one_is_refused(settings: dict, words: str) -
 
 
 def test_changes_become_columns_in_their_order() -> None:
-    output = HomeChanges([HomeChange(open="b"), HomeChange(move="sofa_0", to=(1, 2))])
+    output = HomeChanges([HomeChange(open="b"), HomeChange(move="sofa_1", to=(1, 2))])
     columns = output.to_columns()
     assert ["open", "move"] == columns["change"].tolist()
-    assert ["b", "sofa_0"] == columns["target"].tolist()
+    assert ["b", "sofa_1"] == columns["target"].tolist()

@@ -71,7 +71,7 @@ def test_plan_written_by_hand_is_read(tmp_path: Path) -> None:
     )
 
     assert 14.0 == pytest.approx(plan.area_m2)
-    assert [("kitchen_0", "kitchen", ("kitchen",)), ("den", "unknown", ())] == [
+    assert [("kitchen_1", "kitchen", ("kitchen",)), ("den", "unknown", ())] == [
         (room.name, room.type, room.labels) for room in plan.rooms
     ]
     assert (4.5, 0.5) == plan.entrance
@@ -174,7 +174,7 @@ def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
 
     assert plan == read_native(write(tmp_path, content))
     assert plan == load_floorplan(path)
-    assert [("bed_0", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
+    assert [("bed_1", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
 
 
 def test_doorways_that_a_file_leaves_out_are_searched(tmp_path: Path) -> None:
@@ -223,7 +223,7 @@ def test_family_home_has_the_size_of_the_papers_and_every_room() -> None:
     assert () == plan.rooms_of_type("unknown")
     assert () == plan.notes
     assert plan.entrance is not None
-    assert plan.room("entryway_0") == plan.room_at(*plan.entrance)
+    assert plan.room("entryway_1") == plan.room_at(*plan.entrance)
 
 
 @pytest.mark.parametrize("cell", [0.05, 0.1])
@@ -275,7 +275,7 @@ def test_rectangles_for_rooms_and_doorways_are_one_free_space(tmp_path: Path) ->
 
     assert 1 == len(plan.polygons)
     assert 12 + 11.4 + 0.18 == pytest.approx(plan.area_m2)
-    assert ["kitchen_0", "office_0"] == [room.name for room in plan.rooms]
+    assert ["kitchen_1", "office_1"] == [room.name for room in plan.rooms]
     assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
     assert 0.9 == pytest.approx(plan.doorways[0].width_m)
     assert plan == overlapping

@@ -29,8 +29,8 @@ def thing(name: str, kind: str = "chair") -> PlacedObject:
 
 
 def test_objects_without_a_name_are_numbered_by_type_and_skip_own_names() -> None:
-    things = number_objects([thing(""), thing("chair_1"), thing(""), thing("", "bed")])
-    assert ["chair_0", "chair_1", "chair_2", "bed_0"] == [o.name for o in things]
+    things = number_objects([thing(""), thing("chair_2"), thing(""), thing("", "bed")])
+    assert ["chair_1", "chair_2", "chair_3", "bed_1"] == [o.name for o in things]
 
 
 def test_two_objects_of_one_name_are_refused() -> None:

@@ -7,13 +7,13 @@ import pytest
 from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.placed_objects import distinct_names, find_named, number_names
 
-THINGS = [SimpleNamespace(name=name) for name in ("kitchen_0", "bedroom_0")]
+THINGS = [SimpleNamespace(name=name) for name in ("kitchen_1", "bedroom_1")]
 
 
 def test_numbers_skip_own_names_and_count_by_type() -> None:
-    names = number_names([None, "bed_1", "", None], ["bed", "sofa", "bed", "sofa"], "object")
+    names = number_names([None, "bed_2", "", None], ["bed", "sofa", "bed", "sofa"], "object")
 
-    assert ["bed_0", "bed_1", "bed_2", "sofa_0"] == names
+    assert ["bed_1", "bed_2", "bed_3", "sofa_1"] == names
 
 
 def test_two_of_one_name_are_refused() -> None:
@@ -31,10 +31,10 @@ def test_repeated_names_get_the_next_free_number_with_a_note() -> None:
 
 
 def test_thing_is_found_by_name_or_refused_with_the_nearest() -> None:
-    assert THINGS[1] is find_named(THINGS, "bedroom_0", "flat", "room")
+    assert THINGS[1] is find_named(THINGS, "bedroom_1", "flat", "room")
     with pytest.raises(PlacementError) as caught:
         find_named(THINGS, "kitchen", "flat", "room", PlacementError)
 
     assert str(caught.value) == (
-        "flat has no room 'kitchen': did you mean 'kitchen_0'? Its rooms are: kitchen_0, bedroom_0"
+        "flat has no room 'kitchen': did you mean 'kitchen_1'? Its rooms are: kitchen_1, bedroom_1"
     )

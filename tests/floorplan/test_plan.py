@@ -24,7 +24,7 @@ def flat() -> FloorPlan:
 
 def test_build_gives_walls_cells_and_rooms(flat: FloorPlan) -> None:
     assert 6.0 + 8.4 + 0.2 == pytest.approx(flat.area_m2)
-    assert ["kitchen_0", "bedroom_0"] == [room.name for room in flat.rooms]
+    assert ["kitchen_1", "bedroom_1"] == [room.name for room in flat.rooms]
     assert [40 * 60 + 2 * 20, 56 * 60 + 2 * 20] == [room.cells for room in flat.rooms]
     assert flat.free.sum() == sum(room.cells for room in flat.rooms)
     assert (0.0, 0.0, 5.0, 3.0) == pytest.approx(flat.bounds)
@@ -50,23 +50,23 @@ def test_anchor_is_the_deepest_cell_lowest_row_then_column(flat: FloorPlan) -> N
 def test_room_at_finds_rooms_and_nothing_in_walls_or_outside(flat: FloorPlan) -> None:
     rooms = [flat.room_at(x, y) for x, y in [(1, 1), (2.05, 1.5), (4, 2)]]
 
-    assert ["kitchen_0", "kitchen_0", "bedroom_0"] == [room.name if room else "" for room in rooms]
+    assert ["kitchen_1", "kitchen_1", "bedroom_1"] == [room.name if room else "" for room in rooms]
     assert [None] * 4 == [flat.room_at(*at) for at in [(2.1, 0.5), (-3, 1), (1, 1e6), (9, -9)]]
 
 
 def test_room_by_name_or_index(flat: FloorPlan) -> None:
-    assert flat.room("bedroom_0") is flat.room(1)
+    assert flat.room("bedroom_1") is flat.room(1)
 
 
 def test_room_of_another_name_is_refused_with_the_nearest(flat: FloorPlan) -> None:
-    with pytest.raises(FloorPlanError, match=r"did you mean 'bedroom_0'.*kitchen_0, bedroom_0"):
-        flat.room("bedrom_0")
+    with pytest.raises(FloorPlanError, match=r"did you mean 'bedroom_1'.*kitchen_1, bedroom_1"):
+        flat.room("bedrom_1")
     with pytest.raises(FloorPlanError, match="its rooms are 0 to 1"):
         flat.room(2)
 
 
 def test_rooms_of_type_honours_every_label(flat: FloorPlan) -> None:
-    assert ("bedroom_0",) == tuple(room.name for room in flat.rooms_of_type("Office"))
+    assert ("bedroom_1",) == tuple(room.name for room in flat.rooms_of_type("Office"))
     assert () == flat.rooms_of_type("gym")
 
 
@@ -98,7 +98,7 @@ def test_holes_and_separate_parts_are_kept_and_noted() -> None:
     plan = FloorPlan.build("estate", shapely.union(house, shapely.box(10, 0, 12, 2)))
 
     assert 36 - 4 + 4 == pytest.approx(plan.area_m2)
-    assert ["unknown_0"] == [room.name for room in plan.rooms]
+    assert ["unknown_1"] == [room.name for room in plan.rooms]
     assert ("the free space is in 2 parts that nothing joins: 32.00, 4.00 m2",) == plan.notes
     assert plan.room_at(3, 3) is None
 
@@ -159,7 +159,7 @@ def test_nearest_free_of_a_free_place_is_its_cell(flat: FloorPlan) -> None:
     x, y = flat.nearest_free(1.01, 1.01)
 
     assert (1.0258, 1.0258) == (round(x, 4), round(y, 4))
-    assert flat.room_at(*flat.nearest_free(1e9, -1e9)) is flat.room("bedroom_0")
+    assert flat.room_at(*flat.nearest_free(1e9, -1e9)) is flat.room("bedroom_1")
 
 
 def test_repr_says_what_plan_it_is(flat: FloorPlan) -> None:

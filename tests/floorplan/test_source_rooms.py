@@ -12,7 +12,7 @@ LEFT, RIGHT, DOOR = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.6, 4.0), (4.0, 2.0, 4.1, 
 
 @pytest.fixture
 def plan() -> FloorPlan:
-    """Two rooms: `room_0` on the right, and the smaller `room_1` on the left."""
+    """Two rooms: `room_1` on the right, and the smaller `room_2` on the left."""
     free = shapely.union_all([shapely.box(*box) for box in (LEFT, RIGHT, DOOR)])
     assert isinstance(free, shapely.Polygon)
     return FloorPlan.build("flat", free, doorways=None, regions_are="none")
@@ -25,10 +25,10 @@ def names(plan: FloorPlan) -> list[tuple[str, str]]:
 def test_place_names_and_retypes_its_room_and_its_doorway(plan: FloorPlan) -> None:
     result = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="den", type="Home Office")])
 
-    assert [("room_0", "room"), ("den", "office")] == names(result)
+    assert [("room_1", "room"), ("den", "office")] == names(result)
     assert ("office",) == result.room("den").labels
-    assert {"den-room_0", "room_0-den"} & {doorway.name for doorway in result.doorways}
-    assert [("room_0", "room"), ("room_1", "room")] == names(plan)
+    assert {"den-room_1", "room_1-den"} & {doorway.name for doorway in result.doorways}
+    assert [("room_1", "room"), ("room_2", "room")] == names(plan)
 
 
 def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> None:
@@ -36,13 +36,13 @@ def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> N
         plan, [RoomCorrection(at=(2, 2), type="Küche"), RoomCorrection(at=(5, 2), type="kitchen")]
     )
 
-    assert [("kitchen_0", "kitchen"), ("kitchen_1", "kitchen")] == names(result)
+    assert [("kitchen_1", "kitchen"), ("kitchen_2", "kitchen")] == names(result)
 
 
 def test_room_that_is_only_named_keeps_its_type(plan: FloorPlan) -> None:
     result = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="Anna's")])
 
-    assert [("room_0", "room"), ("Anna's", "room")] == names(result)
+    assert [("room_1", "room"), ("Anna's", "room")] == names(result)
 
 
 def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
@@ -50,10 +50,10 @@ def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
 
     result = correct_rooms(plan, [RoomCorrection(polygon=corners, type="bedroom")])
 
-    assert [("room_0", "room"), ("room_1", "room"), ("bedroom_0", "bedroom")] == names(result)
-    assert 6.0 == pytest.approx(result.room("bedroom_0").area_m2)
+    assert [("room_1", "room"), ("room_2", "room"), ("bedroom_1", "bedroom")] == names(result)
+    assert 6.0 == pytest.approx(result.room("bedroom_1").area_m2)
     assert plan.area_m2 == pytest.approx(sum(room.area_m2 for room in result.rooms), abs=0.2)
-    assert ["bedroom_0"] == [
+    assert ["bedroom_1"] == [
         result.rooms[link.rooms[1]].name for link in result.room_graph if link.kind == "open"
     ]
 
@@ -63,7 +63,7 @@ def test_polygon_over_a_whole_room_replaces_it(plan: FloorPlan) -> None:
 
     result = correct_rooms(plan, [RoomCorrection(polygon=corners, name="studio")])
 
-    assert [("room_0", "room"), ("studio", "room")] == names(result)
+    assert [("room_1", "room"), ("studio", "room")] == names(result)
 
 
 def test_nothing_to_correct_is_the_same_plan(plan: FloorPlan) -> None:
@@ -81,7 +81,7 @@ def test_nothing_to_correct_is_the_same_plan(plan: FloorPlan) -> None:
             RoomCorrection(polygon=((20, 20), (22, 20), (22, 22)), type="office"),
             r"floorplan.rooms\[0\]: no free cell of flat is inside the polygon from \(20, 20\)",
         ),
-        (RoomCorrection(at=(2, 2), name="room_0"), "two rooms are named 'room_0'"),
+        (RoomCorrection(at=(2, 2), name="room_1"), "two rooms are named 'room_1'"),
     ],
 )
 def test_correction_that_fits_nowhere_is_an_error(
@@ -108,7 +108,7 @@ def test_incomplete_correction_is_refused(content: object, message: str) -> None
 
 
 def test_scenario_corrects_the_rooms_of_any_source() -> None:
-    x, y = Bundled().load().room("kitchen_0").anchor_xy
+    x, y = Bundled().load().room("kitchen_1").anchor_xy
 
     source = Bundled.model_validate({"rooms": [{"at": [x, y], "name": "galley"}]})
 

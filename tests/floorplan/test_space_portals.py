@@ -112,8 +112,8 @@ def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(
 
     rows = run.tables["trajectories"].to_pandas()
     rooms = {name: set(rows[rows.entity == name].room.dropna()) for name in ("astro", "bella")}
-    assert {"kitchen_0"} == rooms["astro"]
-    assert rooms["bella"] <= {"bedroom_0", "bathroom_0"}
+    assert {"kitchen_1"} == rooms["astro"]
+    assert rooms["bella"] <= {"bedroom_1", "bathroom_1"}
     ana = rows[(rows.entity == "ana") & ~rows.away]
     x = ana.x.to_numpy()
     assert not ((x > 5) & (x < 8)).any()
@@ -121,8 +121,8 @@ def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(
     assert [x[jump]] * 6 == x[jump - 5 : jump + 1].tolist()  # half of 14 s at either end
     assert [x[jump + 1]] * 6 == x[jump + 1 : jump + 7].tolist()
     seen = run.tables["observations"].to_pandas()
-    assert set(seen.room[seen.robot == "astro"]) <= {"living_room_0", "kitchen_0"}
-    assert {"bedroom_0"} <= set(seen.room[seen.robot == "bella"])
+    assert set(seen.room[seen.robot == "astro"]) <= {"living_room_1", "kitchen_1"}
+    assert {"bedroom_1"} <= set(seen.room[seen.robot == "bella"])
 
 
 @pytest.mark.slow
@@ -146,12 +146,12 @@ def test_the_checkup_tells_what_a_robot_loses_that_climbs_no_stairs(tmp_path: Pa
     assert ("storeys", "odd") == (found.kind, found.severity)
     assert (
         "a robot that starts at (0.50, 0.50) m and climbs no stairs can't get to 20.0 m2 of"
-        " 40.0 m2: bedroom_0, bathroom_0"
+        " 40.0 m2: bedroom_1, bathroom_1"
     ) == found.text
 
 
 @pytest.mark.parametrize(
-    ("climbs", "rooms"), [(False, {"kitchen_0"}), (True, {"kitchen_0", "bedroom_0"})]
+    ("climbs", "rooms"), [(False, {"kitchen_1"}), (True, {"kitchen_1", "bedroom_1"})]
 )
 def test_a_robot_gets_upstairs_if_it_climbs(tmp_path: Path, climbs: bool, rooms: set[str]) -> None:
     floorplan = {"type": "native", "path": str(house(tmp_path))}
@@ -174,4 +174,4 @@ def test_members_of_a_household_sleep_upstairs(tmp_path: Path) -> None:
         way = path(stored, name)
         asleep = slice(60, 4 * 60)  # everybody is in bed at 01:00
         rooms = [stored.plan.rooms[r].name for r in np.array(way.room)[asleep]]
-        assert rooms.count("bedroom_0") > 0.9 * len(rooms)
+        assert rooms.count("bedroom_1") > 0.9 * len(rooms)

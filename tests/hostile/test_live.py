@@ -48,7 +48,7 @@ def home(*, doors: bool) -> dict[str, Any]:
     }
     if doors:
         objects |= {
-            "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
+            "bath_door": {"type": "door", "doorway": "bathroom_1", "closes_after": "10 s"},
             "bath_contact": {"type": "contact_sensor", "of": "bath_door"},
         }
     battery = {
@@ -134,7 +134,7 @@ ACTS = st.one_of(
     act("shut", any_of("bath_door")),
     act("lock", any_of("bath_door")),
     act("unlock", any_of("bath_door")),
-    st.builds(dict, room=any_of("kitchen_0"), type=any_of("bathroom")),
+    st.builds(dict, room=any_of("kitchen_1"), type=any_of("bathroom")),
     st.builds(dict, hold=users, posture=any_of("lie", "sit"), duration=durations),
     st.builds(dict, configure=robots, behavior=any_of("patrol", "come", "follow"), keys=KEYS),
     st.builds(dict, lights=any_of("kitchen", "bedroom"), turn=any_of("on", "off")),
@@ -200,12 +200,12 @@ def put(run: fleet2d.Simulation) -> None:
 @pytest.mark.parametrize(
     ("orders", "room"),
     [
-        ((decide, put), "bedroom_0"),
-        ((put, decide), "kitchen_0"),
-        ((put, decide, put), "bedroom_0"),
-        ((decide, lambda run: run.do(HoldStill("astro")), put), "bedroom_0"),
-        ((decide, lambda run: run.do(Send("astro", "bathroom"))), "bathroom_0"),
-        ((lambda run: run.do(Send("astro", "bathroom")), decide), "kitchen_0"),
+        ((decide, put), "bedroom_1"),
+        ((put, decide), "kitchen_1"),
+        ((put, decide, put), "bedroom_1"),
+        ((decide, lambda run: run.do(HoldStill("astro")), put), "bedroom_1"),
+        ((decide, lambda run: run.do(Send("astro", "bathroom"))), "bathroom_1"),
+        ((lambda run: run.do(Send("astro", "bathroom")), decide), "kitchen_1"),
     ],
 )
 def test_the_last_of_several_orders_counts(

@@ -44,7 +44,7 @@ def home(*script: dict[str, Any], **more: Any) -> dict[str, Any]:
             "gina": "guest",
         },
         robots={"astro": {"battery": battery, "behaviors": behaviors}},
-        objects={"bath_door": {"type": "door", "doorway": "bathroom_0"}},
+        objects={"bath_door": {"type": "door", "doorway": "bathroom_1"}},
         script=list(script),
         **more,
     )
@@ -68,7 +68,7 @@ def test_who_is_sent_goes_on_foot_stays_and_is_left_to_itself_in_the_end() -> No
     assert abs(after["x"] - before["x"]) + abs(after["y"] - before["y"]) < 1.5
     run.advance(60)
     spot = run.state["ana"]
-    assert "kitchen_0" == spot["room"]
+    assert "kitchen_1" == spot["room"]
     run.advance(200)
     assert spot == run.state["ana"]
     assert run.actors["ana"].order is not None
@@ -97,16 +97,16 @@ def test_who_is_sent_away_comes_home_when_called() -> None:
     assert run.state["ana"]["away"]
     run.do(CallHome("ana", to="kitchen"))
     run.advance(120)
-    assert "kitchen_0" == room(run, "ana")
+    assert "kitchen_1" == room(run, "ana")
     run.advance(2400)  # her agenda has her out from 07:30 on
-    assert "kitchen_0" == room(run, "ana")
+    assert "kitchen_1" == room(run, "ana")
 
 
 def test_an_activity_is_done_where_the_agenda_has_it_and_recorded() -> None:
     script = {"at": "10 min", "activity": "ana", "what": "wash", "duration": "5 min"}
     run = fleet2d.Simulation(home(script))
     run.advance(720)
-    assert "bathroom_0" == room(run, "ana")
+    assert "bathroom_1" == room(run, "ana")
     events = table(run.run(), "events", entity="ana")
     done = events["step"][(events["event"] == "activity") & (events["detail"] == "wash")]
     assert any(600 <= step < 700 for step in done)
@@ -118,7 +118,7 @@ def test_a_guest_comes_stays_and_leaves() -> None:
     run.advance(600)
     assert run.state["gina"]["away"]
     run.advance(120)
-    assert "kitchen_0" == room(run, "gina")
+    assert "kitchen_1" == room(run, "gina")
     run.advance(420)
     assert run.state["gina"]["away"]
     with pytest.raises(ScenarioError, match="ana is not a guest"):
@@ -128,7 +128,7 @@ def test_a_guest_comes_stays_and_leaves() -> None:
 def test_a_robot_comes_when_called_and_goes_on_patrol_after() -> None:
     run = simulation({"at": "5 min", "call": "astro", "to": "bedroom"})
     run.advance(360)
-    assert "bedroom_0" == room(run, "astro")
+    assert "bedroom_1" == room(run, "astro")
     spot = run.state["astro"]
     run.advance(60)
     assert spot == run.state["astro"]
@@ -170,7 +170,7 @@ def test_stuck_wheels_hold_a_robot_whatever_it_is_called_to_do() -> None:
     run.advance(598)
     assert spot == run.state["astro"]
     run.advance(120)
-    assert "bedroom_0" == room(run, "astro")  # the call still waited
+    assert "bedroom_1" == room(run, "astro")  # the call still waited
 
 
 def test_a_behavior_that_is_switched_off_is_not_asked() -> None:
@@ -193,10 +193,10 @@ def test_who_is_sent_behind_a_locked_door_waits_until_it_is_open() -> None:
     run.advance(60)
     run.do(Send("ana", "bathroom"))
     run.advance(120)
-    assert "bathroom_0" != room(run, "ana")
+    assert "bathroom_1" != room(run, "ana")
     run.do(UnlockDoor("bath_door"))
     run.advance(120)
-    assert "bathroom_0" == room(run, "ana")
+    assert "bathroom_1" == room(run, "ana")
     assert any(event.event == "way_blocked" for event in run.events())
 
 

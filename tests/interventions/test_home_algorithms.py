@@ -17,7 +17,7 @@ def home(*script: dict[str, Any]) -> dict[str, Any]:
         users={"ana": {"type": "meander"}},
         robots={"astro": {"type": "patrol"}},
         objects={
-            "door": {"type": "door", "doorway": "bathroom_0"},
+            "door": {"type": "door", "doorway": "bathroom_1"},
             "motion": {"type": "motion_sensor", "at": [1.0, 3.0], "range": "6 m"},
         },
         algorithms={
@@ -47,7 +47,7 @@ def test_what_is_reset_begins_anew() -> None:
 
 
 def test_a_replaced_output_is_read_by_others_and_its_own_table_stays() -> None:
-    script = {"at": "15 min", "replace": "share", "rooms": {"kitchen_0": 1}, "duration": "20 min"}
+    script = {"at": "15 min", "replace": "share", "rooms": {"kitchen_1": 1}, "duration": "20 min"}
     plain, run = fleet2d.run(home()), fleet2d.run(home(script))
     assert (shares(plain, "share") == shares(run, "share")).all()
     differs = (shares(plain, "smooth") != shares(run, "smooth")).any(axis=1)
@@ -96,10 +96,10 @@ def test_a_sensor_says_what_it_is_told_to_say(max_span: int | None) -> None:
     [
         ({"reset": "shar"}, "did you mean 'share'"),
         ({"replace": "share"}, "one of 'rooms', 'values'"),
-        ({"replace": "share", "rooms": {"kitchn_0": 1}}, "did you mean 'kitchen_0'"),
+        ({"replace": "share", "rooms": {"kitchn_1": 1}}, "did you mean 'kitchen_1'"),
         (
-            {"replace": "share", "rooms": {"kitchen_0": -1}},
-            "rooms.kitchen_0: weight -1 is negative",
+            {"replace": "share", "rooms": {"kitchen_1": -1}},
+            "rooms.kitchen_1: weight -1 is negative",
         ),
         ({"stick": "motio"}, "did you mean 'motion'"),
         ({"restore": "motio"}, "did you mean 'motion'"),

@@ -23,8 +23,8 @@ EACH = [
     {"call": "astro", "find": "ana"},
     {"call": "astro", "dock": True},
     {"shut": "bath_door"},
-    {"move": "sofa_0", "to": [1, 2], "turn_deg": 90},
-    {"room": "office_0", "type": "bedroom"},
+    {"move": "sofa_1", "to": [1, 2], "turn_deg": 90},
+    {"room": "office_1", "type": "bedroom"},
 ]
 
 

@@ -22,7 +22,7 @@ def place(room: str) -> tuple[float, float]:
 
 
 def drive(simulation: fleet2d.Simulation) -> None:
-    x, y = place("kitchen_0")
+    x, y = place("kitchen_1")
     simulation.do({"put": "ana", "to": [x, y]})
     for k in range(3):
         seen = [{"user": "ana", "x": x, "y": y}, {"user": "unknown", "x": x + 0.1, "y": y}]
@@ -38,7 +38,7 @@ def test_detections_are_observed_at_the_step_of_their_arrival() -> None:
 
     assert table["step"].to_pylist() == [0, 10, 10, 20, 20]
     assert table["user"].to_pylist() == ["ana", "ana", None, "ana", None]
-    assert set(table["room"].to_pylist()) == {"kitchen_0"}
+    assert set(table["room"].to_pylist()) == {"kitchen_1"}
     assert table["truth_known"].to_pylist() == [False] * 5
 
 
@@ -60,7 +60,7 @@ def test_a_live_body_stands_where_it_was_put() -> None:
     path = simulation.run().path("ana")
 
     assert {(round(x, 2), round(y, 2)) for x, y in zip(path.x, path.y, strict=True)} == {
-        tuple(round(v, 2) for v in place("kitchen_0"))
+        tuple(round(v, 2) for v in place("kitchen_1"))
     }
 
 
@@ -95,7 +95,7 @@ def test_what_is_wrong_is_refused(act: dict[str, Any], message: str) -> None:
 def test_simulated_robots_and_sensors_refuse_what_arrives() -> None:
     content = LIVE | {
         "robots": {},
-        "objects": {"front_door": {"type": "motion_sensor", "at": place("kitchen_0")}},
+        "objects": {"front_door": {"type": "motion_sensor", "at": place("kitchen_1")}},
     }
     simulation = fleet2d.Simulation(content)
 

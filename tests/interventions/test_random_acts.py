@@ -19,7 +19,7 @@ KEPT_OUT = {
     "simulation": {"duration": "30 min"},
     "script": [
         {"at": "1 min", "keep_out": "astro", "of": "kitchen", "duration": "10 min"},
-        {"at": "5 min", "room": "kitchen_0", "type": "office"},
+        {"at": "5 min", "room": "kitchen_1", "type": "office"},
     ],
 }
 
@@ -32,15 +32,15 @@ def events(run: Any, kind: str) -> list[tuple[int, str]]:
 def test_05_a_room_of_another_type_than_when_it_was_forbidden_is_allowed_again() -> None:
     """The run failed at 00:11, when the intervention ended: there was no kitchen then."""
     run = fleet2d.run(KEPT_OUT)
-    assert [(60, "kitchen_0")] == events(run, "banned")
-    assert [(660, "kitchen_0")] == events(run, "allowed")
+    assert [(60, "kitchen_1")] == events(run, "banned")
+    assert [(660, "kitchen_1")] == events(run, "allowed")
     assert [] == run.manifest["notes"]
 
 
 def test_a_room_stays_forbidden_while_another_intervention_forbids_it() -> None:
-    again = {"at": "2 min", "keep_out": "astro", "of": "kitchen_0", "duration": "20 min"}
+    again = {"at": "2 min", "keep_out": "astro", "of": "kitchen_1", "duration": "20 min"}
     run = fleet2d.run({**KEPT_OUT, "script": [*KEPT_OUT["script"], again]})
-    assert [(60 * 22, "kitchen_0")] == events(run, "allowed")
+    assert [(60 * 22, "kitchen_1")] == events(run, "allowed")
 
 
 def test_what_was_forbidden_is_known_after_a_checkpoint(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ HOME = {
         "gina": "guest",
     },
     "objects": {
-        "door": {"type": "door", "doorway": "bathroom_1"},
+        "door": {"type": "door", "doorway": "bathroom_2"},
         "contact": {"type": "contact_sensor", "of": "door"},
         "real": {"type": "live_sensor", "room": "hallway"},
     },
@@ -252,7 +252,7 @@ class Chance:
             "lock": lambda: {"lock": "door"},
             "unlock": lambda: {"unlock": "door"},
             "move": lambda: {
-                "move": self.one(*self.furniture, "sofa_0"),
+                "move": self.one(*self.furniture, "sofa_1"),
                 "to": self.point(),
                 "turn_deg": self.one(0, 45, 90),
             },

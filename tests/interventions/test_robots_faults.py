@@ -51,7 +51,7 @@ def test_a_robot_that_does_not_know_its_place_stands_until_it_does(act: dict[str
     assert (jump > 1) == ("kidnap" in act)
     if "kidnap" in act:
         rooms = table(run, "trajectories", entity="astro")["room"].astype(str)
-        assert "bathroom_0" == rooms[301]
+        assert "bathroom_1" == rooms[301]
 
 
 def test_a_broken_charger_does_not_charge_until_it_is_repaired() -> None:
@@ -92,7 +92,7 @@ def test_a_robot_that_is_dismissed_drops_what_it_was_called_to_do(behavior: str)
         assert was_busy
     assert not simulation.actors["astro"].behaviors[0].busy()
     simulation.run_until("07:12")
-    assert simulation.state["astro"]["room"] == "bedroom_0" or behavior == "follow"
+    assert simulation.state["astro"]["room"] == "bedroom_1" or behavior == "follow"
 
 
 def test_a_person_who_lies_down_is_lying() -> None:
@@ -213,9 +213,9 @@ def test_a_robot_keeps_out_of_rooms_until_it_may_enter_again() -> None:
     told = {str(e): int(s) for s, e in zip(events["step"], events["event"], strict=True)}
 
     assert (600, 2400) == (told["banned"], told["allowed"])
-    assert "kitchen_0" in set(rooms[:600])
-    assert "kitchen_0" not in set(rooms[660:2400])
-    assert "kitchen_0" in set(rooms[2400:])
+    assert "kitchen_1" in set(rooms[:600])
+    assert "kitchen_1" not in set(rooms[660:2400])
+    assert "kitchen_1" in set(rooms[2400:])
 
 
 def test_rooms_to_keep_out_of_are_checked() -> None:
@@ -235,7 +235,7 @@ def test_a_robot_that_meanders_keeps_out_while_it_is_told_to(seed: int) -> None:
     run = fleet2d.run(content, seed=seed)
     rooms = table(run, "trajectories", entity="astro")["room"]
 
-    assert "kitchen_0" in set(rooms[:3600]) | set(rooms[7200:])
-    left = 3600 + int(np.argmax(rooms[3600:] != "kitchen_0"))
+    assert "kitchen_1" in set(rooms[:3600]) | set(rooms[7200:])
+    left = 3600 + int(np.argmax(rooms[3600:] != "kitchen_1"))
     assert left < 3700
-    assert "kitchen_0" not in set(rooms[left:7200])
+    assert "kitchen_1" not in set(rooms[left:7200])

@@ -17,6 +17,6 @@ LIVE: dict[str, Any] = {
 
 
 @cache
-def place(room: str = "kitchen_0") -> tuple[float, float]:
+def place(room: str = "kitchen_1") -> tuple[float, float]:
     """Return a place in the middle of a room of the bundled home."""
     return next(r.anchor_xy for r in fleet2d.load_floorplan().rooms if r.name == room)

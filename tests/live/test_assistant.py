@@ -50,7 +50,7 @@ def test_a_simulation_waits_for_interventions(place: Workspace) -> None:
     place.intervene(name, {"put": "ana", "to": "kitchen"})
     state = place.advance(name, "1 s")
 
-    assert state["state"]["ana"]["room"] == "kitchen_0"
+    assert state["state"]["ana"]["room"] == "kitchen_1"
     assert place.advance(name, "08:00")["time"] == "2026-01-05T08:00:00"
     assert place.finish(name)["status"] == "interrupted"
     with pytest.raises(InputError, match="there is no simulation 'simulation_1'"):

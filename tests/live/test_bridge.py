@@ -94,7 +94,7 @@ def test_a_recorded_live_run_gives_the_same_digest(tmp_path: Path) -> None:
     messages: dict[int, list[Any]] = {
         0: [pose(0), seen, {"type": "reading", "sensor": "front_door", "on": True}],
         3: ["nonsense", pose(3), seen],
-        7: [{"type": "goal", "entity": "astro", "to": "kitchen_0"}],
+        7: [{"type": "goal", "entity": "astro", "to": "kitchen_1"}],
     }
 
     run, _, _ = bridged(messages, out=tmp_path / "run")
@@ -242,7 +242,7 @@ def test_a_function_may_intervene() -> None:
 
     def send(frame: LiveStep) -> None:
         if frame.step == 3:
-            simulation.do({"send": "astro", "to": "kitchen_0"})
+            simulation.do({"send": "astro", "to": "kitchen_1"})
 
     run = Bridge(simulation, [to_function(send)], speed=0).run()
 
@@ -261,14 +261,14 @@ def by(client: int, messages: dict[int, Any], **options: Any) -> tuple[Any, Now,
     return bridge.run(), peer, bridge
 
 
-GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_0"}
+GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_1"}
 
 
 def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands() -> None:
     run, peer, bridge = by(3, {0: GOAL, 5: None})
 
     assert [act["do"] for act in run.manifest["interventions"]] == ["send", "release"]
-    assert peer.told == ["astro: who sent it to kitchen_0 is gone: the goal is withdrawn"]
+    assert peer.told == ["astro: who sent it to kitchen_1 is gone: the goal is withdrawn"]
     places = [(frame.bodies["astro"]["x"], frame.bodies["astro"]["y"]) for frame in peer.frames]
     assert len(set(places[:5])) > 1
     assert len(set(places[6:])) == 1
@@ -463,7 +463,7 @@ def test_a_pose_in_millimetres_is_told_as_such() -> None:
 
 
 def test_a_body_that_jumps_is_told() -> None:
-    x, y = place("bedroom_0")
+    x, y = place("bedroom_1")
     elsewhere = pose(0) | {"x": x, "y": y}
     _, peer, bridge = bridged({k: [elsewhere if k % 2 else pose(0)] for k in range(4)})
 

@@ -14,7 +14,7 @@ import fleet2d
 from fleet2d.live import Bridge
 from fleet2d.live.peers import UdpPeer
 
-GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_0", "id": "g1"}
+GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_1", "id": "g1"}
 
 
 def told(messages: dict[int, list[Any]], **changes: Any) -> list[Any]:
@@ -59,7 +59,7 @@ def test_an_impossible_goal_is_told_with_its_reason(to: Any, reason: str) -> Non
 
 def test_goals_end_by_others_by_poses_by_steering_and_when_they_are_withdrawn() -> None:
     x, y = place()
-    other = GOAL | {"id": "g2", "to": "bathroom_0"}
+    other = GOAL | {"id": "g2", "to": "bathroom_1"}
     pose = {"type": "pose", "entity": "astro", "x": x, "y": y}
     steer = {"type": "velocity", "entity": "astro", "forward": 0.1}
     cancel = {"type": "cancel", "entity": "astro"}
@@ -102,11 +102,11 @@ def test_an_order_of_a_script_ends_a_goal() -> None:
 
 
 def test_a_shut_door_blocks_a_goal_until_it_is_open() -> None:
-    door = {"type": "door", "doorway": "bathroom_0", "open": False}
+    door = {"type": "door", "doorway": "bathroom_1", "open": False}
     simulation = LIVE["simulation"] | {"duration": "3 min"}
     opens = [{"at": "1 min", "open": "door"}]
     states = told(
-        {0: [GOAL | {"to": "bathroom_0"}]},
+        {0: [GOAL | {"to": "bathroom_1"}]},
         simulation=simulation,
         objects=LIVE["objects"] | {"door": door},
         script=opens,
@@ -141,7 +141,7 @@ def test_goals_and_velocities_repeat_to_the_same_digest(tmp_path: Path) -> None:
             0: [GOAL],
             9: [steer],
             10: [steer],
-            12: [{"type": "goal", "entity": "astro", "to": "bathroom_0"}],
+            12: [{"type": "goal", "entity": "astro", "to": "bathroom_1"}],
             20: [{"type": "cancel", "entity": "astro"}],
         }
     )

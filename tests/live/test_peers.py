@@ -88,14 +88,14 @@ def test_a_client_hears_all_and_sends_goals() -> None:
     thread, runs = in_background(bridge)
     heard: list[Any] = []
     with connect(f"ws://127.0.0.1:{peer.port}") as client:
-        client.send(json.dumps({"type": "goal", "entity": "astro", "to": "kitchen_0"}))
+        client.send(json.dumps({"type": "goal", "entity": "astro", "to": "kitchen_1"}))
         client.send("?")
         heard = [json.loads(text) for text in client]
     thread.join()
 
     hello, end = heard[0], heard[-1]
     assert (hello["type"], hello["users"], hello["robots"]) == ("hello", ["ana"], ["astro"])
-    assert {"kitchen_0"} <= {room["name"] for room in hello["rooms"]}
+    assert {"kitchen_1"} <= {room["name"] for room in hello["rooms"]}
     assert end == {"type": "end", "status": "complete", "digest": runs[0].digest}
     assert {"poses", "note"} <= {message["type"] for message in heard}
     steps = [message["step"] for message in heard if message["type"] == "poses"]
@@ -203,7 +203,7 @@ def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
         thread, runs = in_background(Bridge(simulation, [peer], speed=10))
         run = f"?run=ws://127.0.0.1:{peer.port}"
         page.goto(f"http://127.0.0.1:{server.server_port}/page.html{run}")
-        page.get_by_role("button", name="kitchen_0").click()
+        page.get_by_role("button", name="kitchen_1").click()
         page.get_by_text("the run is over: ").wait_for(timeout=40_000)
         bodies, log = page.locator("#bodies").inner_text(), page.locator("#log").inner_text()
         server.shutdown()
@@ -211,7 +211,7 @@ def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
 
     acts = runs[0].manifest["interventions"]
     assert [(act["do"], act["entity"], act["to"]) for act in acts] == [
-        ("send", "astro", "kitchen_0")
+        ("send", "astro", "kitchen_1")
     ]
     assert "astro: " in bodies
     assert f"the run is over: {runs[0].digest}" in log
@@ -223,7 +223,7 @@ def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) 
         "users": {
             "ana": {
                 "type": "schedule",
-                "days": [{"items": [{"at": "00:00", "place": "kitchen_0"}]}],
+                "days": [{"items": [{"at": "00:00", "place": "kitchen_1"}]}],
             }
         },
         "robots": {"astro": {"behaviors": [{"type": "live"}]}},
@@ -247,6 +247,6 @@ def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) 
 
     assert tried.returncode == 1
     assert program.returncode == 0, program.stderr
-    assert "astro goes to kitchen_0" in program.stdout
+    assert "astro goes to kitchen_1" in program.stdout
     assert runs[0].status == "complete"
     assert runs[0].manifest["interventions"][0]["do"] == "send"

@@ -133,7 +133,7 @@ def test_goals_are_withdrawn_when_the_broker_is_gone(
     thread = threading.Thread(target=bridge.run)
     thread.start()
     client = Client(port)
-    goal = {"type": "goal", "entity": "astro", "to": "kitchen_0"}
+    goal = {"type": "goal", "entity": "astro", "to": "kitchen_1"}
     client.mqtt.publish("home/in/any", json.dumps(goal), qos=1).wait_for_publish(5)
     while thread.is_alive() and not bridge.counts["applied"]:
         time.sleep(0.01)
@@ -143,7 +143,7 @@ def test_goals_are_withdrawn_when_the_broker_is_gone(
 
     assert told == [
         f"lost connections: mqtt://127.0.0.1:{port}: the connection is tried again",
-        "astro: who sent it to kitchen_0 is gone: the goal is withdrawn",
+        "astro: who sent it to kitchen_1 is gone: the goal is withdrawn",
     ]
 
 

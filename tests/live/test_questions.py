@@ -15,10 +15,10 @@ pytest.importorskip("duckdb", minversion="2.0", reason="the extra study is not i
 
 START = datetime(2026, 1, 5, 7)
 SEEN = [
-    (0, "astro", "user_seen", "kitchen_0"),
-    (60, "astro", "user_lost", "kitchen_0"),
+    (0, "astro", "user_seen", "kitchen_1"),
+    (60, "astro", "user_lost", "kitchen_1"),
     (90, "rover", "user_seen", "hall"),
-    (100, "astro", "user_seen", "kitchen_0"),
+    (100, "astro", "user_seen", "kitchen_1"),
     (400, "astro", "user_lost", "hall"),
 ]
 
@@ -77,7 +77,7 @@ def test_groups_have_sums_counts_and_durations(tables: dict[str, pa.Table]) -> N
 
     assert rows(tables, stays) == [
         ["hall", None, 1, "2026-01-05 07:06:40", "2026-01-05 07:06:40", None],
-        ["kitchen_0", 400.0, 3, "2026-01-05 07:00:00", "2026-01-05 07:01:40", 300.0],
+        ["kitchen_1", 400.0, 3, "2026-01-05 07:00:00", "2026-01-05 07:01:40", 300.0],
     ]
     counts = "SELECT count(*) FILTER (WHERE event = 'user_seen'), count(DISTINCT room) FROM events"
     assert rows(tables, counts) == [[3, 2]]
@@ -102,8 +102,8 @@ def test_tables_are_joined_nested_and_ordered(tables: dict[str, pa.Table]) -> No
         ("SELECT * FROM events WHERE step > soon", "no column 'soon'"),
         ("SELECT * FROM events WHERE event = 'usr_seen'", "did you mean 'user_seen'"),
         ("SELECT * FROM events WHERE event == usr_seen", "did you mean 'user_seen'"),
-        ("SELECT * FROM events WHERE room = 'kichen'", "did you mean 'kitchen_0'"),
-        ("SELECT * FROM events WHERE room != 'kitchen'", "did you mean 'kitchen_0'"),
+        ("SELECT * FROM events WHERE room = 'kichen'", "did you mean 'kitchen_1'"),
+        ("SELECT * FROM events WHERE room != 'kitchen'", "did you mean 'kitchen_1'"),
         ("SELECT * FROM events WHERE room NOT IN ('hall', 'hal')", "did you mean 'hall'"),
         ("SELECT * FROM events e WHERE 'rovr' = e.entity", "did you mean 'rover'"),
         ("SELECT * FROM (SELECT room AS r FROM events) WHERE r = 'hal'", "did you mean 'hall'"),

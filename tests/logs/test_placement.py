@@ -78,6 +78,6 @@ def test_a_label_without_its_room_proposes_the_most_similar_one(
 
 
 def test_a_label_means_the_first_of_its_rooms_that_the_home_has() -> None:
-    rooms: Any = [SimpleNamespace(name="toilet_0", type="toilet")]
+    rooms: Any = [SimpleNamespace(name="toilet_1", type="toilet")]
     known = map_rooms({"Sink": 3, "Sofa": 1}, {"Sink": ("bathroom", "toilet"), "Sofa": None}, rooms)
     assert known == {"Sink": ("toilet",), "Sofa": None}

@@ -20,7 +20,7 @@ def test_stays_cover_the_run_and_agree_with_the_trajectory() -> None:
     ]
     stay = np.searchsorted(begin, path.step, side="right") - 1
     assert places == rows["place"][stay].tolist()
-    assert {"away", "bedroom_0"} <= set(places)
+    assert {"away", "bedroom_1"} <= set(places)
 
 
 def test_without_users_there_is_no_table() -> None:

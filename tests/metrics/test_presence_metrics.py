@@ -315,7 +315,7 @@ def test_a_window_ignores_earlier_steps() -> None:
             metrics={"new": {**settings, "window": "1 h"}, "all": settings},
         )
     )
-    rows = {name: table(stored, name, user="ana", room="kitchen_0") for name in ("new", "all")}
+    rows = {name: table(stored, name, user="ana", room="kitchen_1") for name in ("new", "all")}
     assert rows["new"]["true_share"][-1] > 0.95
     assert rows["all"]["true_share"][-1] == pytest.approx(1 / 3, abs=0.02)
 

@@ -50,7 +50,7 @@ def content(period: str = "17 min") -> dict[str, Any]:
         },
         metrics={name: {"period": period} for name in METRICS},
         artifacts={"trajectories": "every step"},
-        **belief(bathroom_0=1, kitchen_0=1, away=0.4),
+        **belief(bathroom_1=1, kitchen_1=1, away=0.4),
     )
 
 
@@ -257,7 +257,7 @@ def test_a_wrong_verdict_not_at_home_is_counted() -> None:
         "type": "schedule",
         "days": [{"items": [{"at": "00:00", "place": "bathroom"}]}],
     }
-    gate = {"type": "door", "doorway": "bathroom_0", "open": False, "locked": True}
+    gate = {"type": "door", "doorway": "bathroom_1", "open": False, "locked": True}
     hidden["objects"] = {"gate": gate}
     find = {"type": "find", "user": "ana", "every": "40 min", "out": 0.9, "deadline": "30 min"}
     hidden["robots"]["astro"]["behaviors"] = ["dock", find]

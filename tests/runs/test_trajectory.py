@@ -235,7 +235,7 @@ def test_walk_by_unknown_rules_is_refused_not_guessed() -> None:
         run.path("ana")
 
 
-@pytest.mark.parametrize("objects", [{}, {"door": {"type": "door", "doorway": "bathroom_0"}}])
+@pytest.mark.parametrize("objects", [{}, {"door": {"type": "door", "doorway": "bathroom_1"}}])
 @pytest.mark.parametrize("at", [(1,), (300,), (3600,), (300, 300, 4000)])
 def test_a_person_who_walks_at_random_can_be_put_elsewhere(
     objects: Any, at: tuple[int, ...]

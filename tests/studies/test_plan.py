@@ -222,7 +222,7 @@ def test_variants_without_a_metric_are_noted(tmp_path: Path) -> None:
             notes.append(text)
 
     rules = [{"when": {SPEED: 0.6}, "set": {"metrics.sightings": None}}]
-    keep = {"metrics": ["sightings.*", "distance.*", "room_share.ana.kitchen_0"]}
+    keep = {"metrics": ["sightings.*", "distance.*", "room_share.ana.kitchen_1"]}
     compare = [{"metric": "distance.astroo", "against": {SPEED: 0.3}}]
     with pytest.raises(ScenarioError, match="'astroo', which no variant has"):
         check_study(small(rules=rules, keep=keep, compare=compare))

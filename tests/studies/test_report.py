@@ -34,7 +34,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
         "compare": [
             {"metric": SIGHTINGS, "against": {SPEED: 0.3}},
             {"metric": "distance.astro", "against": {SPEED: 0.3}, "within": ["dwell"]},
-            {"metric": "room_share.ana.kitchen_0", "against": {SPEED: 0.3}},
+            {"metric": "room_share.ana.kitchen_1", "against": {SPEED: 0.3}},
         ],
         "description": "Does a fast robot see more?",
         "tags": ["speed", "pilot"],
@@ -57,7 +57,7 @@ def test_a_report_is_one_page_with_its_figures(study: Study, page: Path, tmp_pat
     assert "http" not in text.replace("http://www.w3.org", "")
     figures = {path.stem for path in (page.parent / "figures").iterdir()}
     assert {"compare-1", "compare-1-home", "compare-2", "compare-2-home"} <= figures
-    assert "room_share_ana_kitchen_0-time" in figures
+    assert "room_share_ana_kitchen_1-time" in figures
     assert text == write_report(study, tmp_path / "again").read_text()
     for path in page.parent.rglob("*.*"):
         assert (
@@ -84,7 +84,7 @@ def test_homes_have_a_picture_within_each_value_of_another_axis(page: Path) -> N
 
 def test_shares_that_overlap_say_so(study: Study, page: Path) -> None:
     overlapping = [m for m in study.metrics if study.shares(m)["share"].sum() > 1.01]
-    assert ["room_share.ana.bathroom_0"] == overlapping  # of half of the variants only
+    assert ["room_share.ana.bathroom_1"] == overlapping  # of half of the variants only
     assert 1 == page.read_text().count("Shares overlap")
 
 

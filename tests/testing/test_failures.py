@@ -26,7 +26,7 @@ def flat(duration: str = "20 min", **sections: Any) -> Variant:
             "astro": {"camera": CAMERA, "behaviors": [{"type": "find", "user": "ana"}]},
             "bolt": {"type": "patrol", "dwell": "1 min"},
         },
-        objects={"bath": {"type": "door", "doorway": "bathroom_0"}},
+        objects={"bath": {"type": "door", "doorway": "bathroom_1"}},
     )
     return Variant(load_scenario(content | sections), {"seed": 4})
 

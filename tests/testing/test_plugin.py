@@ -118,11 +118,11 @@ def test_ana_stays(trial):
     trial.run_until("07:02")
     trial.do({"put": "ana", "to": "bathroom"})
     trial.advance(5)
-    assert trial.state["ana"]["room"] == "kitchen_0"
+    assert trial.state["ana"]["room"] == "kitchen_1"
 """, "-q")  # fmt: skip
     assert {"failed": 1} == result.outcomes
     text = result.text
-    assert "assert 'bathroom_0' == 'kitchen_0'" in text
+    assert "assert 'bathroom_1' == 'kitchen_1'" in text
     assert "again: pytest test_suite.py::test_ana_stays --fleet2d-seed 0" in text
     folder = tmp_path / "left" / "test_suite.py-test_ana_stays"
     for name in ("run", "smaller"):

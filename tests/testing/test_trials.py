@@ -57,8 +57,8 @@ def test_interventions_can_be_left_out(without: Any) -> None:
 
     life = run_trial(FLAT, body, without=without)
     assert 2 == len(life.acts)
-    assert (0 not in without) == (rooms[0] == "kitchen_0")
-    assert (1 not in without) == (rooms[1] == "bathroom_0")
+    assert (0 not in without) == (rooms[0] == "kitchen_1")
+    assert (1 not in without) == (rooms[1] == "bathroom_1")
 
 
 def test_margins_of_any_unit_compare() -> None:

@@ -12,8 +12,8 @@ SCENARIO = {
     "simulation": {"duration": "9 h", "seed": 11},
     "floorplan": {"layers": {"dust": {"fill": 0.5}}},
     "objects": {
-        "bath_door": {"type": "door", "doorway": "bathroom_0", "closes_after": "10 s"},
-        "office_door": {"type": "door", "doorway": "office_0", "open": False},
+        "bath_door": {"type": "door", "doorway": "bathroom_1", "closes_after": "10 s"},
+        "office_door": {"type": "door", "doorway": "office_1", "open": False},
     },
 }
 

@@ -107,7 +107,7 @@ QUESTIONS: dict[str, dict[str, Truth]] = {
         "ann not in bedroom": lambda s: ~s.at("ann", "bedroom"),
         "anna away": lambda s: s.at("anna", "away"),
         "ann home": lambda s: s.at("ann", "home"),
-        "ann is in the bedroom_0": lambda s: s.at("ann", "bedroom_0"),
+        "ann is in the bedroom_1": lambda s: s.at("ann", "bedroom_1"),
         "ann and anna in kitchen": lambda s: s.at("ann", "kitchen") & s.at("anna", "kitchen"),
         "ann and anna in bedroom": lambda s: s.at("ann", "bedroom") & s.at("anna", "bedroom"),
         "ann, anna and ann lee home": lambda s: (

@@ -661,14 +661,14 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         floorplan={"slows": [{"area": area, "speed": 0.5}]},
         script=[{"at": "30 min", "lights": "living_room", "turn": "off"}],
     )
-    view = "#select=living_room_0&panel=inspect"
+    view = "#select=living_room_1&panel=inspect"
     with served(PageData(run)) as address, page_at(browser, address + view) as page:
         light = page.locator("div:has(> dt:text-is('light')) dd")
         until(page, lambda: light.inner_text() == "on")
         pictures = {page.locator(".plan canvas.top").screenshot()}
         page.keyboard.press("End")
         until(page, lambda: light.inner_text() == "off")
-        page.wait_for_selector(".label >> text=living_room_0 light")
+        page.wait_for_selector(".label >> text=living_room_1 light")
         add_new_picture(page, pictures)
         page.click("#tab-layers")
         for name in ("slows", "lights"):
@@ -801,7 +801,7 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
     simulation = fleet2d.Simulation(
         "bundled:paper",
         "simulation.duration=6 h",
-        "objects.bath_door={type: door, doorway: bathroom_0}",
+        "objects.bath_door={type: door, doorway: bathroom_1}",
         seed=4,
     )
     live = LiveRun(simulation, paused=True)
@@ -820,7 +820,7 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
         page.click("text=Put ana")
         page.mouse.click(*place_in(page, 0, "Living room"))
         page.click(".live >> text=Step")
-        page.wait_for_selector("[data-inspected=ana] >> text=living_room_0")
+        page.wait_for_selector("[data-inspected=ana] >> text=living_room_1")
         page.select_option("select[aria-label='Speed of the simulation']", "0")
         page.click("button.play")
         page.wait_for_selector("html[data-ended='1']", timeout=60_000)
@@ -872,7 +872,7 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
                 .get_attribute("data-room")
                 for i in range(2)
             ]
-            assert "living_room_0" == rooms[1] != rooms[0]
+            assert "living_room_1" == rooms[1] != rooms[0]
     branch = tmp_path / "day-branch-1"
     done = fleet2d.open_run(branch).manifest["interventions"]
     assert [("configure", at), ("send", at)] == [(act["do"], act["step"]) for act in done]

@@ -19,7 +19,7 @@ from fleet2d.viewing.served_runs import ServedRuns
 
 PORT = 8765
 OWN = f"http://127.0.0.1:{PORT}"
-DOOR = "objects.bath_door={type: door, doorway: bathroom_0}"
+DOOR = "objects.bath_door={type: door, doorway: bathroom_1}"
 
 
 def simulation(duration: str = "8 h") -> fleet2d.Simulation:
@@ -112,7 +112,7 @@ def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
 def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
     live.submit(order("step", value=600))
     home = live.engine.simulation.home
-    x, y = home.plan.room("living_room_0").anchor_xy
+    x, y = home.plan.room("living_room_1").anchor_xy
     assert "" == live.submit(order("place", "ana", x=x, y=y))
     live.submit(order("step", value=1))
     state = live.engine.simulation.state["ana"]
@@ -126,11 +126,11 @@ def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
 
 def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
     live.submit(order("step", value=60))
-    x, y = live.engine.simulation.home.plan.room("kitchen_0").anchor_xy
+    x, y = live.engine.simulation.home.plan.room("kitchen_1").anchor_xy
     assert "" == live.submit(order("call", "astro", x=x, y=y))
     live.submit(order("step", value=120))
     state = live.engine.simulation.state["astro"]
-    assert "kitchen_0" == state["room"]
+    assert "kitchen_1" == state["room"]
     assert "" == live.submit(order("call", "astro", x=x + 0.5, y=y))
     live.submit(order("step", value=1))
     live.end()

@@ -15,7 +15,7 @@ export function bodyLabels(names: readonly string[]): Map<string, string> {
   return new Map(names.map((name) => [name, counts.get(title(name)) === 1 ? title(name) : name]));
 }
 
-/** Rooms as people write them: `bedroom_1` is "Bedroom 1", its number as everywhere, and "Bedroom" where it is the only one. */
+/** Rooms as people write them: `bedroom_2` is "Bedroom 2", and "Bedroom" where it is the only one. */
 export function roomLabels(rooms: readonly RoomFacts[]): string[] {
   const counts = new Map<string, number>();
   for (const { type } of rooms) counts.set(type, (counts.get(type) ?? 0) + 1);

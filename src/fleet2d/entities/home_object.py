@@ -56,7 +56,7 @@ class Door(HomeObject):
         schedule: When it is opened, shut or locked, every day.
     """
 
-    doorway: str | Point = Field(examples=["bathroom_0", "kitchen_0-hallway_0", [4.0, 2.5]])
+    doorway: str | Point = Field(examples=["bathroom_1", "kitchen_1-hallway_1", [4.0, 2.5]])
     open: bool = True
     locked: bool = False
     closes_after: PositiveDuration | None = Field(default=None, examples=["10 s"])

@@ -1,6 +1,6 @@
 """Places: rooms, furniture and points as a scenario names them, and where a body stops for one.
 
-A scenario names a kind ("bathroom", "sofa") or a single place ("bathroom_0", a point). A kind that
+A scenario names a kind ("bathroom", "sofa") or a single place ("bathroom_1", a point). A kind that
 this home lacks, or that the body can't reach, is left out as long as another place remains; the
 body's `notes` say so. A single place that is missing is an error that names the key.
 """
@@ -306,7 +306,7 @@ def lies_in(body: "Body", point: LatticePoint, rooms: frozenset[int]) -> bool:
 
 
 def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
-    """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_0')."""
+    """Whether a place gives a type ('bathroom'), not a particular room or object ('bathroom_1')."""
     if is_point(place):
         return False
     things: tuple[Room | PlacedObject, ...] = (*body.home.rooms, *body.home.objects)
@@ -314,7 +314,7 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     types = {thing.type for thing in things} | {k for room in body.home.rooms for k in room.labels}
     return all(
         name not in names
-        and not str(name)[-1:].isdigit()  # bathroom_7 is a single bathroom
+        and not str(name)[-1:].isdigit()  # bathroom_8 is a single bathroom
         and (name in types or name in FURNITURE or usual_type(str(name)) in PRIORITY)
         for name in place
         if name != ANY

@@ -98,7 +98,7 @@ def checkup(plan: FloorPlan, radius: float = 0.15) -> list[Finding]:
         >>> office = LabelledRegion(("Office",), shapely.box(4.1, 0, 8, 4))
         >>> for finding in checkup(FloorPlan.build("flat", free, [kitchen, office])):
         ...     print(finding.severity, finding.text)
-        wrong a body of radius 0.15 m can't get to office_0 (15.2 m2)
+        wrong a body of radius 0.15 m can't get to office_1 (15.2 m2)
     """
     of_plan = (_scale, _parts, _storeys, _no_go, _specks, _labels, _doors, _standing_in_walls)
     findings = [finding for find in of_plan for finding in find(plan)]

@@ -404,8 +404,8 @@ class HomeChange(Settings):
     Example:
         >>> HomeChange(shut="bath_door").verb
         'shut'
-        >>> HomeChange(room="office_0", type="bedroom").target
-        'office_0'
+        >>> HomeChange(room="office_1", type="bedroom").target
+        'office_1'
     """
 
     open: str | None = None

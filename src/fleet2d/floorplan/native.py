@@ -278,7 +278,7 @@ class PlanFile(FileModel):
         name: Name of the plan; left out: of its file.
         free: The parts of the free space between the walls, such as a rectangle for each room and
             each doorway; where they touch or overlap they are one.
-        rooms: Its rooms; space of none is the room unknown_0.
+        rooms: Its rooms; space of none is the room unknown_1.
         doorways: Passages between rooms; left out: the walls are searched.
         objects: Furniture and devices, which are separate from the walls.
         no_go: Areas that robots keep out of.

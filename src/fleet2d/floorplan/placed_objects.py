@@ -55,14 +55,14 @@ def number_names(names: Sequence[str | None], types: Sequence[str], noun: str) -
         FloorPlanError: Two have the same name.
 
     Example:
-        >>> number_names(["den", None, "room_0"], ["office", "room", "room"], "room")
-        ['den', 'room_1', 'room_0']
+        >>> number_names(["den", None, "room_1"], ["office", "room", "room"], "room")
+        ['den', 'room_2', 'room_1']
     """
     own = Counter(name for name in names if name)
     twice = [name for name, uses in own.items() if uses > 1]
     if twice:
         raise FloorPlanError(f"two {noun}s are named {twice[0]!r}: give each {noun} its own name")
-    numbers: defaultdict[str, count[int]] = defaultdict(count)
+    numbers: defaultdict[str, count[int]] = defaultdict(lambda: count(1))
     return [
         name or next(new for k in numbers[kind] if (new := f"{kind}_{k}") not in own)
         for name, kind in zip(names, types, strict=True)
@@ -142,7 +142,7 @@ class PlacedObject:
     """An object at a place in the home.
 
     Attributes:
-        name: Unique in the plan, such as `bed_0`; empty to be numbered by type.
+        name: Unique in the plan, such as `bed_1`; empty to be numbered by type.
         type: Its type, such as `bed`.
         footprint: The floor that it covers [m].
         blocks: What it blocks: nothing (a rug), bodies (`path`, a table), or bodies and sight
@@ -163,7 +163,7 @@ class PlacedObject:
 
 
 def number_objects(objects: Sequence[PlacedObject]) -> tuple[PlacedObject, ...]:
-    """Return the objects, those without a name numbered by type (`bed_0`).
+    """Return the objects, those without a name numbered by type (`bed_1`).
 
     Raises:
         FloorPlanError: Two have the same name.

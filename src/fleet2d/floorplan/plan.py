@@ -242,9 +242,9 @@ class FloorPlan:
         >>> kitchen = LabelledRegion(("Kitchen",), shapely.box(0, 0, 2, 3))
         >>> plan = FloorPlan.build("flat", shapely.box(0, 0, 5, 3), [kitchen])
         >>> [(room.name, round(room.area_m2, 2)) for room in plan.rooms]
-        [('kitchen_0', 6.0), ('unknown_0', 9.0)]
+        [('kitchen_1', 6.0), ('unknown_1', 9.0)]
         >>> plan.room_at(1.0, 1.0).name, plan.room_at(6.0, 1.0)
-        ('kitchen_0', None)
+        ('kitchen_1', None)
     """
 
     name: str

@@ -88,7 +88,7 @@ def save_world(plan: FloorPlan, path: Path) -> None:
         >>> path = Path(tempfile.mkdtemp()) / "home.sdf"
         >>> save_world(fleet2d.load_floorplan("family_home"), path)
         >>> [model.get("name") for model in ET.parse(path).findall("world/model")][:3]
-        ['floor', 'walls', 'bench_0']
+        ['floor', 'walls', 'bench_1']
     """
     root = ET.Element("sdf", version="1.9")
     world = ET.SubElement(root, "world", name=plan.name)

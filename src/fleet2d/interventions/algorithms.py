@@ -57,8 +57,8 @@ class ReplaceOutput(Lasting):
         withheld: Whether there is no output, as before the first one.
 
     Example:
-        >>> ReplaceOutput("ltp", rooms={"kitchen_0": 1}).rooms
-        {'kitchen_0': 1.0}
+        >>> ReplaceOutput("ltp", rooms={"kitchen_1": 1}).rooms
+        {'kitchen_1': 1.0}
     """
 
     subject = "algorithm"

@@ -87,7 +87,7 @@ class MoveFurniture(HomeIntervention):
         turn_deg: How far it is turned, counter-clockwise.
 
     Example:
-        >>> MoveFurniture("sofa_0", (2, 1), turn_deg=90).to
+        >>> MoveFurniture("sofa_1", (2, 1), turn_deg=90).to
         (2.0, 1.0)
     """
 
@@ -105,7 +105,7 @@ class SetRoomType(HomeIntervention):
         type: Its new type.
 
     Example:
-        >>> SetRoomType("office_0", "bedroom").type
+        >>> SetRoomType("office_1", "bedroom").type
         'bedroom'
     """
 

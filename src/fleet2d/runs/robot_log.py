@@ -128,7 +128,7 @@ def robot_log(
         >>> import fleet2d
         >>> run = fleet2d.run("bundled:paper", "simulation.duration=2 h", seed=4)
         >>> [entry.text for entry in robot_log(run, "astro", 0, 1800)][:2]
-        ['sets out from hallway_0', 'user_seen ana']
+        ['sets out from hallway_1', 'user_seen ana']
     """
     check_known(robot, "robot", run.manifest["entities"]["robots"], InputError)
     if "events" not in run.tables:

@@ -132,7 +132,7 @@ def room_labels(rooms: Sequence[Room]) -> list[str]:
     Example:
         >>> import fleet2d
         >>> room_labels(fleet2d.load_floorplan("family_home").rooms)[3:7]
-        ['Dining room', 'Kitchen', 'Bedroom 0', 'Bedroom 1']
+        ['Dining room', 'Kitchen', 'Bedroom 1', 'Bedroom 2']
     """
     counts = Counter(room.type for room in rooms)
     labels = []

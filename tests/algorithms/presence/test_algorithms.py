@@ -61,7 +61,7 @@ def test_shares_of_each_user_and_hour_sum_to_one(stored) -> None:
 def test_likelihood_finds_a_meandering_user_at_home(stored) -> None:
     rows = table(stored, "e_likelihood", user="ben", room="away")
     assert rows["share"][-1] < 0.3
-    rows = table(stored, "e_likelihood", user="ana", room="kitchen_0")
+    rows = table(stored, "e_likelihood", user="ana", room="kitchen_1")
     assert rows["share"][-1] > 0.15
 
 
@@ -147,7 +147,7 @@ class Sure(Model):
     stored = run(content("1 h", rtp={"type": "real_time_presence", "model": model}))
     rows = table(stored, "rtp", user="ana", share=1.0)
     assert 12 == len(rows["step"])
-    assert {"bedroom_0"} == set(rows["room"])
+    assert {"bedroom_1"} == set(rows["room"])
 
 
 @pytest.mark.slow

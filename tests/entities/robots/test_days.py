@@ -123,7 +123,7 @@ def product() -> dict[str, Any]:
             "rtp": {"type": "real_time_presence"},
         },
         objects={
-            "gate": {"type": "door", "doorway": "living_room_0-kitchen_0", "schedule": agenda}
+            "gate": {"type": "door", "doorway": "living_room_1-kitchen_1", "schedule": agenda}
         },
         metrics={"time_to_find": {}, "battery": {}, "co_presence": {}},
     )

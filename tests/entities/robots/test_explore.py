@@ -24,7 +24,7 @@ def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others() -> None:
     assert ("explored", pytest.approx(98.5, abs=1.5)) == rows[-1]
     assert names(stored).count("explored") == 1
     poses = path(stored, "astro")
-    assert "kitchen_0" == stored.plan.room_at(float(poses.x[-1]), float(poses.y[-1])).name
+    assert "kitchen_1" == stored.plan.room_at(float(poses.x[-1]), float(poses.y[-1])).name
 
 
 def test_the_share_is_that_of_the_layer() -> None:
@@ -64,7 +64,7 @@ def test_behind_a_shut_door_it_goes_on_once_that_is_open() -> None:
         {"at": "07:01", "open": False},
         {"at": "07:20", "open": True},
     ]
-    door = {"type": "door", "doorway": "living_room_0-kitchen_0", "schedule": agenda}
+    door = {"type": "door", "doorway": "living_room_1-kitchen_1", "schedule": agenda}
     stay = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "5 min"}
     content = home_with(["explore", stay], "30 min", objects={"gate": door})
     content["robots"]["astro"]["camera"] = {"range": [0.2, 2.0], "angle_deg": 108}

@@ -77,7 +77,7 @@ def search(policy: str = "receding", **fields: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy: str) -> None:
-    content = home_with([search(policy), STAY], "30 min", **belief(kitchen_0=1, bathroom_0=1))
+    content = home_with([search(policy), STAY], "30 min", **belief(kitchen_1=1, bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     rows = [(name, step) for step, name, _ in events(stored) if name in ("find_begins", "found")]
     assert ["find_begins", "found"] == [name for name, _ in rows]
@@ -91,7 +91,7 @@ def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy: str) -> No
 def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data: Path) -> None:
     """Rooms, ways and looks as they are; chances by size, and drawn."""
     for name in ("bundled", *sorted((shared_data / "houseexpo").glob("*.json"))[:2]):
-        content = home_with([search()], **belief(kitchen_0=1))
+        content = home_with([search()], **belief(kitchen_1=1))
         content["floorplan"] = "bundled"
         if name != "bundled":
             content["floorplan"] = {"type": "houseexpo", "path": str(name)}
@@ -116,8 +116,8 @@ def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data: Path) ->
 
 
 def test_it_looks_first_where_it_is_told_to() -> None:
-    right = run(home_with([search("likeliest"), STAY], "30 min", **belief(bathroom_0=1)))
-    wrong = run(home_with([search("likeliest"), STAY], "30 min", **belief(bedroom_0=1)))
+    right = run(home_with([search("likeliest"), STAY], "30 min", **belief(bathroom_1=1)))
+    wrong = run(home_with([search("likeliest"), STAY], "30 min", **belief(bedroom_1=1)))
     times = [
         next(step for step, name, _ in events(one) if name == "found") for one in (right, wrong)
     ]
@@ -125,17 +125,17 @@ def test_it_looks_first_where_it_is_told_to() -> None:
 
 
 def test_it_gives_up_at_the_deadline() -> None:
-    content = home_with([search(deadline="2 min"), STAY], "30 min", OUT, **belief(bathroom_0=1))
+    content = home_with([search(deadline="2 min"), STAY], "30 min", OUT, **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     rows = [(step, name) for step, name, _ in events(stored)]
     assert [(600, "find_begins"), (720, "gave_up")] == rows
 
 
 def test_it_says_not_at_home_once_all_is_looked_at_and_believed() -> None:
-    stored = run(home_with([search(), STAY], "30 min", OUT, **belief(bathroom_0=1, away=0.6)))
+    stored = run(home_with([search(), STAY], "30 min", OUT, **belief(bathroom_1=1, away=0.6)))
     assert ["find_begins", "not_at_home"] == names(stored)
     surer = run(
-        home_with([search(out_at=1), STAY], "30 min", OUT, **belief(bathroom_0=1, away=0.6))
+        home_with([search(out_at=1), STAY], "30 min", OUT, **belief(bathroom_1=1, away=0.6))
     )
     assert ["find_begins", "gave_up"] == names(surer)
 
@@ -154,12 +154,12 @@ def test_a_search_that_can_not_begin_in_time_is_left_out() -> None:
         "visits": [{"at": "07:05", "place": "kitchen", "dwell": "20 min"}],
     }
     for late, begun in (("10 min", []), ("20 min", [1500])):
-        content = home_with([visit, search(late=late), STAY], "40 min", **belief(bathroom_0=1))
+        content = home_with([visit, search(late=late), STAY], "40 min", **belief(bathroom_1=1))
         stored = assert_same_for_every_max_span(content, 61)
         steps = [step for step, name, _ in events(stored) if name == "find_begins"]
         assert steps == [pytest.approx(step, abs=20) for step in begun]
     often = {**search(at=["07:06", "07:10", "07:24"], late="5 min")}
-    stored = run(home_with([visit, often, STAY], "40 min", **belief(bathroom_0=1)))
+    stored = run(home_with([visit, often, STAY], "40 min", **belief(bathroom_1=1)))
     assert 1 == names(stored).count("find_begins")  # the last of those that were due
 
 
@@ -178,7 +178,7 @@ def test_who_else_comes_into_view_does_not_make_it_look_anew() -> None:
 
 def test_who_is_in_view_is_found_at_once() -> None:
     content = home_with(
-        [search(), STAY], "30 min", astro={"start": [5.5, 6.0]}, **belief(kitchen_0=1)
+        [search(), STAY], "30 min", astro={"start": [5.5, 6.0]}, **belief(kitchen_1=1)
     )
     content["robots"]["astro"]["behaviors"][1]["waypoints"] = [[5.5, 6.0]]
     rows = [(step, name) for step, name, _ in events(run(content))]
@@ -196,7 +196,7 @@ def test_anyone_and_intervals_and_no_source_will_do() -> None:
 
 def test_it_breaks_in_and_the_patrol_goes_on() -> None:
     patrol = {"type": "patrol", "rooms": ["kitchen", "bedroom", "living_room"], "dwell": "7 min"}
-    stored = run(home_with([search(), patrol], "1 h", **belief(bathroom_0=1)))
+    stored = run(home_with([search(), patrol], "1 h", **belief(bathroom_1=1)))
     assert ["find_begins", "found"] == names(stored)
 
 
@@ -217,7 +217,7 @@ def test_a_distribution_of_an_own_algorithm_will_do() -> None:
 )
 def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        fleet2d.Simulation(home_with([search(**fields)], **belief(kitchen_0=1)))
+        fleet2d.Simulation(home_with([search(**fields)], **belief(kitchen_1=1)))
 
 
 def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> None:
@@ -231,4 +231,4 @@ def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> Non
 
 def test_a_robot_without_a_camera_is_refused() -> None:
     with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
-        fleet2d.Simulation(home_with([search()], astro={"camera": None}, **belief(kitchen_0=1)))
+        fleet2d.Simulation(home_with([search()], astro={"camera": None}, **belief(kitchen_1=1)))

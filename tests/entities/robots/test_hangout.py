@@ -29,16 +29,16 @@ def hangout(**fields: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("near", ["room", "view", "path"])
 def test_it_goes_where_people_are_believed_to_be(near: str) -> None:
-    content = home_with([hangout(near=near)], "40 min", **belief(bathroom_0=1))
+    content = home_with([hangout(near=near)], "40 min", **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
-    assert "bathroom_0" == rooms(stored)[-1]
+    assert "bathroom_1" == rooms(stored)[-1]
     assert names(stored)[-1] == "relocates"
 
 
 def test_nearness_by_path_falls_with_the_time_on_foot() -> None:
-    simulation = fleet2d.Simulation(home_with([hangout(near="path")], **belief(kitchen_0=1)))
+    simulation = fleet2d.Simulation(home_with([hangout(near="path")], **belief(kitchen_1=1)))
     astro, places = simulation.actors["astro"], simulation.actors["astro"].behaviors[0].places  # type: ignore[attr-defined]
-    kitchen = simulation.home.plan.room("kitchen_0").index
+    kitchen = simulation.home.plan.room("kitchen_1").index
     near = places.nearness("path", 10.0)
     cells = astro.space.cells(kitchen, astro.part)[:, ::-1] * 64 + 33
     for place in range(0, len(places.points), 9):
@@ -50,18 +50,18 @@ def test_nearness_by_path_falls_with_the_time_on_foot() -> None:
 
 
 def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
-    content = home_with([hangout(no_stops_in=["bathroom"])], "40 min", **belief(bathroom_0=1))
-    assert "kitchen_0" == rooms(run(content))[-1]
+    content = home_with([hangout(no_stops_in=["bathroom"])], "40 min", **belief(bathroom_1=1))
+    assert "kitchen_1" == rooms(run(content))[-1]
 
 
 def test_a_kind_of_room_that_the_home_lacks_is_avoided_all_the_same() -> None:
-    content = home_with([hangout(no_stops_in=["garage"])], "10 min", **belief(bathroom_0=1))
-    plain = home_with([hangout()], "10 min", **belief(bathroom_0=1))
+    content = home_with([hangout(no_stops_in=["garage"])], "10 min", **belief(bathroom_1=1))
+    plain = home_with([hangout()], "10 min", **belief(bathroom_1=1))
     assert rooms(run(plain)) == rooms(run(content))
 
 
 def test_it_stands_off_doors_ways_and_seats() -> None:
-    content = home_with([hangout()], "5 min", **belief(bathroom_0=1))
+    content = home_with([hangout()], "5 min", **belief(bathroom_1=1))
     content["floorplan"] = {"type": "bundled", "furnish": True}
     content["robots"]["astro"].pop("start")
     content["users"]["ana"] = "meander"
@@ -81,7 +81,7 @@ def test_it_stands_off_doors_ways_and_seats() -> None:
 
 
 def test_a_free_place_beats_one_in_the_way() -> None:
-    simulation = Simulation(home_with([hangout()], **belief(kitchen_0=1)))
+    simulation = Simulation(home_with([hangout()], **belief(kitchen_1=1)))
     behavior: Any = simulation.actors["astro"].behaviors[0]
     ways = behavior.places.block
     assert ways.max() > 0.2
@@ -105,7 +105,7 @@ def test_it_moves_rarely() -> None:
 
 
 def test_it_stands_still_in_quiet_hours() -> None:
-    content = home_with([hangout(explore=1, quiet="07:30-08:30")], "2 h", **belief(bathroom_0=1))
+    content = home_with([hangout(explore=1, quiet="07:30-08:30")], "2 h", **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     poses = path(stored, "astro")
     quiet = slice(1860, 5400)  # a way that was begun before is ended
@@ -117,13 +117,13 @@ def test_it_stands_still_in_quiet_hours() -> None:
 
 def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
     content = home_with(
-        [hangout(no_stops_in=["bedroom"], quiet="06:00-09:00")], "1 h", **belief(bathroom_0=1)
+        [hangout(no_stops_in=["bedroom"], quiet="06:00-09:00")], "1 h", **belief(bathroom_1=1)
     )
     content["robots"]["astro"]["start"] = [1.0, 6.0]
     stored = assert_same_for_every_max_span(content, 61)
-    assert "bedroom_0" not in rooms(stored, 60)
+    assert "bedroom_1" not in rooms(stored, 60)
     assert 1 == len(rooms(stored, 60))
-    elsewhere = home_with([hangout(quiet="06:00-09:00")], "1 h", **belief(bathroom_0=1))
+    elsewhere = home_with([hangout(quiet="06:00-09:00")], "1 h", **belief(bathroom_1=1))
     assert [] == names(run(elsewhere))
 
 
@@ -132,7 +132,7 @@ def test_called_away_it_goes_back_to_its_place_without_deciding_again() -> None:
         "type": "scheduled",
         "visits": [{"at": "07:15", "place": "living_room", "dwell": "2 min"}],
     }
-    content = home_with([visit, hangout(period="1 h")], "40 min", **belief(bathroom_0=1))
+    content = home_with([visit, hangout(period="1 h")], "40 min", **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     assert ["relocates", "visits"] == names(stored)
     poses = path(stored, "astro")
@@ -141,7 +141,7 @@ def test_called_away_it_goes_back_to_its_place_without_deciding_again() -> None:
 
 
 def test_it_explores_all_rooms_with_equal_chances() -> None:
-    stored = run(home_with([hangout(explore=1)], "2 d", **belief(bathroom_0=1)))
+    stored = run(home_with([hangout(explore=1)], "2 d", **belief(bathroom_1=1)))
     details = [detail for _, name, detail in events(stored) if name == "explores"]
     shares = {room: details.count(room) / len(details) for room in set(details)}
     assert len(details) == 288
@@ -152,8 +152,8 @@ def test_it_explores_all_rooms_with_equal_chances() -> None:
 
 @pytest.mark.parametrize("ana", ["meander", {"type": "routine", "persona": "works_outside"}])
 def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
-    on = run(home_with([hangout()], "6 h", ana, **belief(bathroom_0=1)))
-    off = run(home_with([], "6 h", ana, **belief(bathroom_0=1)))
+    on = run(home_with([hangout()], "6 h", ana, **belief(bathroom_1=1)))
+    off = run(home_with([], "6 h", ana, **belief(bathroom_1=1)))
     gone = run({**home_with([], "6 h", ana), "robots": {}})
     for column in ("x", "y", "heading", "away", "room"):
         lives = [getattr(path(stored, "ana"), column) for stored in (on, off, gone)]
@@ -180,13 +180,13 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
 )
 def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        fleet2d.Simulation(home_with([hangout(**fields)], **belief(kitchen_0=1)))
+        fleet2d.Simulation(home_with([hangout(**fields)], **belief(kitchen_1=1)))
 
 
 def test_ways_from_where_it_stands_are_those_of_the_home_as_it_is_then() -> None:
-    content = home_with([hangout(moving=0.5)], **belief(kitchen_0=1))
+    content = home_with([hangout(moving=0.5)], **belief(kitchen_1=1))
     simulation = Simulation(
-        content | {"objects": {"gate": {"type": "door", "doorway": "kitchen_0-bathroom_0"}}}
+        content | {"objects": {"gate": {"type": "door", "doorway": "kitchen_1-bathroom_1"}}}
     )
     astro = simulation.actors["astro"]
     behavior: Any = astro.behaviors[0]

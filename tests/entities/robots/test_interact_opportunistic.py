@@ -32,8 +32,8 @@ def test_it_approaches_interacts_and_the_patrol_goes_on() -> None:
     assert gap.min() > 0.9
     # After the bathroom, where it was broken off, comes the bedroom, and not the round's begin.
     visited = rooms(stored)
-    after = visited.index("bathroom_0")
-    assert ["kitchen_0", "bathroom_0", "bedroom_0", "kitchen_0"] == visited[after - 1 : after + 3]
+    after = visited.index("bathroom_1")
+    assert ["kitchen_1", "bathroom_1", "bedroom_1", "kitchen_1"] == visited[after - 1 : after + 3]
 
 
 def test_it_leaves_the_same_person_alone_for_a_while() -> None:

@@ -12,7 +12,7 @@ from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.runs.run import Run
 
 ROUNDS = {"type": "patrol", "dwell": "5 s"}
-DOORWAYS = "unknown_0"
+DOORWAYS = "unknown_1"
 CAMERA = {"range": [0.2, 6], "angle_deg": 340}
 
 
@@ -59,12 +59,12 @@ def lived_in(behavior: str, keep_out: list[str]) -> Run:
 
 @pytest.mark.parametrize("behavior", BEHAVIORS)
 def test_no_behavior_enters(behavior: str) -> None:
-    assert not {"kitchen_0", "bathroom_0"} & set(rooms_of(lived_in(behavior, ["kitchen"])))
+    assert not {"kitchen_1", "bathroom_1"} & set(rooms_of(lived_in(behavior, ["kitchen"])))
 
 
 @pytest.mark.parametrize("behavior", ["patrol", "find", "follow", "explore"])
 def test_behaviors_enter_a_room_that_is_not_forbidden(behavior: str) -> None:
-    assert "kitchen_0" in rooms_of(lived_in(behavior, []))
+    assert "kitchen_1" in rooms_of(lived_in(behavior, []))
 
 
 @pytest.mark.slow
@@ -78,13 +78,13 @@ def test_the_family_s_robot_enters_neither_bedrooms_nor_bathrooms_in_a_week(seed
     assert week.metrics["interactions"]
 
 
-@pytest.mark.parametrize("keep_out", [["bedroom"], ["bedroom_0"]])
+@pytest.mark.parametrize("keep_out", [["bedroom"], ["bedroom_1"]])
 def test_rooms_are_given_by_kind_or_name(keep_out: list[str]) -> None:
     visited = set(rooms_of(run(flat(keep_out=keep_out))))
-    assert {"living_room_0", "kitchen_0", "bathroom_0"} == visited - {DOORWAYS}
+    assert {"living_room_1", "kitchen_1", "bathroom_1"} == visited - {DOORWAYS}
 
 
-@pytest.mark.parametrize(("name", "nearest"), [("kitchn", "kitchen"), ("bedroom_1", "bedroom_0")])
+@pytest.mark.parametrize(("name", "nearest"), [("kitchn", "kitchen"), ("bedroom_2", "bedroom_1")])
 def test_an_unknown_room_is_refused_with_the_nearest_name(name: str, nearest: str) -> None:
     with pytest.raises(PlacementError, match=rf"robots\.astro\.keep_out: .*{name}.*{nearest}"):
         run(flat(keep_out=[name]))
@@ -103,7 +103,7 @@ def test_a_kind_of_room_that_the_home_lacks_is_noted() -> None:
 def test_rooms_that_are_cut_off_are_noted_by_name() -> None:
     said = notes(flat(keep_out=["kitchen"]))
     assert [
-        "robots.astro.keep_out: no way is left to bathroom_0; passing: true of a room lets it through"
+        "robots.astro.keep_out: no way is left to bathroom_1; passing: true of a room lets it through"
     ] == said
     assert [] == notes(flat(keep_out=["bedroom"]))
 
@@ -114,9 +114,9 @@ def test_a_robot_put_where_it_must_not_be_leaves(place: list[float]) -> None:
     script = [{"at": "07:10", "put": "astro", "to": place}]
     content = flat(keep_out=["kitchen", "bathroom"], script=script)
     rooms = rooms_of(run(content))
-    allowed = {"living_room_0", "bedroom_0", DOORWAYS}
+    allowed = {"living_room_1", "bedroom_1", DOORWAYS}
     assert allowed >= set(rooms[:600])
-    assert rooms[600] in ("kitchen_0", "bathroom_0")
+    assert rooms[600] in ("kitchen_1", "bathroom_1")
     assert allowed >= set(rooms[660:])
 
 
@@ -140,7 +140,7 @@ def test_a_robot_starts_elsewhere_if_no_place_is_given() -> None:
     for seed in range(8):
         content = flat(keep_out=["living_room", "kitchen", "bathroom"], astro={"start": None})
         content["simulation"]["seed"] = seed
-        assert {"bedroom_0", DOORWAYS} >= set(rooms_of(run(content, duration="5 min")))
+        assert {"bedroom_1", DOORWAYS} >= set(rooms_of(run(content, duration="5 min")))
 
 
 def test_a_robot_that_may_be_nowhere_is_refused() -> None:
@@ -170,10 +170,10 @@ def test_a_room_stays_forbidden_after_a_ban_of_it_ends() -> None:
     ]
     stored = run(flat(keep_out=["kitchen"], script=script))
     rooms = rooms_of(stored)
-    assert "kitchen_0" not in rooms
-    assert "bedroom_0" in rooms[:600]
-    assert "bedroom_0" not in rooms[660:1200]
-    assert "bedroom_0" in rooms[1200:]
+    assert "kitchen_1" not in rooms
+    assert "bedroom_1" in rooms[:600]
+    assert "bedroom_1" not in rooms[660:1200]
+    assert "bedroom_1" in rooms[1200:]
     assert {"banned", "allowed"} <= set(names(stored))
 
 
@@ -185,15 +185,15 @@ def test_at_hours_it_leaves_the_room_in_which_it_is_and_comes_back_later() -> No
     content = flat(keep_out=[{"room": "bedroom", "during": "07:20-07:40"}])
     stored = assert_same_for_every_max_span(content, 61, 1)
     rooms = rooms_of(stored)
-    assert "bedroom_0" in rooms[:1200]
-    assert "bedroom_0" not in rooms[1230:2400]
-    assert "bedroom_0" in rooms[2400:]
+    assert "bedroom_1" in rooms[:1200]
+    assert "bedroom_1" not in rooms[1230:2400]
+    assert "bedroom_1" in rooms[2400:]
     still = {"type": "patrol", "waypoints": [[2.5, 5.5]], "dwell": "1 d"}
     inside = flat(still, keep_out=[{"room": "bedroom", "during": "07:10-07:20"}], astro={"start": [2.5, 5.5]}, duration="25 min")  # fmt: skip
     stored = assert_same_for_every_max_span(inside, 61, 1)
     rooms = rooms_of(stored)
-    assert {"bedroom_0"} == set(rooms[:600])
-    assert "bedroom_0" not in rooms[630:1200]
+    assert {"bedroom_1"} == set(rooms[:600])
+    assert "bedroom_1" not in rooms[630:1200]
     assert "withdraws" in names(stored)
 
 
@@ -201,7 +201,7 @@ def test_a_run_that_begins_within_the_hours_begins_outside() -> None:
     for seed in range(6):
         content = flat(keep_out=[{"room": "living_room", "during": "06:00-07:05"}], astro={"start": None}, duration="5 min")  # fmt: skip
         content["simulation"]["seed"] = seed
-        assert "living_room_0" not in rooms_of(run(content))
+        assert "living_room_1" not in rooms_of(run(content))
 
 
 def test_it_never_enters_a_drawn_area() -> None:
@@ -230,9 +230,9 @@ def test_it_may_pass_a_room_without_stops() -> None:
     rooms = rooms_of(stored)
     way = path(stored, "astro")
     rests = (way.x[1:] == way.x[:-1]) & (way.y[1:] == way.y[:-1]) & (way.heading[1:] == way.heading[:-1])  # fmt: skip
-    assert "bathroom_0" in rooms
-    assert "kitchen_0" in rooms
-    assert "kitchen_0" not in set(np.array(rooms)[1:][rests])
+    assert "bathroom_1" in rooms
+    assert "kitchen_1" in rooms
+    assert "kitchen_1" not in set(np.array(rooms)[1:][rests])
 
 
 def test_it_keeps_out_while_it_believes_that_somebody_sleeps_there() -> None:

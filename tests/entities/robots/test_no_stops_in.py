@@ -34,7 +34,7 @@ def inside(behavior: str, avoid: list[str]) -> int:
         artifacts={"trajectories": "every step"},
     )  # fmt: skip
     rows = table(fleet2d.run(content), "trajectories", entity="astro")
-    return int((rows["room"].astype(str) == "kitchen_0").sum())
+    return int((rows["room"].astype(str) == "kitchen_1").sum())
 
 
 @pytest.mark.parametrize("behavior", BEHAVIORS)
@@ -57,7 +57,7 @@ def test_a_robot_called_into_a_room_that_it_avoids_waits_near_the_door() -> None
     simulation.do(Call("astro", to="kitchen"))
     simulation.run_until("07:01")
     x, y = simulation.state["astro"]["x"], simulation.state["astro"]["y"]
-    assert simulation.state["astro"]["room"] == "living_room_0"
+    assert simulation.state["astro"]["room"] == "living_room_1"
     assert 0.8 < 5 - x + abs(y - 3.1) < 2
 
 
@@ -82,13 +82,13 @@ def docking(plan: Path, **dock: Any) -> set[str]:
     content["floorplan"]["path"] = str(plan)
     rows = table(fleet2d.run(content), "trajectories", entity="astro")
     assert abs(float(rows["x"][-1]) - 2.0) < 0.1, "it is at the charger"
-    return {"kitchen_0", "bedroom_0"} & set(rows["room"].astype(str))
+    return {"kitchen_1", "bedroom_1"} & set(rows["room"].astype(str))
 
 
 def test_the_way_to_the_charger_leads_round_rooms_to_avoid_if_there_is_another(loop: Path) -> None:
-    assert {"bedroom_0"} == docking(loop)
-    assert {"kitchen_0"} == docking(loop, no_stops_in=["bedroom"])
-    assert {"bedroom_0"} == docking(loop, no_stops_in=["kitchen", "bedroom"])
+    assert {"bedroom_1"} == docking(loop)
+    assert {"kitchen_1"} == docking(loop, no_stops_in=["bedroom"])
+    assert {"bedroom_1"} == docking(loop, no_stops_in=["kitchen", "bedroom"])
 
 
 def test_a_charger_in_a_room_to_avoid_is_refused(loop: Path) -> None:
@@ -100,9 +100,9 @@ def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note() -> None:
     visits = [{"at": "07:01", "place": "kitchen"}, {"at": "07:02", "place": "bedroom"}]
     robot = {"behaviors": [{"type": "scheduled", "visits": visits, "no_stops_in": ["kitchen"]}]}
     simulation = fleet2d.Simulation(scenario(robots={"astro": robot}))
-    note = "scheduled.visits: left out, because of `no_stops_in`: those of kitchen_0"
+    note = "scheduled.visits: left out, because of `no_stops_in`: those of kitchen_1"
     assert [note] == simulation.actors["astro"].notes
-    assert ["bedroom_0"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
+    assert ["bedroom_1"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
 
 
 def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data: Path) -> None:

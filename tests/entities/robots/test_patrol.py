@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.runs.run import Run
 
-REACHABLE = ["living_room_0", "kitchen_0", "bedroom_0", "bathroom_0"]
+REACHABLE = ["living_room_1", "kitchen_1", "bedroom_1", "bathroom_1"]
 
 
 def patrol(duration: str = "1 h", **fields: Any) -> dict[str, Any]:
@@ -43,17 +43,17 @@ def room_names(stored: Run) -> list[str]:
 
 
 def test_it_stops_in_every_room_in_turn_for_the_dwell() -> None:
-    stored = run(patrol(rooms=["kitchen", "bathroom_0", "living_room"], look_around=False))
+    stored = run(patrol(rooms=["kitchen", "bathroom_1", "living_room"], look_around=False))
     visited = room_names(stored)
     assert len(visited) > 20
-    assert ["kitchen_0", "bathroom_0", "living_room_0"] * 2 == visited[:6]
+    assert ["kitchen_1", "bathroom_1", "living_room_1"] * 2 == visited[:6]
     for x, y, count in stops(stored)[:-1]:
         assert 60 <= count <= 62, (x, y)
 
 
 def test_all_rooms_are_those_that_it_can_enter() -> None:
     names = room_names(run(patrol()))
-    assert set(REACHABLE) <= set(names) <= {*REACHABLE, "unknown_0"}
+    assert set(REACHABLE) <= set(names) <= {*REACHABLE, "unknown_1"}
     assert names[: len(set(names))] == sorted(set(names), key=names.index)
 
 
@@ -66,7 +66,7 @@ def test_it_stops_at_the_same_place_of_a_room_each_round() -> None:
 def test_it_stands_at_the_middle_of_a_room() -> None:
     stored = run(patrol("10 min", rooms=["bedroom"]))
     (x, y), *_ = [place[:2] for place in stops(stored)]
-    assert (x, y) == pytest.approx(stored.plan.room("bedroom_0").anchor_xy, abs=0.1)
+    assert (x, y) == pytest.approx(stored.plan.room("bedroom_1").anchor_xy, abs=0.1)
 
 
 def test_waypoints_are_met_exactly() -> None:
@@ -102,8 +102,8 @@ def test_random_order_visits_all_in_each_round_in_changing_order() -> None:
 
 
 def test_a_room_named_twice_is_visited_once_a_round() -> None:
-    names = room_names(run(patrol(rooms=["kitchen", ["kitchen_0", "any"], "bedroom"])))
-    assert ["kitchen_0", "bedroom_0"] * 2 == names[:4]
+    names = room_names(run(patrol(rooms=["kitchen", ["kitchen_1", "any"], "bedroom"])))
+    assert ["kitchen_1", "bedroom_1"] * 2 == names[:4]
 
 
 def bent(**fields: Any) -> dict[str, Any]:
@@ -121,7 +121,7 @@ def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does() -> N
     """In one of forty homes presence erred by a third: the bed was never in view."""
     by_middle = fleet2d.Simulation(bent()).actors["astro"]
     (note,) = by_middle.notes
-    assert "bedroom_1 (29% of its places: nightstand_2, nightstand_3)" in note
+    assert "bedroom_2 (29% of its places: nightstand_3, nightstand_4)" in note
     assert "stop_at: view" in note
     by_view = fleet2d.Simulation(bent(stop_at="view")).actors["astro"]
     assert [] == by_view.notes
@@ -147,8 +147,8 @@ def test_a_round_that_takes_no_time_does_not_hang_the_run() -> None:
         ({"rooms": "kitchen"}, ["robots.astro.rooms"]),
         ({"order": "backwards"}, ["order", "fixed", "random"]),
         ({"dwell": "-1 min"}, ["dwell", "0 or more"]),
-        ({"rooms": ["storage"]}, ["robots.astro", "storage", "can't be reached", "living_room_0"]),
-        ({"rooms": ["kichen"]}, ["robots.astro", "kichen", "did you mean 'kitchen", "bedroom_0"]),
+        ({"rooms": ["storage"]}, ["robots.astro", "storage", "can't be reached", "living_room_1"]),
+        ({"rooms": ["kichen"]}, ["robots.astro", "kichen", "did you mean 'kitchen", "bedroom_1"]),
         ({"waypoints": [[5.05, 1.0]]}, ["robots.astro", "5.05", "wall", "nearest free point"]),
         ({"waypoints": [[10.0, 1.0]]}, ["robots.astro", "can't be reached"]),
         ({"waypoints": [[1.0, 1.0, 0.0]]}, ["waypoints.0"]),

@@ -22,10 +22,10 @@ def test_visits_are_made_at_their_times_and_days() -> None:
     content = home_with([{"type": "scheduled", "visits": VISITS}, REST])
     stored = assert_same_for_every_max_span(content)
     rows = [(step, detail) for step, name, detail in events(stored) if name == "visits"]
-    assert ["sweep", "bedroom_0"] == [detail for _, detail in rows]
+    assert ["sweep", "bedroom_1"] == [detail for _, detail in rows]
     assert 600 < rows[0][0] < 620
     assert 1800 < rows[1][0] < 1830
-    assert ["living_room_0", "kitchen_0", "living_room_0", "bedroom_0", "living_room_0"] == rooms(
+    assert ["living_room_1", "kitchen_1", "living_room_1", "bedroom_1", "living_room_1"] == rooms(
         stored
     )
 
@@ -46,7 +46,7 @@ def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late() -> None:
     assert [(20, "sweep")] == rows
 
 
-GATE = {"gate": {"type": "door", "doorway": "living_room_0-kitchen_0"}}
+GATE = {"gate": {"type": "door", "doorway": "living_room_1-kitchen_1"}}
 
 
 @pytest.mark.parametrize(("opens", "visited"), [("07:25", True), ("07:50", False)])

@@ -105,7 +105,7 @@ def test_what_was_never_perceived_is_not_in_observations() -> None:
 
 
 def test_what_was_perceived_is_in_observations() -> None:
-    bathroom = "bathroom_0"
+    bathroom = "bathroom_1"
     simulation = Simulation(home_with([policy()], "2 h"))
     room = simulation.home.plan.room(bathroom).index
     tables = lives(home_with([policy()], "2 h"), lambda *_: room)[1]
@@ -125,10 +125,10 @@ def test_observation_describes_the_home_and_pads_it() -> None:
     assert np.float32 == table.dtype
     assert [1] * 6 + [0] * 3 == table[:, AT["room"]].tolist()
     assert 0 == np.abs(table[6:, : AT["hour_sin"]]).sum()
-    assert {"storage_0"} == {
+    assert {"storage_1"} == {
         room.name for room in home.rooms if not table[room.index, AT["reachable"]]
     }
-    assert 1 == table[home.plan.room("kitchen_0").index, AT["is_kitchen"]]
+    assert 1 == table[home.plan.room("kitchen_1").index, AT["is_kitchen"]]
     assert pytest.approx(1) == table[:, AT["area"]].sum()
     assert np.abs(table).max() <= 1
 
@@ -136,7 +136,7 @@ def test_observation_describes_the_home_and_pads_it() -> None:
 def test_rooms_without_a_way_are_masked_and_rest_is_always_possible() -> None:
     masks = []
     lives(home_with([policy()], "30 min"), lambda _, __, mask: masks.append(mask) or 16)
-    storage = Simulation(home_with([policy()])).home.plan.room("storage_0").index
+    storage = Simulation(home_with([policy()])).home.plan.room("storage_1").index
 
     expected = [n < 6 and n != storage for n in range(16)]
     assert [*expected, True] == masks[0].tolist()
@@ -148,7 +148,7 @@ def test_rooms_without_a_way_are_masked_and_rest_is_always_possible() -> None:
 )
 def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str) -> None:
     home = Simulation(home_with([policy()])).home
-    action = home.plan.room("storage_0").index if action == 4 else action
+    action = home.plan.room("storage_1").index if action == 4 else action
     with pytest.raises(ComponentError, match=f"robots.astro failed at step 0.*{reason}"):
         run(home_with([fixed(action)]))
 

@@ -299,7 +299,7 @@ def test_asked_anew_in_the_middle_it_goes_on_as_the_log_says(tmp_path: Path) -> 
         simulation.run_until(timedelta(minutes=minute))
         simulation.do(Replan("ben"))
     simulation.run_until(timedelta(minutes=20))
-    assert "bathroom_0" == simulation.state["ben"]["room"]
+    assert "bathroom_1" == simulation.state["ben"]["room"]
 
 
 # Real logs, told by an oracle that reads them anew

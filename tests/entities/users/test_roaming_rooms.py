@@ -78,7 +78,7 @@ def test_rooms_of_a_kind_share_its_part() -> None:
     by_room = ana.behaviors[0].chances.items()
     chances = {ana.home.rooms[room].name: chance for room, chance in by_room}
     bedrooms = [chance for name, chance in chances.items() if name.startswith("bedroom")]
-    assert 250_000 == chances["kitchen_0"]
+    assert 250_000 == chances["kitchen_1"]
     assert 3 == len(bedrooms)
     assert 750_000 == pytest.approx(sum(bedrooms), abs=3)
 

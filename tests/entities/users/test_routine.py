@@ -334,7 +334,7 @@ def test_nobody_goes_through_a_wall_to_furniture_out_of_reach(tmp_path: Path) ->
 
 def locked_out(*changes: dict[str, Any]) -> fleet2d.Run:
     """A day of somebody who works in an office, whose door is shut and locked from 07:10 on."""
-    door = {"type": "door", "doorway": "office_0"}
+    door = {"type": "door", "doorway": "office_1"}
     shut = [{"at": "10 min", "shut": "office"}, {"at": "10 min", "lock": "office"}]
     life = {**lives("works_from_home"), **HOME, "objects": {"office": door}}
     return run({**life, "script": [*shut, *changes]})

@@ -152,11 +152,11 @@ KITCHEN_LIVING = ["Kitchen", "Living_Room"]
 @pytest.mark.parametrize(
     ("uses", "sofa_in", "expected"),
     [
-        ((["Hallway"], KITCHEN_LIVING, ["Bedroom"]), "", "kitchen_0"),
-        ((["Hallway"], ["Kitchen"], ["Bedroom"]), "", "kitchen_0"),
-        ((["Hallway"], ["Dining_Room"], ["Bedroom"]), "left", "dining_room_0"),
-        ((["Hallway"], ["Living_Room"], ["Kitchen"]), "right", "kitchen_0"),
-        ((["Hallway"], ["Bedroom"], ["Bedroom"]), "right", "bedroom_1"),
+        ((["Hallway"], KITCHEN_LIVING, ["Bedroom"]), "", "kitchen_1"),
+        ((["Hallway"], ["Kitchen"], ["Bedroom"]), "", "kitchen_1"),
+        ((["Hallway"], ["Dining_Room"], ["Bedroom"]), "left", "dining_room_1"),
+        ((["Hallway"], ["Living_Room"], ["Kitchen"]), "right", "kitchen_1"),
+        ((["Hallway"], ["Bedroom"], ["Bedroom"]), "right", "bedroom_2"),
     ],
     ids=[
         "a kitchen that is a living room, too",

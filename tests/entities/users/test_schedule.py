@@ -66,7 +66,7 @@ def departures(stored: Run) -> list[int]:
 
 
 def test_it_begins_where_the_item_before_the_run_leaves_it(morning: Run) -> None:
-    assert {"bedroom_0"} == set(rooms(morning)[: step_of("07:02") + 1])
+    assert {"bedroom_1"} == set(rooms(morning)[: step_of("07:02") + 1])
 
 
 def test_it_sets_out_exactly_when_an_item_begins_or_is_over(morning: Run) -> None:
@@ -75,7 +75,7 @@ def test_it_sets_out_exactly_when_an_item_begins_or_is_over(morning: Run) -> Non
 
 
 def test_after_a_dwell_with_nothing_due_it_rests(morning: Run) -> None:
-    assert {"living_room_0"} == set(rooms(morning)[step_of("07:17") : step_of("07:30")])
+    assert {"living_room_1"} == set(rooms(morning)[step_of("07:17") : step_of("07:30")])
 
 
 def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning: Run) -> None:
@@ -151,11 +151,11 @@ def test_a_step_that_does_not_divide_the_times_takes_effect_at_the_next_step() -
 @pytest.mark.parametrize(
     ("start", "room"),
     [
-        ("2026-01-05T07:30", "kitchen_0"),  # Monday
-        ("2026-01-09T23:59", "kitchen_0"),  # Friday
-        ("2026-01-10T08:30", "bathroom_0"),  # Saturday
-        ("2026-01-11T08:30", "bedroom_0"),  # Sunday: a later entry of the list holds
-        ("2026-01-12T06:59", "bedroom_0"),  # Monday before the first item: as on Sunday
+        ("2026-01-05T07:30", "kitchen_1"),  # Monday
+        ("2026-01-09T23:59", "kitchen_1"),  # Friday
+        ("2026-01-10T08:30", "bathroom_1"),  # Saturday
+        ("2026-01-11T08:30", "bedroom_1"),  # Sunday: a later entry of the list holds
+        ("2026-01-12T06:59", "bedroom_1"),  # Monday before the first item: as on Sunday
     ],
 )
 def test_agendas_hold_on_their_days(start: str, room: str) -> None:
@@ -187,10 +187,10 @@ def test_the_agenda_of_the_next_day_follows_at_midnight() -> None:
     def at(day: int, hour: int) -> str:
         return names[(day * 24 + hour - 7) * 60]
 
-    assert ["kitchen_0", "kitchen_0"] == [at(0, 7), at(0, 23)]
-    assert "kitchen_0" == at(1, 0)  # it sets out then
-    assert ["bedroom_0", "bedroom_0", "bathroom_0"] == [at(1, 1), at(1, 12), at(1, 13)]
-    assert ["bathroom_0", "kitchen_0"] == [at(2, 6), at(2, 7)]
+    assert ["kitchen_1", "kitchen_1"] == [at(0, 7), at(0, 23)]
+    assert "kitchen_1" == at(1, 0)  # it sets out then
+    assert ["bedroom_1", "bedroom_1", "bathroom_1"] == [at(1, 1), at(1, 12), at(1, 13)]
+    assert ["bathroom_1", "kitchen_1"] == [at(2, 6), at(2, 7)]
 
 
 def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten() -> None:
@@ -206,7 +206,7 @@ def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten
             simulation={"start": "2026-01-05T23:50"},
         )
     )
-    assert "bathroom_0" == rooms(stored)[-1]
+    assert "bathroom_1" == rooms(stored)[-1]
 
 
 def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_comes() -> None:
@@ -222,7 +222,7 @@ def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_co
     )
     details = table(stored, "events")["detail"].tolist()
     assert ["first", "second"] == details
-    assert "kitchen_0" == rooms(stored)[-1]
+    assert "kitchen_1" == rooms(stored)[-1]
 
 
 def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() -> None:
@@ -232,8 +232,8 @@ def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() ->
         "10 min", users={"ana": {"start": "bathroom", "behaviors": [detour, schedule]}}
     )
     names = rooms(run(content))
-    assert "bedroom_0" in names
-    assert "kitchen_0" == names[-1]
+    assert "bedroom_1" in names
+    assert "kitchen_1" == names[-1]
 
 
 def test_it_does_not_move_when_it_begins_where_it_should_be() -> None:
@@ -266,7 +266,7 @@ def test_a_run_may_begin_away() -> None:
     assert first["away"][: step_of("07:10")].all()
     assert np.isnan(first["x"][: step_of("07:10")]).all()
     assert not first["away"][step_of("07:10") :].any()
-    assert "kitchen_0" == first["room"][-1]
+    assert "kitchen_1" == first["room"][-1]
 
 
 @pytest.mark.parametrize(
@@ -314,12 +314,12 @@ def test_an_unreachable_kind_of_rest_is_left_out_with_a_note() -> None:
     assert [
         "schedule.days: left out, because this home has none that can be reached: storage"
     ] == actor.notes
-    assert "kitchen_0" in {room.name for room in actor.reachable_rooms()}
+    assert "kitchen_1" in {room.name for room in actor.reachable_rooms()}
 
 
 def test_an_unreachable_room_is_refused_before_the_run() -> None:
-    item = {"at": "08:00", "place": "storage_0", "dwell": "1 h"}
-    with pytest.raises(InputError, match=r"schedule\.days.*storage_0") as caught:
+    item = {"at": "08:00", "place": "storage_1", "dwell": "1 h"}
+    with pytest.raises(InputError, match=r"schedule\.days.*storage_1") as caught:
         fleet2d.Simulation(one(agenda(item), start="kitchen"))
     assert "users.ana" in str(caught.value)
 

@@ -41,16 +41,16 @@ def areas(plan: FloorPlan) -> dict[str, float]:
 def test_box_that_reaches_through_a_wall_ends_at_it() -> None:
     plan = build(space(LEFT, RIGHT, DOOR), bedroom=(0.5, 0.5, 5.0, 4.5), office=(4, 1, 7.3, 4.3))
 
-    assert {"bedroom_0": 9.0, "office_0": 9.1} == pytest.approx(areas(plan), abs=0.11)
-    assert ["bedroom_0-office_0"] == [doorway.name for doorway in plan.doorways]
-    assert plan.room_at(4.5, 2.0) is plan.room("office_0")
+    assert {"bedroom_1": 9.0, "office_1": 9.1} == pytest.approx(areas(plan), abs=0.11)
+    assert ["bedroom_1-office_1"] == [doorway.name for doorway in plan.doorways]
+    assert plan.room_at(4.5, 2.0) is plan.room("office_1")
 
 
 def test_box_that_is_too_small_for_its_chamber_has_all_of_it() -> None:
     plan = build(space(LEFT, RIGHT, DOOR), bedroom=(1.3, 1.0, 3.9, 3.8), office=RIGHT)
 
-    assert {"bedroom_0", "office_0"} == set(areas(plan))
-    assert 9.0 == pytest.approx(plan.room("bedroom_0").area_m2, abs=0.1)
+    assert {"bedroom_1", "office_1"} == set(areas(plan))
+    assert 9.0 == pytest.approx(plan.room("bedroom_1").area_m2, abs=0.1)
 
 
 def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone() -> None:
@@ -59,14 +59,14 @@ def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone()
 
     plan = build(free, bedroom=(0.9, 0.9, 5.1, 5.1), bathroom=(3.0, 3.0, 5.1, 5.1))
 
-    assert {"bedroom_0": 12.0, "bathroom_0": 3.6} == pytest.approx(areas(plan), abs=0.3)
+    assert {"bedroom_1": 12.0, "bathroom_1": 3.6} == pytest.approx(areas(plan), abs=0.3)
     assert 1 == len(plan.doorways)
 
 
 def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
     plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4, 1, 9, 5))
 
-    assert {"kitchen_0": 12.0, "living_room_0": 20.0} == areas(plan)
+    assert {"kitchen_1": 12.0, "living_room_1": 20.0} == areas(plan)
     (link,) = plan.room_graph
     assert ("open", 4.0, None) == (link.kind, pytest.approx(link.width_m), link.doorway)
 
@@ -74,19 +74,19 @@ def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
 def test_gap_between_boxes_goes_to_the_nearest() -> None:
     plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4.4, 1, 9, 5))
 
-    assert {"kitchen_0": 12.8, "living_room_0": 19.2} == areas(plan)
+    assert {"kitchen_1": 12.8, "living_room_1": 19.2} == areas(plan)
 
 
 def test_large_space_that_no_box_covers_is_a_room_of_its_own() -> None:
     plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(6.5, 1, 9, 5))
 
-    assert {"kitchen_0": 12.0, "living_room_0": 10.0, "unknown_0": 10.0} == areas(plan)
+    assert {"kitchen_1": 12.0, "living_room_1": 10.0, "unknown_1": 10.0} == areas(plan)
 
 
 def test_box_under_another_is_one_room_with_both_labels() -> None:
     plan = build(shapely.box(1, 1, 5, 5), dining_room=(0.9, 1, 5, 5), kitchen=(1, 1.1, 5, 5.0))
 
-    assert [("kitchen_0", ("kitchen", "dining_room"))] == [(r.name, r.labels) for r in plan.rooms]
+    assert [("kitchen_1", ("kitchen", "dining_room"))] == [(r.name, r.labels) for r in plan.rooms]
     assert (
         "a region dining_room lies under smaller ones: it is one room, kitchen and dining_room"
         in plan.notes
@@ -102,7 +102,7 @@ def test_boxes_that_make_no_room_are_notes_with_the_reason() -> None:
         aeration=(2, 1, 2.1, 4),
     )
 
-    assert {"office_0", "unknown_0"} == set(areas(plan))
+    assert {"office_1", "unknown_1"} == set(areas(plan))
     assert [
         "the region gym from (7.00, 1.00) to (12.00, 4.00) m covers too little free space: it is not a"
         " room",
@@ -128,15 +128,15 @@ def home_with_hall(height: float) -> FloorPlan:
 def test_unlabelled_space_that_joins_three_rooms_is_a_hallway_with_a_note() -> None:
     plan = home_with_hall(1.2)
 
-    assert {"bedroom_0", "kitchen_0", "office_0", "hallway_0"} == set(areas(plan))
-    assert () == plan.room("hallway_0").labels
-    assert ["bedroom_0", "kitchen_0", "office_0"] == [r.name for r in plan.neighbors("hallway_0")]
-    assert ["hallway_0"] == [room.name for room in plan.neighbors("kitchen_0")]
-    assert plan.notes[-1].startswith("hallway_0 is a guess: no label covers its 11.3 m2")
+    assert {"bedroom_1", "kitchen_1", "office_1", "hallway_1"} == set(areas(plan))
+    assert () == plan.room("hallway_1").labels
+    assert ["bedroom_1", "kitchen_1", "office_1"] == [r.name for r in plan.neighbors("hallway_1")]
+    assert ["hallway_1"] == [room.name for room in plan.neighbors("kitchen_1")]
+    assert plan.notes[-1].startswith("hallway_1 is a guess: no label covers its 11.3 m2")
 
 
 def test_large_unlabelled_space_stays_unknown() -> None:
-    assert "unknown_0" in areas(home_with_hall(4.0))
+    assert "unknown_1" in areas(home_with_hall(4.0))
 
 
 # --- No labels ------------------------------------------------------------------------------------
@@ -147,7 +147,7 @@ def test_space_without_labels_is_divided_at_its_doorways() -> None:
         "home", space(LEFT, (4.1, 1.0, 8.1, 4.0), DOOR), doorways=None, regions_are="none"
     )
 
-    assert [("room_0", "room", ()), ("room_1", "room", ())] == [
+    assert [("room_1", "room", ()), ("room_2", "room", ())] == [
         (room.name, room.type, room.labels) for room in plan.rooms
     ]
     assert plan.rooms[0].area_m2 > plan.rooms[1].area_m2
@@ -158,7 +158,7 @@ def test_niche_behind_a_narrow_gap_is_no_room() -> None:
 
     plan = FloorPlan.build("home", space(LEFT, niche, gap), doorways=None, regions_are="none")
 
-    assert ["unknown_0"] == [room.name for room in plan.rooms]
+    assert ["unknown_1"] == [room.name for room in plan.rooms]
     assert () == plan.doorways
 
 

@@ -41,14 +41,14 @@ def test_line_drawn_into_the_walls_is_cut_at_them() -> None:
 
 def test_doorway_is_named_after_the_rooms_on_its_left_and_right() -> None:
     plan = flat(DoorLine((2.05, 1.0), (2.05, 1.9)))
-    assert "kitchen_0-bathroom_0" == plan.doorways[0].name
-    assert (plan.room("kitchen_0").index, plan.room("bathroom_0").index) == plan.doorways[0].rooms
-    assert plan.doorway("kitchen_0-bathroom_0") is plan.doorways[0]
+    assert "kitchen_1-bathroom_1" == plan.doorways[0].name
+    assert (plan.room("kitchen_1").index, plan.room("bathroom_1").index) == plan.doorways[0].rooms
+    assert plan.doorway("kitchen_1-bathroom_1") is plan.doorways[0]
 
 
 def test_reversed_line_swaps_left_and_right() -> None:
     plan = flat(DoorLine((2.05, 1.9), (2.05, 1.0)))
-    assert "bathroom_0-kitchen_0" == plan.doorways[0].name
+    assert "bathroom_1-kitchen_1" == plan.doorways[0].name
 
 
 def test_own_name_stays() -> None:
@@ -123,7 +123,7 @@ def test_stored_plan_has_the_same_doorways() -> None:
 
 
 def test_unknown_doorway_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_0-bathroom_0"):
+    with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_1-bathroom_1"):
         flat(DoorLine((2.05, 1.0), (2.05, 1.9))).doorway("kitchen")
 
 

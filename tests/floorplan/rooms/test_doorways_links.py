@@ -36,5 +36,5 @@ def test_room_graph_has_doorways_first_and_gives_the_neighbors() -> None:
     ]
     plan = FloorPlan.build("flat", free, labels, doorways=[DoorLine((4.05, 0.0), (4.05, 1.0))])
     assert [("doorway", (1, 2)), ("open", (0, 1))] == [(w.kind, w.rooms) for w in plan.room_graph]
-    assert ["kitchen_0", "bedroom_0"] == [room.name for room in plan.neighbors("living_room_0")]
-    assert ["living_room_0"] == [room.name for room in plan.neighbors("kitchen_0")]
+    assert ["kitchen_1", "bedroom_1"] == [room.name for room in plan.neighbors("living_room_1")]
+    assert ["living_room_1"] == [room.name for room in plan.neighbors("kitchen_1")]

@@ -37,11 +37,11 @@ def test_no_labels_make_one_unknown_room_of_everything() -> None:
     """Known failure 6: a plan without labels crashed."""
     _, rooms, notes = assign()
 
-    assert ["unknown_0"] == list(rooms)
+    assert ["unknown_1"] == list(rooms)
     assert ("unknown", (), 26 * 36) == (
-        rooms["unknown_0"].type,
-        rooms["unknown_0"].labels,
-        rooms["unknown_0"].cells,
+        rooms["unknown_1"].type,
+        rooms["unknown_1"].labels,
+        rooms["unknown_1"].cells,
     )
     assert [] == notes
 
@@ -49,7 +49,7 @@ def test_no_labels_make_one_unknown_room_of_everything() -> None:
 def test_uncovered_cells_are_unknown() -> None:
     _, rooms, _ = assign(region("Bedroom", 0, 0, 2, 3))
 
-    assert {"bedroom_0": 18 * 26, "unknown_0": 18 * 26} == {k: r.cells for k, r in rooms.items()}
+    assert {"bedroom_1": 18 * 26, "unknown_1": 18 * 26} == {k: r.cells for k, r in rooms.items()}
 
 
 def test_gaps_between_regions_are_noted() -> None:
@@ -58,7 +58,7 @@ def test_gaps_between_regions_are_noted() -> None:
 
     _, rooms, notes = assign(kitchen, hall, region("Gym", 2.1, 0, 4, 3))
 
-    assert 3 * 26 == rooms["unknown_0"].cells
+    assert 3 * 26 == rooms["unknown_1"].cells
     assert [
         "small gaps between rooms that no region covers, such as doorways: 2, the first at (1.05,"
         " 1.45) m; they make a room of type unknown, so let the regions meet there"
@@ -76,9 +76,9 @@ def test_rooms_are_numbered_by_type_in_file_order() -> None:
         region("Bedroom", 2, 0, 4, 3), region("Toilet", 0, 0, 1, 3), region("Bedroom", 1, 0, 2, 3)
     )
 
-    assert ["bedroom_0", "toilet_0", "bedroom_1"] == list(rooms)
-    assert 0.8 * 2.6 == pytest.approx(rooms["toilet_0"].area_m2)
-    assert (1.0, 0.2, 2.0, 2.8) == pytest.approx(rooms["bedroom_1"].bounds)
+    assert ["bedroom_1", "toilet_1", "bedroom_2"] == list(rooms)
+    assert 0.8 * 2.6 == pytest.approx(rooms["toilet_1"].area_m2)
+    assert (1.0, 0.2, 2.0, 2.8) == pytest.approx(rooms["bedroom_2"].bounds)
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -87,15 +87,15 @@ def test_the_smaller_box_wins_in_either_order(order: int) -> None:
 
     _, rooms, _ = assign(*regions)
 
-    assert 100 == rooms["toilet_0"].cells
-    assert 26 * 36 - 100 == rooms["hall_0"].cells
+    assert 100 == rooms["toilet_1"].cells
+    assert 26 * 36 - 100 == rooms["hall_1"].cells
 
 
 def test_the_first_of_two_boxes_of_equal_size_wins() -> None:
     _, rooms, _ = assign(region("Hall", 0, 0, 2, 3), region("Office", 1, 0, 3, 3))
 
-    assert 18 * 26 == rooms["hall_0"].cells
-    assert 10 * 26 == rooms["office_0"].cells
+    assert 18 * 26 == rooms["hall_1"].cells
+    assert 10 * 26 == rooms["office_1"].cells
 
 
 def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
@@ -106,16 +106,16 @@ def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
         region("Kitchen", 0, 0, 2, 3),
     )
 
-    assert ["kitchen_0", "toilet_0"] == list(rooms)
-    assert ("dining_room", "kitchen") == rooms["kitchen_0"].labels
-    assert 18 * 26 == rooms["kitchen_0"].cells
+    assert ["kitchen_1", "toilet_1"] == list(rooms)
+    assert ("dining_room", "kitchen") == rooms["kitchen_1"].labels
+    assert 18 * 26 == rooms["kitchen_1"].cells
     assert [] == notes
 
 
 def test_boxes_are_the_same_when_they_round_to_the_same() -> None:
     _, rooms, _ = assign(region("Toilet", 0, 0, 2, 3), region("Bathroom", 0, 0, 2.0004, 3))
 
-    assert {"bathroom_0": ("toilet", "bathroom"), "unknown_0": ()} == {
+    assert {"bathroom_1": ("toilet", "bathroom"), "unknown_1": ()} == {
         k: r.labels for k, r in rooms.items()
     }
 
@@ -126,7 +126,7 @@ def test_a_box_that_misses_the_free_space_is_a_note_and_no_room() -> None:
         region("Garage", 7, 7, 9, 9), region("Garage", -5, -5, -1, -1), region("Garage", 0, 0, 4, 2)
     )
 
-    assert ["garage_0", "unknown_0"] == list(rooms)
+    assert ["garage_1", "unknown_1"] == list(rooms)
     assert 2 == len(notes)
     assert notes[0].startswith("the region garage from (7.00, 7.00) to (9.00, 9.00) m has no free")
 
@@ -136,14 +136,14 @@ def test_a_box_under_smaller_ones_is_a_note_and_no_room() -> None:
         region("Office", 0, 0, 4, 3), region("Hall", 0, 0, 2, 3), region("Gym", 2, 0, 4, 3)
     )
 
-    assert ["hall_0", "gym_0"] == list(rooms)
+    assert ["hall_1", "gym_1"] == list(rooms)
     assert 1 == len(notes)
 
 
 def test_a_box_thinner_than_a_cell_is_a_note() -> None:
     _, rooms, notes = assign(region("Aeration", 1.0, 0, 1.01, 3), region("Hall", 1, 1, 1, 1))
 
-    assert ["unknown_0"] == list(rooms)
+    assert ["unknown_1"] == list(rooms)
     assert 2 == len(notes)
 
 
@@ -153,17 +153,17 @@ def test_polygons_take_the_cells_inside_them() -> None:
 
     x, y = LATTICE.centre_axes()
     expected = FREE & ((x[None, :] + y[:, None]) < 3 * LATTICE.units_per_m)
-    assert np.array_equal(expected, room_of_cell == rooms["loggia_0"].index)
+    assert np.array_equal(expected, room_of_cell == rooms["loggia_1"].index)
 
 
 def test_own_names_stay_and_numbering_skips_them() -> None:
     _, rooms, _ = assign(
         region("Bedroom", 0, 0, 1, 3),
-        LabelledRegion(("Bedroom",), shapely.box(1, 0, 2, 3), name="bedroom_0"),
+        LabelledRegion(("Bedroom",), shapely.box(1, 0, 2, 3), name="bedroom_1"),
         LabelledRegion(("Bedroom",), shapely.box(2, 0, 3, 3), name="Anna's", type="child_room"),
     )
 
-    assert ["bedroom_1", "bedroom_0", "Anna's", "unknown_0"] == list(rooms)
+    assert ["bedroom_2", "bedroom_1", "Anna's", "unknown_1"] == list(rooms)
     assert ("child_room", ("bedroom",)) == (rooms["Anna's"].type, rooms["Anna's"].labels)
 
 

@@ -48,7 +48,7 @@ def test_what_dark_walls_enclose_is_free_and_the_paper_around_is_not(tmp_path: P
     assert (2 * 52 * 44 + 12 * 4) * 0.05**2 == pytest.approx(plan.area_m2)
     assert (0.7, 0.7, 5.3, 3.3) == pytest.approx(plan.bounds)  # from the lower left corner
     assert plan.room_at(0.2, 0.2) is None
-    assert ["room_0", "room_1"] == [room.name for room in plan.rooms]
+    assert ["room_1", "room_2"] == [room.name for room in plan.rooms]
     assert 0.6 == pytest.approx(plan.doorways[0].width_m)
 
 

@@ -226,7 +226,7 @@ def test_walls_along_the_borders_are_the_only_ones(tmp_path: Path) -> None:
 def test_free_areas_are_free_and_rooms_are_their_names_then(tmp_path: Path) -> None:
     plan = read(tmp_path, feature(box(0, 0, 9, 3), "free"), KITCHEN)
 
-    assert {"Kitchen": 12.0, "unknown_0": 15.0} == areas(plan)
+    assert {"Kitchen": 12.0, "unknown_1": 15.0} == areas(plan)
 
 
 def test_walls_as_lines_need_a_thickness(tmp_path: Path) -> None:
@@ -285,7 +285,7 @@ def test_objects_and_no_go_areas_are_taken_over(tmp_path: Path) -> None:
 
     plan = read(tmp_path, KITCHEN, BEDROOM, bed, sensor, area)
 
-    assert [("bed_0", "bed"), ("pir", "motion_sensor")] == [(o.name, o.type) for o in plan.objects]
+    assert [("bed_1", "bed"), ("pir", "motion_sensor")] == [(o.name, o.type) for o in plan.objects]
     assert (6.0, 2.0, 1.5, "lie") == (
         plan.objects[0].uses[0].x,
         plan.objects[0].uses[0].y,
@@ -299,16 +299,16 @@ def test_objects_and_no_go_areas_are_taken_over(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("properties", "name", "kind"),
     [
-        ({"type": "Kitchen"}, "kitchen_0", "kitchen"),
-        ({"usage": "Living Room"}, "living_room_0", "living_room"),
+        ({"type": "Kitchen"}, "kitchen_1", "kitchen"),
+        ({"usage": "Living Room"}, "living_room_1", "living_room"),
         ({"name": "Bedroom 2"}, "Bedroom 2", "bedroom"),
         ({"name": "Blue room", "category": "office"}, "Blue room", "office"),
         ({"name": "A 101"}, "A 101", "unknown"),
         ({"name": "A 101", "type": "yoga studio"}, "A 101", "yoga_studio"),
         ({"name": {"de": "Küche", "en": "Kitchen"}}, "Kitchen", "kitchen"),
         ({"type": "room", "name": "Bad"}, "Bad", "bathroom"),
-        ({"name": "  ", "type": 3}, "unknown_0", "unknown"),
-        ({"category": "restroom.female"}, "toilet_0", "toilet"),
+        ({"name": "  ", "type": 3}, "unknown_1", "unknown"),
+        ({"category": "restroom.female"}, "toilet_1", "toilet"),
     ],
 )
 def test_room_has_the_type_of_its_use_else_of_its_name(
@@ -355,11 +355,11 @@ def test_imdf_units_openings_and_fixtures_are_read(tmp_path: Path) -> None:
         units="m",
     )
 
-    assert [("kitchen_0", "kitchen"), ("Aisle", "hallway")] == [
+    assert [("kitchen_1", "kitchen"), ("Aisle", "hallway")] == [
         (r.name, r.type) for r in plan.rooms
     ]
     assert [True, False] == [d.leaf for d in plan.doorways]
-    assert ["desk_0"] == [thing.name for thing in plan.objects]
+    assert ["desk_1"] == [thing.name for thing in plan.objects]
     assert plan.room_at(1.25, 1.25) is None
 
 

@@ -137,64 +137,64 @@ def test_every_doorway_of_every_plan_crosses_free_space_from_wall_to_wall(
 # no box covers is one room: the bathroom of 2dea has 3850 then. Here rooms end at walls.
 ROOMS = {
     "2deaa98e": {
-        "bedroom_0": 4538,
-        "bedroom_1": 7861,
-        "bedroom_2": 7920,
-        "bathroom_0": 3360,
-        "toilet_0": 696,
-        "toilet_1": 720,
-        "toilet_2": 3955,
-        "entryway_0": 7872,
-        "living_room_0": 17911,
-        "kitchen_0": 8992,
-        "unknown_0": 21193,
+        "bedroom_1": 4538,
+        "bedroom_2": 7861,
+        "bedroom_3": 7920,
+        "bathroom_1": 3360,
+        "toilet_1": 696,
+        "toilet_2": 720,
+        "toilet_3": 3955,
+        "entryway_1": 7872,
+        "living_room_1": 17911,
+        "kitchen_1": 8992,
+        "unknown_1": 21193,
     },
     "658e5214": {
-        "living_room_0": 10258,
-        "toilet_0": 1218,
-        "bathroom_0": 3420,
-        "bathroom_1": 4038,
-        "bedroom_0": 8973,
-        "bedroom_1": 5092,
-        "kitchen_0": 7694,
-        "garage_0": 11568,
-        "hallway_0": 9561,
+        "living_room_1": 10258,
+        "toilet_1": 1218,
+        "bathroom_1": 3420,
+        "bathroom_2": 4038,
+        "bedroom_1": 8973,
+        "bedroom_2": 5092,
+        "kitchen_1": 7694,
+        "garage_1": 11568,
+        "hallway_1": 9561,
     },
     "7e80c5f4": {
-        "office_0": 5762,
-        "lobby_0": 6353,
-        "toilet_0": 6117,
-        "living_room_0": 22383,
-        "kitchen_0": 11868,
-        "bedroom_0": 9862,
-        "unknown_0": 3015,
+        "office_1": 5762,
+        "lobby_1": 6353,
+        "toilet_1": 6117,
+        "living_room_1": 22383,
+        "kitchen_1": 11868,
+        "bedroom_1": 9862,
+        "unknown_1": 3015,
     },
 }
 DOORWAYS = {
     "2deaa98e": {
-        "toilet_2-toilet_1",
-        "toilet_2-toilet_0",
-        "toilet_2-entryway_0",
-        "unknown_0-bathroom_0",
-        "unknown_0-bedroom_0",
-        "unknown_0-bedroom_1",
-        "unknown_0-bedroom_2",
+        "toilet_3-toilet_2",
+        "toilet_3-toilet_1",
+        "toilet_3-entryway_1",
+        "unknown_1-bathroom_1",
+        "unknown_1-bedroom_1",
+        "unknown_1-bedroom_2",
+        "unknown_1-bedroom_3",
     },
     "658e5214": {
-        "bedroom_0-bathroom_0",
-        "bedroom_0-bedroom_1",
         "bedroom_1-bathroom_1",
-        "hallway_0-toilet_0",
-        "hallway_0-kitchen_0",
-        "hallway_0-bedroom_0",
-        "living_room_0-garage_0",
+        "bedroom_1-bedroom_2",
+        "bedroom_2-bathroom_2",
+        "hallway_1-toilet_1",
+        "hallway_1-kitchen_1",
+        "hallway_1-bedroom_1",
+        "living_room_1-garage_1",
     },
     "7e80c5f4": {
-        "lobby_0-living_room_0",
-        "living_room_0-toilet_0",
-        "living_room_0-kitchen_0",
-        "living_room_0-bedroom_0",
-        "office_0-bedroom_0",
+        "lobby_1-living_room_1",
+        "living_room_1-toilet_1",
+        "living_room_1-kitchen_1",
+        "living_room_1-bedroom_1",
+        "office_1-bedroom_1",
     },
 }
 
@@ -211,13 +211,13 @@ def test_labels_of_658e(plans: list[Path]) -> None:
     plan = read(plans, "658e5214")
 
     assert (
-        ("toilet", "bathroom") == plan.room("bathroom_0").labels == plan.room("bathroom_1").labels
+        ("toilet", "bathroom") == plan.room("bathroom_1").labels == plan.room("bathroom_2").labels
     )
-    assert ["toilet_0", "bathroom_0", "bathroom_1"] == [
+    assert ["toilet_1", "bathroom_1", "bathroom_2"] == [
         room.name for room in plan.rooms_of_type("toilet")
     ]
-    assert ["bathroom_1", "bedroom_0"] == [room.name for room in plan.neighbors("bedroom_1")]
-    assert ("hallway_0 is a guess" in plan.notes[-1], ()) == (True, plan.room("hallway_0").labels)
+    assert ["bathroom_2", "bedroom_1"] == [room.name for room in plan.neighbors("bedroom_2")]
+    assert ("hallway_1 is a guess" in plan.notes[-1], ()) == (True, plan.room("hallway_1").labels)
     assert 154.67 == pytest.approx(plan.area_m2, abs=0.05)
     assert (331, 202) == (plan.lattice.columns, plan.lattice.rows)
 
@@ -226,7 +226,7 @@ def test_plan_without_categories_is_one_unknown_room(plans: list[Path]) -> None:
     """Known failure 6: a plan without labels crashed."""
     plan = read(plans, "13f8a2df")
 
-    assert ["unknown_0"] == [room.name for room in plan.rooms]
+    assert ["unknown_1"] == [room.name for room in plan.rooms]
     assert (404, 804) == (plan.lattice.columns, plan.lattice.rows)
 
 
@@ -290,7 +290,7 @@ def test_outline_that_runs_over_itself_stays_free_there(tmp_path: Path) -> None:
 def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path: Path) -> None:
     plan = home(tmp_path, room_category={"Hall": [[2, 3, 0, 0]], "Gym": [[2, 3, 4, 0]]})
 
-    assert {"hall_0": 2400, "gym_0": 2400} == {room.name: room.cells for room in plan.rooms}
+    assert {"hall_1": 2400, "gym_1": 2400} == {room.name: room.cells for room in plan.rooms}
     assert plan.notes == (
         "room_category.Hall[0] runs from its high to its low corner: the corners are exchanged",
         "room_category.Gym[0] runs from its high to its low corner: the corners are exchanged",
@@ -300,7 +300,7 @@ def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path: Path) -> None:
 def test_categories_that_are_not_houseexpos_become_types_too(tmp_path: Path) -> None:
     plan = home(tmp_path, room_category={"Wine Cellar": [[0, 0, 4, 3]], "Attic": []})
 
-    assert ["wine_cellar_0"] == [room.name for room in plan.rooms]
+    assert ["wine_cellar_1"] == [room.name for room in plan.rooms]
 
 
 def test_missing_categories_are_no_rooms(tmp_path: Path) -> None:

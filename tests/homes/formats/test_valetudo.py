@@ -173,7 +173,7 @@ def test_real_segments_are_rooms_of_the_area_that_the_file_states(
     names = [s["metaData"].get("name") or f"segment_{s['metaData']['segmentId']}" for s in segments]
     assert names == [room.name for room in plan.rooms][: len(names)]
     if segments:
-        rest = ["unknown_0"] * ("floor" in {item["type"] for item in content["layers"]})
+        rest = ["unknown_1"] * ("floor" in {item["type"] for item in content["layers"]})
         assert rest == [room.name for room in plan.rooms[len(names) :]]
     else:  # rooms are found then
         assert {"room"} == {room.type for room in plan.rooms}
@@ -211,7 +211,7 @@ def test_real_map_with_german_names_has_rooms_of_known_types(shared_data: Path) 
         "Wohnzimmer": "living_room",
         "Essbereich": "dining_room",
         "Schreibtisch": "schreibtisch",
-        "unknown_0": "unknown",
+        "unknown_1": "unknown",
     }
     assert expected == {room.name: room.type for room in plan.rooms}
 
@@ -261,7 +261,7 @@ def test_pixels_become_metres_with_y_upwards(tmp_path: Path) -> None:
 def test_upper_rows_of_the_file_have_the_higher_y(tmp_path: Path) -> None:
     plan = home(tmp_path, KITCHEN, FLOOR)
 
-    kitchen, floor = plan.room("Kitchen"), plan.room("unknown_0")
+    kitchen, floor = plan.room("Kitchen"), plan.room("unknown_1")
     assert kitchen.anchor_xy[1] > floor.anchor_xy[1]
 
 
@@ -315,7 +315,7 @@ def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path: Path) -> None:
     assert [
         ("Kitchen", "kitchen", ("kitchen",), 1200),
         ("segment_17", "unknown", ("segment_17",), 600),
-        ("unknown_0", "unknown", (), 200),
+        ("unknown_1", "unknown", (), 200),
     ] == rooms
 
 
@@ -687,7 +687,7 @@ def test_scraps_of_floor_are_no_rooms(tmp_path: Path) -> None:
     assert "scraps left out: 1 parts of the floor" in " ".join(plan.notes)
     assert ["Kitchen"] == [room.name for room in beside.rooms]
     assert beside.area_m2 == pytest.approx((40 * 30 + 100) * PIXEL_AREA)
-    assert ["Kitchen", "unknown_0"] == [room.name for room in kept.rooms]
+    assert ["Kitchen", "unknown_1"] == [room.name for room in kept.rooms]
 
 
 def test_segment_without_a_name_that_is_a_scrap_belongs_to_its_neighbor(tmp_path: Path) -> None:

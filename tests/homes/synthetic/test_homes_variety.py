@@ -83,7 +83,7 @@ def test_people_sleep_in_the_living_room_of_a_furnished_studio() -> None:
         }
     )
 
-    assert run.metrics["room_share"]["u"]["living_room_0"] > 0.5
+    assert run.metrics["room_share"]["u"]["living_room_1"] > 0.5
     assert not any("bedroom" in note for note in run.notes)
 
 
@@ -128,7 +128,7 @@ def test_home_has_rooms_that_an_architect_would_draw(seed: int) -> None:
 
     assert kinds.index("living_room") in reached
     others = [room.area_m2 for room in plan.rooms if room.type != "garage"]
-    assert max(others) == plan.room("living_room_0").area_m2
+    assert max(others) == plan.room("living_room_1").area_m2
     baths = [room.area_m2 for room in plan.rooms if room.type == "bathroom"]
     assert all(3 <= area <= 9 for area in baths)
 

@@ -21,7 +21,7 @@ def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path
     assert stored.tables["sensors"].num_rows == len(lines)
     assert f"{len(lines)} readings in {path}" == text
     date, time, room, sensor, state, activity = lines[0].split(" ")
-    assert ("2026-01-05", "hallway_0") == (date, room)
+    assert ("2026-01-05", "hallway_1") == (date, room)
     assert sensor in {"hall", "contact"}
     assert state in {"ON", "OPEN"}
     assert time.startswith("00:0")

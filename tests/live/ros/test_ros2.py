@@ -215,7 +215,7 @@ def test_what_is_no_goal_is_refused(beside: Beside, x: float, frame: str) -> Non
 
 def test_a_goal_is_canceled_once(beside: Beside) -> None:
     program = beside.program
-    accepted, name = program.send(*place("bathroom_0"))
+    accepted, name = program.send(*place("bathroom_1"))
     time.sleep(0.3)
 
     assert accepted
@@ -227,8 +227,8 @@ def test_a_goal_is_canceled_once(beside: Beside) -> None:
 
 def test_a_later_goal_ends_the_one_before(beside: Beside) -> None:
     program = beside.program
-    _, first = program.send(*place("bathroom_0"))
-    _, second = program.send(*place("office_0"))
+    _, first = program.send(*place("bathroom_1"))
+    _, second = program.send(*place("office_1"))
 
     result = program.result(first)
     assert result["status"] == ActionStatus.ABORTED
@@ -259,7 +259,7 @@ def test_velocities_move_the_robot_until_they_stop_coming(beside: Beside, of: st
 
 def test_an_initial_pose_puts_the_robot_there_and_goals_go_on(beside: Beside) -> None:
     program = beside.program
-    x, y = place("office_0")
+    x, y = place("office_1")
     of = "geometry_msgs/msg/PoseWithCovarianceStamped"
     publish = program.node.publisher("/astro/initialpose", of)
     time.sleep(0.3)
@@ -277,7 +277,7 @@ def test_open_goals_end_with_the_run_which_stores_what_was_taken(tmp_path: Path)
     with Beside(out=tmp_path / "run") as both:
         program = both.program
         program.wait_for("/clock", 5)
-        _, name = program.send(*place("bathroom_0"))
+        _, name = program.send(*place("bathroom_1"))
         answers: list[Any] = []
         waiting = threading.Thread(target=lambda: answers.append(program.result(name)))
         waiting.start()

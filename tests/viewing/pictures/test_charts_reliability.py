@@ -53,8 +53,8 @@ def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run:
             share = dict(zip(rows["room"][at_step], rows["share"][at_step], strict=True))
             row = belief[36 * number + k]
             assert share["away"] == pytest.approx(row[-1])
-            assert share["kitchen_0"] * (1 - share["away"]) == pytest.approx(
-                row[rooms.index("kitchen_0")]
+            assert share["kitchen_1"] * (1 - share["away"]) == pytest.approx(
+                row[rooms.index("kitchen_1")]
             )
             place = "away" if trajectory["away"][step] else trajectory["room"][step]
             assert place == [*rooms, "away"][truth[36 * number + k]]

@@ -50,7 +50,7 @@ def test_only_cells_with_a_value_are_coloured(dtype: Any) -> None:
     values = np.full(plan.free.shape, {"b": 0, "i": -1, "f": np.nan}[np.dtype(dtype).kind]).astype(
         dtype
     )
-    kitchen = plan.room_of_cell == plan.room("kitchen_0").index
+    kitchen = plan.room_of_cell == plan.room("kitchen_1").index
     values[kitchen] = 1
     places = ((7.0, 1.0), (1.0, 2.5), (-0.05, 2.0))
 

@@ -571,7 +571,7 @@ def _merge_labels(regions: list[LabelledRegion], into: Mapping[int, int]) -> lis
 
 
 def number_rooms(lattice: Lattice, room_of_cell: I64) -> tuple[I16, tuple[Room, ...], list[str]]:
-    """Return rooms without labels: `room_0` and so on, or `unknown_0` for a single one.
+    """Return rooms without labels: `room_1` and so on, or `unknown_1` for a single one.
 
     Args:
         lattice: The plan's lattice.

@@ -51,7 +51,7 @@ class Doorway:
 
     Attributes:
         index: Its number in the plan.
-        name: Unique in the plan, such as `bathroom_0-hallway_0`.
+        name: Unique in the plan, such as `bathroom_1-hallway_1`.
         start: One jamb (x, y) [m], exactly on a wall.
         end: The other jamb (x, y) [m].
         rooms: Indices of the rooms on its left and its right, looking from start to end; equal if

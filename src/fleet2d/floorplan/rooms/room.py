@@ -69,7 +69,7 @@ def usual_type(name: str) -> str:
         >>> usual_type("Salle de bain"), usual_type("Chambre parentale")
         ('bathroom', 'bedroom')
         >>> usual_type("Yoga Studio 3")
-        'yoga_studio_3'
+        'yoga_studio_4'
     """
     return leading_type(usual_types(name))
 
@@ -133,7 +133,7 @@ class LabelledRegion:
         labels: Its labels, as spelled in the file; none for a region of unknown use.
         shape: Its outline [m], or [lattice] once it is snapped; it may reach over walls and over
             other regions. Empty for one that is only cells.
-        name: Name of the room, or None to be numbered by type (`bedroom_0`).
+        name: Name of the room, or None to be numbered by type (`bedroom_1`).
         type: Type of the room, or None for the one of its labels that leads.
     """
 
@@ -282,7 +282,7 @@ class Room:
 
     Attributes:
         index: Its number in the plan, the value of its cells in `FloorPlan.room_of_cell`.
-        name: Unique in the plan, such as `bedroom_0`.
+        name: Unique in the plan, such as `bedroom_1`.
         type: Its type, such as `bedroom`.
         labels: Every type that the file gives it, in file order; empty for space without a label.
             Each is a function: a kitchen with the label living_room is a living room, too.

@@ -126,7 +126,7 @@ class Synthetic(FloorPlanSource):
 
     Example:
         >>> plan = Synthetic(seed=7, area_m2=120, bedrooms=3).load()
-        >>> len(plan.rooms_of_type("bedroom")), plan.room("kitchen_0").type
+        >>> len(plan.rooms_of_type("bedroom")), plan.room("kitchen_1").type
         (3, 'kitchen')
     """
 
