@@ -1,7 +1,6 @@
 """Furniture by rule: in free space, apart, off the doorways, and all rooms stay reachable."""
 
 from collections import Counter
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -19,19 +18,16 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furnish import RULES, furnish
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
 from fleet2d.floorplan.furniture_places import (
-    CUT_OFF_M2,
     DOOR_CLEARANCE,
-    RADII,
     FurnitureGroup,
     RoomView,
-    stays_whole,
     whole_cells,
 )
-from fleet2d.floorplan.home import Home, lattice_footprint
+from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import PRIORITY
-from fleet2d.floorplan.space import BODY_RADIUS, Space, grow_polygons, shrink
+from fleet2d.floorplan.space import BODY_RADIUS, Space
 from fleet2d.runtime.determinism import Draws, stream_key
 
 # Cells of less than this may become a pocket beside furniture: no body's length fits into it.
@@ -219,40 +215,6 @@ def test_group_is_tried_only_where_it_and_the_floor_before_it_are_empty() -> Non
             turns.add(turn)
 
     assert {0, 1, 2, 3} == turns
-
-
-box_of_floor = st.tuples(
-    st.integers(0, 40), st.integers(0, 30), st.integers(2, 20), st.integers(2, 20)
-)
-
-
-@quick
-@given(st.lists(box_of_floor, max_size=6))
-def test_home_is_whole_only_if_no_body_has_a_second_large_space(
-    boxes: list[tuple[int, int, int, int]],
-) -> None:
-    plan = one_room("bedroom")
-    unit = plan.lattice.units_per_m
-    rectangles = [shapely.box(x / 10, y / 10, (x + w) / 10, (y + h) / 10) for x, y, w, h in boxes]
-    bed = stand_furniture("bed", (2.0, 2.0))
-    solid = [lattice_footprint(plan, replace(bed, footprint=shape)) for shape in rectangles]
-
-    if stays_whole(plan, solid):
-        for radius in RADII:
-            blocked = grow_polygons(solid, radius * unit)
-            spaces = shrink(plan.polygons, radius * unit, blocked)
-            assert 1 >= sum(space.area > CUT_OFF_M2 * unit**2 for space in spaces)
-
-
-def test_home_is_whole_unless_furniture_divides_it_or_a_wall_is_slanted() -> None:
-    plan = one_room("bedroom")
-    bed = replace(stand_furniture("bed", (2, 2)), footprint=shapely.box(2, 0, 2.5, 4))
-    across = lattice_footprint(plan, bed)
-    slanted = FloorPlan.build("tent", shapely.Polygon([(0, 0), (5, 0), (5, 4)]))
-
-    assert stays_whole(plan, [])
-    assert not stays_whole(plan, [across])
-    assert not stays_whole(slanted, [])
 
 
 def test_rooms_of_no_known_type_get_nothing() -> None:

@@ -2,29 +2,33 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
+from shapely import Polygon
 
+from fleet2d.floorplan.body_spaces import (
+    RADII,
+    BodySpace,
+    body_spaces,
+    exact_space,
+    large_parts,
+    solid_footprints,
+    stays_whole,
+)
 from fleet2d.floorplan.furniture import stand_furniture
-from fleet2d.floorplan.home import lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
-from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, Room, largest_part
 from fleet2d.floorplan.space import (
     BODY_RADIUS,
     Space,
     Window,
-    grow_polygons,
     grown_cells,
-    shrink,
     with_approaches,
 )
 from fleet2d.kernels import I64, QUARTER, TURN, Bool, label_parts, squared_distance
@@ -304,23 +308,6 @@ def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
 DOOR_CLEARANCE = 0.9
 """Depth of the floor before a doorway that stays empty, on either side [m]."""
 
-THIN_RADIUS = 0.1
-"""The radius of the thinnest body whose routes furniture leaves open [m]."""
-NARROW_RADII = (0.225, 0.2, 0.175, 0.15, 0.125)
-"""Radii between those two, which matter in homes with passages that not every body fits through."""
-RADII = (BODY_RADIUS, *NARROW_RADII, THIN_RADIUS)
-"""All of them: the bodies for which the finished home is checked [m]."""
-CUT_OFF_M2 = 0.25
-"""Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
-
-# By how much more than its radius a body's space is shrunk so that rounding can't make it smaller
-# [lattice], and the part of `CUT_OFF_M2` that is less than it in any case.
-ROUNDED = 8
-CERTAIN = 0.75
-
-# The outlines of the space of a body [lattice], by its radius [m].
-BodySpaces = dict[float, list[Polygon]]
-
 
 class Interior:
     """A home while furniture is put into it.
@@ -344,7 +331,7 @@ class Interior:
         self._views: dict[int, RoomView] = {}
         self._main: dict[int, Bool] = {}
         self._approached = np.zeros_like(self.whole)
-        self._empty = self._spaces = _body_spaces(plan, space.polygons)
+        self._empty = self._spaces = body_spaces(plan, space.polygons)
         for thing in plan.objects:
             window, covered = grown_cells(plan.lattice, thing.footprint, 0.0)
             self.occupied[window] |= covered
@@ -387,18 +374,20 @@ class Interior:
         """
         plan = self.plan
         fixed = len(plan.objects)
-        solid = [_solid(plan, plan.objects), *(_solid(plan, group) for group in self.groups)]
+        groups = [plan.objects, *self.groups]
+        solid = [solid_footprints(plan, group) for group in groups]
 
         @cache
         def before(radius: float) -> list[Polygon]:
-            return self._empty.get(radius) or _exact_space(plan, solid[0], radius)
+            known = (space.parts for space in self._empty if space.radius == radius)
+            return next(known, None) or exact_space(plan, solid[0], radius)
 
         def is_open(count: int) -> bool:
             standing = list(chain.from_iterable(solid[: count + 1]))
             if stays_whole(plan, standing):
                 return True
             for radius in RADII:
-                large = _large(plan, _exact_space(plan, standing, radius))
+                large = large_parts(plan, exact_space(plan, standing, radius))
                 if len(large) > 1:
                     inside = shapely.point_on_surface(large)
                     if any(shapely.contains(part, inside).sum() > 1 for part in before(radius)):
@@ -421,7 +410,7 @@ class Interior:
         if self._ways_stay_open(view, before, grown):
             usable = self._usable(view, things)
         if usable is not None:
-            spaces = self._spaces_with(usable)
+            spaces = self._spaces_with(view, usable)
         if usable is None or spaces is None:
             self.standing[view.window] = before
             return False
@@ -466,35 +455,27 @@ class Interior:
             usable.append(reachable)
         return usable
 
-    def _spaces_with(self, things: list[PlacedObject]) -> BodySpaces | None:
+    def _spaces_with(self, view: RoomView, things: list[PlacedObject]) -> list[BodySpace] | None:
         """Return the spaces of bodies among further objects, or None if these cut a space in two.
 
         Cells alone can't tell: between slanted walls, or for a thin body, there may be a way where
         no two neighboring cells are free.
         """
-        spaces: BodySpaces = {}
-        solid = _solid(self.plan, things)
-        for radius, parts in self._spaces.items():
-            # Further by the rounding of a space, so that what is connected here is connected there.
-            reach = radius * self.plan.lattice.units_per_m + GRID
-            grown = grow_polygons(solid, reach)
-            blocked = grown[0] if len(grown) == 1 else shapely.union_all(grown)
-            spaces[radius] = []
-            for part in parts:
-                pieces = _pieces(part, blocked)
-                if len(_large(self.plan, pieces)) > 1:
-                    return None
-                spaces[radius] += pieces[:1]
+        bounds = [thing.footprint.bounds for thing in things if thing.blocks != "nothing"]
+        if not bounds:
+            return self._spaces
+        lattice = self.plan.lattice
+        boxes = lattice.to_walls(np.reshape(bounds, (-1, 2))).reshape(-1, 4)
         uses = [use for thing in (*self.objects, *things) for use in thing.uses]
         approaches = [use.approach for use in uses if use.approach is not None]
-        if approaches:
-            x, y = self.plan.lattice.to_lattice(approaches).T
-            before, after = (
-                shapely.contains_xy(MultiPolygon(by_radius[BODY_RADIUS]), x, y)
-                for by_radius in (self._spaces, spaces)
-            )
-            if (before & ~after).any():
+        kept = lattice.to_lattice(np.reshape(approaches, (-1, 2)))
+        spaces = []
+        for space in self._spaces:
+            must_keep = kept if space.radius == BODY_RADIUS else kept[:0]
+            rest = space.without(boxes, view.window, must_keep)
+            if rest is None:
                 return None
+            spaces.append(rest)
         return spaces
 
     def _reached(self, view: RoomView) -> Bool:
@@ -514,90 +495,6 @@ class Interior:
             if use.approach is not None:
                 row, column = lattice.cell_of(*lattice.point_at(use.approach))
                 self._approached[row, column] = bool(self.standing[row, column])
-
-
-def _body_spaces(plan: FloorPlan, widest: list[Polygon]) -> BodySpaces:
-    """Return the spaces of bodies among the walls and objects of a plan.
-
-    Args:
-        plan: The plan.
-        widest: The space of a body of `BODY_RADIUS` between its walls.
-    """
-    solid = _solid(plan, plan.objects)
-    thin = _exact_space(plan, solid, THIN_RADIUS)
-    if solid:
-        widest = _exact_space(plan, solid, BODY_RADIUS)
-    spaces = {BODY_RADIUS: widest, THIN_RADIUS: thin}
-    if _has_narrow_places(plan, spaces):
-        spaces |= {radius: _exact_space(plan, solid, radius) for radius in NARROW_RADII}
-    return spaces
-
-
-def _solid(plan: FloorPlan, things: Iterable[PlacedObject]) -> list[Polygon]:
-    """Return the footprints of the objects that bodies can't pass [lattice]."""
-    return [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
-
-
-def _exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> list[Polygon]:
-    """Return the space of a body among footprints, exactly as `Space` computes it [lattice]."""
-    reach = radius * plan.lattice.units_per_m
-    return shrink(plan.polygons, reach, grow_polygons(solid, reach))
-
-
-def stays_whole(plan: FloorPlan, solid: Sequence[Polygon]) -> bool:
-    """Return whether no body has a space besides its largest one that furniture may not cut off.
-
-    A fast check of homes whose walls and furniture are parallel to the axes: there a mitred buffer
-    whose corners are cut is the space of an octagonal body, but for rounding. It is taken a little
-    wider than that, so a passage counts only if it certainly is one.
-
-    Args:
-        plan: The home.
-        solid: The footprints of the objects that bodies can't pass [lattice].
-
-    Returns:
-        False also where this can't tell.
-    """
-    free = shapely.difference(MultiPolygon(plan.polygons), shapely.union_all(solid))
-    for ring in shapely.get_rings(shapely.get_parts(free)):
-        along = np.diff(shapely.get_coordinates(ring), axis=0)
-        if (along != 0).all(axis=1).any():
-            return False
-    unit = plan.lattice.units_per_m
-    for radius in RADII:
-        space = free.buffer(-radius * unit - ROUNDED, join_style="mitre", mitre_limit=1.0)
-        areas = shapely.area(shapely.get_parts(space))
-        if not len(areas) or areas.sum() - areas.max() > CERTAIN * CUT_OFF_M2 * unit**2:
-            return False
-    return True
-
-
-def _has_narrow_places(plan: FloorPlan, spaces: BodySpaces) -> bool:
-    """Return whether thin bodies get to places, or between places, where large ones don't."""
-    wide = _large(plan, spaces[BODY_RADIUS])
-    thin = np.array(spaces[THIN_RADIUS], np.object_)
-    inside = np.asarray(shapely.point_on_surface(wide))
-    if (shapely.contains(thin[:, None], inside).sum(axis=1) > 1).any():
-        return True
-    # The octagon of a body reaches up to 8 % farther than its radius.
-    reach = (1.09 * BODY_RADIUS - THIN_RADIUS) * plan.lattice.units_per_m
-    near = MultiPolygon(wide).buffer(reach, join_style="mitre")
-    return any(_large(plan, _pieces(part, near)) for part in thin)
-
-
-def _pieces(polygon: Polygon, without: BaseGeometry) -> list[Polygon]:
-    """Return the pieces of a polygon that lie outside of a shape, the largest first."""
-    if not polygon.intersects(without):
-        return [polygon]
-    pieces = shapely.get_parts(shapely.difference(polygon, without)).tolist()
-    polygons = [piece for piece in pieces if piece.geom_type == "Polygon"]
-    return sorted(polygons, key=lambda piece: -piece.area)
-
-
-def _large(plan: FloorPlan, polygons: Sequence[Polygon]) -> list[Polygon]:
-    """Return the polygons [lattice] that furniture may not cut off."""
-    least = CUT_OFF_M2 * plan.lattice.units_per_m**2
-    return [polygon for polygon in polygons if polygon.area >= least]
 
 
 def _hull(slices: list[slice], start: int) -> slice:

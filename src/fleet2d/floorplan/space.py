@@ -471,6 +471,19 @@ def grow_polygons(polygons: Sequence[Polygon], radius: float) -> list[BaseGeomet
     return list(grown)
 
 
+def grow_boxes(boxes: I64, radius: float) -> NDArray[np.object_]:
+    """Grow upright rectangles by the octagon of a body, as `grow_polygons` does.
+
+    Args:
+        boxes: Least x and y, and greatest, int64 (n, 4) [lattice].
+        radius: The radius of the body [lattice].
+    """
+    octagon = _octagon(radius)
+    x = np.where(octagon[:, 0] > 0, boxes[:, 2, None], boxes[:, 0, None])
+    y = np.where(octagon[:, 1] > 0, boxes[:, 3, None], boxes[:, 1, None])
+    return np.asarray(shapely.polygons(np.stack([x, y], axis=2) + octagon))
+
+
 # What an area may lack of that of its hull, by rounding.
 CONVEX_SLACK = 1e-9
 
