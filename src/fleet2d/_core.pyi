@@ -470,6 +470,31 @@ def descend(cost: numpy.typing.NDArray[numpy.int32], distance: numpy.typing.NDAr
         int64 (n, 2) as (row, column); empty if no path from the start is known.
     """
 
+def corner_sums(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    Count the cells of a mask above and left of each corner of the cells.
+
+    Args:
+        mask: bool (rows, columns).
+
+    Returns:
+        int32 (rows + 1, columns + 1).
+    """
+
+def group_places(floor: tuple[Any, ...], occupied: numpy.typing.NDArray[numpy.bool_], group: tuple[Any, ...]) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return where a group of furniture can be in a room, and how good each place is.
+
+    Args:
+        floor: The room, a `RoomFloor`.
+        occupied: Cells that other things occupy, bool (rows, columns).
+        group: The group, a `GroupRule`.
+
+    Returns:
+        Turn, first row and first column in the turned window, and points, int64 (n, 4); by turn, row
+        and column.
+    """
+
 def leg_cost(cost: numpy.typing.NDArray[numpy.int32], ax: int, ay: int, bx: int, by: int) -> float:
     """
     Return the cost of a straight leg [percent times lattice units]; infinite if it is blocked.

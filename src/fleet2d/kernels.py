@@ -123,6 +123,27 @@ UNKNOWN_TRUTH = -2
 """The true user of a sighting in a real home, where nobody knows it; see SightingColumn.USER."""
 
 
+class RoomFloor(NamedTuple):
+    """The floor of a room and what surrounds it; (rows, columns) unless noted otherwise."""
+
+    holds: Bool  # cells that furniture may cover
+    whole: Bool  # cells that no wall cuts: what must stay empty before furniture is of these
+    before_walls: I32  # (4, rows + 1, columns + 1) corner_sums of cells before a wall, by turn
+    from_doors: I64  # squared distance from the floor before doors [cells]
+
+
+class GroupRule(NamedTuple):
+    """A group of furniture, and what its places are worth."""
+
+    width: int  # extent along the back [cells]
+    depth: int  # extent away from the back [cells]
+    front: int  # depth of the floor before it that stays empty [cells]
+    backed: int  # least part of its back that is before a wall [cells]
+    corner: int  # points for a place in a corner
+    away: int  # points for a place far from doors
+    far: int  # distance from doors beyond which more distance earns no points [cells]
+
+
 class Lenses(NamedTuple):
     """The constants of a robot's cameras; int64 (cameras,) unless noted otherwise."""
 

@@ -30,10 +30,12 @@ from fleet2d.kernels import (
     DetectionRule,
     Distances,
     ErrorTables,
+    GroupRule,
     Lenses,
     Moments,
     PlaceNetwork,
     Reach,
+    RoomFloor,
     RoomMemory,
     ShownMemory,
     StayModel,
@@ -307,6 +309,11 @@ def setup() -> CoverageSetup:
     return CoverageSetup(MESH, lenses(), patches, SECOND, 1, 4)
 
 
+def floor() -> RoomFloor:
+    before_walls = np.stack([_core.corner_sums(MASK)] * 4)
+    return RoomFloor(MASK.copy(), MASK.copy(), before_walls, MASK.astype(np.int64))
+
+
 def record() -> CoverageRecord:
     def never() -> Any:
         return np.full((HOME.rows, HOME.columns), NEVER, np.int64)
@@ -495,6 +502,8 @@ CALLS: dict[str, Args] = {
     "count_steps": lambda: (MASK.copy(), MASK.copy()),
     "trace_rings": lambda: (MASK.copy(),),
     "squared_distance": lambda: (MASK.copy(),),
+    "corner_sums": lambda: (MASK.copy(),),
+    "group_places": lambda: (floor(), ~MASK, GroupRule(1, 1, 1, 0, 40, 20, 3)),
     "box_sums": lambda: (COSTS.astype(np.int64), 1),
     "climb": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.astype(np.int64)),
     "walking_distance": lambda: (MASK.copy(), np.array([[0, 0], [2, 3]])),

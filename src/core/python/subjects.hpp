@@ -13,6 +13,7 @@ void bind_line_of_sight(nanobind::module_& m);
 void bind_chambers(nanobind::module_& m);
 void bind_masks(nanobind::module_& m);
 void bind_fields(nanobind::module_& m);
+void bind_furniture(nanobind::module_& m);
 void bind_taut(nanobind::module_& m);
 void bind_giving_way(nanobind::module_& m);
 void bind_timelines(nanobind::module_& m);

@@ -140,20 +140,20 @@ def _place_tv(interior: Interior, room: Room, first: int, draws: Draws) -> None:
         return
     cell = interior.plan.lattice.cell
     turn_of_sofa = round(sofa.heading / (np.pi / 2)) - 1
+    turn_of_tv = (turn_of_sofa + 2) % 4
     middle = sofa.footprint.centroid
+    view = interior.view(room)
+    u, v = view.turn_place(turn_of_tv, middle.x, middle.y)
     group = replace(_alone("tv", draws)[0], corner=0, away=0)
 
-    def score(turn: int, shape: tuple[int, int], size: tuple[int, int]) -> I64:
-        if turn != (turn_of_sofa + 2) % 4:
-            return np.full(shape, -1)
-        u, v = view.turn_place(turn, middle.x, middle.y)
-        rows, columns = np.indices(shape)
-        off = np.abs(2 * columns + size[0] - round(2 * u))  # in half cells
-        ahead = (v - rows) * cell
+    def score(places: I64, size: tuple[int, int]) -> I64:
+        turn, row, column = places.T
+        off = np.abs(2 * column + size[0] - round(2 * u))  # in half cells
+        ahead = (v - row) * cell
         is_far = (ahead > TV_DISTANCES_M[0]) & (ahead < TV_DISTANCES_M[1])
-        return np.where(is_far & (off * cell < 2.0), 4000 - 10 * off, -1).astype(np.int64)
+        faces = turn == turn_of_tv
+        return np.where(faces & is_far & (off * cell < 2.0), 4000 - 10 * off, -1).astype(np.int64)
 
-    view = interior.view(room)
     interior.place(room, group, draws, score)
 
 

@@ -31,7 +31,18 @@ from fleet2d.floorplan.space import (
     grown_cells,
     with_approaches,
 )
-from fleet2d.kernels import I64, QUARTER, TURN, Bool, label_parts, squared_distance
+from fleet2d.kernels import (
+    I64,
+    QUARTER,
+    TURN,
+    Bool,
+    GroupRule,
+    RoomFloor,
+    corner_sums,
+    group_places,
+    label_parts,
+    squared_distance,
+)
 from fleet2d.runtime.determinism import Draws
 
 # Largest distance of a wall behind a piece, to allow for the steps of jagged walls [m].
@@ -47,7 +58,7 @@ POCKET_M2 = 0.06
 # Distance from a door beyond which more distance earns no points [m].
 FAR_M = 3.0
 
-Score = Callable[[int, tuple[int, int], tuple[int, int]], I64]
+Score = Callable[[I64, tuple[int, int]], I64]
 
 
 @dataclass(frozen=True)
@@ -112,15 +123,18 @@ class RoomView:
         self.window = (slice(y0, y1), slice(x0, x1))
         self.inside = largest_part(plan.room_of_cell[self.window] == room.index)
         self.pocket = int(POCKET_M2 / lattice.cell**2)
-        self._whole = whole[self.window]
+        whole = np.ascontiguousarray(whole[self.window])
         doors = doors[self.window]
-        self._may_hold = self._whole & self.inside & ~doors
-        self._from_doors = squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1]
         reach = max(1, count_cells(lattice.cell, WALL_REACH))
         # Cells before walls, in the direction of the rows of each turn: the wall on the left of a
         # turn is behind the next one.
         ahead = ((reach, 0), (-reach, 1), (-reach, 0), (reach, 1))
-        self._before_walls = [_sums(cells_after(~self._whole, *way)) for way in ahead]
+        self._floor = RoomFloor(
+            holds=whole & self.inside & ~doors,
+            whole=whole,
+            before_walls=np.stack([corner_sums(cells_after(~whole, *way)) for way in ahead]),
+            from_doors=squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1],
+        )
 
     def places(
         self, group: FurnitureGroup, occupied: Bool, draws: Draws, score: Score | None = None
@@ -131,12 +145,24 @@ class RoomView:
             group: The group.
             occupied: Cells that other things occupy, bool (rows, columns) of the plan.
             draws: The stream that chooses among good places.
-            score: Called with a turn, the shape of the turned window and the size of the group;
-                returns points for each first cell, below 0 where the group must not be.
+            score: Returns further points for turns, first rows and first columns, int64 (n, 3), of
+                a group of a size; below 0 where the group must not be.
         """
-        empty = ~occupied[self.window]
-        sums = _sums(self._may_hold & empty), _sums(self._whole & empty)
-        places = np.concatenate([self._options(group, turn, sums, score) for turn in range(4)])
+        width, depth = self._size(group)
+        rule = GroupRule(
+            width,
+            depth,
+            front=count_cells(self.lattice.cell, group.front),
+            backed=-(-MIN_WALL_TENTHS * width // 10) if group.wall else 0,
+            corner=group.corner,
+            away=group.away,
+            far=count_cells(self.lattice.cell, FAR_M),
+        )
+        places = group_places(self._floor, occupied[self.window], rule)
+        if score is not None:
+            more = score(places[:, :3], (width, depth))
+            places[:, 3] += more
+            places = places[more >= 0]
         for _ in range(ATTEMPTS):
             if not len(places):
                 return
@@ -147,70 +173,6 @@ class RoomView:
             away = np.abs(places[:, 1:3] - (row, column)).max(axis=1)
             is_far = away > count_cells(self.lattice.cell, 0.2)
             places = places[is_far | (places[:, 0] != turn)]
-
-    def _options(
-        self, group: FurnitureGroup, turn: int, sums: tuple[I64, I64], score: Score | None
-    ) -> I64:
-        """Return where the group can be: turn, row and column of first cells, and their points.
-
-        Args:
-            group: The group.
-            turn: The turn.
-            sums: Of the cells that may hold furniture, and of those that may stay empty before it.
-            score: See `places`.
-
-        Returns:
-            int64 (n, 4).
-        """
-        width, depth = self._size(group)
-        front = count_cells(self.lattice.cell, group.front)
-        high, wide = self.inside.shape[:: -1 if turn % 2 else 1]
-        if depth + front > high or width > wide:
-            return np.empty((0, 4), np.int64)
-        possible = _is_full(sums[0], turn, depth, width)
-        if front:
-            before = _is_full(sums[1], turn, front, width)[depth:]
-            possible = possible[: len(before)] & before
-        rows, columns = np.nonzero(possible)
-        if group.wall:
-            touching = self._beside_wall(turn, turn, rows, columns, 1, width)
-            backed = 10 * touching >= MIN_WALL_TENTHS * width
-            rows, columns = rows[backed], columns[backed]
-        points = self._points(group, turn, rows, columns)
-        places = np.stack([np.full_like(rows, turn), rows, columns, points], axis=1)
-        if score is not None:
-            more = score(turn, (high, wide), (width, depth))[rows, columns]
-            places[:, 3] += more
-            places = places[more >= 0]
-        return places
-
-    def _points(self, group: FurnitureGroup, turn: int, rows: I64, columns: I64) -> I64:
-        """Return the points of first cells for corners and for the distance from doors."""
-        width, depth = self._size(group)
-        points = np.zeros(len(rows), np.int64)
-        if group.corner:
-            right = self._beside_wall(turn - 1, turn, rows, columns, depth, 1)
-            left = self._beside_wall(turn + 1, turn, rows, columns + width - 1, depth, 1)
-            points += group.corner * np.maximum(left, right) // depth
-        if group.away:
-            far = count_cells(self.lattice.cell, FAR_M)
-            distance = np.rot90(self._from_doors, turn)[rows + depth // 2, columns + width // 2]
-            points += np.minimum(distance, far * far) * group.away // (far * far)
-        return points
-
-    def _beside_wall(
-        self, side: int, turn: int, rows: I64, columns: I64, high: int, wide: int
-    ) -> I64:
-        """Return how many cells of boxes of the turned window are before a wall on a side of it."""
-        height, width = self.inside.shape
-        if turn == 1:
-            rows, columns = columns, width - rows - high
-        elif turn == 2:
-            rows, columns = height - rows - high, width - columns - wide
-        elif turn == 3:
-            rows, columns = height - columns - wide, rows
-        size = (wide, high) if turn % 2 else (high, wide)
-        return _in_box(self._before_walls[side % 4], rows, columns, *size)
 
     def _size(self, group: FurnitureGroup) -> tuple[int, int]:
         cell = self.lattice.cell
@@ -271,27 +233,6 @@ def count_cells(cell: float, metres: float) -> int:
     """Return how many cells of a side [m] come nearest to a length [m]."""
     # Slightly more than a half is added, so that sums of equal value are rounded alike.
     return math.floor(metres / cell + 0.5 + 1e-6)
-
-
-def _sums(mask: Bool) -> I64:
-    """Count the cells of a mask above and left of each corner, (rows + 1, columns + 1)."""
-    sums = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int32)
-    np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
-    return sums
-
-
-def _in_box(sums: I64, rows: I64, columns: I64, high: int, wide: int) -> I64:
-    """Return how many cells of a mask are in the boxes that begin at some cells."""
-    right, top = columns + wide, rows + high
-    return sums[top, right] - sums[rows, right] - sums[top, columns] + sums[rows, columns]
-
-
-def _is_full(sums: I64, turn: int, high: int, wide: int) -> Bool:
-    """Return whether a rectangle of the turned window has only cells of a mask, by first cell."""
-    if turn % 2:
-        high, wide = wide, high
-    counts = sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]
-    return np.rot90(counts == high * wide, turn)
 
 
 def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
