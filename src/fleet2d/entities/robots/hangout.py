@@ -304,12 +304,24 @@ class Hangout(BeliefBehavior):
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until the next period."""
         belief = self.belief(now, self.user)
-        scores = self._scores(now, belief.joint)
+        worth = self._worth(belief.joint)
+        if self._stays(plan, worth):
+            return
+        scores = worth - self._ways(now.actor)
         best = int(np.argmax(scores))
         if self.place is not None and scores[best] <= scores[self.place] + self.hysteresis:
             return
         self.place = best
         plan.note(EventKind.RELOCATES, now.home.plan.rooms[int(self.places.room[best])].name)
+
+    def _stays(self, plan: Plan, worth: F64) -> bool:
+        """Return whether no place is better, however short the way there, and long its own.
+
+        It spares robots that yield the ways to all places, as they stand elsewhere each time.
+        """
+        if self.place is None or worth.max() > worth[self.place] - self.moving + self.hysteresis:
+            return False
+        return plan.reaches(*self.places.points[self.place].tolist())
 
     def _explore(self, now: Situation, plan: Plan, room: int) -> None:
         """Look round in a room from viewpoints that show nearly all of it, by present walls."""
@@ -321,8 +333,8 @@ class Hangout(BeliefBehavior):
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 
-    def _scores(self, now: Situation, joint: F64) -> F64:
-        """Return the rating of each place, float64 (n,), by the probability of each room."""
+    def _worth(self, joint: F64) -> F64:
+        """Return the rating of each place but for its way, float64 (n,), by chances of rooms."""
         if self.rated_by is None or not np.array_equal(joint, self.rated_by):
             gain = np.zeros(len(self.places.points))
             # Summed in a fixed order, unlike in a matrix product: the same on every machine.
@@ -330,7 +342,7 @@ class Hangout(BeliefBehavior):
                 gain += chance * self.nearness[:, room]
             self.rated_by = joint
             self.worth = gain - self.penalty
-        return self.worth - self._ways(now.actor)
+        return self.worth
 
     def _ways(self, actor: Actor) -> F64:
         """Return the cost of the way to each place, float64 (n,), infinite without a way.
