@@ -79,13 +79,17 @@ std::optional<Delay> come_back(Legs& legs, Moment now, const TrackPiece* track, 
     const i64 next = next_stop(*track, met, body.can_stand), last = length_of(*track) - 1;
     const i64 stop = next < 0 ? last : next;
     const Moment goal = row_of(*track, stop);
+    if (next < 0 && !body.can_stand({goal.x, goal.y})) {  // it stood at a corner, to which no way leads
+        stay_until(legs, now, goal.time);
+        return Delay{begin, 0, begin};
+    }
     const auto there = body.go(legs, now, {goal.x, goal.y});
     if (!there) return {};
     now = *there;
     const i64 since = std::max(goal.time, begin);
     if (stop < last) {
         now = legs.turn(now, turn_between(now.heading, heading_at(*track, stop, since)), body.turn_rate);
-        stay_until(legs, now, since);
+        stay_until(legs, now, std::max(since, next_multiple(now.time, body.beat)));
     }
     return go_on(legs, now, *track, since, stop + 1);
 }

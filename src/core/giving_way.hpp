@@ -17,6 +17,7 @@ namespace fleet2d {
 struct Yielder {
     i64 row;
     f64 turn_rate;  // headings per second
+    i64 beat;       // us; late, it leaves a stop at a multiple of that, so that poses recur and their views are known
     // Walks to a point, at home: adds breakpoints and returns the end; nothing if no way leads there.
     std::function<std::optional<Moment>(Legs&, const Moment&, Point)> go;
     std::function<bool(Point)> can_stand;  // a turn at a corner, on the border of its space, is no stop

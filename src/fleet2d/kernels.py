@@ -431,6 +431,7 @@ class Yielder(NamedTuple):
         routes: The shortest ways in it; None if it takes others.
         speed: How fast it goes [lattice units per second].
         turn_rate: How fast it turns [1/4096 turn per second].
+        beat_us: If it is late, it leaves a stop at a multiple of that [us].
         walk: Called with time [us], x, y, heading, and the x and y of a goal to which no route
             leads; returns the breakpoints of a way there, int64 (n, 5), or None.
     """
@@ -440,6 +441,7 @@ class Yielder(NamedTuple):
     routes: Routes | None
     speed: float
     turn_rate: float
+    beat_us: int
     walk: Callable[..., I64 | None]
 
 

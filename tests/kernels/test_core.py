@@ -814,7 +814,7 @@ CALLS: dict[str, Args] = {
     "Timelines.way_after_a_wait": lambda: (timelines(), 0, 3, np.array([1, 2]), kept(1), 9),
     "Timelines.way_by_a_place": lambda: (
         timelines(),
-        (0, MESH, None, 1000.0, 500.0, lambda *_: None),
+        (0, MESH, None, 1000.0, 500.0, 10**6, lambda *_: None),
         3,
         4,
         POINTS[:2].copy(),

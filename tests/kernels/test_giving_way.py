@@ -13,6 +13,7 @@ from fleet2d.kernels import I64, Breakpoints, Distances, Timelines, Yielder, nex
 SECOND = 10**6
 NEAR = 300
 END = 30
+BEAT = 3 * SECOND // 2
 MESH = home_of([box(0, 0, 4096, 4096)]).mesh
 WAITS = np.array([1, 4])
 
@@ -108,8 +109,9 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
                     continue
                 track += back.tolist()
                 since = max(goal[0], now)
-                if stop >= 0 and track[-1][0] < since:
-                    track.append([since, *track[-1][1:]])
+                leaves = max(since, -(-track[-1][0] // BEAT) * BEAT)
+                if stop >= 0 and track[-1][0] < leaves:
+                    track.append([leaves, *track[-1][1:]])
                 rest = rows[stop + 1 :].tolist() if stop >= 0 else []
                 later = track[-1][0] - since
                 track += slow.delayed(rest, since, track[-1][1:], later)[0]
@@ -117,13 +119,29 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
             expected = slow.first_free(tracks, is_free)
             if expected is None and rests and tracks:
                 expected = tracks[-1]
-        body = Yielder(0, MESH, None, 1000.0, 1000.0, straight)
+        body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
         way = timelines.way_by_a_place(body, step, met, places, WAITS, rests, kept(3), END)
         assert (expected is None) == (way is None)
         if way is not None:
             found += 1
             assert way[0].tolist() == expected
     assert 10 < found < 115
+
+
+def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back() -> None:
+    corner = np.array([[0, 0, 0, 0, 0], [20 * SECOND, 0, 0, 0, 0]])
+    timelines = Timelines(1, SECOND)
+    timelines.follow(0, 0, breakpoints(corner), np.zeros(0, np.int64), np.zeros(1, np.int8))
+    body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
+    place = np.array([[900, 1200]])
+    way = timelines.way_by_a_place(body, 2, 4, place, WAITS, 6, kept(1), END)
+    assert way is not None
+    assert way[0].tolist() == [
+        [2 * SECOND, 0, 0, 0, 0],
+        [3 * SECOND + SECOND // 2, 900, 1200, 0, 0],
+        [5 * SECOND, 900, 1200, 0, 0],
+        [20 * SECOND, 900, 1200, 0, 0],
+    ]
 
 
 def test_a_body_at_rest_meets_whom_it_would_meet_on_a_track_that_rests() -> None:

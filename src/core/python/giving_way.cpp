@@ -8,6 +8,8 @@
 namespace fleet2d {
 namespace {
 
+constexpr i64 LONGEST_BEAT = i64{1} << 40;  // us: 12 days
+
 // Add what a function of Python returns for a way that no shortest route leads.
 std::optional<Moment> add_way(const nb::callable& walk, Legs& legs, const Moment& now, Point to) {
     const nb::object rows = walk(now.time, now.x, now.y, now.heading, to.x, to.y);
@@ -27,12 +29,13 @@ std::optional<Moment> add_way(const nb::callable& walk, Legs& legs, const Moment
 }  // namespace
 
 Yielder yielder_of(const YielderFields& fields) {
-    const auto& [row, space, routes, speed, turn_rate, walk] = fields;
+    const auto& [row, space, routes, speed, turn_rate, beat, walk] = fields;
     Routes* shortest = nullptr;
     require(routes.is_none() || nb::try_cast(routes, shortest), "routes must be Routes or None");
     check_rates(speed, turn_rate);
+    require(0 < beat && beat < LONGEST_BEAT, "beat_us must be above 0, and below 2**40");
     const auto go = [shortest, &fields](Legs& legs, const Moment& now, Point to) -> std::optional<Moment> {
-        const auto& [row, space, routes, speed, turn_rate, walk] = fields;
+        const auto& [row, space, routes, speed, turn_rate, beat, walk] = fields;
         if (shortest) {
             const auto route = shortest->find({now.x, now.y}, to);
             if (!route.empty()) return legs.walk(now, rows_of(route), speed, turn_rate);
@@ -40,7 +43,7 @@ Yielder yielder_of(const YielderFields& fields) {
         return add_way(walk, legs, now, to);
     };
     const auto can_stand = [&fields](Point at) { return strictly_inside(std::get<1>(fields), at.x, at.y); };
-    return {row, turn_rate, go, can_stand};
+    return {row, turn_rate, beat, go, can_stand};
 }
 
 void bind_giving_way(nb::module_& m) {

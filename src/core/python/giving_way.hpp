@@ -6,9 +6,9 @@
 
 namespace fleet2d {
 
-// Row, space, routes or None, speed, turn rate, and a function that leads where the routes don't: see `Yielder` of
-// `fleet2d.kernels`.
-using YielderFields = std::tuple<i64, Mesh, nb::object, f64, f64, nb::callable>;
+// Row, space, routes or None, speed, turn rate, beat, and a function that leads where the routes don't: see `Yielder`
+// of `fleet2d.kernels`.
+using YielderFields = std::tuple<i64, Mesh, nb::object, f64, f64, i64, nb::callable>;
 
 // The body of a call: its fields outlive it.
 Yielder yielder_of(const YielderFields& fields);

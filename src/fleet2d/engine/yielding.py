@@ -124,6 +124,8 @@ class Yielding(Watcher):
         self._number = {row: number for number, row in enumerate(self.rows)}
         self._rows = np.array(self.rows, np.int64)
         self._step_us = basis.clock.step_us
+        # Robots that are late for each other take the same poses later, whose views are known.
+        self._beat_us = self._step_us if len(self.rows) > 1 else 1
         self._ahead = self._steps(AHEAD)
         self._tries = np.array([self._steps(wait) for wait in WAITS], np.int64)
         self._tries_aside = np.array([self._steps(wait) for wait in WAITS_ASIDE], np.int64)
@@ -405,7 +407,8 @@ class Yielding(Watcher):
             round_it = self._by_waiting(now, at, other) if self._rests(other, now.step) else None
             if round_it is not None:
                 return [(now, self._noted(now, other, round_it))]
-            return [(now, self._blocked(now, at, other, self._stop(now)))]
+            # For as long as the other one looks ahead: else it never has the time to get away.
+            return [(now, self._blocked(now, at, other, self._stop(now, self._ahead)))]
         stays = self._hit_at_rest(now, self._everybody[row])
         if stays is None:
             plan = self._by_waiting(now, at, other)
@@ -462,7 +465,7 @@ class Yielding(Watcher):
         last, where = self._looked_round.get(actor.row, (None, None))
         if last is not None and (now.step - last < self._ahead or where == seen):
             return None
-        around = plan_around(now, actor.plan, standing, at, _charger(actor))
+        around = plan_around(now, actor.plan, standing, at, _charger(actor), self._beat_us)
         if around is not None and self._is_free(now, around):
             return around
         self._looked_round[actor.row] = now.step, None if around is not None else seen
@@ -482,7 +485,7 @@ class Yielding(Watcher):
         """Return a plan to go on by one of some places: see `Timelines.way_by_a_place`."""
         actor = self._actors[now.actor.row]
         continued = self._bodies.timelines.way_by_a_place(
-            yielder(actor), now.step, at, places, waits, rests, kept, self._far(now)
+            yielder(actor, self._beat_us), now.step, at, places, waits, rests, kept, self._far(now)
         )
         return None if continued is None else plan_along(now, actor.plan, continued)
 

@@ -324,12 +324,12 @@ def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Not
     return plan
 
 
-def yielder(actor: Actor) -> Yielder:
+def yielder(actor: Actor, beat_us: int) -> Yielder:
     """Return how a robot goes somewhere to give way, for the core."""
     space = actor.space
     routes = None if actor.drive is not None or actor.slows else space.shortest
     walk = partial(_way, actor)
-    return Yielder(actor.row, space.mesh, routes, actor.speed, actor.turn_rate, walk)
+    return Yielder(actor.row, space.mesh, routes, actor.speed, actor.turn_rate, beat_us, walk)
 
 
 def _way(actor: Actor, time_us: int, x: int, y: int, heading: int, *goal: int) -> I64 | None:
@@ -359,6 +359,7 @@ def plan_around(
     bodies: I64,
     met_at: int | None = None,
     waits_for: LatticePoint | None = None,
+    beat_us: int = 1,
 ) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
@@ -371,6 +372,7 @@ def plan_around(
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
         met_at: The step in which they are in the way; left out: now.
         waits_for: A place beside which it doesn't stop: its charger.
+        beat_us: If it is late, it leaves a stop at a multiple of that [us].
 
     Returns:
         The plan; None if there is no way round.
@@ -399,11 +401,12 @@ def plan_around(
         return None
     since_us = max(int(rows[stop, 0]), begin_us)
     plan.go_to_point(*goal, route=route)
-    plan.turn_to(heading_at(motion.breakpoints, stop, since_us)).stay_until(since_us)
+    plan.turn_to(heading_at(motion.breakpoints, stop, since_us))
+    _leave(plan, since_us, beat_us)
     rest = rows[stop + 1 :]
     if not is_taken:
         return _continue(plan, interrupted, begin_us, since_us, rest)
-    return _continue_beside(plan, interrupted, begin_us, since_us, stop, rows)
+    return _continue_beside(plan, interrupted, begin_us, since_us, stop, rows, beat_us)
 
 
 def plan_here(now: Situation, interrupted: Plan, met_at: int) -> Plan | None:
@@ -437,7 +440,13 @@ def plan_here(now: Situation, interrupted: Plan, met_at: int) -> Plan | None:
 
 
 def _continue_beside(
-    plan: Plan, interrupted: Plan, begin_us: int, since_us: int, stop: int, rows: I64
+    plan: Plan,
+    interrupted: Plan,
+    begin_us: int,
+    since_us: int,
+    stop: int,
+    rows: I64,
+    beat_us: int = 1,
 ) -> Plan | None:
     """Continue a plan that stops beside a stop of another one, which is taken.
 
@@ -448,6 +457,7 @@ def _continue_beside(
         since_us: The moment at which it would have stopped, or the present one.
         stop: The row at which the other plan stops.
         rows: All rows of the other plan, int64 (n, 5).
+        beat_us: As in `plan_around`.
 
     Returns:
         The plan; None if no way leads on to the stop after that one.
@@ -475,8 +485,14 @@ def _continue_beside(
     except NoWayError:
         return None
     arrives_us = int(rows[after, 0])
-    plan.turn_to(heading_at(motion.breakpoints, after, arrives_us)).stay_until(arrives_us)
+    plan.turn_to(heading_at(motion.breakpoints, after, arrives_us))
+    _leave(plan, arrives_us, beat_us)
     return _continue(plan, interrupted, left_us, arrives_us, rows[after + 1 :])
+
+
+def _leave(plan: Plan, time_us: int, beat_us: int) -> None:
+    """Let a body stay at a stop until a moment, and if it is late until a multiple of a beat."""
+    plan.stay_until(max(time_us, -(-plan.time_us // beat_us) * beat_us))
 
 
 def _continue(
