@@ -157,7 +157,7 @@ def test_a_wrong_question_is_answered_with_what_there_is(
 
 @pytest.mark.parametrize(
     ("where", "rows"),
-    [("event == user_seen", 6), ("event == 'user_seen' and entity == 'astro'", 6)],
+    [("event == user_seen", 4), ("event == 'user_seen' and entity == 'astro'", 4)],
 )
 def test_conditions_of_rows_are_joined(place: Workspace, where: str, rows: int) -> None:
     """Only astro sees; a condition with `and` had 0 rows."""

@@ -72,7 +72,7 @@ def test_a_frame_that_says_too_much_or_too_little_is_refused(
 def test_a_label_without_its_room_proposes_the_most_similar_one(
     label: str, kinds: list[str], proposal: str
 ) -> None:
-    rooms: Any = [SimpleNamespace(name=f"{kind}_0", type=kind) for kind in kinds]
+    rooms: Any = [SimpleNamespace(name=f"{kind}_1", type=kind) for kind in kinds]
     with pytest.raises(LogError, match=rf"rooms: {{{label}: {proposal}}}, or another: "):
         map_rooms({label: 3}, {}, rooms)
 

@@ -17,7 +17,7 @@ from fleet2d.floorplan.home import Home
 from fleet2d.metrics.ltp_error import walking_distances
 
 ROOMS = [
-    f"{name}_0" for name in ("living_room", "kitchen", "bedroom", "bathroom", "storage", "unknown")
+    f"{name}_1" for name in ("living_room", "kitchen", "bedroom", "bathroom", "storage", "unknown")
 ]
 USERS = {
     "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},

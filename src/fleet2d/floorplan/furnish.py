@@ -75,7 +75,7 @@ def furnish(plan: FloorPlan, seed: int = 0, density: float = 1.0) -> FloorPlan:
         >>> box = shapely.box(0, 0, 4, 3)
         >>> plan = FloorPlan.build("cabin", box, [LabelledRegion(("Bedroom",), box)])
         >>> [thing.name for thing in furnish(plan, density=0).objects]
-        ['bed_1', 'nightstand_1', 'wardrobe_1']
+        ['bed_1', 'nightstand_1', 'nightstand_2', 'wardrobe_1']
     """
     if not 0 <= density <= 10:
         raise FloorPlanError(

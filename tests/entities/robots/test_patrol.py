@@ -121,7 +121,7 @@ def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does() -> N
     """In one of forty homes presence erred by a third: the bed was never in view."""
     by_middle = fleet2d.Simulation(bent()).actors["astro"]
     (note,) = by_middle.notes
-    assert "bedroom_2 (29% of its places: nightstand_3, nightstand_4)" in note
+    assert "living_room_1 (50% of its places: tv_1, bookshelf_1, dresser_1)" in note
     assert "stop_at: view" in note
     by_view = fleet2d.Simulation(bent(stop_at="view")).actors["astro"]
     assert [] == by_view.notes

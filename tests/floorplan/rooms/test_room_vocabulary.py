@@ -73,7 +73,7 @@ def test_leading_type_prefers_living_to_catch_alls() -> None:
         ("Cuarto de baño", "bathroom"),
         ("Yoga Studio", "yoga_studio"),
         ("Dressing Room", "wardrobe"),
-        ("Room 5", "room_6"),
+        ("Room 5", "room_5"),
         ("42", "42"),
         ("  ", "unknown"),
     ],

@@ -95,8 +95,8 @@ def test_words_name_the_plan_its_rooms_the_scale_and_the_entrance(home: FloorPla
     labels = zip(room_labels(home.rooms), home.rooms, strict=True)
     # The smallest one, in which a door swings, has only its name.
     texts_of_rooms = {f"{label}\n{room.area_m2:.1f} m²" for label, room in labels}
-    assert {"Storage 1\n2.3 m²"} == texts_of_rooms - set(texts)
-    assert "Storage\n1" in texts
+    assert {"Storage 2\n2.3 m²"} == texts_of_rooms - set(texts)
+    assert "Storage\n2" in texts
     assert {"0", "2.5", "5 m", "entrance"} <= set(texts)
     assert {"0", "2.5", "5 m", "entrance"} == set(words(home, names=False, title=False))
 

@@ -69,7 +69,7 @@ def usual_type(name: str) -> str:
         >>> usual_type("Salle de bain"), usual_type("Chambre parentale")
         ('bathroom', 'bedroom')
         >>> usual_type("Yoga Studio 3")
-        'yoga_studio_4'
+        'yoga_studio_3'
     """
     return leading_type(usual_types(name))
 
