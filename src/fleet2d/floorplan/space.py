@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Point, Polygon
+from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
@@ -19,6 +19,7 @@ from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, Portal, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, cells_of, read_only
 from fleet2d.kernels import (
+    CELL_CENTRE,
     F64,
     I32,
     I64,
@@ -509,6 +510,8 @@ STAND_REACH = 0.35
 SIT_REACH = 1.6
 # Number of cells that are tried for a way onto a piece of furniture, nearest first.
 ATTEMPTS = 600
+# So many of them are put in order at first.
+FIRST_ATTEMPTS = 16
 # What snapping of the grown footprint may add [lattice].
 SLACK = 8
 HALF = UNITS_PER_CELL // 2
@@ -562,9 +565,11 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
         corners = lattice.to_lattice(shapely.get_coordinates(piece)[:-1])
         hull = shapely.convex_hull(shapely.multipoints((corners[:, None] + octagon).reshape(-1, 2)))
         hulls.append(shapely.get_coordinates(shapely.orient_polygons(hull)).astype(np.int64))
-    window = _window(lattice, np.concatenate(hulls))
-    xs, ys = lattice.centre_axes()
-    x, y = xs[window[1]][None, :], ys[window[0]][:, None]
+    corners = np.concatenate(hulls)
+    window = _window(lattice, corners.min(axis=0).tolist(), corners.max(axis=0).tolist())
+    rows, columns = window
+    x = _centres(columns)[None, :]
+    y = _centres(rows)[:, None]
     covered = np.zeros((y.shape[0], x.shape[1]), np.bool_)
     for corners in hulls:
         inside = np.ones_like(covered)
@@ -600,14 +605,14 @@ def _cells_by_rectangle(lattice: Lattice, corners: I64, a: int, b: int) -> tuple
         a: How far the octagon's straight sides are from its middle [lattice].
         b: Half the length of these sides [lattice].
     """
-    low, high = corners
-    window = _window(lattice, np.array([low - a, high + a]))
-    xs, ys = (
-        axis[cells] for axis, cells in zip(lattice.centre_axes(), reversed(window), strict=True)
-    )
-    x = np.maximum(np.maximum(low[0] - xs, xs - high[0]), 0)
-    y = np.maximum(np.maximum(low[1] - ys, ys - high[1]), 0)
-    return window, (x <= a)[None, :] & (y <= a)[:, None] & (x[None, :] + y[:, None] <= a + b)
+    (x0, y0), (x1, y1) = corners.tolist()
+    rows, columns = _window(lattice, (x0 - a, y0 - a), (x1 + a, y1 + a))
+    xs = _centres(columns)
+    ys = _centres(rows)
+    x = np.maximum(np.maximum(x0 - xs, xs - x1), 0)
+    y = np.maximum(np.maximum(y0 - ys, ys - y1), 0)
+    covered = (x <= a)[None, :] & (y <= a)[:, None] & (x[None, :] + y[:, None] <= a + b)
+    return (rows, columns), covered
 
 
 def with_approaches(
@@ -624,19 +629,22 @@ def with_approaches(
         standing: Cells where the middle of the body can be, bool (rows, columns).
         others: Other objects, over which no body steps, except for a chair to sit on.
     """
+    if not thing.uses:
+        return thing
     x0, y0, x1, y1 = thing.footprint.bounds
     near = shapely.box(x0 - SIT_REACH, y0 - SIT_REACH, x1 + SIT_REACH, y1 + SIT_REACH)
-    shapes = [
-        other.footprint for other in others if other.blocks != "nothing" and other is not thing
-    ]
-    close = shapely.intersects(near, shapes) if shapes else ()
-    solid = [shape for shape, is_close in zip(shapes, close, strict=True) if is_close]
+    solid = np.array(
+        [other.footprint for other in others if other.blocks != "nothing" and other is not thing],
+        np.object_,
+    )
+    solid = solid[shapely.intersects(near, solid)]
     uses = []
     for use in thing.uses:
-        reach = STAND_REACH if use.posture == "stand" else SIT_REACH
-        at = Point(use.x, use.y)
         is_seat = use.posture != "stand"
-        obstacles = [shape for shape in solid if not (is_seat and shape.intersects(at))]
+        reach = SIT_REACH if is_seat else STAND_REACH
+        obstacles = solid
+        if is_seat:
+            obstacles = solid[~shapely.intersects_xy(solid, use.x, use.y)]
         cell = nearest_standing(plan, use, standing, reach, obstacles)
         if cell is None:
             continue
@@ -648,7 +656,11 @@ def with_approaches(
 
 
 def nearest_standing(
-    plan: FloorPlan, use: UsePlace, standing: Bool, reach: float, obstacles: Sequence[Polygon] = ()
+    plan: FloorPlan,
+    use: UsePlace,
+    standing: Bool,
+    reach: float,
+    obstacles: Sequence[Polygon] | NDArray[np.object_] = (),
 ) -> LatticePoint | None:
     """Return the cell (row, column) from which a body gets to a place of use, or None.
 
@@ -664,25 +676,48 @@ def nearest_standing(
     if not strictly_inside(plan.mesh, x, y):
         return None
     units = int(reach * lattice.units_per_m) + HALF
-    window = _window(lattice, np.array([(x - units, y - units), (x + units, y + units)]))
-    cells = cells_of(standing[window]) + np.array([window[0].start, window[1].start])
+    rows, columns = _window(lattice, (x - units, y - units), (x + units, y + units))
+    cells = cells_of(standing[rows, columns]) + np.array([rows.start, columns.start])
     away = lattice.squared_distances(cells, (x, y))
-    near = np.flatnonzero(away <= units * units)
+    is_near = away <= units * units
     triangle = locate(plan.mesh, x, y)
-    for i in near[np.argsort(away[near], kind="stable")][:ATTEMPTS].tolist():
-        row, column = cells[i].tolist()
+    for row, column in _nearest_first(cells[is_near], away[is_near]):
         centre = lattice.cell_centre(row, column)
         if not line_of_sight(plan.mesh, x, y, triangle, *centre):
             continue
-        step = LineString([(use.x, use.y), lattice.to_metres(centre).tolist()])
-        if not any(step.intersects(shape) for shape in obstacles):
+        step = LineString([(use.x, use.y), lattice.xy_of(*centre)])
+        if not shapely.intersects(step, obstacles).any():
             return row, column
     return None
 
 
-def _window(lattice: Lattice, points: I64) -> Window:
-    """Return the rows and columns of the cells around lattice points (n, 2)."""
-    (x0, y0), (x1, y1) = points.min(axis=0) // UNITS_PER_CELL, points.max(axis=0) // UNITS_PER_CELL
-    rows = slice(*np.clip((y0, y1 + 1), 0, lattice.rows).tolist())
-    columns = slice(*np.clip((x0, x1 + 1), 0, lattice.columns).tolist())
+def _nearest_first(cells: I64, away: I64) -> Iterator[LatticePoint]:
+    """Yield the nearest cells (row, column) in order, of equally near ones the first.
+
+    Args:
+        cells: int64 (n, 2).
+        away: How far each is, int64 (n,).
+    """
+    tried = 0
+    # Mostly one of the first will do, so the others are sorted only if it doesn't.
+    for most in (min(FIRST_ATTEMPTS, len(cells)), min(ATTEMPTS, len(cells))):
+        if tried == most:
+            return
+        is_near = away <= np.partition(away, most - 1)[most - 1]
+        order = np.argsort(away[is_near], kind="stable")[tried:most]
+        yield from map(tuple, cells[is_near][order].tolist())
+        tried = most
+
+
+def _window(lattice: Lattice, low: Sequence[int], high: Sequence[int]) -> Window:
+    """Return the rows and columns of the cells between two lattice points."""
+    columns, rows = (
+        slice(min(max(first // SUB, 0), count), min(max(last // SUB + 1, 0), count))
+        for first, last, count in zip(low, high, (lattice.columns, lattice.rows), strict=True)
+    )
     return rows, columns
+
+
+def _centres(cells: slice) -> I64:
+    """Return the x of the centres of some columns, or the y of those of rows, int64 (n,)."""
+    return np.arange(cells.start, cells.stop, dtype=np.int64) * SUB + CELL_CENTRE
