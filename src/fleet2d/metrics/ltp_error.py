@@ -180,15 +180,18 @@ def shares(counts: I64, steps: float) -> tuple[F64, F64]:
     return home, counts[..., -1] / max(steps, 1)
 
 
-def walking_distances(home: Home) -> F64:
+def walking_distances(home: Home, space: Space) -> F64:
     """Return the distance on foot between the middles of each two rooms [m].
 
     Without a route between them it is twice the longest distance.
 
+    Args:
+        home: The home.
+        space: Where people can walk in it.
+
     Returns:
         float64 (rooms, rooms), symmetric, read-only.
     """
-    space = home.space(RADIUS)
     return home.cached(("walking distances", space), lambda: read_only(_distances(home, space)))
 
 
@@ -295,7 +298,8 @@ class LtpError(LongTermMetric):
     def start(self, home: Home) -> None:
         """Begin counting."""
         super().start(home)
-        self.metres = walking_distances(home)
+        self.home = home
+        self.space = home.space(RADIUS)
         self.last: dict[str, dict[str, float]] = {}
         self.within: dict[str, float | None] = {}
         self.best: dict[str, tuple[int, int]] = {}  # the likeliest room, and its changes so far
@@ -329,7 +333,8 @@ class LtpError(LongTermMetric):
             return self._distances(truth, np.array([presence.with_away(user) for user in users]))
         estimate = np.array([presence.share(user) for user in users])
         columns = self._distances(home, estimate)
-        columns["earth_mover_m"] = earth_mover(home, estimate, self.metres)
+        metres = walking_distances(self.home, self.space)
+        columns["earth_mover_m"] = earth_mover(home, estimate, metres)
         if presence.low() is not None and presence.high() is not None:
             low = np.array([presence.low(user) for user in users])
             high = np.array([presence.high(user) for user in users])
