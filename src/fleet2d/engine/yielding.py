@@ -673,8 +673,10 @@ class Yielding(Watcher):
 
     def _is_taken(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
         """Return whether another body stays where a robot wants to stop next."""
+        if not self._rests(other, step):
+            return False
         stop = self._stop_of(actor, at)
-        if stop is None or not self._rests(other, step):
+        if stop is None:
             return False
         near = int(self._near[self._number[actor.row], other])
         return math.dist(stop, self._actors[other].state.position) < near
