@@ -40,7 +40,7 @@ void stay_until(Legs& legs, Moment& now, i64 time) {
 // Add the breakpoints of a track from number `first` on, of which the body is at `now` what it would have been at
 // `since`.
 Delay go_on(Legs& legs, const Moment& now, const TrackPiece& track, i64 since, i64 first) {
-    Delay delay{since, now.time - since, since};
+    Delay delay{since, since, now.time - since, since};
     Moment last = now;
     last.time = since;
     for (i64 i = first; i < length_of(track); ++i) {
@@ -72,26 +72,68 @@ Moment moment_of(Timelines& timelines, i64 row, i64 step) {
     return {step * timelines.step_us(), pose.x, pose.y, pose.heading, pose.away};
 }
 
+// Turn as at a stop of a track, and leave it as planned or, if it is late, at the next beat.
+Moment rest_at(Legs& legs, const Moment& now, const TrackPiece& track, i64 stop, i64 since, const Yielder& body) {
+    const i64 turn = turn_between(now.heading, heading_at(track, stop, since));
+    Moment then = legs.turn(now, turn, body.turn_rate);
+    stay_until(legs, then, std::max(since, next_multiple(then.time, body.beat)));
+    return then;
+}
+
 // From a place to which a body stepped aside, go on with the first stop after a moment.
 std::optional<Delay> come_back(Legs& legs, Moment now, const TrackPiece* track, const Yielder& body, i64 begin,
                                i64 met) {
-    if (!track) return Delay{begin, 0, begin};
+    if (!track) return Delay{begin, begin, 0, begin};
     const i64 next = next_stop(*track, met, body.can_stand), last = length_of(*track) - 1;
     const i64 stop = next < 0 ? last : next;
     const Moment goal = row_of(*track, stop);
     if (next < 0 && !body.can_stand({goal.x, goal.y})) {  // it stood at a corner, to which no way leads
         stay_until(legs, now, goal.time);
-        return Delay{begin, 0, begin};
+        return Delay{begin, begin, 0, begin};
     }
-    const auto there = body.go(legs, now, {goal.x, goal.y});
+    const auto there = body.go(legs, now, {goal.x, goal.y}, {});
     if (!there) return {};
-    now = *there;
     const i64 since = std::max(goal.time, begin);
-    if (stop < last) {
-        now = legs.turn(now, turn_between(now.heading, heading_at(*track, stop, since)), body.turn_rate);
-        stay_until(legs, now, std::max(since, next_multiple(now.time, body.beat)));
+    now = stop < last ? rest_at(legs, *there, *track, stop, since, body) : *there;
+    Delay delay = go_on(legs, now, *track, since, stop + 1);
+    delay.after = begin;
+    return delay;
+}
+
+// Do at a place what a track does at its stop number `stop`, and go on from there with the stop after it; false if no
+// way leads to that one.
+bool go_on_beside(Detour& detour, Moment now, const TrackPiece& track, const Yielder& body, i64 begin, i64 since,
+                  i64 stop) {
+    const i64 size = length_of(track);
+    i64 leaves = stop + 1;
+    while (leaves < size && track.x[nth(leaves)] == track.x[nth(stop)] && track.y[nth(leaves)] == track.y[nth(stop)]) {
+        ++leaves;
     }
-    return go_on(legs, now, *track, since, stop + 1);
+    TrackPiece here = track;
+    std::fill(here.x.begin() + stop, here.x.begin() + leaves, now.x);
+    std::fill(here.y.begin() + stop, here.y.begin() + leaves, now.y);
+    if (leaves == size) {
+        detour.delays = {go_on(detour.legs, now, here, since, stop + 1)};
+        detour.delays.front().after = begin;
+        return true;
+    }
+    const i64 left = track.time[nth(leaves - 1)];
+    const i64 after = next_stop(track, track.time[nth(leaves)] - 1, body.can_stand);
+    const bool goes_away = std::any_of(track.away.begin() + stop, track.away.end(), [](u8 away) { return away != 0; });
+    if (after < 0 || goes_away) return false;
+    const Delay delay{begin, since, now.time - since, std::numeric_limits<i64>::max()};
+    for (i64 i = stop + 1; i < leaves; ++i) {
+        now = row_of(here, i);
+        now.time = delay.of(std::max(now.time, since));
+        detour.legs.mark(now);
+    }
+    const auto there = body.go(detour.legs, now, {track.x[nth(after)], track.y[nth(after)]}, {});
+    if (!there) return false;
+    const i64 arrives = track.time[nth(after)];
+    const Moment next = rest_at(detour.legs, *there, track, after, arrives, body);
+    detour.delays = {delay, go_on(detour.legs, next, track, arrives, after + 1)};
+    detour.delays.back().after = left;
+    return true;
 }
 
 }  // namespace
@@ -111,13 +153,13 @@ std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, 
     const Moment now = moment_of(timelines, row, step);
     const TrackPiece* track = followed(timelines, row);
     for (const i64 wait : waits) {
-        Detour detour{{}, {now.time, 0, now.time}};
+        Detour detour{{}, {{now.time, now.time, 0, now.time}}};
         Moment then = now;
         detour.legs.mark(now);
         stay_until(detour.legs, then, now.time + wait * timelines.step_us());
         if (track) {
             const auto after = std::upper_bound(track->time.begin(), track->time.end(), now.time);
-            detour.delay = go_on(detour.legs, then, *track, now.time, after - track->time.begin());
+            detour.delays = {go_on(detour.legs, then, *track, now.time, after - track->time.begin())};
         }
         if (!ways.meeting(row, track_of(detour.legs), distances)) return detour;
     }
@@ -135,7 +177,7 @@ std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, 
     for (i64 i = 0; i < places.size(); ++i) {
         Legs there;
         there.mark(now);
-        const auto arrived = body.go(there, now, {places(i, 0), places(i, 1)});
+        const auto arrived = body.go(there, now, {places(i, 0), places(i, 1)}, {});
         if (!arrived || (rests > 0 && !is_free(there))) continue;
         const i64 arrives = -floor_div(-arrived->time, step_us);
         const auto goes_on_after = [&](i64 wait) -> std::optional<Detour> {
@@ -144,7 +186,7 @@ std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, 
             stay_until(detour.legs, then, (arrives + wait) * step_us);
             const auto delay = come_back(detour.legs, then, track, body, now.time, (met + 1) * step_us);
             if (!delay) return {};
-            detour.delay = *delay;
+            detour.delays = {*delay};
             return detour;
         };
         for (const i64 wait : waits) {
@@ -155,6 +197,50 @@ std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, 
         if (auto detour = goes_on_after(rests)) return detour;
     }
     return {};
+}
+
+std::optional<Detour> way_round(Timelines& timelines, const Yielder& body, i64 step, i64 met,
+                                const std::vector<Disc>& discs,
+                                const std::function<std::optional<Point>(Point)>& beside) {
+    const TrackPiece* track = followed(timelines, body.row);
+    const i64 stop = track ? next_stop(*track, met, body.can_stand) : -1;
+    if (stop < 0) return {};
+    const Moment now = moment_of(timelines, body.row, step);
+    std::optional<Point> goal = Point{track->x[nth(stop)], track->y[nth(stop)]};
+    const bool is_free = std::ranges::all_of(discs, [&](const Disc& disc) { return disc.is_clear_of(*goal); });
+    if (!is_free) goal = beside(*goal);
+    if (!goal) return {};
+    Detour detour;
+    detour.legs.mark(now);
+    const auto there = body.go(detour.legs, now, *goal, discs);
+    if (!there) return {};
+    const i64 since = std::max(track->time[nth(stop)], now.time);
+    const Moment then = rest_at(detour.legs, *there, *track, stop, since, body);
+    if (!is_free) {
+        return go_on_beside(detour, then, *track, body, now.time, since, stop) ? std::optional(detour) : std::nullopt;
+    }
+    detour.delays = {go_on(detour.legs, then, *track, since, stop + 1)};
+    detour.delays.front().after = now.time;
+    return detour;
+}
+
+std::optional<Detour> way_from_here(Timelines& timelines, const Yielder& body, i64 step, i64 met,
+                                    const std::function<bool(Point)>& may_stop) {
+    const TrackPiece* track = followed(timelines, body.row);
+    if (!track) return {};
+    const i64 next = next_stop(*track, met, body.can_stand), last = length_of(*track) - 1;
+    const i64 stop = next < 0 ? last : next;
+    if (!may_stop({track->x[nth(stop)], track->y[nth(stop)]})) return {};
+    Moment now = moment_of(timelines, body.row, step);
+    const i64 begin = now.time, since = std::max(track->time[nth(stop)], begin);
+    Detour detour;
+    detour.legs.mark(now);
+    if (stop < last) {
+        now = rest_at(detour.legs, now, *track, stop, since, body);
+    } else {
+        stay_until(detour.legs, now, since);
+    }
+    return go_on_beside(detour, now, *track, body, begin, since, stop) ? std::optional(detour) : std::nullopt;
 }
 
 std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,

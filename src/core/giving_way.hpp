@@ -18,24 +18,26 @@ struct Yielder {
     i64 row;
     f64 turn_rate;  // headings per second
     i64 beat;       // us; late, it leaves a stop at a multiple of that, so that poses recur and their views are known
-    // Walks to a point, at home: adds breakpoints and returns the end; nothing if no way leads there.
-    std::function<std::optional<Moment>(Legs&, const Moment&, Point)> go;
+    // Walks to a point, at home, clear of some discs: adds breakpoints and returns the end; nothing if no way leads
+    // there.
+    std::function<std::optional<Moment>(Legs&, const Moment&, Point, const std::vector<Disc>&)> go;
     std::function<bool(Point)> can_stand;  // a turn at a corner, on the border of its space, is no stop
 };
 
 // What follows a moment of a track is later.
 struct Delay {
-    i64 since;  // us; that moment
+    i64 after;  // us; what was planned up to that moment has happened, or counts with the delay before
+    i64 since;  // us; what was planned before that moment happens at it
     i64 later;  // us; by so much, but
     i64 edge;   // us; a rest that begins then is shortened, so that the body is on time again after it
 
     i64 of(i64 time) const { return time <= edge ? time + later : std::max(time, edge + later); }
 };
 
-// Another track of a body from now on, and how much later it continues the one before.
+// Another track of a body from now on, and how much later it continues the one before: one delay after the other.
 struct Detour {
     Legs legs;
-    Delay delay;
+    std::vector<Delay> delays;
 };
 
 // The breakpoint at which a body next stands still after a moment; -1 for none.
@@ -56,6 +58,17 @@ std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, 
 std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, i64 step, i64 met,
                                      View<const i64, 2> places, View<const i64> waits, i64 rests,
                                      const Distances& distances, i64 end);
+
+// The way round some discs to the first stop after the moment `met`, from which it goes on. If that stop is taken by a
+// disc, it stops at the place that `beside` returns instead; nothing if that is none.
+std::optional<Detour> way_round(Timelines& timelines, const Yielder& body, i64 step, i64 met,
+                                const std::vector<Disc>& discs,
+                                const std::function<std::optional<Point>(Point)>& beside);
+
+// The way on if the body stops where it is, in place of its first stop after the moment `met`; nothing where `may_stop`
+// says that it mustn't.
+std::optional<Detour> way_from_here(Timelines& timelines, const Yielder& body, i64 step, i64 met,
+                                    const std::function<bool(Point)>& may_stop);
 
 // A part of the cells in which a body can be.
 struct Cells {

@@ -2,7 +2,7 @@
 The compiled core of Fleet2D: arrays and integers in, arrays and integers out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import enum
 from typing import Any, overload
 
@@ -1581,7 +1581,7 @@ class Timelines:
         Return whether a body doesn't leave its place in the steps from `first` to `end` - 1.
         """
 
-    def way_after_a_wait(self, row: int, step: int, waits: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], int, int, int] | None:
+    def way_after_a_wait(self, row: int, step: int, waits: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
         """
         Return how a body goes on after the first wait that lets it.
 
@@ -1593,11 +1593,11 @@ class Timelines:
             end: One past the last step in which it must meet nobody.
 
         Returns:
-            Breakpoints from now on, int64 (n, 5); the moment that those after the wait continue, by how much they are
-            later, and the moment at which a rest begins that is shortened by that [us]. None if it is free after no wait.
+            Breakpoints from now on, int64 (n, 5), and how much later they continue the track: see `Continued`. None if it is
+            free after no wait.
         """
 
-    def way_by_a_place(self, body: tuple[Any, ...], step: int, met: int, places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], rests: int, distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], int, int, int] | None:
+    def way_by_a_place(self, body: tuple[Any, ...], step: int, met: int, places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], rests: int, distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
         """
         Return how a body goes on by the first place that lets it.
 
@@ -1614,6 +1614,35 @@ class Timelines:
 
         Returns:
             As `way_after_a_wait`.
+        """
+
+    def way_round(self, body: tuple[Any, ...], step: int, met: int, discs: numpy.typing.NDArray[numpy.int64], beside: Callable[[int, int], tuple[int, int] | None]) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
+        """
+        Return how a body goes round others that stand, to its next stop.
+
+        Args:
+            body: Its row, how it goes there, and how it can stand: see `Yielder`.
+            step: The present step.
+            met: A moment; it goes on with its next stop after that [us].
+            discs: x, y and the distance to keep of each of the others [lattice], int64 (n, 3).
+            beside: Called with x and y of a stop that one of them has taken; returns where to stop instead, or None.
+
+        Returns:
+            As `way_after_a_wait`; None if there is no way or no place.
+        """
+
+    def way_from_here(self, body: tuple[Any, ...], step: int, met: int, may_stop: Callable[[int, int], bool]) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
+        """
+        Return how a body goes on that stops where it is, in place of its next stop.
+
+        Args:
+            body: Its row, how it goes there, and how it can stand: see `Yielder`.
+            step: The present step.
+            met: A moment; the stop is the next one after that [us].
+            may_stop: Called with x and y of the stop; returns whether it may.
+
+        Returns:
+            As `way_after_a_wait`; None if it may not, or no way leads on.
         """
 
     def places_aside(self, row: int, step: int, end: int, part_of_cell: numpy.typing.NDArray[numpy.int32], part: int, from_: tuple[int, int], search: tuple[int, int, int], reach: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:

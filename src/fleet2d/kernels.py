@@ -432,8 +432,9 @@ class Yielder(NamedTuple):
         speed: How fast it goes [lattice units per second].
         turn_rate: How fast it turns [1/4096 turn per second].
         beat_us: If it is late, it leaves a stop at a multiple of that [us].
-        walk: Called with time [us], x, y, heading, and the x and y of a goal to which no route
-            leads; returns the breakpoints of a way there, int64 (n, 5), or None.
+        walk: Called with time [us], x, y, heading, the x and y of a goal to which no route leads,
+            and the discs to keep clear of, as for `Routes.around`; returns the breakpoints of a way
+            there, int64 (n, 5), or None.
     """
 
     row: int
@@ -445,9 +446,29 @@ class Yielder(NamedTuple):
     walk: Callable[..., I64 | None]
 
 
-Continued = tuple[I64, int, int, int]
-"""Breakpoints from now on, int64 (n, 5), that continue a track from a moment on; by how much later
-they are, and up to which moment [us]: a rest that begins then is shortened by that."""
+class Delay(NamedTuple):
+    """By how much later the rest of a track comes."""
+
+    after_us: (
+        int  # what was planned up to that moment has happened, or counts with the delay before
+    )
+    since_us: int  # what was planned before that moment happens at it
+    later_us: int
+    edge_us: int  # a rest that begins then is shortened, so that the body is on time again after it
+
+    def of(self, time_us: int) -> int:
+        """Return when something happens that was planned for a moment."""
+        time_us = max(time_us, self.since_us)
+        return (
+            max(time_us, self.edge_us + self.later_us)
+            if time_us > self.edge_us
+            else time_us + self.later_us
+        )
+
+
+Continued = tuple[I64, list[tuple[int, int, int, int]]]
+"""Breakpoints from now on, int64 (n, 5), that continue a track, and the delays of its parts, one
+after the other: see `Delay`."""
 
 
 class Poses(NamedTuple):

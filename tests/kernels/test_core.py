@@ -823,6 +823,21 @@ CALLS: dict[str, Args] = {
         kept(1),
         9,
     ),
+    "Timelines.way_round": lambda: (
+        timelines(),
+        (0, MESH, None, 1000.0, 500.0, 10**6, lambda *_: None),
+        3,
+        4 * 10**6,
+        np.array([[300, 300, 100]]),
+        lambda *_: None,
+    ),
+    "Timelines.way_from_here": lambda: (
+        timelines(),
+        (0, MESH, None, 1000.0, 500.0, 10**6, lambda *_: None),
+        3,
+        4 * 10**6,
+        lambda *_: True,
+    ),
     "Timelines.places_aside": lambda: (
         timelines(),
         0,

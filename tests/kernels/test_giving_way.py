@@ -14,6 +14,7 @@ SECOND = 10**6
 NEAR = 300
 END = 30
 BEAT = 3 * SECOND // 2
+NO_DISCS = np.zeros((0, 3), np.int64)
 MESH = home_of([box(0, 0, 4096, 4096)]).mesh
 WAITS = np.array([1, 4])
 
@@ -37,12 +38,20 @@ def kept(bodies: int) -> Distances:
     return Distances(whole * 0, whole * NEAR, whole * 0, np.zeros((1, bodies), np.uint8))
 
 
-def straight(time: int, x: int, y: int, heading: int, to_x: int, to_y: int) -> I64 | None:
+def straight(
+    time: int, x: int, y: int, heading: int, to_x: int, to_y: int, discs: I64
+) -> I64 | None:
     """Drive there at 1000 units a second, facing one way; the right border can't be reached."""
     if to_x > 3000:
         return None
     takes = int(np.hypot(to_x - x, to_y - y) * SECOND / 1000)
     return np.array([[time + takes, to_x, to_y, heading, 0]])
+
+
+def walk(now: list[int], place: list[int]) -> list[list[int]] | None:
+    """The same, for the reference."""
+    rows = straight(*now[:4], *place, NO_DISCS)
+    return None if rows is None else rows.tolist()
 
 
 def scenes(count: int) -> Any:
@@ -78,7 +87,7 @@ def test_a_body_goes_on_after_the_first_wait_that_lets_it() -> None:
             found += 1
             assert way[0].tolist() == expected
             later = (expected[1][0] - expected[0][0]) if len(expected) > 1 else 0
-            assert way[1:] == (now, later, slow.delayed(rest, now, pose, later)[1])
+            assert way[1] == [(now, now, later, slow.delayed(rest, now, pose, later)[1])]
     assert 10 < found < 110
 
 
@@ -94,7 +103,7 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
         goal = rows[stop].tolist()
         expected = None
         for place in places.tolist():
-            there = straight(now, *pose[:3], *place)
+            there = straight(now, *pose[:3], *place, NO_DISCS)
             if expected is not None or there is None:
                 continue
             out = [[now, *pose], *there.tolist()]
@@ -104,7 +113,7 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
             for wait in [*WAITS.tolist(), *([rests] if rests else [])]:
                 until = (-(-out[-1][0] // SECOND) + wait) * SECOND
                 track = [*out, [until, *out[-1][1:]]] if until > out[-1][0] else list(out)
-                back = straight(*track[-1][:4], *goal[1:3])
+                back = straight(*track[-1][:4], *goal[1:3], NO_DISCS)
                 if back is None:
                     continue
                 track += back.tolist()
@@ -142,6 +151,53 @@ def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back() -> No
         [5 * SECOND, 900, 1200, 0, 0],
         [20 * SECOND, 900, 1200, 0, 0],
     ]
+
+
+def random_rest(random: np.random.Generator) -> I64:
+    """A track on which most moments are of stops, with turns at some of them; some end away."""
+    rows = random_rows(random)
+    rows[-1, 4] = random.integers(0, 4) == 0
+    return rows
+
+
+def test_a_body_goes_round_others_and_beside_those_at_its_stop() -> None:
+    random = np.random.default_rng(52)
+    found = {0: 0, 1: 0, 2: 0}
+    for _ in range(300):
+        rows = random_rest(random)
+        timelines = Timelines(1, SECOND)
+        timelines.follow(0, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
+        step = int(random.integers(0, 20))
+        met = int(random.integers(step, step + 4)) * SECOND
+        stops = rows[[1, 2, 4]][random.integers(0, 3, 2)]
+        discs = np.column_stack([stops[:, 1:3] + random.integers(-200, 200, (2, 2)), [250, 150]])
+        beside = random.integers(100, 4000, 2).tolist() if random.integers(0, 5) else None
+        body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
+        now = [step * SECOND, *timelines.pose(0, step)]
+        ways = slow.way_round(now, rows.tolist(), met, discs.tolist(), beside, walk, BEAT)
+        way = timelines.way_round(body, step, met, discs, lambda *_, at=beside: at)
+        assert ways == (None if way is None else (way[0].tolist(), way[1]))
+        found[0 if way is None else len(way[1])] += 1
+    assert min(found.values()) > 10, found
+
+
+def test_a_body_goes_on_from_where_it_is_instead_of_a_stop() -> None:
+    random = np.random.default_rng(53)
+    found = {0: 0, 1: 0, 2: 0}
+    for _ in range(200):
+        rows = random_rest(random)
+        timelines = Timelines(1, SECOND)
+        timelines.follow(0, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
+        step = int(random.integers(0, 20))
+        met = int(random.integers(step, step + 4)) * SECOND
+        body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
+        now = [step * SECOND, *timelines.pose(0, step)]
+        ways = slow.way_from_here(now, rows.tolist(), met, walk, BEAT)
+        way = timelines.way_from_here(body, step, met, lambda *_: True)
+        assert ways == (None if way is None else (way[0].tolist(), way[1]))
+        assert timelines.way_from_here(body, step, met, lambda *_: False) is None
+        found[0 if way is None else len(way[1])] += 1
+    assert min(found.values()) > 5, found
 
 
 def test_a_body_at_rest_meets_whom_it_would_meet_on_a_track_that_rests() -> None:

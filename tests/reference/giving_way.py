@@ -1,5 +1,6 @@
 """How a body goes on when somebody is in its way, row by row and place by place: slow and obvious."""
 
+import math
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 
@@ -9,6 +10,7 @@ from fleet2d.kernels import CELL_CENTRE, I32, I64, SUB, walking_distance
 
 Row = list[int]
 """Time, x, y, heading, away."""
+ENDLESS = 2**63 - 1
 
 
 def delayed(rest: list[Row], since: int, pose: Row, later: int) -> tuple[list[Row], int]:
@@ -30,6 +32,90 @@ def next_stop(rows: list[Row], moment: int) -> int:
         if here[1:3] == after[1:3] and after[0] > moment and i >= len(begun) - 1:
             return i
     return -1
+
+
+Walk = Callable[[Row, list[int]], list[Row] | None]
+"""The rows of a way from a row to a place; None if no way leads there."""
+Delay = tuple[int, int, int, int]
+"""After which moment it counts, since when it is late, by how much, and up to when."""
+
+
+def rested(way: list[Row], until: int, beat: int) -> list[Row]:
+    """Return a way that stays until a moment; if it is late, until the next beat."""
+    leaves = max(until, -(-way[-1][0] // beat) * beat)
+    return [*way, [leaves, *way[-1][1:]]] if leaves > way[-1][0] else way
+
+
+def going_on(
+    way: list[Row], rows: list[Row], after: int, since: int, first: int
+) -> tuple[list[Row], Delay]:
+    """Return a way with the rows of a track from number `first` on, delayed, and the delay."""
+    later = way[-1][0] - since
+    rest, edge = delayed(rows[first:], since, way[-1][1:], later)
+    return [*way, *rest], (after, since, later, edge)
+
+
+def stopping_beside(
+    way: list[Row], rows: list[Row], stop: int, walk: Walk, beat: int
+) -> tuple[list[Row], list[Delay]] | None:
+    """Return a way that ends beside a stop of a track, with the rest of the track from there on."""
+    begin = way[0][0]
+    since = max(rows[stop][0], begin)
+    place = way[-1][1:3]
+    leaves = [i for i in range(stop, len(rows)) if rows[i][1:3] != rows[stop][1:3]]
+    here = [[time, *place, *pose] for time, _, _, *pose in rows[: leaves[0] if leaves else None]]
+    if not leaves:
+        way, delay = going_on(way, here, begin, since, stop + 1)
+        return way, [delay]
+    after = next_stop(rows, rows[leaves[0]][0] - 1)
+    if after < 0 or any(row[4] for row in rows[stop:]):
+        return None
+    later = way[-1][0] - since
+    way = way + [[max(time, since) + later, *pose] for time, *pose in here[stop + 1 :]]
+    there = walk(way[-1], rows[after][1:3])
+    if there is None:
+        return None
+    way = rested([*way, *there], rows[after][0], beat)
+    way, delay = going_on(way, rows, rows[leaves[0] - 1][0], rows[after][0], after + 1)
+    return way, [(begin, since, later, ENDLESS), delay]
+
+
+def way_round(
+    now: Row,
+    rows: list[Row],
+    met: int,
+    discs: list[list[int]],
+    beside: list[int] | None,
+    walk: Walk,
+    beat: int,
+) -> tuple[list[Row], list[Delay]] | None:
+    """Return the way round discs to the next stop of a track after a moment, or beside it."""
+    stop = next_stop(rows, met)
+    if stop < 0:
+        return None
+    goal = rows[stop][1:3]
+    is_taken = any(math.dist(goal, at) <= reach for *at, reach in discs)
+    place = beside if is_taken else goal
+    there = None if place is None else walk(now, place)
+    if there is None:
+        return None
+    since = max(rows[stop][0], now[0])
+    way = rested([now, *there], since, beat)
+    if is_taken:
+        return stopping_beside(way, rows, stop, walk, beat)
+    way, delay = going_on(way, rows, now[0], since, stop + 1)
+    return way, [delay]
+
+
+def way_from_here(
+    now: Row, rows: list[Row], met: int, walk: Walk, beat: int
+) -> tuple[list[Row], list[Delay]] | None:
+    """Return the way on from where a body is, in place of the next stop after a moment."""
+    stop = next_stop(rows, met)
+    is_last = stop < 0
+    stop = len(rows) - 1 if is_last else stop
+    since = max(rows[stop][0], now[0])
+    return stopping_beside(rested([now], since, 1 if is_last else beat), rows, stop, walk, beat)
 
 
 def places_aside(

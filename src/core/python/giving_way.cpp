@@ -11,8 +11,9 @@ namespace {
 constexpr i64 LONGEST_BEAT = i64{1} << 40;  // us: 12 days
 
 // Add what a function of Python returns for a way that no shortest route leads.
-std::optional<Moment> add_way(const nb::callable& walk, Legs& legs, const Moment& now, Point to) {
-    const nb::object rows = walk(now.time, now.x, now.y, now.heading, to.x, to.y);
+std::optional<Moment> add_way(const nb::callable& walk, Legs& legs, const Moment& now, Point to,
+                              const std::vector<Disc>& discs) {
+    const nb::object rows = walk(now.time, now.x, now.y, now.heading, to.x, to.y, rows_of(discs));
     if (rows.is_none()) return {};
     View<const i64, 2> breakpoints;
     nb::object copy;
@@ -28,21 +29,34 @@ std::optional<Moment> add_way(const nb::callable& walk, Legs& legs, const Moment
 
 }  // namespace
 
+Array<i64, 2> rows_of(const std::vector<Disc>& discs) {
+    auto rows = Array<i64, 2>::empty({static_cast<i64>(discs.size()), 3});
+    const View<i64, 2> values = rows;
+    for (i64 i = 0; i < values.size(); ++i) {
+        const Disc& disc = discs[static_cast<std::size_t>(i)];
+        values(i, 0) = disc.at.x, values(i, 1) = disc.at.y, values(i, 2) = disc.reach;
+    }
+    return rows;
+}
+
 Yielder yielder_of(const YielderFields& fields) {
     const auto& [row, space, routes, speed, turn_rate, beat, walk] = fields;
     Routes* shortest = nullptr;
     require(routes.is_none() || nb::try_cast(routes, shortest), "routes must be Routes or None");
     check_rates(speed, turn_rate);
     require(0 < beat && beat < LONGEST_BEAT, "beat_us must be above 0, and below 2**40");
-    const auto go = [shortest, &fields](Legs& legs, const Moment& now, Point to) -> std::optional<Moment> {
-        const auto& [row, space, routes, speed, turn_rate, beat, walk] = fields;
-        if (shortest) {
-            const auto route = shortest->find({now.x, now.y}, to);
-            if (!route.empty()) return legs.walk(now, rows_of(route), speed, turn_rate);
-        }
-        return add_way(walk, legs, now, to);
-    };
     const auto can_stand = [&fields](Point at) { return strictly_inside(std::get<1>(fields), at.x, at.y); };
+    const auto go = [=, &fields](Legs& legs, const Moment& now, Point to,
+                                 const std::vector<Disc>& discs) -> std::optional<Moment> {
+        const auto& [row, space, routes, speed, turn_rate, beat, walk] = fields;
+        const Point from{now.x, now.y};
+        if (shortest && can_stand(from)) {
+            const auto route = discs.empty() ? shortest->find(from, to) : shortest->around(from, to, discs);
+            if (!route.empty()) return legs.walk(now, rows_of(route), speed, turn_rate);
+            if (!discs.empty()) return {};
+        }
+        return add_way(walk, legs, now, to, discs);
+    };
     return {row, turn_rate, beat, go, can_stand};
 }
 

@@ -10,6 +10,9 @@ namespace fleet2d {
 // of `fleet2d.kernels`.
 using YielderFields = std::tuple<i64, Mesh, nb::object, f64, f64, i64, nb::callable>;
 
+// Discs as rows (n, 3): x, y and the distance to keep.
+Array<i64, 2> rows_of(const std::vector<Disc>& discs);
+
 // The body of a call: its fields outlive it.
 Yielder yielder_of(const YielderFields& fields);
 

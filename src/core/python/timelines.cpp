@@ -146,12 +146,14 @@ public:
         return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
     }
 
-    // Rows (n, 5) from the present one on; the moment that they continue, how much later, and up to when.
-    using DetourFields = std::optional<std::tuple<Array<i64, 2>, i64, i64, i64>>;
+    // Rows (n, 5) from the present one on, and how much later they continue the track.
+    using DelayFields = std::tuple<i64, i64, i64, i64>;
+    using DetourFields = std::optional<std::tuple<Array<i64, 2>, std::vector<DelayFields>>>;
     static DetourFields fields_of(const std::optional<Detour>& detour) {
         if (!detour) return {};
-        const auto& [legs, delay] = *detour;
-        return std::tuple(legs.rows(), delay.since, delay.later, delay.edge);
+        std::vector<DelayFields> delays;
+        for (const auto& [after, since, later, edge] : detour->delays) delays.emplace_back(after, since, later, edge);
+        return std::tuple(detour->legs.rows(), delays);
     }
 
     DetourFields way_after_a_wait(i64 row, i64 step, View<const i64> waits, const Distances& distances, i64 end) {
@@ -169,6 +171,26 @@ public:
                 "places must be (n, 2), within 2**29 of 0");
         const Yielder yielder = yielder_of(body);
         return fields_of(fleet2d::way_by_a_place(timelines_, yielder, step, met, places, waits, rests, distances, end));
+    }
+
+    DetourFields way_round(const YielderFields& body, i64 step, i64 met, View<const i64, 2> discs,
+                           const nb::callable& beside) {
+        check_begin(std::get<0>(body), step);
+        const auto place = [&](Point goal) -> std::optional<Point> {
+            const nb::object found = beside(goal.x, goal.y);
+            if (found.is_none()) return {};
+            std::pair<i64, i64> at;
+            require(nb::try_cast(found, at), "beside must return x and y, or None");
+            check_point(at.first, at.second);
+            return Point{at.first, at.second};
+        };
+        return fields_of(fleet2d::way_round(timelines_, yielder_of(body), step, met, discs_of(discs), place));
+    }
+
+    DetourFields way_from_here(const YielderFields& body, i64 step, i64 met, const nb::callable& may_stop) {
+        check_begin(std::get<0>(body), step);
+        const auto may = [&](Point goal) { return nb::cast<bool>(may_stop(goal.x, goal.y)); };
+        return fields_of(fleet2d::way_from_here(timelines_, yielder_of(body), step, met, may));
     }
 
     Array<i64, 2> places_aside(i64 row, i64 step, i64 end, View<const i32, 2> part_of_cell, i64 part,
@@ -198,17 +220,7 @@ public:
             check_known(body, step);
             check(body, step + 2 * steps);
         }
-        const std::vector<Disc> discs = fleet2d::standing(timelines_, row, step, steps, reach);
-        auto rows = Array<i64, 2>::empty({static_cast<i64>(discs.size()), 3});
-        i64 i = 0;
-        for (const Disc& disc : discs) {
-            const View<i64, 2> values = rows;
-            values(i, 0) = disc.at.x;
-            values(i, 1) = disc.at.y;
-            values(i, 2) = disc.reach;
-            ++i;
-        }
-        return rows;
+        return rows_of(fleet2d::standing(timelines_, row, step, steps, reach));
     }
 
     bool rests(i64 body, i64 first, i64 end) {
@@ -266,9 +278,12 @@ public:
 private:
     void check_detour(i64 row, i64 step, View<const i64> waits, const Distances& distances, i64 end) const {
         check_meetings(1, distances, step, end);
-        check(row, step);
-        require(timelines_.pieces(row).back().first <= step, "the body begins another motion later");
+        check_begin(row, step);
         require(all_in_range(waits, 0, FAR), "waits must be 0 or more steps, and short");
+    }
+    void check_begin(i64 row, i64 step) const {
+        check_known(row, step);
+        require(timelines_.pieces(row).back().first <= step, "the body begins another motion later");
     }
     void check_meetings(i64 rows, const Distances& distances, i64 first, i64 end) const {
         require(first <= end && end - first <= FAR, "end must not be before first");
@@ -609,14 +624,14 @@ Args:
     end: One past the last step in which it must meet nobody.
 
 Returns:
-    Breakpoints from now on, int64 (n, 5); the moment that those after the wait continue, by how much they are
-    later, and the moment at which a rest begins that is shortened by that [us]. None if it is free after no wait.)")
+    Breakpoints from now on, int64 (n, 5), and how much later they continue the track: see `Continued`. None if it is
+    free after no wait.)")
         .def("way_by_a_place", &OwnedTimelines::way_by_a_place, "body"_a, "step"_a, "met"_a, "places"_a, "waits"_a,
              "rests"_a, "distances"_a, "end"_a,
              nb::sig("def way_by_a_place(self, body: tuple[typing.Any, ...], step: int, met: int, "
                      "places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], "
                      "rests: int, distances: tuple[typing.Any, ...], end: int) "
-                     "-> tuple[numpy.typing.NDArray[numpy.int64], int, int, int] | None"),
+                     "-> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None"),
              R"(Return how a body goes on by the first place that lets it.
 
 Args:
@@ -632,6 +647,36 @@ Args:
 
 Returns:
     As `way_after_a_wait`.)")
+        .def("way_round", &OwnedTimelines::way_round, "body"_a, "step"_a, "met"_a, "discs"_a, "beside"_a,
+             nb::sig("def way_round(self, body: tuple[typing.Any, ...], step: int, met: int, "
+                     "discs: numpy.typing.NDArray[numpy.int64], "
+                     "beside: collections.abc.Callable[[int, int], tuple[int, int] | None]) "
+                     "-> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None"),
+             R"(Return how a body goes round others that stand, to its next stop.
+
+Args:
+    body: Its row, how it goes there, and how it can stand: see `Yielder`.
+    step: The present step.
+    met: A moment; it goes on with its next stop after that [us].
+    discs: x, y and the distance to keep of each of the others [lattice], int64 (n, 3).
+    beside: Called with x and y of a stop that one of them has taken; returns where to stop instead, or None.
+
+Returns:
+    As `way_after_a_wait`; None if there is no way or no place.)")
+        .def("way_from_here", &OwnedTimelines::way_from_here, "body"_a, "step"_a, "met"_a, "may_stop"_a,
+             nb::sig("def way_from_here(self, body: tuple[typing.Any, ...], step: int, met: int, "
+                     "may_stop: collections.abc.Callable[[int, int], bool]) "
+                     "-> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None"),
+             R"(Return how a body goes on that stops where it is, in place of its next stop.
+
+Args:
+    body: Its row, how it goes there, and how it can stand: see `Yielder`.
+    step: The present step.
+    met: A moment; the stop is the next one after that [us].
+    may_stop: Called with x and y of the stop; returns whether it may.
+
+Returns:
+    As `way_after_a_wait`; None if it may not, or no way leads on.)")
         .def("places_aside", &OwnedTimelines::places_aside, "row"_a, "step"_a, "end"_a, "part_of_cell"_a, "part"_a,
              "from_"_a, "search"_a, "reach"_a,
              R"(Return places that a body can step aside to, the nearest first: int64 (n, 2) [lattice].

@@ -109,11 +109,11 @@ class BlockedWays(Watcher):
         row = now.actor.row
         if (other := self.in_way(bodies, row)) is None:
             return None
-        if (plan := self.plan(now, other)) is None:
+        if (plan := self.plan(bodies, now, other)) is None:
             return None
         return partial(self._actors[row].follow_instead, plan, now)
 
-    def plan(self, now: Situation, other: int) -> Plan | None:
+    def plan(self, bodies: Bodies, now: Situation, other: int) -> Plan | None:
         """Return a plan to wait for another body, or to go round it; None to squeeze past."""
         row = now.actor.row
         lattice = now.actor.home.plan.lattice
@@ -136,7 +136,7 @@ class BlockedWays(Watcher):
             plan: Plan | None = plan_after(now, actor.plan, step + 1, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:
-            plan = plan_around(now, actor.plan, clear)
+            plan = plan_around(now, actor.plan, bodies.timelines, clear)
             until = step + micros(PASSING_TIME) // step_us + 1
             self._waits[row] = Wait()
             self._passes[row] = Pass(until, other)

@@ -465,7 +465,9 @@ class Yielding(Watcher):
         last, where = self._looked_round.get(actor.row, (None, None))
         if last is not None and (now.step - last < self._ahead or where == seen):
             return None
-        around = plan_around(now, actor.plan, standing, at, _charger(actor), self._beat_us)
+        around = plan_around(
+            now, actor.plan, self._bodies.timelines, standing, at, _charger(actor), self._beat_us
+        )
         if around is not None and self._is_free(now, around):
             return around
         self._looked_round[actor.row] = now.step, None if around is not None else seen
@@ -598,7 +600,9 @@ class Yielding(Watcher):
         actor = self._actors[row]
         taken = self._is_taken(actor, other, now.step, at)
         queues = self._queues(actor, other, now.step, at)
-        here = plan_here(now, actor.plan, at) if taken and not queues else None
+        here = None
+        if taken and not queues:
+            here = plan_here(now, actor.plan, self._bodies.timelines, at, self._beat_us)
         if here is not None:
             return self._noted(now, other, here)
         self._noted(now, other, plan)

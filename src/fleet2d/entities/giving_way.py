@@ -5,6 +5,7 @@ another one that blocks it, or goes around it. The rest of a plan is resumed fro
 is by then.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
@@ -30,7 +31,9 @@ from fleet2d.kernels import (
     Bool,
     Breakpoints,
     Continued,
+    Delay,
     Legs,
+    Timelines,
     Yielder,
     strictly_inside,
     turn_between,
@@ -324,38 +327,51 @@ def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Not
     return plan
 
 
-def yielder(actor: Actor, beat_us: int) -> Yielder:
-    """Return how a robot goes somewhere to give way, for the core."""
+def yielder(actor: Actor, beat_us: int = 1) -> Yielder:
+    """Return how a body goes somewhere to give way, for the core.
+
+    Args:
+        actor: The body.
+        beat_us: If it is late, it leaves a stop at a multiple of that [us].
+    """
     space = actor.space
-    routes = None if actor.drive is not None or actor.slows else space.shortest
+    is_plain = actor.drive is None and not actor.slows and actor.step_off(*actor.state[:2]) is None
+    routes = space.shortest if is_plain else None
     walk = partial(_way, actor)
     return Yielder(actor.row, space.mesh, routes, actor.speed, actor.turn_rate, beat_us, walk)
 
 
-def _way(actor: Actor, time_us: int, x: int, y: int, heading: int, *goal: int) -> I64 | None:
+def _way(
+    actor: Actor, time_us: int, x: int, y: int, heading: int, to_x: int, to_y: int, discs: I64
+) -> I64 | None:
     """Return the breakpoints of a way by its drive, or from the border of its space, or None."""
+    route = None
+    if len(discs):
+        route = RoutesAround(actor, discs)((x, y), (to_x, to_y))
+        if route is None:
+            return None
     plan = Plan(actor, time_us // actor.clock.step_us)
     plan.time_us, plan.x, plan.y, plan.heading, plan.away = time_us, x, y, heading, 0
     plan.legs = Legs()
     try:
-        return plan.go_to_point(*goal).legs.rows()
+        return plan.go_to_point(to_x, to_y, route=route).legs.rows()
     except NoWayError:
         return None
 
 
 def plan_along(now: Situation, interrupted: Plan, continued: Continued) -> Plan:
     """Return a plan that goes on as the core found: it continues the present one, later."""
-    rows, since_us, later_us, edge_us = continued
-    plan = now.plan().follow(rows[1:])
+    rows, delays = continued
+    plan = now.plan().take("stand").follow(rows[1:])
     if isinstance(interrupted.finish(), Track):
-        begin_us = now.step * plan.step_us
-        _take_over(plan, interrupted, begin_us, since_us, later_us, edge_us)
+        _take_over(plan, interrupted, [Delay(*delay) for delay in delays])
     return plan
 
 
 def plan_around(
     now: Situation,
     interrupted: Plan,
+    timelines: Timelines,
     bodies: I64,
     met_at: int | None = None,
     waits_for: LatticePoint | None = None,
@@ -369,130 +385,55 @@ def plan_around(
     Args:
         now: The situation.
         interrupted: The present plan.
+        timelines: The ways of all bodies.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
         met_at: The step in which they are in the way; left out: now.
         waits_for: A place beside which it doesn't stop: its charger.
-        beat_us: If it is late, it leaves a stop at a multiple of that [us].
+        beat_us: See `yielder`.
 
     Returns:
         The plan; None if there is no way round.
     """
-    motion = interrupted.finish()
     actor = now.actor
-    begin_us = now.step * interrupted.step_us
-    if not isinstance(motion, Track):
+    if not isinstance(interrupted.finish(), Track):
         return now.plan().turn_by(0.5)
-    met_us = begin_us if met_at is None else (met_at + 1) * interrupted.step_us
-    stop = next_stop(actor, motion.breakpoints, met_us)
-    if stop is None:
-        return None
-    rows = _rows(motion.breakpoints)
-    detour = RoutesAround(actor, bodies)
-    goal = (int(rows[stop, 1]), int(rows[stop, 2]))
-    is_taken = not detour.clear(np.array([goal])).all()
-    if is_taken:
-        free = None if goal == waits_for or interrupted.postures else beside(actor, goal, detour)
-        if free is None:
+
+    def free_place(x: int, y: int) -> LatticePoint | None:
+        if (x, y) == waits_for or interrupted.postures:
             return None
-        goal = free
-    plan = now.plan()
-    route = detour(plan.position, goal)
-    if route is None:
-        return None
-    since_us = max(int(rows[stop, 0]), begin_us)
-    plan.go_to_point(*goal, route=route)
-    plan.turn_to(heading_at(motion.breakpoints, stop, since_us))
-    _leave(plan, since_us, beat_us)
-    rest = rows[stop + 1 :]
-    if not is_taken:
-        return _continue(plan, interrupted, begin_us, since_us, rest)
-    return _continue_beside(plan, interrupted, begin_us, since_us, stop, rows, beat_us)
+        return beside(actor, (x, y), RoutesAround(actor, bodies))
+
+    met_us = (now.step if met_at is None else met_at + 1) * interrupted.step_us
+    body = yielder(actor, beat_us)
+    continued = timelines.way_round(body, now.step, met_us, bodies, free_place)
+    return None if continued is None else plan_along(now, interrupted, continued)
 
 
-def plan_here(now: Situation, interrupted: Plan, met_at: int) -> Plan | None:
+def plan_here(
+    now: Situation, interrupted: Plan, timelines: Timelines, met_at: int, beat_us: int
+) -> Plan | None:
     """Return the rest of the present plan, with its next stop where the body is.
 
     Args:
         now: The situation.
         interrupted: The present plan.
+        timelines: The ways of all bodies.
         met_at: The step in which somebody stands in the way to that stop.
+        beat_us: See `yielder`.
 
     Returns:
         The plan; None if that stop is in another room.
     """
-    motion = interrupted.finish()
-    plan = now.plan()
-    if not isinstance(motion, Track):
+    if not isinstance(interrupted.finish(), Track):
         return None
-    track = motion.breakpoints
-    stop = next_stop(now.actor, track, (met_at + 1) * plan.step_us)
-    rows = _rows(track)
-    number = len(rows) - 1 if stop is None else stop
     home = now.actor.home.plan
-    if home.room_of_point(*plan.position) != home.room_of_point(*rows[number, 1:3].tolist()):
-        return None
-    begin_us = now.step * plan.step_us
-    since_us = max(int(rows[number, 0]), begin_us)
-    if stop is not None:
-        plan.turn_to(heading_at(track, stop, since_us))
-    plan.stay_until(since_us)
-    return _continue_beside(plan, interrupted, begin_us, since_us, number, rows)
-
-
-def _continue_beside(
-    plan: Plan,
-    interrupted: Plan,
-    begin_us: int,
-    since_us: int,
-    stop: int,
-    rows: I64,
-    beat_us: int = 1,
-) -> Plan | None:
-    """Continue a plan that stops beside a stop of another one, which is taken.
-
-    Args:
-        plan: The plan, up to that stop.
-        interrupted: The other plan.
-        begin_us: The moment up to which the other plan was followed.
-        since_us: The moment at which it would have stopped, or the present one.
-        stop: The row at which the other plan stops.
-        rows: All rows of the other plan, int64 (n, 5).
-        beat_us: As in `plan_around`.
-
-    Returns:
-        The plan; None if no way leads on to the stop after that one.
-    """
-    leaves = np.flatnonzero((rows[stop:, 1:3] != rows[stop, 1:3]).any(axis=1))
-    here = rows[stop + 1 :] if not len(leaves) else rows[stop + 1 : stop + leaves[0]]
-    here[:, 1:3] = plan.position
-    if not len(leaves):
-        return _continue(plan, interrupted, begin_us, since_us, here)
-    left_us = int(rows[stop + leaves[0] - 1, 0])
-    motion = interrupted.finish()
-    assert isinstance(motion, Track)
-    after = next_stop(plan.body, motion.breakpoints, int(rows[stop + leaves[0], 0]) - 1)
-    if after is None or rows[stop:, 4].any():
-        return None
-    later = plan.time_us - since_us
-    plan.notes += [
-        Note(max(at, since_us) + later, event, detail)
-        for at, event, detail in interrupted.notes
-        if begin_us < at <= left_us
-    ]
-    here[:, 0] = np.maximum(here[:, 0], since_us) + later
-    try:
-        plan.follow(here).go_to_point(int(rows[after, 1]), int(rows[after, 2]))
-    except NoWayError:
-        return None
-    arrives_us = int(rows[after, 0])
-    plan.turn_to(heading_at(motion.breakpoints, after, arrives_us))
-    _leave(plan, arrives_us, beat_us)
-    return _continue(plan, interrupted, left_us, arrives_us, rows[after + 1 :])
-
-
-def _leave(plan: Plan, time_us: int, beat_us: int) -> None:
-    """Let a body stay at a stop until a moment, and if it is late until a multiple of a beat."""
-    plan.stay_until(max(time_us, -(-plan.time_us // beat_us) * beat_us))
+    room = home.room_of_point(*now.actor.state[:2])
+    met_us = (met_at + 1) * interrupted.step_us
+    body = yielder(now.actor, beat_us)
+    continued = timelines.way_from_here(
+        body, now.step, met_us, lambda x, y: home.room_of_point(x, y) == room
+    )
+    return None if continued is None else plan_along(now, interrupted, continued)
 
 
 def _continue(
@@ -520,24 +461,22 @@ def _continue(
     times = rest[:, 0]
     rest[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     plan.follow(rest)
-    return _take_over(plan, interrupted, begin_us, since_us, later, edge)
+    return _take_over(plan, interrupted, [Delay(begin_us, since_us, later, edge)])
 
 
-def _take_over(
-    plan: Plan, interrupted: Plan, begin_us: int, since_us: int, later: int, edge: int
-) -> Plan:
-    """Let a plan have what another one would have done after a moment, delayed, and return it.
-
-    Up to `edge` all is delayed by `later`; what comes then is at `edge + later` at the earliest.
-    """
-
-    def delayed(time_us: int) -> int:
-        return time_us + later if time_us <= edge else max(time_us, edge + later)
-
-    notes = (note for note in interrupted.notes if note.time_us > begin_us)
-    plan.notes += [Note(delayed(max(at, since_us)), event, detail) for at, event, detail in notes]
-    postures = ((at, code) for at, code in interrupted.postures if at > begin_us)
-    plan.postures += [(delayed(max(at, since_us)), code) for at, code in postures]
+def _take_over(plan: Plan, interrupted: Plan, delays: Sequence[Delay]) -> Plan:
+    """Let a plan have what another one would have done, delayed, and return it."""
+    for delay, until in zip(delays, [*[d.after_us for d in delays[1:]], math.inf], strict=True):
+        plan.notes += [
+            Note(delay.of(at), event, detail)
+            for at, event, detail in interrupted.notes
+            if delay.after_us < at <= until
+        ]
+        plan.postures += [
+            (delay.of(at), code)
+            for at, code in interrupted.postures
+            if delay.after_us < at <= until
+        ]
     if interrupted.postures:
         plan.posture = interrupted.posture
     plan.endless = interrupted.endless
