@@ -11,7 +11,7 @@ import fleet2d
 from fleet2d.floorplan import home as homes
 from fleet2d.floorplan import source
 from fleet2d.floorplan.native import HOMES
-from fleet2d.floorplan.plan import Cache, FolderCache
+from fleet2d.floorplan.plan import HOME_FOLDER, Cache, FolderCache
 from fleet2d.metrics.ltp_error import walking_distances
 
 SHORT = "simulation.duration=6 h"
@@ -61,7 +61,8 @@ def test_second_run_shares_plan_spaces_and_ratings() -> None:
     assert first.home.plan is second.home.plan
     assert first.home.space(0.15) is second.home.space(0.15)
     assert hangouts[0].nearness is hangouts[1].nearness
-    assert walking_distances(first.home) is walking_distances(second.home)
+    distances = [walking_distances(each.home, each.home.space(0.2)) for each in (first, second)]
+    assert distances[0] is distances[1]
 
 
 def test_changed_file_is_read_anew(tmp_path: Path) -> None:
@@ -92,7 +93,7 @@ def test_shared_arrays_are_read_only() -> None:
         plan.free, plan.room_of_cell, plan.room_of_place, plan.mesh.vertices, space.part_of_cell,
         space.cells(), space.cells(2), hangout.nearness, hangout.places.points,
         hangout.places.room, hangout.places.block, hangout.places.prox,
-        walking_distances(simulation.home),
+        walking_distances(simulation.home, simulation.home.space(0.2)),
     ]  # fmt: skip
 
     assert [False] * len(shared) == [array.flags.writeable for array in shared]
@@ -128,12 +129,14 @@ def test_a_folder_shares_a_home_among_processes_and_changes_no_run(
     digests = []
     for _ in range(2):  # with memories as empty as those of two processes
         monkeypatch.setattr(source, "PLAN_CACHE", Cache(source.CACHED_PLANS))
-        with source.PLAN_FOLDER.within(tmp_path):
+        with HOME_FOLDER.within(tmp_path):
             digests.append(fleet2d.run("bundled:paper", SHORT, seed=4, floorplan=home).digest)
-        monkeypatch.setattr(source, "place_furniture", None)  # not called again
+        # Neither the home nor its spaces and walls are made again.
+        monkeypatch.setattr(source, "place_furniture", None)
+        monkeypatch.setattr(homes, "shape_space", None)
+        monkeypatch.setattr(homes, "build_mesh", None)
 
     assert [alone, alone] == digests
-    assert 1 == len(list(tmp_path.iterdir()))
 
 
 def test_a_damaged_or_missing_folder_is_no_error(tmp_path: Path) -> None:

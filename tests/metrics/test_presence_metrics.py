@@ -334,7 +334,8 @@ def test_hours_of_the_week_are_compared_one_by_one() -> None:
 
 def test_walking_distances_are_symmetric_and_far_for_unreachable_rooms() -> None:
     plan = fleet2d.Simulation(content()).home.plan
-    metres = walking_distances(Home(plan))
+    home = Home(plan)
+    metres = walking_distances(home, home.space(0.2))
     assert np.array_equal(metres, metres.T)
     assert (np.diagonal(metres) == 0).all()
     reached = metres[:4, :4]

@@ -20,11 +20,11 @@ from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.layers import COSTMAP, Layers
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh, snap_polygon
 from fleet2d.floorplan.placed_objects import PlacedObject, Point, UsePlace, find_named
-from fleet2d.floorplan.plan import Cache, FloorPlan, Room, cell_polygons
+from fleet2d.floorplan.plan import HOME_FOLDER, Cache, FloorPlan, Room, cell_polygons
 from fleet2d.floorplan.rooms.doorways import Doorway, doorway_segments
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.floorplan.slow_area import SlowRegion
-from fleet2d.floorplan.space import LinkedSpace, Space
+from fleet2d.floorplan.space import LinkedSpace, Space, SpaceShape, shape_space
 from fleet2d.kernels import I32, Mesh
 
 # Types of rooms through which people leave a home without an entrance, the likeliest first.
@@ -311,6 +311,13 @@ class _Shapes:
         plan = self.plan
         if not tall and not self.door_lines:
             return plan.sight_mesh if glass else plan.mesh
+        if tall == _tall(plan.objects):
+            return self._shared(("walls", glass), lambda: self._cut_out(tall, glass))
+        return self._cut_out(tall, glass)
+
+    def _cut_out(self, tall: tuple[PlacedObject, ...], glass: bool) -> Mesh:
+        """Return the mesh between the walls and tall objects."""
+        plan = self.plan
         polygons = plan.sight_polygons if glass else plan.polygons
         if tall:
             blocks = shapely.union_all([lattice_footprint(plan, thing) for thing in tall])
@@ -321,6 +328,12 @@ class _Shapes:
         corners = [end for line in self.door_lines for end in line]
         return build_mesh(polygons, plan.lattice.columns, plan.lattice.rows, corners)
 
+    def _shared(self, part: Hashable, make: Callable[[], T]) -> T:
+        """Return a part of the home as its plan has it, made by the first process that needs it."""
+        if not HOME_FOLDER.is_open:
+            return make()
+        return HOME_FOLDER.get((self.plan.digest, *self.door_lines, part), make)
+
     def _make_space(
         self,
         radius: float,
@@ -328,18 +341,20 @@ class _Shapes:
         solid: tuple[PlacedObject, ...],
         without: frozenset[int],
     ) -> Space:
-        rooms = [self.plan.room_of_cell == room for room in sorted(without) if room >= 0]
-        space = Space(
-            self.plan,
-            radius,
-            walls=self.walls(shut, _tall(solid), glass=not self.plan.glass),
-            obstacles=[
+        def shape() -> SpaceShape:
+            rooms = [self.plan.room_of_cell == room for room in sorted(without) if room >= 0]
+            obstacles = [
                 *(lattice_footprint(self.plan, thing) for thing in solid),
                 *(shape for room in rooms for shape in cell_polygons(room)),
                 *(self.areas[-1 - area] for area in without if area < 0),
-            ],
-            shut=[self.door_lines[door] for door in sorted(shut)],
-        )
+            ]
+            doors = [self.door_lines[door] for door in sorted(shut)]
+            return shape_space(self.plan, radius, obstacles, doors)
+
+        is_as_planned = not shut and not without and solid == _solid(self.plan.objects)
+        walls = self.walls(shut, _tall(solid), glass=not self.plan.glass)
+        known = self._shared(("space", radius), shape) if is_as_planned else shape()
+        space = Space(self.plan, radius, walls=walls, shape=known)
         space.key = radius, shut, solid, without
         return space
 

@@ -126,6 +126,11 @@ class FolderCache:
         """Use no folder."""
         self._folder: Path | None = None
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it uses a folder."""
+        return self._folder is not None
+
     @contextmanager
     def within(self, folder: Path | None) -> Iterator[None]:
         """Use a folder for the time of a block; None: no folder."""
@@ -154,6 +159,10 @@ class FolderCache:
             part.replace(file)
         return value
 
+
+HOME_FOLDER = FolderCache()
+"""Homes, read and furnished, and their spaces: for all processes of a command that runs many
+scenarios."""
 
 A = TypeVar("A", bound=NDArray[Any])
 

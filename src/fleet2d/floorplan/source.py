@@ -34,7 +34,7 @@ from fleet2d.floorplan.placed_objects import (
     Portal,
     number_objects,
 )
-from fleet2d.floorplan.plan import Cache, FloorPlan, FolderCache, read_only
+from fleet2d.floorplan.plan import HOME_FOLDER, Cache, FloorPlan, read_only
 from fleet2d.floorplan.rooms.doorways import DoorLine, doorway_segments, name_doorways
 from fleet2d.floorplan.rooms.room import (
     LabelledRegion,
@@ -292,9 +292,6 @@ CACHED_PLANS = 8
 PLAN_CACHE = Cache(CACHED_PLANS)
 """Homes, read and furnished."""
 
-PLAN_FOLDER = FolderCache()
-"""The same, for all processes of a command that runs many scenarios."""
-
 # Largest `scale`: of a file in kilometres.
 MAX_SCALE = 1000.0
 
@@ -387,7 +384,7 @@ class FloorPlanSource(Component):
         key = self._cache_key()
         if key is None:
             return self._read()
-        return PLAN_CACHE.get(key, lambda: PLAN_FOLDER.get(key, self._read))
+        return PLAN_CACHE.get(key, lambda: HOME_FOLDER.get(key, self._read))
 
     def _cache_key(self) -> Hashable:
         """Return all that the plan depends on, or None if that is unknown, as for a plugin."""

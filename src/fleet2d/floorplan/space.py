@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -49,6 +49,65 @@ SECOND_US = 1_000_000
 CACHED_ROUTES = 4096
 
 
+class SpaceShape(NamedTuple):
+    """The shape of a space, which processes may share.
+
+    Attributes:
+        polygons: Its outlines [lattice].
+        mesh: The same in triangles.
+        part_of_cell: As in `Space`, int32 (rows, columns).
+        part_of_triangle: The connected part of each triangle of the mesh, int32 (triangles,).
+        parts: Number of connected parts.
+    """
+
+    polygons: list[Polygon]
+    mesh: Mesh
+    part_of_cell: I32
+    part_of_triangle: I32
+    parts: int
+
+
+def shape_space(
+    plan: FloorPlan, radius: float, obstacles: Sequence[Polygon] = (), shut: Sequence[Segment] = ()
+) -> SpaceShape:
+    """Return the shape of the space of a body.
+
+    Args:
+        plan: The floor plan.
+        radius: The body's radius [m].
+        obstacles: Further obstacles to movement [lattice].
+        shut: The lines of shut doors [lattice].
+
+    Raises:
+        FloorPlanError: The body fits nowhere.
+    """
+    lattice = plan.lattice
+    reach = radius * lattice.units_per_m
+    blocks = grow_polygons([Polygon(o.exterior) for o in obstacles], reach)
+    blocks += [grow_shape(np.array(segment, np.float64), reach) for segment in shut]
+    polygons = shrink(plan.polygons, reach, blocks)
+    if not polygons:
+        raise FloorPlanError(
+            f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
+            " radius or check the scale of the plan"
+        )
+    mesh = build_mesh(polygons, lattice.columns, lattice.rows)
+    triangles = rasterize_cells(mesh, lattice.rows, lattice.columns)
+    part = label_triangles(mesh.neighbors)
+    part_of_cell = np.where(triangles >= 0, part[triangles], -1)
+    # Parts without a cell's centre rank last and aren't counted.
+    sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
+    rank = np.argsort(np.argsort(-sizes, kind="stable"))
+    ranked = np.where(triangles >= 0, rank[part_of_cell], -1)
+    return SpaceShape(
+        polygons,
+        mesh,
+        ranked.astype(np.int32),
+        rank[part].astype(np.int32),
+        int(np.count_nonzero(sizes)),
+    )
+
+
 class Space:
     """The places where the centre of a body of one radius may be (its configuration space).
 
@@ -70,47 +129,30 @@ class Space:
         radius: float,
         *,
         walls: Mesh | None = None,
-        obstacles: Sequence[Polygon] = (),
-        shut: Sequence[Segment] = (),
+        shape: SpaceShape | None = None,
     ) -> None:
-        """Compute the space.
+        """Make the space.
 
         Args:
             plan: The floor plan.
             radius: The body's radius [m].
             walls: The mesh that bounds where a body can be; None for the plan's.
-            obstacles: Further obstacles to movement [lattice].
-            shut: The lines of shut doors [lattice].
+            shape: Its shape, from `shape_space`; None for that between the plan's walls.
 
         Raises:
             FloorPlanError: The body fits nowhere.
         """
+        shape = shape_space(plan, radius) if shape is None else shape
         self.plan = plan
         self.walls = plan.mesh if walls is None else walls
         self._cache_searches()
         self.radius = radius
         self.key: tuple[Any, ...] = ()  # the home's key of this space
-        lattice = plan.lattice
-        reach = radius * lattice.units_per_m
-        blocks = grow_polygons([Polygon(o.exterior) for o in obstacles], reach)
-        blocks += [grow_shape(np.array(segment, np.float64), reach) for segment in shut]
-        self.polygons = shrink(plan.polygons, reach, blocks)
-        if not self.polygons:
-            raise FloorPlanError(
-                f"a body of radius {radius:g} m fits nowhere in {plan.name}: give it a smaller"
-                " radius or check the scale of the plan"
-            )
-        self.mesh: Mesh = build_mesh(self.polygons, lattice.columns, lattice.rows)
-        triangles = rasterize_cells(self.mesh, lattice.rows, lattice.columns)
-        part = label_triangles(self.mesh.neighbors)
-        part_of_cell = np.where(triangles >= 0, part[triangles], -1)
-        # Parts without a cell's centre rank last and aren't counted.
-        sizes = np.bincount(part_of_cell[part_of_cell >= 0], minlength=int(part.max()) + 1)
-        rank = np.argsort(np.argsort(-sizes, kind="stable"))
-        ranked = np.where(triangles >= 0, rank[part_of_cell], -1)
-        self.part_of_cell = read_only(ranked.astype(np.int32))
-        self._part_of_triangle = read_only(rank[part].astype(np.int32))
-        self.parts = int(np.count_nonzero(sizes))
+        self.polygons = shape.polygons
+        self.mesh: Mesh = shape.mesh
+        self.part_of_cell = read_only(shape.part_of_cell)
+        self._part_of_triangle = read_only(shape.part_of_triangle)
+        self.parts = shape.parts
 
     def _cache_searches(self) -> None:
         """Cache the searches, since behaviors repeat them for the same rooms and routes."""

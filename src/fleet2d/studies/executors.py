@@ -229,12 +229,12 @@ def run_batch(
     Raises:
         InputError: The job can't be loaded.
     """
-    from fleet2d.floorplan.source import PLAN_FOLDER  # the driver doesn't need it
+    from fleet2d.floorplan.plan import HOME_FOLDER  # the driver doesn't need it
 
     job = _loaded(content)
     end_s = time.monotonic() + seconds
     results = []
-    with PLAN_FOLDER.within(plans):
+    with HOME_FOLDER.within(plans):
         for task in tasks:
             results.append(job(task))
             if time.monotonic() >= end_s:
