@@ -132,6 +132,14 @@ def test_a_kind_of_rooms_that_the_home_lacks_is_a_note_not_an_error() -> None:
     assert verdict["bath"].notes == ()
 
 
+def test_run_and_validate_note_a_kind_of_rooms_that_an_expectation_lacks() -> None:
+    simulation = fleet2d.Simulation(home(expect={"out": "never(room(astro) == office)"}))
+    note = 'expect.out: room("astro"): this home has no office'
+
+    assert note in simulation.notes
+    assert note in simulation.run().manifest["notes"]
+
+
 def test_likeliest_is_the_room_with_the_highest_probability() -> None:
     run, verdict = verdicts(
         where="never(likeliest(share) == bathroom)", same="never(likeliest(share) == room(ana))"

@@ -184,7 +184,7 @@ class Simulation:
 
     @property
     def notes(self) -> list[str]:
-        """Oddities of the floor plan and its flaws, and remarks on bodies and their sources."""
+        """Oddities of the floor plan and its flaws, and remarks on what the scenario names."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
         wrong = (f"wrong: {text}" for text in flaws_of(self))
@@ -199,7 +199,16 @@ class Simulation:
             *sensors,
             *self._unused_heights,
             *bodies,
+            *self._of_expectations,
         ]
+
+    @property
+    def _of_expectations(self) -> Iterator[str]:
+        """Remarks on expectations, such as that the home lacks a kind of rooms."""
+        expectations = self._state.expectations
+        entries = {} if expectations is None else expectations.entries
+        for name, entry in entries.items():
+            yield from (f"expect.{name}: {note}" for note in entry.notes)
 
     @property
     def _unused_heights(self) -> Iterator[str]:
