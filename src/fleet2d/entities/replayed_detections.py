@@ -16,15 +16,13 @@ from fleet2d.errors import errors_as
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, LogKeys, begin_of_run, files_of
-from fleet2d.logs.placement import COORDINATE_LIMIT_M, LogFrame
+from fleet2d.logs.placement import COORDINATE_LIMIT_M, MAX_OUTSIDE, LogFrame
 from fleet2d.storage.bags import is_bag
 
 if TYPE_CHECKING:
     from fleet2d.logs.detections import RobotDetections
 
 
-# If more detections than this are outside of the home, the frame of the log is wrong.
-MAX_OUTSIDE = 0.5
 # Labels that mean nobody known in usual detectors.
 ANONYMOUS = frozenset({"unknown", "person", "people", "human", "none", "nobody", "0", ""})
 

@@ -21,6 +21,8 @@ from fleet2d.runtime.determinism import sum_in_order
 Pair = tuple[float, float]
 # Coordinates are clipped to this, far outside of any home [m].
 COORDINATE_LIMIT_M = 1e6
+# If more positions than this are outside of the home, the frame of the log is wrong.
+MAX_OUTSIDE = 0.5
 RoomChoice = tuple[str, ...]
 
 DOOR = "door"

@@ -34,6 +34,7 @@ from fleet2d.logs.log import (
 from fleet2d.logs.placement import (
     COORDINATE_LIMIT_M,
     DOOR,
+    MAX_OUTSIDE,
     UNKNOWN,
     LogFrame,
     LoggedVisit,
@@ -59,6 +60,7 @@ class Fixes:
         heading: Headings [1/4096 turn], -1 where the log has none, int64 (n,).
         snapped: The number of fixes that were moved to the nearest free place.
         outside: The number of fixes that were left out, too far from any free place.
+        beyond_m: Their distance from the nearest free place, in the median [m]; 0 without any.
     """
 
     time_us: I64
@@ -66,6 +68,7 @@ class Fixes:
     heading: I64
     snapped: int
     outside: int
+    beyond_m: float
 
 
 def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -> Fixes:
@@ -91,7 +94,12 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
     off = np.flatnonzero(~np.array(fits, bool))
     near = Nearest(actor).of(points[off])
     away: I64 = near - points[off]
-    outside = off[(away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2]
+    is_outside = (away * away).sum(axis=1) > (reach * lattice.units_per_m) ** 2
+    outside = off[is_outside]
+    beyond_m = 0.0
+    if len(outside):
+        dx, dy = (xy[outside] - lattice.to_metres(near[is_outside])).T
+        beyond_m = float(np.median(np.hypot(dx, dy)))
     points[off] = near
     known = np.isfinite(turns)
     heading = np.full(len(turns), -1, np.int64)
@@ -99,7 +107,7 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
     columns = (np.delete(column, outside, axis=0) for column in (time_us, points, heading))
     time_us, points, heading = columns
     snapped = len(off) - len(outside)
-    return Fixes(time_us, points, heading, snapped=snapped, outside=len(outside))
+    return Fixes(time_us, points, heading, snapped, len(outside), beyond_m)
 
 
 class FixFollower:
@@ -561,6 +569,13 @@ class Replay(Behavior, LogKeys):
             frame.turn_headings(log.heading[used] / (2 * np.pi)),
             self.reach,
         )
+        count = int(np.count_nonzero(used))
+        if fixes.outside > MAX_OUTSIDE * count:
+            raise LogError(
+                f"the frame of {self.path} doesn't fit the home: {fixes.outside} of {count} fixes"
+                f" are more than {self.reach:g} m outside, by {fixes.beyond_m:.1f} m in the median:"
+                " correct 'frame' (scale, origin, rotation_deg, or matches)"
+            )
         gap_us = units.micros(self.gap or GAP_OF_FIXES)
         self.follower = FixFollower(actor, fixes, gap_us, self.gaps)
         self.follower.follow(Plan(actor, 0))
