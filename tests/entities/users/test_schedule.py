@@ -193,6 +193,47 @@ def test_the_agenda_of_the_next_day_follows_at_midnight() -> None:
     assert ["bathroom_1", "kitchen_1"] == [at(2, 6), at(2, 7)]
 
 
+@pytest.mark.parametrize(
+    ("start", "room"),
+    [
+        ("2026-01-06T05:59", None),  # Tuesday: at work since Monday
+        ("2026-01-06T06:30", "bathroom_1"),  # home, where it rests
+        ("2026-01-06T14:30", "kitchen_1"),
+        ("2026-01-10T06:30", "bedroom_1"),  # Saturday: an item is due before the work is over
+        ("2026-01-11T19:30", None),  # Sunday: away since Saturday
+        ("2026-01-11T21:30", "bathroom_1"),
+    ],
+)
+def test_a_dwell_over_midnight_ends_on_a_later_day(start: str, room: str | None) -> None:
+    content = one(
+        agenda(
+            {"at": "14:00", "place": "kitchen"},
+            {"at": "22:00", "away": True, "dwell": "8 h"},
+            on="weekdays",
+        ),
+        agenda(
+            {"at": "05:00", "place": "bedroom"},
+            {"at": "20:00", "away": True, "dwell": "1 d"},
+            on="saturday",
+        ),
+        rest="bathroom",
+        simulation={"start": start},
+        duration="1 min",
+    )
+
+    assert room == fleet2d.Simulation(content).state["ana"]["room"]
+
+
+def test_an_agenda_that_later_ones_replace_on_each_of_its_days_is_refused() -> None:
+    content = one(
+        agenda({"at": "08:00", "place": "bathroom"}, on="weekend"),
+        agenda({"at": "07:00", "place": "kitchen"}, on="daily"),
+    )
+
+    with pytest.raises(InputError, match=r"days\.0.*replace it on each of its days"):
+        fleet2d.load_scenario(content)
+
+
 def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten() -> None:
     stored = run(
         one(

@@ -61,7 +61,7 @@ class AgendaEntry(NamedTuple):
     """A resolved item of an agenda.
 
     Attributes:
-        begins: When it begins, since midnight.
+        begins: When it begins, since midnight; that of a rest may be on a later day.
         place: Where it is; () is out of the home.
         activity: What is done there.
     """
@@ -75,8 +75,8 @@ class Schedule(Behavior):
     """Be at fixed places at fixed times, daily or by weekday.
 
     At an item's time the body walks to its place by the shortest path; in a room, to a spot drawn
-    each time. When an item with a dwell is over and no other is due, it goes to the place `rest`. A
-    later day of the list replaces an earlier one on the weekdays they share.
+    each time. When an item with a dwell is over and no other is due, it goes to the place `rest`,
+    also on a later day. A later day of the list replaces an earlier one on the weekdays they share.
 
     Attributes:
         days: The agendas of the days of the week.
@@ -87,9 +87,16 @@ class Schedule(Behavior):
     rest: Place = ("living_room", "any")
 
     def model_post_init(self, _: object, /) -> None:
-        """Refuse days that overlap or are not in order."""
+        """Refuse days that overlap, are not in order, or are all replaced by later ones."""
         for number, day in enumerate(self.days):
             _entries(day, self.rest, number)
+            later = {weekday for other in self.days[number + 1 :] for weekday in other.weekdays}
+            if day.weekdays <= later:
+                raise problem_at(
+                    ("days", number),
+                    "later entries of the list replace it on each of its days: list those of more"
+                    " days first, or leave it out",
+                )
 
     def start(self, actor: Actor) -> None:
         """Resolve the week, and check that every place exists and can be reached."""
@@ -145,6 +152,7 @@ class Schedule(Behavior):
         for day in self.days:
             for weekday in day.weekdays:
                 week[weekday] = _entries(day, self.rest)
+        _rest_later(week)
         return week
 
     @staticmethod
@@ -197,6 +205,21 @@ def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[Age
             entries.append(AgendaEntry(over, rest, "rest"))
         entries.append(AgendaEntry(begins, item.place or AWAY, item.activity))
         over = None if item.dwell is None else begins + item.dwell
-    if over is not None and over < DAY:
+    if over is not None:
         entries.append(AgendaEntry(over, rest, "rest"))
     return entries
+
+
+def _rest_later(week: list[list[AgendaEntry]]) -> None:
+    """Move a rest that begins after midnight to its day, unless an item begins before it."""
+    late = [(day, entries.pop()) for day, entries in enumerate(week) if _is_late(entries)]
+    for day, rest in late:
+        days, begins = divmod(rest.begins, DAY)
+        target = week[(day + days) % 7]
+        is_due_before = bool(target) and target[0].begins <= begins
+        if not is_due_before and not any(week[(day + n) % 7] for n in range(1, days)):
+            target.insert(0, rest._replace(begins=begins))
+
+
+def _is_late(entries: list[AgendaEntry]) -> bool:
+    return bool(entries) and entries[-1].begins >= DAY
