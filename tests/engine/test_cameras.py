@@ -1,6 +1,7 @@
 """Cameras in a run: those that wait for something end a span together, at the earliest of it."""
 
 import copy
+import re
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from fleet2d.algorithms.observations import SightingTable
 from fleet2d.engine import loop
 from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.loop import PHASES, Span
+from fleet2d.errors import PlacementError
 from fleet2d.kernels import new_memory
 
 
@@ -160,3 +162,38 @@ def test_users_with_cameras_look_at_robots_and_robots_at_users() -> None:
     assert [(2, 0), (3, 1), (4, 2), (5, 3)] == [(c.row, c.index) for c in state.cameras]
     assert all(["ana", "ben"] == [actor.name for actor in c.others] for c in state.cameras)
     assert np.array_equal(gaze.counts, np.zeros((1, 5, 2)))
+
+
+def remarks(**robot: Any) -> list[str]:
+    """What is said of a robot's sight before the run."""
+    content = scenario(users={"ana": "meander"}, robots={"astro": {"type": "meander", **robot}})
+    return [note for note in fleet2d.Simulation(content).notes if "astro" in note]
+
+
+SHARES = {"detection": {"visible_share": [[0, 0], [1, 1]]}}
+
+
+@pytest.mark.parametrize(
+    ("robot", "note"),
+    [
+        ({"camera": {"range": [300, 4500]}}, r"astro\.camera\.range begins at 300 m, and the home"),
+        ({"camera": None, "perception": SHARES}, r"astro\.perception has no effect without a cam"),
+        ({"perception": SHARES}, r"astro\.camera: .*visible_share needs body_points"),
+        ({"camera": {"height": 1}}, r"astro\.camera\.height has no effect without sight\.heights"),
+    ],
+)
+def test_settings_of_sight_without_effect_are_noted(robot: dict[str, Any], note: str) -> None:
+    (text,) = remarks(**robot)
+
+    assert re.search(note, text)
+
+
+def test_settings_of_sight_that_have_an_effect_are_not_noted() -> None:
+    assert [] == remarks(camera={"range": [0.3, 4.5], "body_points": 4}, perception=SHARES)
+
+
+def test_a_spot_outside_the_home_is_refused() -> None:
+    centimetres = {"false_positives": {"spots": [{"at": [400, 250], "per_hour": 1}]}}
+
+    with pytest.raises(PlacementError, match=r"spots\.0: \(400, 250\) m is outside the home"):
+        remarks(perception=centimetres)

@@ -381,6 +381,10 @@ def test_homes_without_doors_pay_nothing() -> None:
             },
             "give 'open' or 'locked'",
         ),
+        (
+            {"objects": {"gate": {"type": "door", "doorway": [600, 145]}}},
+            r"\(600, 145\) m is outside the home",
+        ),
     ],
 )
 def test_change_or_door_that_can_not_be_is_refused(

@@ -129,3 +129,23 @@ def test_slow_areas_are_the_same_for_every_span() -> None:
 def test_areas_that_are_none_are_refused(fields: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         fleet2d.load_scenario(patrol(script=[{"at": "07:01", **fields}]))
+
+
+CENTIMETRES = [[200, 200], [400, 200], [400, 390]]
+
+
+@pytest.mark.parametrize(
+    ("sections", "place"),
+    [
+        ({"script": [{"at": "07:01", "slow": CENTIMETRES, "speed": 0.5}]}, "script.0"),
+        ({"slows": [{"area": CENTIMETRES, "speed": 0.5}]}, "floorplan.slows.0"),
+    ],
+)
+def test_a_slow_area_in_which_the_home_has_no_floor_is_refused(
+    sections: dict[str, Any], place: str
+) -> None:
+    content = patrol(script=sections.get("script", ()))
+    content["floorplan"] = {**content["floorplan"], "slows": sections.get("slows", ())}
+
+    with pytest.raises(InputError, match=f"{place}: the area from .* has no part of the floor"):
+        fleet2d.Simulation(content)

@@ -197,6 +197,9 @@ class ChangeQueue:
         self._used_us = [-1] * len(self.names)
         self._switches = PeopleSwitches(basis)
         self._floor = basis.scenario.floorplan.slows
+        for number, area in enumerate(self._floor):
+            with errors_as(ScenarioError, f"floorplan.slows.{number}", of=PlacementError):
+                basis.home.plan.check_area(area.area)
         self.home.slows = tuple(area.on(basis.home.plan.lattice) for area in self._floor)
         # By step; those of one step happen in the order in which they were put into the queue.
         self._queue: list[tuple[int, int, DueChange]] = []

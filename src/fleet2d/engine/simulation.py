@@ -31,6 +31,7 @@ from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.basis import input_files
+from fleet2d.engine.cameras import unused_settings
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.sensors import Sensors
@@ -191,13 +192,14 @@ class Simulation:
         of_sensors = self._state.find(Sensors)
         sensors = [] if of_sensors is None else of_sensors.notes
         plan = self.home.plan.notes
+        heights = self.scenario.sight.heights
         return [
             *wrong,
             *self._odd_moments(),
             *plan,
             *sources,
             *sensors,
-            *self._unused_heights,
+            *unused_settings(self._state.actors, self.home, heights=heights),
             *bodies,
             *self._of_expectations,
         ]
@@ -209,16 +211,6 @@ class Simulation:
         entries = {} if expectations is None else expectations.entries
         for name, entry in entries.items():
             yield from (f"expect.{name}: {note}" for note in entry.notes)
-
-    @property
-    def _unused_heights(self) -> Iterator[str]:
-        """Remarks on heights that have no effect."""
-        for actor in () if self.scenario.sight.heights else self._state.actors:
-            eyes = actor.entity.eyes
-            only = ["camera"] if "camera" in eyes else [f"cameras.{name}" for name in eyes]
-            for path, camera in zip(only, eyes.values(), strict=True):
-                if camera.height is not None:
-                    yield f"{actor.path}.{path}.height has no effect without sight.heights: true"
 
     @property
     def time(self) -> datetime:

@@ -78,6 +78,7 @@ class Door(HomeObject):
             raise PlacementError(f"{plan.name} has no doorways: give it some, or no doors")
         if not isinstance(self.doorway, str):
             x, y = self.doorway
+            plan.check_inside(x, y)
             return min(plan.doorways, key=lambda d: (_squared(d, x, y), d.index))
         matches = doorways_named(plan, self.doorway)
         names = [doorway.name for doorway in plan.doorways]

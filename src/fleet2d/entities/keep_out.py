@@ -14,7 +14,7 @@ from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import Length
 from fleet2d.entities.behavior import Hours, holds
 from fleet2d.entities.place import is_kind, matching_rooms
-from fleet2d.errors import PlacementError
+from fleet2d.errors import PlacementError, errors_as
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import I32, I64
@@ -164,6 +164,8 @@ class KeepOutRules:
 def _zones(body: "Body", entry: Any) -> frozenset[int]:
     rooms = body.home.rooms
     if entry.area is not None:
+        with errors_as(PlacementError, f"{body.path}.keep_out", of=PlacementError):
+            body.home.plan.check_area(entry.area)
         return frozenset({body.home.area(entry.area)})
     if entry.room is None:
         return frozenset(room.index for room in rooms)

@@ -21,7 +21,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.bounds import CORNERS, POLYGONS, ROOM_CORNERS, ROOMS
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import FloorPlanError, PlacementError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice, unit_hint
 from fleet2d.floorplan.mesh import (
     build_mesh,
@@ -451,6 +451,36 @@ class FloorPlan:
         corners = np.reshape(shapely.total_bounds(self.polygons), (2, 2))
         (x0, y0), (x1, y1) = self.lattice.to_metres(corners).tolist()
         return x0, y0, x1, y1
+
+    def check_inside(self, x: float, y: float) -> None:
+        """Refuse a point [m] beyond the free space and all walls within it.
+
+        Raises:
+            PlacementError: It is outside `bounds`.
+        """
+        x0, y0, x1, y1 = self.bounds
+        if not (x0 <= x <= x1 and y0 <= y <= y1):
+            raise PlacementError(f"({x:g}, {y:g}) m is outside the home, {self._reach}")
+
+    def check_area(self, corners: Sequence[tuple[float, float]]) -> None:
+        """Refuse an area, by its corners [m], that has no part of the free space.
+
+        Raises:
+            PlacementError: It has none.
+        """
+        area = Polygon(corners)
+        if not area.intersects(self.free_space):
+            x0, y0, x1, y1 = area.bounds
+            raise PlacementError(
+                f"the area from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m has no part of the floor of"
+                f" the home, {self._reach}"
+            )
+
+    @property
+    def _reach(self) -> str:
+        """From where to where it reaches, for messages."""
+        x0, y0, x1, y1 = self.bounds
+        return f"which reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
 
     @cached_property
     def digest(self) -> str:

@@ -146,6 +146,10 @@ class SlowFloor(SlowArea, Lasting):
 
     subject = "area"
 
+    def check(self, world: World) -> None:
+        """Refuse an area where the home has no floor."""
+        world.home.plan.check_area(self.area)
+
     def begin(self, world: World) -> None:
         """Apply all that are active."""
         world.slow([act for act in world.lasting if isinstance(act, SlowFloor)])

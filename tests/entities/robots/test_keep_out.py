@@ -90,6 +90,15 @@ def test_an_unknown_room_is_refused_with_the_nearest_name(name: str, nearest: st
         run(flat(keep_out=[name]))
 
 
+def test_an_area_in_which_the_home_has_no_floor_is_refused() -> None:
+    centimetres = [[100, 100], [300, 100], [300, 200]]
+
+    with pytest.raises(
+        PlacementError, match=r"robots\.astro\.keep_out: the area from .* no part of the floor"
+    ):
+        fleet2d.Simulation(flat(keep_out=[{"area": centimetres}]))
+
+
 def notes(content: Any) -> list[str]:
     """What is said of the key before the run starts."""
     said = fleet2d.Simulation(content).notes
@@ -98,6 +107,13 @@ def notes(content: Any) -> list[str]:
 
 def test_a_kind_of_room_that_the_home_lacks_is_noted() -> None:
     assert ["robots.astro.keep_out: this home has no office"] == notes(flat(keep_out=["office"]))
+
+
+def test_sleepers_that_a_robot_without_a_camera_never_sees_are_noted() -> None:
+    blind = flat(keep_out=[{"while": "asleep"}], astro={"camera": None})
+
+    assert ["robots.astro.keep_out: while: asleep has no effect without a camera"] == notes(blind)
+    assert [] == notes(flat(keep_out=[{"while": "asleep"}]))
 
 
 def test_rooms_that_are_cut_off_are_noted_by_name() -> None:

@@ -445,7 +445,9 @@ def test_fixes_in_walls_are_moved_off_and_those_outside_the_home_left_out(tmp_pa
 def test_a_log_of_positions_most_of_which_are_outside_the_home_is_refused(tmp_path: Path) -> None:
     centimetres = fixes(tmp_path, [(0, 400, 100), (10, 200, 300), (20, 2, 3)])
 
-    with pytest.raises(InputError, match="2 of 3 fixes are more than 1 m outside.*correct 'frame'"):
+    with pytest.raises(
+        InputError, match=r"2 of 3 fixes are more than 1 m outside.*correct 'frame'"
+    ):
         run(replay(centimetres, "40 s"))
 
 
