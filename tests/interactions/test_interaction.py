@@ -47,6 +47,12 @@ def test_requests_at_an_interval_count_from_the_start() -> None:
     assert MONDAY + 4.5 * HOUR == next(times)
 
 
+def test_requests_at_an_interval_come_up_on_their_days_only() -> None:
+    pill = queue(at=[], every="1 h", on="weekend").interactions["pill"]
+
+    assert MONDAY + timedelta(days=5) == next(pill.times(MONDAY, MONDAY))
+
+
 def test_value_falls_evenly_until_the_deadline() -> None:
     song = Interaction(do="offer", to="ana", every="1 d", within="2 h", worth=10, falls_to=0.5)
     values = [song.value_after(hours * HOUR) for hours in (0, 1, 2, 2.1, -1)]

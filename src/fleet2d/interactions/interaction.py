@@ -123,12 +123,13 @@ class Interaction(Settings):
             start: The start of the run.
             after: The first moment that counts.
         """
+        days = units.weekdays_of(self.on)
         if self.every is not None:
             passed = max(timedelta(0), after - start)
-            for number in count(-(-passed // self.every)):
-                yield start + number * self.every
+            moments_of_run = (start + n * self.every for n in count(-(-passed // self.every)))
+            yield from (moment for moment in moments_of_run if moment.weekday() in days)
         for midnight in midnights(after):
-            if midnight.weekday() in units.weekdays_of(self.on):
+            if midnight.weekday() in days:
                 moments = (at_reading(start, midnight + at) for at in sorted(self.at))
                 yield from (moment for moment in moments if moment >= after)
 
