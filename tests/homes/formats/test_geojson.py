@@ -695,3 +695,25 @@ def test_a_room_may_name_its_building(tmp_path: Path) -> None:
     room = feature(box(0, 0, 4, 3), name="Kitchen", building="House A")
 
     assert ["Kitchen"] == [r.name for r in read(tmp_path, room, units="m").rooms]
+
+
+@pytest.mark.parametrize("name", ["urn:ogc:def:crs:EPSG::3857", "EPSG:900913"])
+def test_coordinates_of_web_mercator_are_refused_unless_their_unit_is_given(
+    tmp_path: Path, name: str
+) -> None:
+    crs = {"type": "name", "properties": {"name": name}}
+    path = tmp_path / "mercator.geojson"
+    path.write_text(json.dumps({**SAMPLE[1], "crs": crs}))
+
+    with pytest.raises(FloorPlanError, match=r"Web Mercator .*export it in EPSG:4326"):
+        load_floorplan(path)
+    assert GeoJson(path=path, units="m").load().area_m2 > 20
+    assert GeoJson(path=path, scale=0.61).load().area_m2 > 8
+
+
+def test_coordinates_of_another_reference_system_are_read(tmp_path: Path) -> None:
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32633"}}
+    path = tmp_path / "utm.geojson"
+    path.write_text(json.dumps({**SAMPLE[1], "crs": crs}))
+
+    assert load_floorplan(path).area_m2 > 20

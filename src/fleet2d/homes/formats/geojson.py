@@ -5,6 +5,7 @@ Three dialects are read, also mixed: our own, which names the kind of a feature 
 maps of OpenStreetMap, which have the tag `indoor`.
 """
 
+import json
 import math
 import re
 from collections import Counter
@@ -49,6 +50,8 @@ Units = Literal["auto", "m", "degrees"]
 # WGS 84: half the larger axis [m], and the square of the eccentricity.
 SEMI_MAJOR_M = 6378137.0
 ECCENTRICITY_2 = 0.00669437999014
+# Names of Web Mercator in the member `crs` of older GeoJSON.
+_WEB_MERCATOR = re.compile(r"EPSG:{1,2}(3857|900913|3785)\b")
 # Minimum width of a home [m], and largest [degrees], about 5 km.
 SMALLEST_M = 0.5
 LARGEST_DEGREES = 0.05
@@ -336,6 +339,17 @@ def _shape(geometry: object, kind: str, where: str, notes: list[str]) -> BaseGeo
 # --- Units -------------------------------------------------------------------------------------
 
 
+def _refuse_mercator(content: dict[str, Any]) -> None:
+    """Refuse coordinates of Web Mercator, whose metres are longer than those on the ground."""
+    match = _WEB_MERCATOR.search(json.dumps(content.get("crs")))
+    if match is not None:
+        raise FloorPlanError(
+            f"its crs is Web Mercator (EPSG:{match[1]}), in which a home is too large, twice as"
+            " wide at a latitude of 60: export it in EPSG:4326 (longitude and latitude), or set"
+            " floorplan.units=m if it is in true metres"
+        )
+
+
 def _units(content: dict[str, Any], bounds: F64, units: Units) -> Units:
     """Return the units: of the setting, else those that the file declares, else by its extent."""
     declared = content.get("units", "auto") if units == "auto" else units
@@ -422,6 +436,8 @@ class GeoJson(FileSource):
         with in_file(self.path):
             notes: list[str] = []
             raw, storeys = read_features(content, notes)
+            if self.scale is None and self.units == "auto":
+                _refuse_mercator(content)
             units = "m" if self.scale and self.units == "auto" else self.units
             measured, move = in_metres(raw, content, units, notes)
             metre = 1 / (self.scale or 1)
