@@ -143,6 +143,8 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
         ({"objects": [{"type": "bed", "footprint": [[0, 0]]}]}, "footprint has 1 different points"),
         ({"objects": [{**BED, "blocks": "air"}]}, 'blocks is "air": one of nothing, path, sight'),
         ({"objects": [{**BED, "heading": "north"}]}, "heading .* is not a number"),
+        ({"objects": [{**BED, "heading": 90}]}, r"heading is 90, .* 1\.5708 if it is in degrees"),
+        ({"objects": [{**BED, "uses": [{**USE, "heading": -90}]}]}, r"\.heading is -90, more than"),
         ({"objects": [{**BED, "uses": [{"x": 1, "y": 1}]}]}, r"uses\[0\] has no key 'heading'"),
         ({"objects": [{**BED, "uses": [{**USE, "posture": "hang"}]}]}, "one of stand, sit, lie"),
         ({"objects": [{**BED, "uses": [{**USE, "approach": 1}]}]}, "approach is 1: a list of 2"),
@@ -159,6 +161,14 @@ def test_what_is_no_plan_is_refused_with_the_place(
         read(tmp_path, **change)
 
     assert str(tmp_path / "plan.json") in str(caught.value)
+
+
+def test_a_key_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(PLAN)[:-1] + ', "version": 1}')
+
+    with pytest.raises(FloorPlanError, match="the key 'version' is there twice"):
+        load_floorplan(path)
 
 
 def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:

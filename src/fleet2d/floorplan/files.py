@@ -85,10 +85,13 @@ def read_document(path: Path) -> dict[str, Any]:
     return parse_document(read_file(path), path)
 
 
-def parse_document(content: bytes, path: Path) -> dict[str, Any]:
-    """Return the mapping in the content of a file, as `read_document` does."""
+def parse_document(content: bytes, path: Path, *, unique: bool = False) -> dict[str, Any]:
+    """Return the mapping in the content of a file, as `read_document` does.
+
+    In JSON, a key that is there twice is refused if keys have to be `unique`; in YAML it always is.
+    """
     is_yaml = path.suffix.lower() in YAML
-    return parse_yaml(content, path) if is_yaml else parse_json(content, path)
+    return parse_yaml(content, path) if is_yaml else parse_json(content, path, unique=unique)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -100,17 +103,22 @@ def read_json(path: Path) -> dict[str, Any]:
     return parse_json(read_file(path), path)
 
 
-def parse_json(content: bytes, path: Path) -> dict[str, Any]:
+def parse_json(content: bytes, path: Path, *, unique: bool = False) -> dict[str, Any]:
     """Return the JSON object in the content of a file.
 
+    Args:
+        content: The content.
+        path: The file, for messages.
+        unique: Whether to refuse a key that an object has twice, as in files written by hand.
+
     Raises:
-        FloorPlanError: It doesn't hold a JSON object.
+        FloorPlanError: It doesn't hold a JSON object, or has a key twice.
     """
     text = _text_of(content, path, "JSON")
     values = text.count(",") + text.count("[") + text.count("{")
     JSON_VALUES.check(values, path, FloorPlanError, prefix="about ")
     try:
-        document = json.loads(text)
+        document = json.loads(text, object_pairs_hook=_unique_keys if unique else None)
     except json.JSONDecodeError as error:
         _refuse_foreign(path, text[:4096].encode())
         raise FloorPlanError(
@@ -121,6 +129,16 @@ def parse_json(content: bytes, path: Path) -> dict[str, Any]:
         reason = "it has lists in lists without end" if is_deep else error
         raise FloorPlanError(f"{path} is not a floor plan: {reason}") from None
     return _mapping(document, path, "a JSON object {…}")
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object, whose second value of a key would replace the first one."""
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {one_line(twice)!r} is there twice in an object")
+    return result
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

@@ -10,6 +10,7 @@ A plan that is written by `native_document` and read again at the same cell size
 `PlanFile` has all keys. The bundled homes are files in this format.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -19,6 +20,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 import shapely
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -194,6 +196,23 @@ class DoorwayEntry(FileModel):
     leaf: bool = True
 
 
+# A heading beyond two turns is in degrees [rad].
+MAX_HEADING = 4 * math.pi
+
+
+def _heading(value: float) -> float:
+    if abs(value) > MAX_HEADING:
+        raise problem(
+            f"is {value:g}, more than two turns: headings are in radians,"
+            f" {math.radians(value):.6g} if it is in degrees"
+        )
+    return value
+
+
+Heading = Annotated[Coordinate, AfterValidator(_heading)]
+"""A direction [rad], counter-clockwise from +x."""
+
+
 class UseEntry(FileModel):
     """A place to use an object from.
 
@@ -204,7 +223,7 @@ class UseEntry(FileModel):
 
     x: Coordinate
     y: Coordinate
-    heading: Coordinate
+    heading: Heading
     posture: Posture = "stand"
     approach: Point | None = None
 
@@ -220,7 +239,7 @@ class ObjectUse(FileModel):
     """
 
     blocks: Blocks = "path"
-    heading: Coordinate = 0.0
+    heading: Heading = 0.0
     height: Annotated[float, Field(ge=0, le=MAX_HEIGHT_M)] | None = None
     uses: Listed[UseEntry] = Field(default_factory=list)
 
@@ -368,7 +387,7 @@ class Native(FileSource):
         Raises:
             FloorPlanError: It can't be read, isn't in this format, or has no free space.
         """
-        content = parse_document(files[self.path], self.path)
+        content = parse_document(files[self.path], self.path, unique=True)
         with in_file(self.path):
             if content.get("format") != FORMAT:
                 hint = (
