@@ -224,6 +224,47 @@ def test_a_dwell_over_midnight_ends_on_a_later_day(start: str, room: str | None)
     assert room == fleet2d.Simulation(content).state["ana"]["room"]
 
 
+@pytest.mark.parametrize(
+    ("start", "events"),
+    [
+        ("2026-03-29T01:30", {"tea": "03:00+02:00", "rest": "04:00+02:00", "end": "05:00+02:00"}),
+        ("2026-10-25T01:30", {"tea": "02:30+02:00", "rest": "02:30+01:00", "end": "05:00+01:00"}),
+    ],
+)
+def test_a_dwell_lasts_as_long_when_clocks_change(start: str, events: dict[str, str]) -> None:
+    content = one(
+        agenda(
+            {"at": "02:30", "place": [1.0, 3.0], "dwell": "1 h", "activity": "tea"},
+            {"at": "05:00", "place": [1.0, 3.0], "activity": "end"},
+        ),
+        rest=[1.0, 3.0],
+        start=[1.0, 3.0],
+        simulation={"start": start, "time_zone": "Europe/Berlin", "step": "1 min"},
+        duration="5 h",
+    )
+    rows = run(content, "artifacts.trajectories=1 min").pandas("events")
+    activities = rows[rows["event"] == "activity"]
+
+    times = [f"{time:%H:%M%z}"[:8] + ":00" for time in activities["time"]]
+    assert events == dict(zip(activities["detail"], times, strict=True))
+
+
+def test_a_rest_that_a_change_of_clocks_delays_past_the_next_item_is_left_out() -> None:
+    content = one(
+        agenda(
+            {"at": "02:30", "place": [1.0, 3.0], "dwell": "1 h"},
+            {"at": "03:45", "place": [1.0, 3.0], "activity": "end"},
+        ),
+        rest=[1.0, 3.0],
+        start=[1.0, 3.0],
+        simulation={"start": "2026-03-29T01:30", "time_zone": "Europe/Berlin", "step": "1 min"},
+        duration="5 h",
+    )
+    rows = run(content, "artifacts.trajectories=1 min").pandas("events")
+
+    assert {"end"} == set(rows[rows["event"] == "activity"]["detail"])
+
+
 def test_an_agenda_that_later_ones_replace_on_each_of_its_days_is_refused() -> None:
     content = one(
         agenda({"at": "08:00", "place": "bathroom"}, on="weekend"),

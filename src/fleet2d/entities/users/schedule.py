@@ -13,6 +13,7 @@ from fleet2d.entities.place import Place, Point, RoomChoice, available_places, i
 from fleet2d.entities.plan import Plan
 from fleet2d.runtime.clock import DAY, midnight_of, midnights, next_midnight
 from fleet2d.runtime.events import EventKind
+from fleet2d.runtime.local_time import at_reading
 
 AWAY: tuple[()] = ()
 
@@ -61,14 +62,25 @@ class AgendaEntry(NamedTuple):
     """A resolved item of an agenda.
 
     Attributes:
-        begins: When it begins, since midnight; that of a rest may be on a later day.
+        at: The time of day of its own, or of the last item before it that has one.
+        later: The dwells from then until it begins, in real time.
         place: Where it is; () is out of the home.
         activity: What is done there.
     """
 
-    begins: timedelta
+    at: timedelta
+    later: timedelta
     place: RoomChoice | Point | tuple[()]
     activity: str
+
+    @property
+    def begins(self) -> timedelta:
+        """When it begins since midnight, on a day of 24 hours; a rest may on a later day."""
+        return self.at + self.later
+
+    def moment(self, midnight: datetime, time: datetime) -> datetime:
+        """Return when it begins on the day of a midnight, by the clock of a time."""
+        return at_reading(time, midnight + self.at) + self.later
 
 
 class Schedule(Behavior):
@@ -128,9 +140,13 @@ class Schedule(Behavior):
                 _add(plan, entry)
         self.until = next_midnight(now.time)
         for midnight in midnights(since, self.until):
-            for entry in self.week[midnight.weekday()]:
-                if midnight + entry.begins >= since:
-                    _add(plan.stay(until=midnight + entry.begins), entry)
+            entries = self.week[midnight.weekday()]
+            moments = [entry.moment(midnight, now.time) for entry in entries]
+            for number, (entry, moment) in enumerate(zip(entries, moments, strict=True)):
+                # When clocks are put forward, what a dwell delays may be due after a later item.
+                is_overtaken = any(later < moment for later in moments[number + 1 :])
+                if moment >= since and not is_overtaken:
+                    _add(plan.stay(until=moment), entry)
         self.plan = plan.stay(until=self.until)
         return self.plan
 
@@ -161,7 +177,7 @@ class Schedule(Behavior):
         midnight = midnight_of(time)
         for back in range(8):
             day = midnight - back * DAY
-            earlier = [entry for entry in week[day.weekday()] if day + entry.begins < time]
+            earlier = [entry for entry in week[day.weekday()] if entry.moment(day, time) < time]
             if earlier:
                 return earlier[-1]
         return None
@@ -184,29 +200,35 @@ def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[Age
             list of days.
     """
     entries: list[AgendaEntry] = []
-    over: timedelta | None = None  # when the item before is over, if it says so
+    over: AgendaEntry | None = None  # the rest after the item before, if that has a dwell
     for index, item in enumerate(day.items):
         key = ("days", number, "items", index)
-        begins = item.at if item.at is not None else over
-        if begins is None:
+        place = item.place or AWAY
+        if item.at is not None:
+            entry = AgendaEntry(item.at, timedelta(0), place, item.activity)
+        elif over is not None:
+            entry = over._replace(place=place, activity=item.activity)
+        else:
             raise problem_at(key, "it needs 'at', or a 'dwell' in the item before it")
-        earliest = over if over is not None else entries[-1].begins if entries else timedelta(0)
-        if begins < earliest:
+        before = over or (entries[-1] if entries else None)
+        if before is not None and entry.begins < before.begins:
             raise problem_at(
                 key,
-                f"it begins at {format_time_of_day(begins)}, but the item before it lasts until"
-                f" {format_time_of_day(earliest)}: list the items of a day in order",
+                f"it begins at {format_time_of_day(entry.begins)}, but the item before it lasts"
+                f" until {format_time_of_day(before.begins)}: list the items of a day in order",
             )
-        if begins >= DAY:
+        if entry.begins >= DAY:
             raise problem_at(
-                key, f"it begins at {format_time_of_day(begins)}: an item begins before 24:00"
+                key, f"it begins at {format_time_of_day(entry.begins)}: an item begins before 24:00"
             )
-        if over is not None and begins > over:
-            entries.append(AgendaEntry(over, rest, "rest"))
-        entries.append(AgendaEntry(begins, item.place or AWAY, item.activity))
-        over = None if item.dwell is None else begins + item.dwell
+        if over is not None and entry.begins > over.begins:
+            entries.append(over)
+        entries.append(entry)
+        over = None
+        if item.dwell is not None:
+            over = AgendaEntry(entry.at, entry.later + item.dwell, rest, "rest")
     if over is not None:
-        entries.append(AgendaEntry(over, rest, "rest"))
+        entries.append(over)
     return entries
 
 
@@ -214,11 +236,12 @@ def _rest_later(week: list[list[AgendaEntry]]) -> None:
     """Move a rest that begins after midnight to its day, unless an item begins before it."""
     late = [(day, entries.pop()) for day, entries in enumerate(week) if _is_late(entries)]
     for day, rest in late:
-        days, begins = divmod(rest.begins, DAY)
+        days = rest.begins // DAY
+        moved = rest._replace(at=rest.at - days * DAY)
         target = week[(day + days) % 7]
-        is_due_before = bool(target) and target[0].begins <= begins
+        is_due_before = bool(target) and target[0].begins <= moved.begins
         if not is_due_before and not any(week[(day + n) % 7] for n in range(1, days)):
-            target.insert(0, rest._replace(begins=begins))
+            target.insert(0, moved)
 
 
 def _is_late(entries: list[AgendaEntry]) -> bool:
