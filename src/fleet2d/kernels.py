@@ -447,23 +447,26 @@ class Yielder(NamedTuple):
 
 
 class Delay(NamedTuple):
-    """By how much later the rest of a track comes."""
+    """By how much later a part of a track comes.
 
-    after_us: (
-        int  # what was planned up to that moment has happened, or counts with the delay before
-    )
-    since_us: int  # what was planned before that moment happens at it
+    Attributes:
+        after_us: What was planned up to that moment has happened, or has the delay before.
+        since_us: What was planned before that moment happens at it.
+        later_us: How much later all is, up to the edge.
+        edge_us: A rest that begins then is shortened, so that the body is on time again after it.
+    """
+
+    after_us: int
+    since_us: int
     later_us: int
-    edge_us: int  # a rest that begins then is shortened, so that the body is on time again after it
+    edge_us: int
 
     def of(self, time_us: int) -> int:
         """Return when something happens that was planned for a moment."""
         time_us = max(time_us, self.since_us)
-        return (
-            max(time_us, self.edge_us + self.later_us)
-            if time_us > self.edge_us
-            else time_us + self.later_us
-        )
+        if time_us <= self.edge_us:
+            return time_us + self.later_us
+        return max(time_us, self.edge_us + self.later_us)
 
 
 Continued = tuple[I64, list[tuple[int, int, int, int]]]

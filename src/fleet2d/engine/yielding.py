@@ -535,8 +535,13 @@ class Yielding(Watcher):
 
     def _stop(self, now: Situation, steps: int = 0) -> Plan:
         """Return a plan to stop for a moment, and then to go on."""
-        until = now.step + max(steps, self._steps(PAUSE))
-        return plan_after(now, self._actors[now.actor.row].plan, until)
+        row = now.actor.row
+        wait = np.array([max(steps, self._steps(PAUSE))])
+        continued = self._bodies.timelines.way_after_a_wait(
+            row, now.step, wait, self._politely[row], now.step
+        )
+        assert continued is not None, "up to the present step, it meets nobody"
+        return plan_along(now, self._actors[row].plan, continued)
 
     def _pause(self, now: Situation) -> int:
         """Return for how many steps a robot stands before it looks again: longer and longer."""
