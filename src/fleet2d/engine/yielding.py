@@ -242,6 +242,8 @@ class Yielding(Watcher):
         plan.interrupts = actor.arbiter.own
         actor.follow_instead(plan, now)
         self._bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
+        if self._bodies.pose_at(row, now.step + 1)[:2] == actor.state.position:
+            plan.notes[:0] = self._overlap_notes(now, self._hits(now))
 
     # Whom each robot minds
 
@@ -551,34 +553,43 @@ class Yielding(Watcher):
 
     def _overlapping(self, now: Situation, pause: int) -> Plan | None:
         """Write once who walks into a robot now; it goes on as before, and minds them no more."""
-        row = now.actor.row
-        robot = self._actors[row]
-        notes = []
-        for other in self._hits(now):
+        hits = self._hits(now)
+        for other in hits:
             stays = self._steps(GIVES_UP) if self._rests(other, now.step) else pause
             self._have_patience(now, other, stays, ignores=True)
+        notes = self._overlap_notes(now, hits)
+        if not notes:
+            return None
+        plan = plan_after(now, self._actors[now.actor.row].plan, now.step)
+        plan.notes[:0] = notes
+        return plan
+
+    def _overlap_notes(self, now: Situation, others: list[int]) -> list[Note]:
+        """Return the notes that others walk into a robot now, where they aren't written yet."""
+        row = now.actor.row
+        robot = self._actors[row].name
+        notes = []
+        for other in others:
             told = self._told.get((row, other))
             self._told[row, other] = now.step
             if told is not None and now.step - told <= self._steps(SAME_WAIT):
                 continue
             name = self._actors[other].name
-            self.overlaps[robot.name, name] = self.overlaps.get((robot.name, name), 0) + 1
+            self.overlaps[robot, name] = self.overlaps.get((robot, name), 0) + 1
             notes.append(Note(now.step * self._step_us, EventKind.OVERLAPS, name))
-        if not notes:
-            return None
-        plan = plan_after(now, robot.plan, now.step)
-        plan.notes[:0] = notes
-        return plan
+        return notes
 
     def _hits(self, now: Situation) -> list[int]:
-        """Return the rows of those who don't yield and walk into a robot at this step."""
+        """Return who doesn't yield and walks into a robot in this step, if it stands still."""
         hits = []
         kept = self._everybody[now.actor.row]
         for other in range(len(self._actors)):
+            if other in self._number:
+                continue
             only = np.full_like(kept.lead, -1)
             only[:, other] = 0
             met = self._hit_at_rest(now, kept._replace(lead=only))
-            if other not in self._number and met is not None and met[0] == now.step:
+            if met is not None and met[0] == now.step:
                 hits.append(other)
         return hits
 
