@@ -140,6 +140,24 @@ def robots(count: int) -> list[str]:
     return _copies("robots", "astro", count)
 
 
+def rounds(count: int) -> list[str]:
+    """Return overrides of so many robots that go from room to room, each in its own order."""
+    names = ["astro", *(f"astro_{i}" for i in range(1, count))]
+    order = "[{type: patrol, dwell: 10 min, order: random}]"
+    return [*robots(count), *(f"robots.{name}.behaviors={order}" for name in names)]
+
+
+def cost_of_yielding(*overrides: str) -> float:
+    """Return how many times longer a run takes with bodies that yield than with ghosts."""
+
+    def run_as(ghosts: str) -> Callable[[], object]:
+        return lambda: run(f"simulation.ghosts={ghosts}", *overrides, seed=4)
+
+    run_as("true")()
+    ghosts, yielding = least_of_both(run_as("true"), run_as("false"), 3)
+    return yielding / ghosts
+
+
 def users(count: int) -> list[str]:
     """Return overrides that add users like the first, up to a number."""
     import fleet2d
