@@ -287,6 +287,16 @@ def test_sun_rises_and_sets_an_hour_later_by_the_clock_in_summer_time(month: int
         assert list(clock.sun.day(ordinal)) == [end + later for end in ends]
 
 
+@pytest.mark.parametrize(("offset", "is_noted"), [("", True), ("+02:00", False), ("+01:00", False)])
+def test_a_start_that_the_clock_reads_twice_is_noted(offset: str, is_noted: bool) -> None:
+    keys = [BERLIN, f"simulation.start=2026-10-25T02:30{offset}", "simulation.duration=1 h"]
+    note = "simulation.start: the clock reads 2026-10-25 02:30 twice"
+
+    notes = fleet2d.Simulation("bundled:paper", *keys).notes
+
+    assert is_noted == any(text.startswith(note) for text in notes)
+
+
 def test_dated_moment_that_is_not_one_is_noted_and_one_with_an_offset_is_exact() -> None:
     """In a script and in changes of the home."""
     script = '[{at: "2026-10-25T02:30", put: ana, to: kitchen}, {at: "2026-10-25T02:30+01:00", put: ana, to: hallway}]'

@@ -878,9 +878,13 @@ class Simulation:
     def _odd_moments(self) -> list[str]:
         """Return a note for each dated moment that the clock of the home reads twice, or never."""
         zone = self.clock.zone
-        moments = self.scenario.moments() if zone else ()
-        odd = ((where, zone.oddity(moment)) for where, moment in moments if zone)
-        return [f"{section}.{number}.at: {text}" for (section, number), text in odd if text]
+        if zone is None:
+            return []
+        moments = [("simulation.start", self.scenario.simulation.start)]
+        for (section, number), moment in self.scenario.moments():
+            moments.append((f"{section}.{number}.at", moment))
+        odd = ((where, zone.oddity(moment)) for where, moment in moments)
+        return [f"{where}: {text}" for where, text in odd if text]
 
     def _describe_end(self, results: Mapping[str, Any]) -> None:
         """Set the fields that are known after the last step; tables and digest are set already."""
