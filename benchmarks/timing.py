@@ -109,7 +109,7 @@ def draw_loop(weeks: pl.DataFrame, axes: Axes) -> None:
     axes.set_xticks(range(1, WEEKS + 1))
     axes.set_ylim(0)
     axes.set_xlabel("week")
-    axes.set_ylabel("questions a week, mean of thirty lives")
+    axes.set_ylabel("questions a week, mean over lives")
 
 
 def main() -> None:
