@@ -717,3 +717,17 @@ def test_coordinates_of_another_reference_system_are_read(tmp_path: Path) -> Non
     path.write_text(json.dumps({**SAMPLE[1], "crs": crs}))
 
     assert load_floorplan(path).area_m2 > 20
+
+
+def test_latitudes_before_longitudes_are_refused(tmp_path: Path) -> None:
+    corners = [[37.7, -122.4], [37.70004, -122.4], [37.70004, -122.39995], [37.7, -122.4]]
+    room = {
+        "type": "Feature",
+        "properties": {"kind": "room", "name": "Kitchen"},
+        "geometry": {"type": "Polygon", "coordinates": [corners]},
+    }
+    path = tmp_path / "swapped.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [room]}))
+
+    with pytest.raises(FloorPlanError, match=r"no latitude is -122.*\[longitude, latitude\]"):
+        load_floorplan(path)

@@ -362,6 +362,11 @@ def _units(content: dict[str, Any], bounds: F64, units: Units) -> Units:
     if declared != "auto":
         return "m" if declared == "m" else "degrees"
     extent = max(x1 - x0, y1 - y0)
+    is_swapped = max(abs(x0), abs(x1)) <= 90 < max(abs(y0), abs(y1)) <= 180
+    if is_swapped and extent <= LARGEST_DEGREES:
+        raise FloorPlanError(
+            f"no latitude is {y1:g}: a position is [longitude, latitude] in GeoJSON; swap them"
+        )
     if extent >= SMALLEST_M or not on_earth:
         return "m"
     if extent <= LARGEST_DEGREES:
