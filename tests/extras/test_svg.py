@@ -145,3 +145,8 @@ def test_the_hole_of_a_wall_is_no_wall(tmp_path: Path) -> None:
     plan = load_floorplan(path, scale=0.01)
 
     assert plan.area_m2 == pytest.approx(2 * 4.35 * 5.8 + 0.09, abs=0.02)
+
+    unscaled = load_floorplan(path)
+
+    assert (85 / 90) ** 2 * plan.area_m2 == pytest.approx(unscaled.area_m2, rel=0.01)
+    assert "by the width of 1 doors" in unscaled.notes[0]

@@ -91,7 +91,8 @@ class Svg(FileSource):
                     "no group, layer or shape in it is named like walls or rooms: name the layer of"
                     " the walls 'walls', and the group of each room like 'room kitchen'"
                 )
-            scale = self.scale or _scale([c for kind, _, [c], _ in shapes if kind == "door"], notes)
+            doors = [ring for kind, _, rings, _ in shapes if kind == "door" for ring in rings]
+            scale = self.scale or _scale(doors, notes)
             features = [
                 _feature(
                     f"{kind} {number}", kind, name, [r * (scale, -scale) for r in rings], closed
