@@ -52,8 +52,8 @@ ARM_M2 = 1.2
 """An arm of a space is at most this share as wide, and at least this large [m²]."""
 LONG = 3
 """A corridor is at least this many times as long as wide."""
-FURNITURE_M2 = 0.3
-"""Free-standing obstacles up to this size, such as chairs, make no space narrower."""
+FURNITURE_M2 = 0.4
+"""Free-standing obstacles up to this size, such as chairs or a small table, narrow no space."""
 SMOOTHED_M = 0.2
 """Heights are averaged twice over squares that reach this far to all sides."""
 FINE = 64
