@@ -220,3 +220,13 @@ def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(
     assert {frozenset(link.rooms) for link in plan.room_graph} == {
         frozenset(doorway.rooms) for doorway in plan.doorways
     }
+
+
+def test_crossing_of_corridors_has_no_opening_from_corner_to_corner() -> None:
+    """The hall makes diagonals a main direction, but no wall is in line with one there."""
+    hall = Polygon([(9, 3), (13, 7), (9, 11), (5, 7)])
+    crossing = rooms((1.0, 6.0, 6.0, 7.9), (2.5, 1.0, 4.4, 13.0))
+
+    found = passages(shapely.union_all([hall, crossing]), gaps_only=False)
+
+    assert [] == [passage for passage in found if width(passage) > MAX_DOOR_M]

@@ -157,8 +157,8 @@ def find_passages(
         polygons: The same, outer rings counter-clockwise [lattice].
         units_per_m: Lattice units to a metre.
         directions: Main directions of straight walls: openings wider than a doorway must run in
-            these, and passages in main directions rank before others. None if such openings
-            must be gaps in a wall.
+            these, in line with the walls at their ends, and passages in main directions rank
+            before others. None if such openings must be gaps in a wall.
 
     Returns:
         Lines that don't touch each other [lattice]; their ends have even coordinates, and are on
@@ -169,7 +169,7 @@ def find_passages(
     batches = np.array_split(corners, -(-len(corners) // BATCH) or 1)
     lines = _shortest_of_each_corner(
         np.concatenate([
-            _shortest_of_each_corner(_of_width(lines, units_per_m, directions), directions)
+            _shortest_of_each_corner(_of_width(walls, lines, units_per_m, directions), directions)
             for lines in chain(
                 _corner_to_corner(walls, corners, batches, units_per_m),
                 _to_walls(walls, batches, units_per_m),
@@ -266,14 +266,44 @@ def _ends_well(walls: _Walls, corner: NDArray[np.intp], other: F64) -> Bool:
     return is_shortest
 
 
-def _of_width(lines: I64, units_per_m: float, directions: WallDirections | None) -> I64:
-    """Return the lines as wide as a passage; those wider than a doorway run in main directions."""
+def _of_width(
+    walls: _Walls, lines: I64, units_per_m: float, directions: WallDirections | None
+) -> I64:
+    """Return the lines as wide as a passage.
+
+    Between straight walls, those wider than a doorway run in main directions, and in line with the
+    walls at their ends: others cut a corner of a corridor, or go to its side from a cupboard.
+    """
     length2 = _length2(lines)
     low, door, high = ((w * units_per_m) ** 2 for w in (MIN_DOOR_M, MAX_DOOR_M, MAX_OPENING_M))
     fits = (length2 >= low) & (length2 <= high)
     if directions is not None:
-        fits &= directions.are_main(lines) | (length2 <= door)
+        is_gap = directions.are_main(lines) & _continue_walls(walls, lines)
+        fits &= is_gap | (length2 <= door)
     return lines[fits]
+
+
+def _continue_walls(walls: _Walls, lines: I64) -> Bool:
+    """Return which lines have a wall in line with them at each end that is on a corner."""
+    corners = np.flatnonzero(walls.reflex)
+    keys = _keys(walls.start[corners].astype(np.int64))
+    order = np.argsort(keys, kind="stable")
+    corners = corners[order]
+    keys = keys[order]
+    in_line = np.ones(len(lines), np.bool_)
+    for end, other in ((lines[:, :2], lines[:, 2:]), (lines[:, 2:], lines[:, :2])):
+        end_keys = _keys(end)
+        nearest = np.minimum(np.searchsorted(keys, end_keys), len(keys) - 1)
+        corner = corners[nearest]
+        outwards = end - other
+        goes_on = keys[nearest] != end_keys
+        for side in (walls.before[corner], walls.end[corner]):
+            wall = side - walls.start[corner]
+            along = (outwards * wall).sum(axis=1)
+            across = outwards[:, 0] * wall[:, 1] - outwards[:, 1] * wall[:, 0]
+            goes_on |= np.abs(across) <= MAX_LEAN * along
+        in_line &= goes_on
+    return in_line
 
 
 def _length2(lines: I64) -> I64:
