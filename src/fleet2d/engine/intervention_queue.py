@@ -225,6 +225,16 @@ class InterventionQueue:
         """The kinds of events that interventions wait for."""
         return frozenset(w.trigger.event for w in self.waiting if not w.is_over)
 
+    @property
+    def unmet(self) -> list[str]:
+        """Remarks on entries of the script whose event hasn't come."""
+        return [
+            f"{waiting.due.by}: {waiting.due.act.type_name} was never applied: no"
+            f" {waiting.trigger} came"
+            for waiting in self.waiting
+            if waiting.last < 0 and waiting.due.by
+        ]
+
     def take_events(self, events: Sequence[Event]) -> None:
         """Schedule entries that wait for one of these events: at the step after it, or later.
 
@@ -298,7 +308,7 @@ def _kinds_of(
         kinds |= {*REQUEST_EVENTS, EventKind.BROKEN_OFF}
     for behavior in actor.behaviors:
         kinds |= behavior.records
-    if _is_own(actor):
+    if is_own(actor):
         kinds |= KINDS  # it may record any of them
     return frozenset(kinds)
 
@@ -319,21 +329,21 @@ def possible_details(
     people = [user.name for user in users]
     names = [robot.name for robot in robots]
     details: dict[str, list[str]] = {}
-    if not any(_is_own(robot) for robot in robots):
+    if not any(is_own(robot) for robot in robots):
         details |= dict.fromkeys(ABOUT_USERS, people)
         calls = [f"{do} {name}" for do in ("come", "find") for name in people]
         details[EventKind.CALLED] = ["dock", *calls]
     details |= dict.fromkeys(ABOUT_ROBOTS, names)
     for robot in robots:
         wanted = {} if robot.requests is None else robot.requests.interactions
-        for name, interaction in wanted.items() if not _is_own(robot) else ():
+        for name, interaction in wanted.items() if not is_own(robot) else ():
             texts = [f"{name} {person}" for person in interaction.people]
             for kind in OF_REQUESTS:
                 key = f"{kind} {robot.name}"
                 details[key] = [*details.get(key, []), *texts]
     for user in users:
         # A log may hold any activities, and so may a class of the user's own.
-        if not _is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:
+        if not is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:
             told = [a["what"] for a in acts if a["do"] == "activity" and a["entity"] == user.name]
             known = [name for behavior in user.behaviors for name in behavior.activities()]
             details[f"{EventKind.ACTIVITY} {user.name}"] = [*known, *told]
@@ -343,6 +353,6 @@ def possible_details(
     return details
 
 
-def _is_own(actor: Actor) -> bool:
+def is_own(actor: Actor) -> bool:
     """Whether a body has a behavior that isn't Fleet2D's."""
     return any(not type(b).__module__.startswith("fleet2d.") for b in actor.behaviors)

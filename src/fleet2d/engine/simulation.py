@@ -32,6 +32,7 @@ from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.basis import input_files
 from fleet2d.engine.cameras import unused_settings
+from fleet2d.engine.idle import idle_behaviors, unasked_interactions
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.sensors import Sensors
@@ -201,6 +202,8 @@ class Simulation:
             *sensors,
             *unused_settings(self._state.actors, self.home, heights=heights),
             *bodies,
+            *idle_behaviors(self._state.actors, self.scenario),
+            *unasked_interactions(self._state.actors),
             *self._of_expectations,
         ]
 
@@ -894,6 +897,8 @@ class Simulation:
         simulated_s = self.step * self.clock.step_us / 1e6
         manifest.steps = self.step
         manifest.simulated_s = simulated_s
+        if self.done:
+            manifest.notes += queue.unmet
         manifest.metrics = dict(results)
         manifest.wall_s = self._wall_s
         manifest.add_inputs([file for each in self._state.watchers for file in each.files])

@@ -413,6 +413,10 @@ class Behavior(Component):
         """Add the way to where one of its activities is done to a plan."""
         raise NotImplementedError
 
+    def always_decides(self) -> bool:
+        """Return whether it has a plan whenever it is asked, so that none after it is."""
+        return False
+
     def busy(self) -> bool:
         """Return whether it is in the middle of something that hours and cooldown don't end."""
         return False

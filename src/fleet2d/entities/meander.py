@@ -43,6 +43,10 @@ class Meander(Behavior):
             stays=int(self.at_walls == "stay"),
         )
 
+    def always_decides(self) -> bool:
+        """Return true: it always has a plan."""
+        return True
+
     def decide(self, now: Situation) -> Plan:
         """Walk on."""
         return now.plan().meander(self.rule)

@@ -432,6 +432,10 @@ class Trigger(Settings):
             and self.detail in (None, event.detail)
         )
 
+    def __str__(self) -> str:
+        """Return the event for a message: its kind, the entity and the detail."""
+        return " ".join(filter(None, (self.event, self.entity, self.detail)))
+
 
 def _as_mapping(value: Any) -> Any:
     if isinstance(value, str):

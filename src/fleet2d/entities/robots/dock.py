@@ -77,6 +77,10 @@ class Dock(Behavior):
         falls = charge.falls_to(self.threshold, plan.finish())
         return None if falls is None else now.actor.clock.start + timedelta(microseconds=falls)
 
+    def always_decides(self) -> bool:
+        """Return whether it rests at the charger when there is nothing else to do."""
+        return self.rest
+
     def decide(self, now: Situation) -> Plan | None:
         """Charge, if the charge is low; rest at the charger, if `rest` says so."""
         charge = now.actor.charge

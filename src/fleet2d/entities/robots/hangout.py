@@ -284,6 +284,10 @@ class Hangout(BeliefBehavior):
         self.decides_at = actor.clock.start
         self.is_blocked = False  # a person is on its place, or in front of it
 
+    def always_decides(self) -> bool:
+        """Return true: it always has a plan."""
+        return True
+
     def decide(self, now: Situation) -> Plan:
         """Stay, or go to a better place; go back to its place after another behavior's turn."""
         plan = now.plan()

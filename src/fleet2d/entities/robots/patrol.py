@@ -104,6 +104,10 @@ class Patrol(Behavior):
     def _stops_in(self, actor: Actor, room: Room) -> Sequence[LatticePoint]:
         return stops_with_view(actor, room) if self.stop_at == "view" else [actor.middle(room)]
 
+    def always_decides(self) -> bool:
+        """Return true: it always has a plan."""
+        return True
+
     def decide(self, now: Situation) -> Plan:
         """Plan one round."""
         stops = self.stops
@@ -278,6 +282,10 @@ class Retrace(Behavior):
                 f" {self.reach:g} m of where the robot can be and goes: is this the home of that"
                 " map?"
             )
+
+    def always_decides(self) -> bool:
+        """Return true: it always has a plan."""
+        return True
 
     def decide(self, now: Situation) -> Plan:
         """Drive the whole path."""

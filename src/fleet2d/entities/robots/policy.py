@@ -502,6 +502,10 @@ class Policy(LearnedBehavior):
             return EventKind.GAVE_UP
         return None
 
+    def always_decides(self) -> bool:
+        """Return true: it always has a plan."""
+        return True
+
     def decide(self, now: Situation) -> Plan | None:
         """Carry out the action that the policy chooses."""
         plan = now.plan()

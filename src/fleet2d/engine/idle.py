@@ -1,0 +1,49 @@
+"""Remarks on what has no effect in a run: behaviors without a turn, requests that nobody makes."""
+
+from collections.abc import Iterator, Sequence
+
+from fleet2d.engine.intervention_queue import is_own
+from fleet2d.entities.behavior import Actor
+from fleet2d.interventions.robots import SwitchOff
+from fleet2d.runtime.events import EventKind
+from fleet2d.scenario.model import Scenario
+
+
+def idle_behaviors(actors: Sequence[Actor], scenario: Scenario) -> Iterator[str]:
+    """Yield a remark on each behavior of Fleet2D's that never gets a turn.
+
+    Args:
+        actors: The bodies.
+        scenario: The scenario, whose script may switch a behavior off.
+    """
+    switched = {
+        entry.act.entity
+        for entry in scenario.script
+        if isinstance(entry.act, SwitchOff) and entry.act.behavior is not None
+    }
+    for actor in actors:
+        if actor.name in switched or is_own(actor):
+            continue
+        for number, behavior in enumerate(actor.behaviors[:-1]):
+            if behavior.always_decides() and not (behavior.when or behavior.cooldown):
+                first = behavior.type_name
+                later = " and ".join(each.type_name for each in actor.behaviors[number + 1 :])
+                never = "gets" if number + 2 == len(actor.behaviors) else "get"
+                yield (
+                    f"{actor.path}: {later} never {never} a turn, as {first} before always has a"
+                    f" plan: put {first} last, or give it hours (when) or a cooldown"
+                )
+                break
+
+
+def unasked_interactions(actors: Sequence[Actor]) -> Iterator[str]:
+    """Yield a remark on each robot that wants something of people and has no way to ask for it."""
+    for actor in actors:
+        if actor.requests is None or not actor.behaviors or is_own(actor):
+            continue
+        if not actor.may_record(EventKind.ASKS):
+            names = ", ".join(actor.requests.interactions)
+            yield (
+                f"{actor.path}: none of its behaviors asks for what it wants by interactions,"
+                f" {names}: add interact or opportunistic, or its requests only expire"
+            )

@@ -1,0 +1,85 @@
+"""What has no effect in a run: behaviors without a turn, requests never made, events that never come."""
+
+from typing import Any
+
+import pytest
+from tests.scenes import AGENDA, scenario
+
+import fleet2d
+
+BATTERY = {"driving": "2 h", "standing": "4 h", "charging": "1 h", "charger": [0.5, 6.5]}
+CAMERA = {"range": [0.2, 4], "angle_deg": 120}
+PATROL = {"type": "patrol", "dwell": "10 s"}
+
+
+def home(*behaviors: Any, **sections: Any) -> dict[str, Any]:
+    """Ana and astro, a robot with some behaviors, a battery and a camera."""
+    astro = {"behaviors": list(behaviors), "battery": BATTERY, "camera": CAMERA}
+    users = {"ana": {"type": "schedule", "days": AGENDA}}
+    return scenario("10 min", users=users, robots={"astro": astro}, **sections)
+
+
+def notes(document: dict[str, Any]) -> list[str]:
+    """Return the notes of a run about astro and the script, up to its end."""
+    found = fleet2d.run(document).manifest["notes"]
+    return [note for note in found if note.startswith(("robots.astro:", "script"))]
+
+
+@pytest.mark.parametrize(
+    ("behaviors", "later"),
+    [
+        ([PATROL, {"type": "dock"}], "dock never gets"),
+        ([PATROL, {"type": "hangout"}, {"type": "dock"}], "hangout and dock never get"),
+        ([{"type": "dock", "rest": True}, PATROL], "patrol never gets"),
+    ],
+)
+def test_a_behavior_after_one_that_always_has_a_plan_is_noted(
+    behaviors: list[dict[str, Any]], later: str
+) -> None:
+    first = behaviors[0]["type"]
+
+    assert notes(home(*behaviors)) == [
+        f"robots.astro: {later} a turn, as {first} before always has a plan: put {first} last, or"
+        " give it hours (when) or a cooldown"
+    ]
+
+
+@pytest.mark.parametrize(
+    "behaviors",
+    [
+        [{"type": "dock"}, PATROL],
+        [PATROL | {"cooldown": "1 min"}, {"type": "dock"}],
+        [PATROL | {"when": "07:00-07:05"}, {"type": "dock"}],
+    ],
+)
+def test_behaviors_that_all_get_a_turn_are_not_noted(behaviors: list[dict[str, Any]]) -> None:
+    assert notes(home(*behaviors)) == []
+
+
+def test_a_behavior_whose_turn_comes_as_the_script_switches_one_off_is_not_noted() -> None:
+    script = [{"at": "07:02", "switch_off": "astro", "behavior": "patrol"}]
+
+    assert notes(home(PATROL, {"type": "dock"}, script=script)) == []
+
+
+def test_interactions_that_no_behavior_asks_for_are_noted() -> None:
+    tea = {"tea": {"to": "ana", "do": "offer", "at": ["07:05"]}}
+
+    assert notes(home(PATROL, interactions=tea)) == [
+        "robots.astro: none of its behaviors asks for what it wants by interactions, tea: add"
+        " interact or opportunistic, or its requests only expire"
+    ]
+    assert notes(home({"type": "opportunistic"}, PATROL, interactions=tea)) == []
+
+
+def test_an_entry_of_the_script_whose_event_never_comes_is_noted_at_the_end() -> None:
+    script = [
+        {"on": ["activity", "ana", "wash"], "replan": "astro"},
+        {"on": ["came_home", "ana"], "replan": "astro"},
+    ]
+    document = home(PATROL, script=script)
+
+    assert fleet2d.Simulation(document).notes == [
+        note for note in fleet2d.run(document).manifest["notes"] if "script" not in note
+    ]
+    assert notes(document) == ["script.1: replan was never applied: no came_home ana came"]
