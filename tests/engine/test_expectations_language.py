@@ -12,6 +12,7 @@ from fleet2d.expectations import Verdict, at_end, distance, room, speed
 from fleet2d.expectations.parse import parse_expectation
 
 CAMERA = {"range": [0.2, 4], "angle_deg": 120}
+WHOLE_HOME = [[0, 0], [20, 0], [20, 20], [0, 20]]
 
 
 def home(**sections: Any) -> dict[str, Any]:
@@ -297,3 +298,69 @@ def test_python_has_the_same_language() -> None:
     assert str(2 * speed("ana") >= "1 m/s") == '(2 * speed("ana")) >= 1 m/s'
     assert str(room("ana") != room("ben")) == 'not (room("ana") == room("ben"))'
     assert str(at_end(-speed("ana") < 0)) == 'at_end((-1 * speed("ana")) < 0 m/s)'
+
+
+@pytest.mark.parametrize(
+    ("text", "outcome"),
+    [
+        (
+            "always(distance(astro, ana) > -1)",
+            'always holds: distance("astro", "ana") is 0 m or more',
+        ),
+        ("never(speed(astro) < 0)", 'can\'t hold: speed("astro") is 0 m/s or more'),
+        (
+            "at_end(metric(sightings.ana) > 30)",
+            'can\'t hold: metric("sightings.ana") is 0 to 1; write 0.3 for 30 %',
+        ),
+        (
+            "at_end(metric(sightings.ana) < 10)",
+            'always holds: metric("sightings.ana") is 0 to 1; write 0.1 for 10 %',
+        ),
+        (
+            "always(distance(astro, ana) + 1 > 50 cm)",
+            'always holds: (distance("astro", "ana") + 1 m) is 1 m or more',
+        ),
+    ],
+)
+def test_a_comparison_whose_outcome_is_certain_is_noted(text: str, outcome: str) -> None:
+    simulation = fleet2d.Simulation(home(expect={"it": text}, metrics={"sightings": {}}))
+    told = [note for note in simulation.notes if note.startswith("expect")]
+
+    assert len(told) == 1
+    assert told[0].endswith(outcome)
+
+
+def test_comparisons_whose_outcome_is_open_are_not_noted() -> None:
+    texts = [
+        "at_end(metric(sightings.ana) >= 0)",  # it is known
+        "at_end(metric(distance.astro) > 50)",
+        "always(battery(astro) > 0)",
+        "always(distance(astro, ana) > distance(bolt, ana))",
+        "count(moving(astro)) < 40",
+    ]
+    metrics = {"sightings": {}, "distance": {}}
+    document = home(expect={f"e{n}": text for n, text in enumerate(texts)}, metrics=metrics)
+
+    assert not [note for note in fleet2d.Simulation(document).notes if note.startswith("expect")]
+
+
+@pytest.mark.parametrize("step", ["100 ms", "1 s"])
+@pytest.mark.parametrize("slows", [[], [{"area": WHOLE_HOME, "speed": "50 %"}]])
+def test_a_robot_is_no_faster_than_its_speed_by_the_rounding_of_positions(
+    step: str, slows: list[dict[str, Any]]
+) -> None:
+    limit = 0.3 if slows else 0.6
+    document = scenario(
+        "3 min",
+        simulation={"step": step},
+        robots={"astro": {"type": "patrol", "dwell": "1 s", "speed": 0.6}},
+        expect={
+            "keeps_to_it": f"always(speed(astro) <= {limit})",
+            "reaches_it": f"eventually(speed(astro) >= {limit})",
+        },
+    )
+    document["floorplan"]["slows"] = slows
+    simulation = fleet2d.Simulation(document)
+    simulation.run()
+
+    assert all(verdict.holds for verdict in simulation.verdicts().values())

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from fleet2d.expectations.verdict import (
     is_decided,
     verdict_of,
 )
+from fleet2d.metrics.metric import limits_of
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 
@@ -133,6 +135,7 @@ class RunExpectations(Watcher):
             home.plan.bounds,
             (clock.steps - since) * clock.step_us * MICROSECOND,
             self._scenario.interactions,
+            {name: partial(limits_of, m) for name, m in self._scenario.metrics.items()},
         )
 
     # Measuring

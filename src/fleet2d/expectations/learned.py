@@ -10,7 +10,9 @@ from fleet2d.configuration.problems import suggest
 from fleet2d.errors import ScenarioError
 from fleet2d.expectations.expectation import WORDS, Trace, constant
 from fleet2d.expectations.signals import (
+    ANY_NUMBER,
     Gauge,
+    Limits,
     MeasuredRun,
     NumberSignal,
     Outputs,
@@ -110,6 +112,11 @@ class metric(_Value):
     def check(self, scene: Scene) -> None:
         """Refuse an unknown metric."""
         scene.check_name("metric", self.name, scene.names["metrics"], self)
+
+    def limits(self, scene: Scene) -> Limits:
+        """Return the least and the largest value that the metric declares for the number."""
+        limits_of = scene.limits.get(self.name)
+        return ANY_NUMBER if limits_of is None else limits_of(self.path.rpartition(".")[2])
 
     def learn(self, outputs: Outputs, results: Results, gauge: Gauge) -> None:
         """Read the number from a new result of the metric."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, fields
 from datetime import timedelta
 from functools import reduce
+from itertools import product
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -56,6 +57,10 @@ QUANTIFIERS: Mapping[str, Callable[[Any, Any], Any]] = {
 QUANTITIES = {"m": LENGTH, "m/s": SPEED, "share": SHARE}
 """How the limits of a signal are written, by its unit; limits of others are plain numbers."""
 
+Limits = tuple[float, float]
+"""The least and the largest value that a signal can have."""
+ANY_NUMBER: Limits = (-INFINITE, INFINITE)
+
 
 # Names
 
@@ -75,7 +80,9 @@ class Scene:
         bounds: The least and the greatest coordinates of the home (x, y, x, y) [m].
         remaining: Time from now to the end of the run.
         interactions: What robots want of people, by name.
-        notes: Notes for readers, about kinds of rooms that the home doesn't have.
+        limits: For each metric, what returns the least and the largest value of a number of it.
+        notes: Notes for readers: kinds of rooms that the home doesn't have, and comparisons whose
+            outcome is certain.
     """
 
     names: Mapping[str, Collection[str]]
@@ -85,6 +92,7 @@ class Scene:
     bounds: tuple[float, float, float, float]
     remaining: timedelta
     interactions: Mapping[str, Interaction] = field(default_factory=dict)
+    limits: Mapping[str, Callable[[str], Limits]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def meant(self, name: "str | Term", of: Expectation) -> Expectation | None:
@@ -360,9 +368,16 @@ class Signal(Term):
     Where it is missing (an algorithm without an output so far), no comparison holds.
     """
 
+    between: ClassVar[Limits] = ANY_NUMBER
+    """Its least and its largest possible value."""
+
     def trace(self, run: RunSignals) -> Trace:
         """Return its values from the first judged step on."""
         raise NotImplementedError
+
+    def limits(self, scene: Scene) -> Limits:
+        """Return its least and its largest possible value in a run."""
+        return self.between
 
     __gt__ = _comparison(">")
     __ge__ = _comparison(">=")
@@ -395,6 +410,20 @@ def operand_text(value: "float | Signal", unit: str) -> str:
     return str(value) if isinstance(value, Signal) else number_text(value, unit)
 
 
+def _limits_of(value: "float | Signal", scene: Scene) -> Limits:
+    return value.limits(scene) if isinstance(value, Signal) else (value, value)
+
+
+def _range_text(signal: "Signal", limits: Limits) -> str:
+    """Return between which values a signal is, for messages."""
+    low, high = limits
+    if high == INFINITE:
+        return f"{signal} is {number_text(low, signal.unit)} or more"
+    if low == -INFINITE:
+        return f"{signal} is {number_text(high, signal.unit)} or less"
+    return f"{signal} is {number_text(low, signal.unit)} to {number_text(high, signal.unit)}"
+
+
 def values_of(value: "float | Signal", run: RunSignals) -> Trace:
     """Return a number or a signal at each step."""
     if isinstance(value, Signal):
@@ -425,6 +454,18 @@ class Arithmetic(Signal):
         if is_scaled or self.sign in "+-":
             return units[0]
         return "" if self.sign == "/" and len(set(units)) == 1 and len(units) == 2 else MIXED
+
+    def limits(self, scene: Scene) -> Limits:
+        """Return the least and the largest result; of quotients nothing is known."""
+        if self.sign == "/":
+            return ANY_NUMBER
+        ends = product(_limits_of(self.one, scene), _limits_of(self.other, scene))
+        one, other = np.array(list(ends)).T
+        with np.errstate(invalid="ignore"):
+            results = _SIGNS[self.sign](one, other)
+        if np.isnan(results).any():
+            return ANY_NUMBER
+        return float(results.min()), float(results.max())
 
     def trace(self, run: RunSignals) -> Trace:
         """Return the result at each step; missing where an operand is, and for 0 / 0."""
@@ -465,6 +506,30 @@ class SignalComparison(Expectation):
     def unit(self) -> str:  # type: ignore[override]
         """The unit of the signal; 1 if it has none."""
         return self.signal.unit or "1"
+
+    def check(self, scene: Scene) -> None:
+        """Refuse what the run doesn't have; note a comparison that always holds, or never."""
+        super().check(scene)
+        low, high = self.signal.limits(scene)
+        least, largest = _limits_of(self.limit, scene)
+        is_above = low > largest
+        is_below = high < least
+        is_never = {
+            ">": high <= least, ">=": is_below, "<": low >= largest, "<=": is_above,
+            "==": is_above or is_below, "!=": False,
+        }  # fmt: skip
+        is_always = {
+            ">": is_above, ">=": is_above, "<": is_below, "<=": is_below,
+            "==": False, "!=": is_above or is_below,
+        }  # fmt: skip
+        if is_never[self.sign] or is_always[self.sign]:
+            outcome = "can't hold" if is_never[self.sign] else "always holds"
+            facts = [_range_text(self.signal, (low, high))]
+            if isinstance(self.limit, Signal):
+                facts.append(_range_text(self.limit, (least, largest)))
+            elif (low, high) == (0, 1) and 1 < self.limit <= 100:
+                facts.append(f"write {self.limit / 100:g} for {self.limit:g} %")
+            scene.notes.append(f"{self} {outcome}: {'; '.join(facts)}")
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the distance of the signal from the limit, below 0 on the wrong side."""

@@ -475,6 +475,7 @@ class count(Total):
     """How often a condition has begun: in the present hour, day or week, or in the run so far."""
 
     unit = "times"
+    between = (0.0, INFINITE)
 
     def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
         """Return how many occasions have passed."""
@@ -497,6 +498,7 @@ class share(Total):
     of: Expectation | None = field(default=None, kw_only=True)
 
     unit = "share"
+    between = (0.0, 1.0)
 
     def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
         """Return the share of the steps that have passed."""

@@ -5,6 +5,7 @@ fields are its arguments, `check` refuses names that a run doesn't have, and `me
 values. It can be written in texts and imported from `fleet2d.expectations` at once.
 """
 
+import math
 from collections.abc import Collection, Iterator
 from dataclasses import field
 from typing import Any, get_args
@@ -19,6 +20,7 @@ from fleet2d.entities.behavior import Actor, HoursSpan
 from fleet2d.entities.power import PowerState
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.expectations.expectation import (
+    INFINITE,
     WORDS,
     Expectation,
     RunSignals,
@@ -82,6 +84,7 @@ class distance(NumberSignal):
 
     of = BODY
     unit = "m"
+    between = (0.0, INFINITE)
 
     def __post_init__(self) -> None:
         if isinstance(self.other, tuple | list):
@@ -200,9 +203,37 @@ def _pose(pose: Any) -> I64:
 
 
 class speed(_Motion, NumberSignal):
-    """The speed of a body: the distance from its position at the step before, per step [m/s]."""
+    """The speed of a body: the distance from its position at the step before, per step [m/s].
+
+    Positions are whole lattice units, so that a step may be a little longer than the body's own
+    speed, or its speed in a slow area, allows: such a step is at that speed.
+    """
 
     unit = "m/s"
+    between = (0.0, INFINITE)
+
+    def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
+        """Return the body's own speed, and the memory of its way."""
+        usual = run.actors[run.row(self.body)].entity.speed
+        return usual, super().start(run, gauge)
+
+    def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
+        """Return the speed over a block of steps [m/s]."""
+        usual, gauge.memory = gauge.memory
+        measured = super().measure(block, gauge)
+        _, _, steps_per_s = gauge.memory
+        gauge.memory = usual, gauge.memory
+        # Both ends of a step are rounded by up to half a unit in x and in y.
+        rounding = math.sqrt(2) / block.home.plan.lattice.units_per_m * steps_per_s
+        speeds_driven = [usual, *(usual * float(area.speed) for area in block.home.slows)]
+
+        def without_rounding(value: F64) -> F64:
+            for driven in speeds_driven:
+                is_rounded = (value > driven) & (value <= driven + rounding)
+                value = np.where(is_rounded, driven, value)
+            return value
+
+        return measured.map(without_rounding)
 
 
 class battery(NumberSignal):
@@ -215,6 +246,7 @@ class battery(NumberSignal):
 
     of = ("robot with a battery", "batteries")
     unit = "share"
+    between = (0.0, 1.0)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the course of the charge along each plan, so far the present one."""

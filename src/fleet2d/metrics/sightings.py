@@ -73,6 +73,7 @@ class Detections(Metric):
     """
 
     unit = "share"
+    units = {"unknown_truth": "observations"}
     better = dict.fromkeys(("recall", "precision", "recognized"), "higher")
 
     def start(self, home: Home) -> None:

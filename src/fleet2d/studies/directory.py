@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import BaseModel, ConfigDict
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as, extra
+from fleet2d.metrics.metric import limits_of
 from fleet2d.storage.files import PARTIAL, FolderLock
 from fleet2d.studies.intervals import Limits
 from fleet2d.studies.results import VARIANT, check_numbers, read_results
@@ -59,9 +59,6 @@ class Counts:
     def missing(self) -> int:
         """The number of variants without results."""
         return self.total - self.complete - self.failed
-
-
-SHARE = "share"  # the unit of numbers from 0 to 1 begins with it
 
 
 class MetricFacts(BaseModel):
@@ -130,11 +127,7 @@ class Meta(BaseModel):
 
     def limits(self, metric: str) -> Limits:
         """Return the least and the largest value that a metric can have; a share is 0 to 1."""
-        if self.unit(metric).startswith(SHARE):
-            return 0.0, 1.0
-        facts, last = self._facts(metric)
-        least = facts.least.get(last, facts.least.get("", -math.inf))
-        return least, facts.largest.get(last, facts.largest.get("", math.inf))
+        return limits_of(*self._facts(metric))
 
     def better(self, metric: str) -> str:
         """Return which values of a metric are better, `higher` or `lower`; empty: neither is."""
