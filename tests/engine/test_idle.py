@@ -83,3 +83,27 @@ def test_an_entry_of_the_script_whose_event_never_comes_is_noted_at_the_end() ->
         note for note in fleet2d.run(document).manifest["notes"] if "script" not in note
     ]
     assert notes(document) == ["script.1: replan was never applied: no came_home ana came"]
+
+
+def family(*members: str, **users: Any) -> list[str]:
+    """Return what notes say of households: of ana, and of more users."""
+    household = {"members": dict.fromkeys(members, "works_outside")}
+    everybody = {"ana": {"type": "routine", "household": household}} | users
+    simulation = fleet2d.Simulation(scenario("10 min", users=everybody))
+    return [note for note in simulation.notes if "household" in note]
+
+
+def test_a_member_of_a_household_who_is_no_user_is_noted() -> None:
+    assert family("ana", "ben") == [
+        "users.ana.household: ben is a member and no user: add users.ben, or leave ben out"
+    ]
+    assert family("ana") == []
+
+
+def test_members_with_different_settings_of_their_household_are_noted() -> None:
+    other = {"members": {"ana": "works_outside", "ben": "works_outside"}, "welcome": 0.1}
+    found = family("ana", "ben", ben={"type": "routine", "household": other})
+    advice = "give users.ben the same household, with the same settings"
+
+    assert found[0] == f"users.ana.household: ben is a member, but lives apart: {advice}"
+    assert family("ana", "ben", ben={"type": "routine", "household": other | {"welcome": 0}}) == []

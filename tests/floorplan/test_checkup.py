@@ -63,6 +63,15 @@ def test_doorway_that_ends_before_the_wall_does_is_told_with_the_gap() -> None:
     assert "though they are only 0.009 m apart at (5.20, " in part.text  # 0.01 m on the lattice
 
 
+def test_a_no_go_area_without_floor_is_noted() -> None:
+    areas = [shapely.box(1, 1, 2, 2), shapely.box(100, 100, 101, 101)]
+
+    assert home(no_go=areas).notes == (
+        "no_go.1, from (100, 100) to (101, 101) m, has no part of the floor: robots keep out of"
+        " nothing there",
+    )
+
+
 def test_no_go_areas_over_most_of_the_floor_are_found() -> None:
     finding = only(checkup(home(no_go=[shapely.box(0, 0, 10, 3)])))
 

@@ -1,4 +1,4 @@
-"""Remarks on what has no effect in a run: behaviors without a turn, requests that nobody makes."""
+"""Remarks on what has no effect in a run: behaviors, requests, households."""
 
 from collections.abc import Iterator, Sequence
 
@@ -47,3 +47,29 @@ def unasked_interactions(actors: Sequence[Actor]) -> Iterator[str]:
                 f"{actor.path}: none of its behaviors asks for what it wants by interactions,"
                 f" {names}: add interact or opportunistic, or its requests only expire"
             )
+
+
+def split_households(users: Sequence[Actor]) -> Iterator[str]:
+    """Yield a remark on each member of a household who doesn't live in it."""
+    households = {
+        user.name: household
+        for user in users
+        for behavior in user.behaviors
+        if (household := getattr(behavior, "household", None)) is not None
+    }
+    names = {user.name for user in users}
+    told = list[object]()
+    for user in users:
+        household = households.get(user.name)
+        if household is None or household in told:
+            continue
+        told.append(household)
+        for member in household.members:
+            where = f"{user.path}.household: {member} is a member"
+            if member not in names:
+                yield f"{where} and no user: add users.{member}, or leave {member} out"
+            elif households.get(member) != household:
+                yield (
+                    f"{where}, but lives apart: give users.{member} the same household, with the"
+                    " same settings"
+                )

@@ -223,6 +223,17 @@ def _scaled(part: Any, scale: float) -> Any:
 __all__ = ["FloorPlan", "LabelledRegion", "Room"]
 
 
+def _areas_without_floor(free: BaseGeometry, no_go: Sequence[Polygon]) -> Iterator[str]:
+    """Yield a note on each area to keep out of that has no part of the free space [m]."""
+    for number, area in enumerate(no_go):
+        if not area.intersects(free):
+            x0, y0, x1, y1 = area.bounds
+            yield (
+                f"no_go.{number}, from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m, has no part of the"
+                " floor: robots keep out of nothing there"
+            )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FloorPlan:
     """The inside of a home, immutable; plans of equal content are equal.
@@ -375,7 +386,14 @@ class FloorPlan:
             objects=number_objects(objects),
             no_go=tuple(no_go),
             glass=panes,
-            notes=(*notes, *part_notes(lattice, polygons), *room_notes, *door_notes, *glass_notes),
+            notes=(
+                *notes,
+                *part_notes(lattice, polygons),
+                *room_notes,
+                *door_notes,
+                *glass_notes,
+                *_areas_without_floor(free, no_go),
+            ),
             regions=tuple(regions),
             lost_doorways=tuple(line for line, at in found if at is None),
         )
