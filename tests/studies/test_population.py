@@ -102,6 +102,18 @@ def test_rows_of_a_table_are_drawn_by_their_weights_with_all_their_columns(tmp_p
         assert 40 <= plan.get("area_m2", 50) <= 60
 
 
+def test_lives_whose_homes_are_not_as_their_rows_say_are_left_out_and_counted(
+    tmp_path: Path,
+) -> None:
+    text = "household,region,rooms\nretired,town,..6\nstudent,country,7..\n"
+    axis = PopulationAxis(population=4, homes=SYNTHETIC, table=table(tmp_path, text))
+
+    lives = find_lives(axis, "robot", Document(BASE))
+    for life in lives:
+        assert (life.labels["region"] == "town") == (int(str(life.labels["rooms"])) <= 6)
+    assert "as their rows say" in lives.words
+
+
 @pytest.mark.parametrize(
     ("text", "keys", "words"),
     [

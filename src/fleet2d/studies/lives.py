@@ -313,6 +313,12 @@ class Draw:
                     return f"no {lacking[0]}"
             elif column in labels and condition != FIT and not fulfils(labels[column], condition):
                 return f"{column} is not {condition_words(condition)}"
+        # The program of a synthetic home has the bedrooms and the area of its row, and no more.
+        for column in ("people", "rooms"):
+            condition = read_condition(life.row.get(column))
+            is_asked = condition is not None and labels.get(column) is not None
+            if is_asked and not fulfils(labels[column], condition):
+                return f"{column} is not {condition_words(condition)}, as their rows say"
         return ""
 
 
