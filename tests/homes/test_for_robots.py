@@ -49,6 +49,16 @@ def corners(polyline: ET.Element) -> list[tuple[float, ...]]:
     return [tuple(map(float, point.text.split())) for point in polyline if point.tag == "point"]  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("target", ["map.pgm", "home.sdf"])
+def test_convert_for_robots_says_what_a_map_or_a_world_leaves_out(
+    fleet2d: Cli, target: str
+) -> None:
+    code, out, _ = fleet2d("convert", "family_home", target)
+
+    assert code == 0
+    assert "left out, as it holds only what stands in the way: 14 rooms, 14 doorways" in out
+
+
 def test_convert_writes_both_and_replaces_nothing(fleet2d: Cli) -> None:
     assert 0 == fleet2d("convert", "synthetic:7", "map.pgm")[0]
     assert 0 == fleet2d("convert", "synthetic:7", "home.sdf")[0]

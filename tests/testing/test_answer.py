@@ -46,6 +46,13 @@ def test_equal_builds_say_what_may_have_gone_unseen() -> None:
     )
 
 
+def test_builds_between_which_nothing_differs_at_all_are_asked_about() -> None:
+    asked = "nothing holds by more or less: do both builds differ in what these tests use?"
+
+    assert asked in str(answer(gate(set(), set())))
+    assert asked not in str(answer(gate(set(), set(), margin=0.75)))
+
+
 def test_a_difference_that_may_be_chance_says_how_many_trials_would_show_it() -> None:
     # 3 of 20 are worse: 2 / 2**3 is .25, and 2 / 2**6 is below .05.
     says = " ".join(answer(gate({1, 2, 3}, set())).sentences)

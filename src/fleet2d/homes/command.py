@@ -30,11 +30,13 @@ def convert(
       fleet2d convert synthetic:7 home.sdf
     """
     from fleet2d.floorplan.load import load_floorplan, save_floorplan
-    from fleet2d.homes.for_robots import save_map, save_world
+    from fleet2d.homes.for_robots import left_out_for_robots, save_map, save_world
 
     plan = load_floorplan(source, resolution=resolution, scale=scale)
-    save = {".pgm": save_map, ".sdf": save_world}.get(target.suffix.lower(), save_floorplan)
+    for_robots = {".pgm": save_map, ".sdf": save_world}.get(target.suffix.lower())
+    save = for_robots or save_floorplan
     save(plan, target)
-    for note in plan.notes:
+    lost = [left_out_for_robots(plan)] if for_robots else []
+    for note in [*plan.notes, *lost]:
         typer.echo(f"note: {note}")
     typer.echo(target)

@@ -237,10 +237,13 @@ def _unseen(gate: Gate, ordered: Sequence[Tally]) -> str:
         return "; ".join([text, *filter(None, more)][:2])
     units = min(change.pairs for change in gate.changes)
     rate = percent(1 - ERROR ** (1 / units))
-    return (
+    text = (
         f"All {counted(pairs, 'verdict')} are those of {gate.against}; what differs in less than"
         f" {rate} of trials may have gone unseen"
     )
+    if not any(change.narrower or change.wider for change in gate.changes):
+        text += "; nothing holds by more or less: do both builds differ in what these tests use?"
+    return text
 
 
 def _more(gate: Gate, each: Tally) -> str:
