@@ -266,6 +266,18 @@ def test_what_is_not_in_a_log_is_said() -> None:
     assert "kitchen" not in notes
 
 
+def test_rooms_whose_kind_nobody_knows_are_said() -> None:
+    minutes = np.zeros((6, DAY_MINUTES), np.int16)
+    minutes[:, 23 * 60 :], minutes[:, : 7 * 60] = 1, 1
+    states = (ActivityPlace("", "zimmer_9"), ActivityPlace("sleep", "bedroom"))
+    timeline = Timeline(states, minutes, minutes.repeat(60, axis=1), None)
+
+    assert (
+        "rooms of no known kind: zimmer_9; in a home without such rooms the persona is in any room"
+        " instead: --rooms LABEL=KIND says what they are"
+    ) in gaps(timeline, find_days(timeline))
+
+
 # Distances
 
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import yaml
 
+from fleet2d.floorplan.rooms.room import PRIORITY
 from fleet2d.learning.fit.privacy import private_days
 from fleet2d.learning.fit.timeline import (
     ActivityPlace,
@@ -185,6 +186,13 @@ def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
         if all(state.place != place for state in timeline.states):
             where = "out of the home" if place == AWAY else f"in a {place}"
             notes.append(f"nobody is ever {where} in this log, nor will the persona be")
+    known = {AWAY, *PRIORITY, *USUAL_ROOMS}
+    unusual = [place for place in timeline.places if place not in known]
+    if unusual:
+        notes.append(
+            f"rooms of no known kind: {', '.join(unusual)}; in a home without such rooms the"
+            " persona is in any room instead: --rooms LABEL=KIND says what they are"
+        )
     if not any(state.activity and not is_sleep(state) for state in timeline.states):
         notes.append("activities have no names: postures and furniture follow from rooms alone")
     return notes
