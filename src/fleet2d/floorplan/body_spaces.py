@@ -47,7 +47,7 @@ class BodySpace:
         radius: float,
         parts: Sequence[Polygon],
         removed: tuple[BaseGeometry, ...] = (),
-        near: "_Surroundings | None" = None,
+        near: "_NearSpace | None" = None,
     ) -> None:
         """Remember a space.
 
@@ -90,7 +90,7 @@ class BodySpace:
         pieces = [_pieces(polygon, blocked) for polygon in self._near.polygons]
         leads_round = all(len(polygons) == 1 for polygons in pieces)
         if leads_round and not shapely.intersects_xy(blocked, x, y).any():
-            near = _Surroundings(window, [polygon for (polygon,) in pieces])
+            near = _NearSpace(window, [polygon for (polygon,) in pieces])
             removed = (*self._removed, blocked)
             return BodySpace(self._plan, self.radius, self._parts, removed, near)
         for part in self.parts:
@@ -102,7 +102,7 @@ class BodySpace:
         )
         return None if (before & ~after).any() else BodySpace(self._plan, self.radius, left)
 
-    def _clipped(self, window: Window) -> "_Surroundings":
+    def _clipped(self, window: Window) -> "_NearSpace":
         """Return the part of the space within some rows and columns."""
         rows, columns = window
         ends = (columns.start, rows.start, columns.stop, rows.stop)
@@ -112,10 +112,10 @@ class BodySpace:
         if removed:
             inside = shapely.difference(inside, shapely.union_all(removed))
         parts = shapely.get_parts(inside).tolist()
-        return _Surroundings(window, [part for part in parts if part.geom_type == "Polygon"])
+        return _NearSpace(window, [part for part in parts if part.geom_type == "Polygon"])
 
 
-class _Surroundings(NamedTuple):
+class _NearSpace(NamedTuple):
     """The part of a space around a room.
 
     Attributes:
