@@ -25,7 +25,7 @@ def idle_behaviors(actors: Sequence[Actor], scenario: Scenario) -> Iterator[str]
         if actor.name in switched or is_own(actor):
             continue
         for number, behavior in enumerate(actor.behaviors[:-1]):
-            if behavior.always_decides() and not (behavior.when or behavior.cooldown):
+            if not behavior.leaves_turns():
                 first = behavior.type_name
                 later = " and ".join(each.type_name for each in actor.behaviors[number + 1 :])
                 never = "gets" if number + 2 == len(actor.behaviors) else "get"

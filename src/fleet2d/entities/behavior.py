@@ -354,6 +354,8 @@ class Behavior(Component):
     is_recorded: ClassVar[bool] = False
     # Whether it reads what its robot remembers of its sightings, by `actor.recall`.
     remembers: ClassVar[bool] = False
+    # Whether it has a plan whenever it is asked, so that none after it is.
+    always_decides: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
     # Height of a user with it, unless the scenario says it [m].
@@ -413,9 +415,9 @@ class Behavior(Component):
         """Add the way to where one of its activities is done to a plan."""
         raise NotImplementedError
 
-    def always_decides(self) -> bool:
-        """Return whether it has a plan whenever it is asked, so that none after it is."""
-        return False
+    def leaves_turns(self) -> bool:
+        """Return whether behaviors after it may ever be asked."""
+        return not self.always_decides or bool(self.when or self.cooldown)
 
     def busy(self) -> bool:
         """Return whether it is in the middle of something that hours and cooldown don't end."""

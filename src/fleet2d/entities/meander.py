@@ -27,6 +27,8 @@ class Meander(Behavior):
         at_walls: At a wall: turn by any angle, or by small ones until the way is free.
     """
 
+    always_decides = True
+
     turn_std_deg: AngleDeg = Field(default=15.0, ge=0, le=36000)
 
     at_walls: Literal["turn", "stay"] = "turn"
@@ -42,10 +44,6 @@ class Meander(Behavior):
             turn_limit=min(max(1, math.floor(actor.turn_rate * step_s)), TURN // 2),
             stays=int(self.at_walls == "stay"),
         )
-
-    def always_decides(self) -> bool:
-        """Return true: it always has a plan."""
-        return True
 
     def decide(self, now: Situation) -> Plan:
         """Walk on."""

@@ -77,9 +77,9 @@ class Dock(Behavior):
         falls = charge.falls_to(self.threshold, plan.finish())
         return None if falls is None else now.actor.clock.start + timedelta(microseconds=falls)
 
-    def always_decides(self) -> bool:
-        """Return whether it rests at the charger when there is nothing else to do."""
-        return self.rest
+    def leaves_turns(self) -> bool:
+        """Return whether behaviors after it may be asked: not if it rests instead."""
+        return not self.rest or bool(self.when or self.cooldown)
 
     def decide(self, now: Situation) -> Plan | None:
         """Charge, if the charge is low; rest at the charger, if `rest` says so."""

@@ -254,6 +254,7 @@ class Hangout(BeliefBehavior):
         quiet: Hours in which it doesn't move.
     """
 
+    always_decides = True
     records = frozenset({EventKind.EXPLORES, EventKind.RELOCATES})
 
     period: PositiveDuration = timedelta(minutes=30)
@@ -283,10 +284,6 @@ class Hangout(BeliefBehavior):
         self.place: int | None = None
         self.decides_at = actor.clock.start
         self.is_blocked = False  # a person is on its place, or in front of it
-
-    def always_decides(self) -> bool:
-        """Return true: it always has a plan."""
-        return True
 
     def decide(self, now: Situation) -> Plan:
         """Stay, or go to a better place; go back to its place after another behavior's turn."""

@@ -55,6 +55,7 @@ class Patrol(Behavior):
             from which it sees all places at the room's furniture (without any, 95 % of the floor).
     """
 
+    always_decides = True
     resumes = True
 
     rooms: Literal["all"] | tuple[Place, ...] = "all"
@@ -103,10 +104,6 @@ class Patrol(Behavior):
 
     def _stops_in(self, actor: Actor, room: Room) -> Sequence[LatticePoint]:
         return stops_with_view(actor, room) if self.stop_at == "view" else [actor.middle(room)]
-
-    def always_decides(self) -> bool:
-        """Return true: it always has a plan."""
-        return True
 
     def decide(self, now: Situation) -> Plan:
         """Plan one round."""
@@ -242,6 +239,7 @@ class Retrace(Behavior):
             left out.
     """
 
+    always_decides = True
     records = frozenset({EventKind.RETRACED, EventKind.RETRACES})
     resumes = True
 
@@ -282,10 +280,6 @@ class Retrace(Behavior):
                 f" {self.reach:g} m of where the robot can be and goes: is this the home of that"
                 " map?"
             )
-
-    def always_decides(self) -> bool:
-        """Return true: it always has a plan."""
-        return True
 
     def decide(self, now: Situation) -> Plan:
         """Drive the whole path."""

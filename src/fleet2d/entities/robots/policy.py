@@ -372,6 +372,7 @@ class Policy(LearnedBehavior):
         deadline: Duration of a search after which it gives up (find).
     """
 
+    always_decides = True
     records = frozenset(
         {
             EventKind.DOCKS, EventKind.FIND_BEGINS, EventKind.FOUND, EventKind.GAVE_UP,
@@ -501,10 +502,6 @@ class Policy(LearnedBehavior):
         if self.since is not None and now.time >= self.since + self.deadline:
             return EventKind.GAVE_UP
         return None
-
-    def always_decides(self) -> bool:
-        """Return true: it always has a plan."""
-        return True
 
     def decide(self, now: Situation) -> Plan | None:
         """Carry out the action that the policy chooses."""

@@ -481,6 +481,7 @@ class Replay(Behavior, LogKeys):
         reach: A position farther than this from free space is left out.
     """
 
+    always_decides = True
     records = frozenset({EventKind.KNOWN, EventKind.REPLAY, EventKind.UNKNOWN})
     is_recorded = True
 

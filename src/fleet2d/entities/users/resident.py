@@ -422,6 +422,8 @@ class ResidentBehavior(Behavior):
             whom this holds; members of a household have such anyway.
     """
 
+    always_decides = True
+
     small_moves: bool = True
     own_places: bool = False
 

@@ -43,6 +43,8 @@ class RoomSampling(Behavior):
         dwell: How long a visit takes.
     """
 
+    always_decides = True
+
     shares: dict[str, float] = Field(
         min_length=1, examples=[{"living_room": 0.4, "bedroom": 0.4, "kitchen": 0.2}]
     )
@@ -160,6 +162,7 @@ class Pet(Behavior):
         spots: Smallest and largest number of stops between two naps.
     """
 
+    always_decides = True
     usual_height = 0.3
 
     rooms: tuple[str, ...] = ()

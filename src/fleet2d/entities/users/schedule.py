@@ -95,6 +95,8 @@ class Schedule(Behavior):
         rest: Where it goes when an item is over and nothing is due.
     """
 
+    always_decides = True
+
     days: tuple[Agenda, ...] = Field(min_length=1)
     rest: Place = ("living_room", "any")
 
