@@ -68,6 +68,10 @@ class FloorPlanError(InputError):
     """A floor plan can't be read, or isn't a home."""
 
 
+class NoLayoutError(FloorPlanError):
+    """No layout of a synthetic home was found that meets a request."""
+
+
 class UnclearPlaceError(FloorPlanError):
     """A picture is no home because of one place in it.
 

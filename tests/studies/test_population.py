@@ -12,11 +12,12 @@ from tests.studies.scenes import CountingExecutor, run
 from tests.studies.test_driver import CollectingObserver
 
 from fleet2d.configuration.documents import Document
-from fleet2d.errors import Fleet2DError, RunDirectoryError, ScenarioError
+from fleet2d.errors import Fleet2DError, NoLayoutError, RunDirectoryError, ScenarioError
 from fleet2d.learning.datasets.specification import plan_dataset
+from fleet2d.studies import population
 from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.households import bedrooms_needed, members_of
-from fleet2d.studies.lives import Draw, DrawSettings
+from fleet2d.studies.lives import Draw, DrawSettings, HomeFeatures
 from fleet2d.studies.population import PopulationAxis, find_lives
 from fleet2d.studies.specification import read_specification
 
@@ -219,6 +220,34 @@ def test_what_is_left_out_is_noted_and_stored(tmp_path: Path) -> None:
     observer = CollectingObserver()
     _, study = run(fleet(1, where={"people": 2}), tmp_path / "fleet", observer=observer)
     assert "people is not 2" in study.meta.notes
+
+
+def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A fleet of 2,000 was refused, as for two of its homes no layout was found."""
+    built = iter(range(100))
+
+    def facts_of(*_: Any) -> HomeFeatures:
+        if next(built) in {0, 2}:
+            raise NoLayoutError("no synthetic home was found")
+        return HomeFeatures(7, 3, 120.0, frozenset({"bedroom"}))
+
+    monkeypatch.setattr(population, "facts_of", facts_of)
+    lives = find_lives(PopulationAxis(population=3, homes=SYNTHETIC), "robot", Document(BASE))
+    assert [1, 3, 4] == lives.numbers.tolist()
+    assert f"robot: 2 left out: 2 ({population.NO_LAYOUT})" == lives.words
+
+
+def test_a_fleet_of_which_no_home_has_a_layout_is_refused_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def facts_of(*_: Any) -> HomeFeatures:
+        raise NoLayoutError("no synthetic home was found: ask for more or less area")
+
+    monkeypatch.setattr(population, "facts_of", facts_of)
+    with pytest.raises(ScenarioError, match=r"ask for more or less area; 2 more likewise"):
+        find_lives(PopulationAxis(population=3, homes=SYNTHETIC), "robot", Document(BASE))
 
 
 def test_data_sets_draw_and_leave_out_as_studies_do(tmp_path: Path) -> None:

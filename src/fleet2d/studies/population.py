@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from fleet2d.configuration.components import OneOf
 from fleet2d.configuration.documents import Document
-from fleet2d.errors import Fleet2DError, ScenarioError
+from fleet2d.errors import Fleet2DError, NoLayoutError, ScenarioError
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.studies.axes import (
@@ -49,6 +49,8 @@ FEW_HOMES = 8
 MAX_PROBLEMS = 10
 # The number of lives or variants that are named beside the first one of a reason.
 MAX_NAMED = 5
+# Why a life is left out whose synthetic home isn't found, though others are.
+NO_LAYOUT = "no layout of its home was found"
 
 
 class PopulationAxis(Axis, DrawSettings):
@@ -119,12 +121,24 @@ class FactsJob:
 
     base: Document
 
-    def __call__(self, task: "HomeTask") -> HomeFeatures | str:
+    def __call__(self, task: "HomeTask") -> "HomeFeatures | UnbuiltHome":
         """Return the facts of a home, or why it can't be built."""
         try:
             return facts_of(self.base, task.changes)
         except Fleet2DError as error:
-            return str(error)
+            return UnbuiltHome(str(error), isinstance(error, NoLayoutError))
+
+
+class UnbuiltHome(NamedTuple):
+    """A home that can't be built.
+
+    Attributes:
+        reason: Why.
+        by_chance: Whether another synthetic home of as many rooms might be found.
+    """
+
+    reason: str
+    by_chance: bool
 
 
 @dataclass(frozen=True)
@@ -249,6 +263,7 @@ class LifeFinder:
         self._crew = crew or Crew(SerialExecutor())
         self._on_progress = on_progress
         self._facts: dict[str, HomeFeatures] = {}
+        self._unbuilt = set[str]()
         if draw.asks_homes:
             listed = draw.homes.listed
             changes = [draw.homes[place].changes for place in listed]
@@ -280,13 +295,14 @@ class LifeFinder:
                 changes = [_home_changes(life) for life in lives]
                 self._build(changes, [f"life {life.number} ({life.home.words})" for life in lives])
             for life in lives:
-                facts = self._facts[repr(_home_changes(life))] if needs_facts else None
-                if facts is None or not self._is_left_out(life, facts):
+                facts = self._facts.get(repr(_home_changes(life))) if needs_facts else None
+                if not self._is_left_out(life, facts):
                     kept.append(life.number)
         return kept
 
     def _is_left_out(self, life: FleetLife, facts: HomeFeatures | None) -> bool:
-        reason = self._draw.left_out(life, facts)
+        is_unbuilt = repr(_home_changes(life)) in self._unbuilt
+        reason = NO_LAYOUT if is_unbuilt else self._draw.left_out(life, facts)
         if reason:
             self.left_out[reason] += 1
         return bool(reason)
@@ -295,26 +311,34 @@ class LifeFinder:
         """Build homes, unless they are known.
 
         Raises:
-            ScenarioError: Some can't be built.
+            ScenarioError: Some can't be built, other than by chance, or none can.
         """
         new = {repr(c): (c, name) for c, name in zip(changes, names, strict=True)}
-        keys = [key for key in new if key not in self._facts]
+        keys = [key for key in new if key not in self._facts and key not in self._unbuilt]
         tasks = ((1, iter([HomeTask(i, i, "", "", new[k][0])])) for i, k in enumerate(keys))
         crew = (
             self._crew if len(keys) > FEW_HOMES else Crew(SerialExecutor(), plans=self._crew.plans)
         )
         problems: dict[int, str] = {}
+        by_chance = set[int]()
         done = 0
         with closing(run_tasks(crew, FactsJob(self._base), TaskQueue(tasks))) as rounds:
             for ends in rounds:
                 done += len(ends)
                 self._on_progress(done, len(keys))
                 for end in ends:
-                    key = keys[end.task.number]
+                    number = end.task.number
+                    key = keys[number]
                     if isinstance(end.payload, HomeFeatures):
                         self._facts[key] = end.payload
-                    else:
-                        problems[end.task.number] = f"{new[key][1]}: {end.loss or end.payload}"
+                        continue
+                    unbuilt = end.payload or UnbuiltHome(str(end.loss), by_chance=False)
+                    problems[number] = f"{new[key][1]}: {unbuilt.reason}"
+                    if unbuilt.by_chance:
+                        by_chance.add(number)
+        if self._facts:
+            self._unbuilt |= {keys[number] for number in by_chance}
+            problems = {n: text for n, text in problems.items() if n not in by_chance}
         raise_problems([problems[number] for number in sorted(problems)])
 
 

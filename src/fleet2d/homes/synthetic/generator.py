@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from fleet2d.errors import FloorPlanError
+from fleet2d.errors import NoLayoutError
 from fleet2d.homes.synthetic.plans import RoomLayout, draw_layout
 from fleet2d.homes.synthetic.program import (
     SIZES,
@@ -476,7 +476,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
         style: The request for its shape.
 
     Raises:
-        FloorPlanError: No home was found that meets the request.
+        NoLayoutError: No home was found that meets the request.
     """
     decided = settle_wishes(wishes, Choices(seed, "wishes"), style)
     used = style
@@ -518,7 +518,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     for best in sorted(candidates, key=lambda candidate: candidate.cost):
         with suppress(MisfitError):
             return _finish(best, Choices(seed, "doors"), style)
-    raise FloorPlanError(_failure(decided, style))
+    raise NoLayoutError(_failure(decided, style))
 
 
 def _tastes(choices: Choices, style: Style) -> Prices:
