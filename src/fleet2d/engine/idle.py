@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 
 from fleet2d.engine.intervention_queue import is_own
 from fleet2d.entities.behavior import Actor
-from fleet2d.interventions.robots import SwitchOff
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
 
@@ -16,11 +15,7 @@ def idle_behaviors(actors: Sequence[Actor], scenario: Scenario) -> Iterator[str]
         actors: The bodies.
         scenario: The scenario, whose script may switch a behavior off.
     """
-    switched = {
-        entry.act.entity
-        for entry in scenario.script
-        if isinstance(entry.act, SwitchOff) and entry.act.behavior is not None
-    }
+    switched = _switched_by(scenario)
     for actor in actors:
         if actor.name in switched or is_own(actor):
             continue
@@ -34,6 +29,19 @@ def idle_behaviors(actors: Sequence[Actor], scenario: Scenario) -> Iterator[str]
                     f" plan: put {first} last, or give it hours (when) or a cooldown"
                 )
                 break
+
+
+def _switched_by(scenario: Scenario) -> set[str]:
+    """Return the bodies of which a script switches a behavior off."""
+    if not scenario.script:
+        return set()
+    from fleet2d.interventions.robots import SwitchOff  # few scenarios have a script
+
+    return {
+        entry.act.entity
+        for entry in scenario.script
+        if isinstance(entry.act, SwitchOff) and entry.act.behavior is not None
+    }
 
 
 def unasked_interactions(actors: Sequence[Actor]) -> Iterator[str]:
