@@ -153,6 +153,17 @@ def test_space_without_labels_is_divided_at_its_doorways() -> None:
     assert plan.rooms[0].area_m2 > plan.rooms[1].area_m2
 
 
+def test_a_plan_without_labels_notes_that_its_rooms_are_divided_by_walls() -> None:
+    """Half of sixty drawings came back with another number of rooms, and said nothing."""
+    flat, room = (
+        FloorPlan.build("home", free, [], doorways=None, regions_are="none")
+        for free in (space(LEFT, RIGHT, DOOR), space(LEFT))
+    )
+    (note,) = flat.notes
+    assert "divide its floor into 2" in note
+    assert () == room.notes
+
+
 def test_niche_behind_a_narrow_gap_is_no_room() -> None:
     niche, gap = (4.1, 2.0, 4.7, 3.4), (4.0, 2.0, 4.1, 2.9)
 

@@ -578,12 +578,17 @@ def number_rooms(lattice: Lattice, room_of_cell: I64) -> tuple[I16, tuple[Room, 
         room_of_cell: The room of each cell, -1 where not free, (rows, columns).
 
     Returns:
-        As `assign_rooms`.
+        As `assign_rooms`, with a note if there are several.
     """
     count = int(room_of_cell.max()) + 1
-    kind = ROOM if count > 1 else None
+    is_divided = count > 1
+    kind = ROOM if is_divided else None
     regions = [LabelledRegion((), Polygon(), type=kind) for _ in range(count)]
-    return (*make_rooms(lattice, room_of_cell, regions), [])
+    notes = [
+        f"the file tells no rooms: walls and passages divide its floor into {count}, which may be"
+        " others than people see; look at them, and name or redraw them by floorplan.rooms"
+    ]
+    return (*make_rooms(lattice, room_of_cell, regions), notes if is_divided else [])
 
 
 def _neighbors(lattice: Lattice, painted: I64, passages: Sequence[Segment]) -> dict[int, set[int]]:
