@@ -27,7 +27,7 @@ from fleet2d.expectations.verdict import (
     is_decided,
     verdict_of,
 )
-from fleet2d.metrics.metric import limits_of
+from fleet2d.metrics.limits import limits_of
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import BaseModel, ConfigDict
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, errors_as, extra
-from fleet2d.metrics.metric import limits_of
+from fleet2d.metrics.limits import limits_of
 from fleet2d.storage.files import PARTIAL, FolderLock
 from fleet2d.studies.intervals import Limits
 from fleet2d.studies.results import VARIANT, check_numbers, read_results
