@@ -6,6 +6,7 @@
 #include "../grid.hpp"
 #include "giving_way.hpp"
 #include "legs.hpp"
+#include "line_of_sight.hpp"
 #include "mesh.hpp"
 #include "motion.hpp"
 #include "subjects.hpp"
