@@ -1,5 +1,6 @@
 """The ways by which a body gets round others, against trying one after the other."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -160,15 +161,21 @@ def random_rest(random: np.random.Generator) -> I64:
     return rows
 
 
-def test_a_body_goes_round_others_and_beside_those_at_its_stop() -> None:
-    random = np.random.default_rng(52)
-    found = {0: 0, 1: 0, 2: 0}
-    for _ in range(300):
+def rests(random: np.random.Generator, count: int) -> Iterator[tuple[I64, Timelines, int, int]]:
+    """Yield tracks of a body with many stops, its timelines, a step, and when it meets another."""
+    for _ in range(count):
         rows = random_rest(random)
         timelines = Timelines(1, SECOND)
         timelines.follow(0, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
         step = int(random.integers(0, 20))
         met = int(random.integers(step, step + 4)) * SECOND
+        yield rows, timelines, step, met
+
+
+def test_a_body_goes_round_others_and_beside_those_at_its_stop() -> None:
+    random = np.random.default_rng(52)
+    found = {0: 0, 1: 0, 2: 0}
+    for rows, timelines, step, met in rests(random, 300):
         stops = rows[[1, 2, 4]][random.integers(0, 3, 2)]
         discs = np.column_stack([stops[:, 1:3] + random.integers(-200, 200, (2, 2)), [250, 150]])
         beside = random.integers(100, 4000, 2).tolist() if random.integers(0, 5) else None
@@ -184,12 +191,7 @@ def test_a_body_goes_round_others_and_beside_those_at_its_stop() -> None:
 def test_a_body_goes_on_from_where_it_is_instead_of_a_stop() -> None:
     random = np.random.default_rng(53)
     found = {0: 0, 1: 0, 2: 0}
-    for _ in range(200):
-        rows = random_rest(random)
-        timelines = Timelines(1, SECOND)
-        timelines.follow(0, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
-        step = int(random.integers(0, 20))
-        met = int(random.integers(step, step + 4)) * SECOND
+    for rows, timelines, step, met in rests(random, 200):
         body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
         now = [step * SECOND, *timelines.pose(0, step)]
         ways = slow.way_from_here(now, rows.tolist(), met, walk, BEAT)

@@ -15,6 +15,7 @@ from tests.studies.scenes import SPEED, CountingExecutor, base, digests, run, sm
 from tests.thorough import some
 
 from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
+from fleet2d.storage import files
 from fleet2d.studies import design, driver, plan, results, storage
 from fleet2d.studies.executors import LocalExecutor, SerialExecutor
 from fleet2d.studies.plan import Changed
@@ -174,12 +175,10 @@ def test_a_data_set_of_many_slices_is_the_same(
 def test_a_full_disk_ends_it_and_the_same_command_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
 ) -> None:
-    replacing = storage.replacing
-
     def full(path: Path) -> AbstractContextManager[int]:
         if path.parent.name == "results" and path.exists():
             raise OSError(28, "No space left on device")
-        return replacing(path)
+        return files.replacing(path)
 
     with monkeypatch.context() as patched:
         patched.setattr(storage, "replacing", full)

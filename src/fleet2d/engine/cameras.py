@@ -47,7 +47,7 @@ from fleet2d.runtime.events import Event, new_event
 from fleet2d.runtime.local_time import even_parts, stamp_us
 from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
 from fleet2d.sight.fov import FieldOfView
-from fleet2d.sight.perception import ALWAYS, Perception
+from fleet2d.sight.perception import Perception
 
 if TYPE_CHECKING:
     from fleet2d.engine.heights import BodyHeights
@@ -592,36 +592,3 @@ def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U
     in_view = flags.reshape(len(queries), -1)
     bits: U64 = np.uint64(1) << np.arange(in_view.shape[1], dtype=np.uint64)
     return in_view @ bits
-
-
-def unused_settings(actors: Sequence[Actor], home: Home, *, heights: bool) -> Iterator[str]:
-    """Yield a remark on each setting of sight that has no effect in a run.
-
-    Args:
-        actors: The bodies.
-        home: The home.
-        heights: Whether heights matter.
-    """
-    x0, y0, x1, y1 = home.plan.bounds
-    across_m = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
-    for actor in actors:
-        entity = actor.entity
-        eyes = entity.eyes
-        common: Perception | None = getattr(entity, "perception", None)
-        if common is not None and not eyes:
-            yield f"{actor.path}.perception has no effect without a camera"
-        if actor.rules is not None and actor.rules.minds_sleep and not eyes:
-            yield f"{actor.path}.keep_out: while: asleep has no effect without a camera"
-        for name, camera in eyes.items():
-            where = f"{actor.path}.camera" if name == "camera" else f"{actor.path}.cameras.{name}"
-            perception = camera.perception or common
-            if camera.height is not None and not heights:
-                yield f"{where}.height has no effect without sight.heights: true"
-            if camera.range[0] > across_m:
-                yield (
-                    f"{where}.range begins at {camera.range[0]:g} m, and the home is"
-                    f" {across_m:.1f} m across: it never sees anybody"
-                )
-            has_shares = perception and perception.detection.visible_share != ALWAYS
-            if has_shares and not camera.body_points:
-                yield f"{where}: perception.detection.visible_share needs body_points"

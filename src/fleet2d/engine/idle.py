@@ -1,11 +1,14 @@
-"""Remarks on what has no effect in a run: behaviors, requests, households."""
+"""Remarks on what has no effect in a run: settings of sight, behaviors, requests, households."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from fleet2d.engine.intervention_queue import is_own
 from fleet2d.entities.behavior import Actor
+from fleet2d.floorplan.home import Home
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
+from fleet2d.sight.perception import ALWAYS, Perception
 
 
 def idle_behaviors(actors: Sequence[Actor], scenario: Scenario) -> Iterator[str]:
@@ -81,3 +84,36 @@ def split_households(users: Sequence[Actor]) -> Iterator[str]:
                     f"{where}, but lives apart: give users.{member} the same household, with the"
                     " same settings"
                 )
+
+
+def unused_settings(actors: Sequence[Actor], home: Home, *, heights: bool) -> Iterator[str]:
+    """Yield a remark on each setting of sight that has no effect in a run.
+
+    Args:
+        actors: The bodies.
+        home: The home.
+        heights: Whether heights matter.
+    """
+    x0, y0, x1, y1 = home.plan.bounds
+    across_m = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+    for actor in actors:
+        entity = actor.entity
+        eyes = entity.eyes
+        common: Perception | None = getattr(entity, "perception", None)
+        if common is not None and not eyes:
+            yield f"{actor.path}.perception has no effect without a camera"
+        if actor.rules is not None and actor.rules.minds_sleep and not eyes:
+            yield f"{actor.path}.keep_out: while: asleep has no effect without a camera"
+        for name, camera in eyes.items():
+            where = f"{actor.path}.camera" if name == "camera" else f"{actor.path}.cameras.{name}"
+            perception = camera.perception or common
+            if camera.height is not None and not heights:
+                yield f"{where}.height has no effect without sight.heights: true"
+            if camera.range[0] > across_m:
+                yield (
+                    f"{where}.range begins at {camera.range[0]:g} m, and the home is"
+                    f" {across_m:.1f} m across: it never sees anybody"
+                )
+            has_shares = perception and perception.detection.visible_share != ALWAYS
+            if has_shares and not camera.body_points:
+                yield f"{where}: perception.detection.visible_share needs body_points"

@@ -31,8 +31,12 @@ from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.configuration.problems import check_known, suggest
 from fleet2d.configuration.units import micros, parse_duration
 from fleet2d.engine.basis import input_files
-from fleet2d.engine.cameras import unused_settings
-from fleet2d.engine.idle import idle_behaviors, split_households, unasked_interactions
+from fleet2d.engine.idle import (
+    idle_behaviors,
+    split_households,
+    unasked_interactions,
+    unused_settings,
+)
 from fleet2d.engine.intervention_queue import is_from_outside
 from fleet2d.engine.loop import Loop
 from fleet2d.engine.sensors import Sensors

@@ -294,10 +294,10 @@ class LifeFinder:
             if needs_facts:
                 changes = [_home_changes(life) for life in lives]
                 self._build(changes, [f"life {life.number} ({life.home.words})" for life in lives])
-            for life in lives:
-                facts = self._facts.get(repr(_home_changes(life))) if needs_facts else None
-                if not self._is_left_out(life, facts):
-                    kept.append(life.number)
+                homes = [self._facts.get(repr(change)) for change in changes]
+                pairs = zip(lives, homes, strict=True)
+                lives = [life for life, facts in pairs if not self._is_left_out(life, facts)]
+            kept += [life.number for life in lives]
         return kept
 
     def _is_left_out(self, life: FleetLife, facts: HomeFeatures | None) -> bool:

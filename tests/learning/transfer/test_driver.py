@@ -12,7 +12,8 @@ from tests.scenes import Cli
 from tests.thorough import THOROUGH
 
 from fleet2d.errors import RunDirectoryError, ScenarioError
-from fleet2d.learning.transfer import driver, sources
+from fleet2d.learning.datasets import generate
+from fleet2d.learning.transfer import driver, learners, sources
 from fleet2d.learning.transfer.driver import COLUMNS, run_transfer
 from fleet2d.learning.transfer.report import compared
 from fleet2d.learning.transfer.specification import read_plan
@@ -66,7 +67,7 @@ def test_a_kill_loses_only_the_cell_under_way_and_results_are_the_same(
     file: Path, made: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trained: list[Any] = []
-    score = driver.forecast
+    score = learners.forecast
 
     def dies_at_the_fourth(*arguments: Any) -> Any:
         trained.append(arguments)
@@ -154,7 +155,7 @@ def test_the_small_example_tells_its_result_of_real_homes(examples: Path, fleet2
 def test_people_who_fit_into_no_home_are_left_out_with_their_cells(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fleet2d: Cli
 ) -> None:
-    check = sources.check_dataset
+    check = generate.check_dataset
 
     def finds_no_room(content: Any, *arguments: Any, **keys: Any) -> None:
         if content["name"] == "simulated":
