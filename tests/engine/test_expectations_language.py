@@ -320,6 +320,10 @@ def test_python_has_the_same_language() -> None:
             "always(distance(astro, ana) + 1 > 50 cm)",
             'always holds: (distance("astro", "ana") + 1 m) is 1 m or more',
         ),
+        (
+            "never(probability(share, kitchen) > 30)",
+            'can\'t hold: output("share.kitchen") is 0 to 1; write 0.3 for 30 %',
+        ),
     ],
 )
 def test_a_comparison_whose_outcome_is_certain_is_noted(text: str, outcome: str) -> None:

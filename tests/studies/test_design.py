@@ -99,6 +99,38 @@ def test_conditions_that_never_hold_are_refused(keys: dict[str, Any], message: s
         design(**keys)
 
 
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"rules": [{"when": {"home": "b", "room": 0.1}, "set": {SPEED: 1}}]}, "rules.0.when"),
+        ({"exclude": [{"home": "b", "room": [0.1, 0.2]}]}, r"exclude.0.*no variant has home = b"),
+        (
+            {
+                "exclude": [{"home": "a", "room": 0.1}],
+                "rules": [{"when": {"room": 0.1}, "set": {SPEED: 1}}],
+            },
+            r"rules.0.when: no variant has room = 0.1: change a value, or leave this out",
+        ),
+    ],
+)
+def test_conditions_on_values_that_never_occur_at_once_are_refused(
+    keys: dict[str, Any], message: str
+) -> None:
+    """A rule for a combination that `exclude` or `when` takes away set nothing, without a word."""
+    axes = {
+        "home": {"options": {"a": {SPEED: 0.3}, "b": {SPEED: 0.6}}},
+        "room": {"key": RADIUS, "values": [0.1, 0.2], "when": {"home": "a"}},
+    }
+    with pytest.raises(ScenarioError, match=message):
+        design(axes=axes, **keys)
+
+
+def test_two_conditions_may_exclude_the_same_variants() -> None:
+    axes = {SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}
+    exclude = [{SPEED: 0.3}, {SPEED: 0.3, RADIUS: 0.2}]
+    assert 2 == len(design(axes=axes, replicates=1, exclude=exclude))
+
+
 def test_an_error_in_a_scenario_names_axis_and_value() -> None:
     study_design = design(axes={"pace": {"key": SPEED, "values": [0.3, "quick"]}})
     with pytest.raises(ScenarioError, match=r"variant 3 \(pace = quick, seed = 0\).*axis 'pace'"):

@@ -139,8 +139,8 @@ def test_conditions_count_what_they_leave_out() -> None:
 
     assert {2} == {*lives.labels["people"]}
     assert {*lives.labels["rooms"]} <= {*range(10)}
-    assert "people is not 2" in lives.left_out
-    assert "rooms is not ..9" in lives.left_out
+    assert "people is not 2" in "".join(lives.notes)
+    assert "rooms is not ..9" in "".join(lives.notes)
 
 
 @pytest.mark.parametrize(
@@ -220,6 +220,18 @@ def test_what_is_left_out_is_noted_and_stored(tmp_path: Path) -> None:
     observer = CollectingObserver()
     _, study = run(fleet(1, where={"people": 2}), tmp_path / "fleet", observer=observer)
     assert "people is not 2" in study.meta.notes
+
+
+def test_a_column_that_is_almost_another_one_is_noted(tmp_path: Path) -> None:
+    """A column `wieght` labelled lives, which all were drawn with equal chances."""
+    census = table(tmp_path, "household,wieght,age,robots.astro.speed\nretired,1,70,0.3\n")
+    _, study = run(fleet(1, households=[], table=census), tmp_path / "fleet")
+    note = "census.csv: the column 'wieght' only labels lives: did you mean 'weight'?"
+    assert note in study.meta.notes
+    assert "age" not in study.meta.notes
+
+    split = {"runs": 1, "homes": SYNTHETIC, "table": census}
+    assert note in "\n".join(plan_dataset({"base": BASE, "splits": {"train": split}}).left_out)
 
 
 def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(

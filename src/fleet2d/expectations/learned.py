@@ -94,9 +94,15 @@ class output(_Value):
         return float(columns[number][keep][0])
 
 
+class _Probability(output):
+    """A number of an output that is from 0 to 1."""
+
+    between = (0.0, 1.0)
+
+
 def probability(algorithm: str, room: str, user: str | None = None) -> output:
     """Return an algorithm's probability of a room, for a user if it has one for each."""
-    return output(".".join(part for part in (algorithm, user, room) if part))
+    return _Probability(".".join(part for part in (algorithm, user, room) if part))
 
 
 WORDS["probability"] = probability

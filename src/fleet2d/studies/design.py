@@ -15,7 +15,7 @@ import numpy as np
 
 from fleet2d import __version__
 from fleet2d.configuration.documents import Document
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import Location, suggest
 from fleet2d.errors import InputError, ScenarioError, errors_as, os_errors_as
 from fleet2d.kernels import I32
 from fleet2d.scenario.compose import apply_changes, assignment, merge
@@ -223,10 +223,10 @@ class Design:
         return np.fromiter(rows, np.dtype((np.int32, (len(self.axes),))))
 
     @property
-    def left_out(self) -> str:
-        """How many lives of a population are left out, and why; empty without any."""
-        lives = (axis.choices for axis in self.axes if isinstance(axis.choices, FleetLives))
-        return "".join(each.words for each in lives)
+    def notes(self) -> list[str]:
+        """Remarks on populations, and how many of their lives are left out, and why."""
+        lives = [axis.choices for axis in self.axes if isinstance(axis.choices, FleetLives)]
+        return [note for each in lives for note in (*each.draw.notes, each.words) if note]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -394,9 +394,10 @@ def build_design(
         axes[ROLLOUT] = AxisPlan(ROLLOUT, (ROLLOUT,), {}, choices, (Document(), Document()))
     design = replace(design, axes=tuple(axes.values()), rollout=file.rollout)
     _check_size(specification.name, design)
-    _check_conditions(specification, design)
+    _check_values(specification, design)
     if not len(design.combinations):
         raise ScenarioError(f"{specification.name} has no variants: all are excluded")
+    _check_combinations(specification, design)
     return design
 
 
@@ -481,16 +482,66 @@ def _change(changes: Any, place: str) -> Document:
     return result
 
 
-def _check_conditions(specification: Specification, design: Design) -> None:
-    """Refuse conditions on values that no axis has: they would silently never hold."""
-    of_axes = [(("axes", axis.name, "when"), axis.when) for axis in design.axes]
-    for location, condition in [*of_axes, *specification.file.conditions()]:
+def _conditions(
+    specification: Specification, design: Design
+) -> Iterator[tuple[Location, Mapping[str, Any]]]:
+    """Yield all conditions of a study on columns, and where they stand."""
+    for axis in design.axes:
+        yield ("axes", axis.name, "when"), axis.when
+    yield from specification.file.conditions()
+
+
+def _check_values(specification: Specification, design: Design) -> None:
+    """Refuse conditions on values that no axis has: they would silently never hold.
+
+    Raises:
+        ScenarioError: There is such a condition.
+    """
+    for location, condition in _conditions(specification, design):
         for column in condition:
             labels = design.labels[column]
             for value in _values(condition, column):
                 if not any(same_label(label, value) for label in labels):
                     message = f"no variant has {value!r}{suggest(value, labels)}"
                     raise specification.error((*location, column), message)
+
+
+def _check_combinations(specification: Specification, design: Design) -> None:
+    """Refuse conditions on values that no variant has at once, likewise.
+
+    Raises:
+        ScenarioError: There is such a condition.
+    """
+    for location, condition in _conditions(specification, design):
+        of_condition = design
+        if location[0] == "exclude":  # several of these may exclude the same variants
+            of_condition = replace(design, axes=_axes_of(design, condition), exclude=())
+        if not _occurs(of_condition, condition):
+            words = " and ".join(f"{column} = {value}" for column, value in condition.items())
+            message = f"no variant has {words}: change a value, or leave this out"
+            raise specification.error(location, message)
+
+
+def _axes_of(design: Design, condition: Mapping[str, Any]) -> tuple[AxisPlan, ...]:
+    """Return the axes of the columns of a condition, and those on which they depend."""
+    columns = {*condition}
+    kept: list[AxisPlan] = []
+    for axis in reversed(design.axes):
+        if columns & {*axis.columns}:
+            kept.append(axis)
+            columns |= {*axis.when}
+    return tuple(reversed(kept))
+
+
+def _occurs(design: Design, condition: Mapping[str, Any]) -> bool:
+    """Return whether a combination of a design fulfils a condition, with some seed."""
+    occurs = np.ones(len(design.combinations), np.bool_)
+    for number, axis in enumerate(design.axes):
+        for column in {*axis.columns} & {*condition}:
+            values = _values(condition, column)
+            fulfils = [any(same_label(x, v) for v in values) for x in axis.labels()[column]]
+            occurs &= np.isin(design.combinations[:, number], np.flatnonzero(fulfils))
+    return bool(occurs.any())
 
 
 def _artifacts(tables: Sequence[str]) -> Document:

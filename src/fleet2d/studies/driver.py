@@ -201,8 +201,8 @@ def check_study(
     on_size(len(design))
     plan = make_plan(design, on_scenario)
     names.check(specification)
-    if design.left_out:
-        observer.on_note(design.left_out)
+    for note in design.notes:
+        observer.on_note(note)
     return CheckedStudy(specification, plan, scenarios, names.facts)
 
 
@@ -370,7 +370,7 @@ def describe(checked: CheckedStudy) -> Meta:
         source=source.read_text(encoding="utf-8") if source else "",
         metrics=dict(checked.metrics),
         tags=file.tags,
-        notes="\n".join(filter(None, (file.notes, checked.plan.design.left_out))),
+        notes="\n".join(filter(None, (file.notes, *checked.plan.design.notes))),
         fleet=file.fleet,
         features=_features(checked),
         rollout=file.rollout.model_dump(mode="json") if file.rollout else None,

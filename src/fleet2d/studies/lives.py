@@ -9,6 +9,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from pydantic import Field
 
 from fleet2d.bounds import FILE_BYTES, read_bytes
 from fleet2d.configuration.components import Settings
-from fleet2d.configuration.problems import suggest
+from fleet2d.configuration.problems import did_you_mean, suggest
 from fleet2d.configuration.units import InputPath
 from fleet2d.errors import ScenarioError, errors_as, extra
 from fleet2d.runtime.determinism import Draws, stream_key
@@ -201,7 +202,7 @@ class Draw:
         self.facts: dict[int, HomeFeatures] = {}
         self._eligible: dict[tuple[int, int], list[int]] = {}
         self._varied = {name: axis.choices(name) for name, axis in vary.items()}
-        self._rows, self._ends = _read_table(settings)
+        self._rows, self._ends, self._columns = _read_table(settings)
         self.table_columns = tuple(self._rows[0]) if self._rows else ()
         varied = [column for name, axis in vary.items() for column in axis.columns(name)]
         own = [c for c in self.table_columns if c not in (HOME, HOUSEHOLD, *FEATURES)]
@@ -212,6 +213,34 @@ class Draw:
                 hint = suggest(column, known, "There are")
                 raise ScenarioError(f"where: lives have no {column!r}{hint}")
         self._places = self._places_of_rows()
+
+    @property
+    def table_households(self) -> list[Any]:
+        """The households that the table names."""
+        named = dict.fromkeys(row.get(HOUSEHOLD) for row in self._rows)
+        return [_members(household) for household in named if household]
+
+    @property
+    def files(self) -> list[Path]:
+        """The table, and the files that it names, such as logs."""
+        table = self._settings.table
+        named = {str(v) for row in self._rows for key, v in row.items() if "." in key}
+        return [] if table is None else [table, *filter(Path.is_file, map(Path, sorted(named)))]
+
+    @property
+    def notes(self) -> list[str]:
+        """Remarks on columns of the table that only label lives, and almost have another name."""
+        meant = [
+            column
+            for column in (HOME, HOUSEHOLD, *FEATURES, self._settings.weight)
+            if column not in self._columns
+        ]
+        hints = {c: did_you_mean(c, meant) for c in self.table_columns if c in self.columns}
+        return [
+            f"{self._settings.table}: the column {column!r} only labels lives{hint}"
+            for column, hint in hints.items()
+            if hint != "." and "." not in column
+        ]
 
     def _places_of_rows(self) -> dict[str, int]:
         """Return the place of each home that the table names, by its label.
@@ -257,7 +286,7 @@ class Draw:
             row = self._rows[place]
         household: Any = None
         if row.get(HOUSEHOLD):
-            household = [name.strip() for name in str(row[HOUSEHOLD]).split("+")]
+            household = _members(row[HOUSEHOLD])
         elif self._settings.households:
             household = draws.choice(self._settings.households)
         varied = tuple(draws.choice(choices) for choices in self._varied.values())
@@ -322,6 +351,11 @@ class Draw:
         return ""
 
 
+def _members(household: object) -> list[str]:
+    """Return the personas of a household as a table has it, such as "retired + child"."""
+    return [name.strip() for name in str(household).split("+")]
+
+
 def _is_like(column: str, fact: Any, asked: Any) -> bool:
     """Return whether a home is as a row of the table says; a single area is rounded too finely."""
     condition = read_condition(asked)
@@ -381,14 +415,14 @@ def _program(bedrooms: int, plan: Mapping[str, Any], seed: int) -> dict[str, Any
     return {BEDROOMS: beds}
 
 
-def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[float]]:
-    """Return the rows of a table without their weights, and the running sums of these.
+def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[float], list[str]]:
+    """Return the rows of a table without their weights, the running sums of these, and the columns.
 
     Raises:
         InputError: It can't be read, has no such column, or weights that can't be.
     """
     if settings.table is None:
-        return [], []
+        return [], [], []
     with extra("study", "tables of a population need polars"):
         import polars as pl
     path = settings.table
@@ -418,7 +452,7 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
         for key, value in row.items():
             if isinstance(value, str) and "." in key and (path.parent / value).is_file():
                 row[key] = str((path.parent / value).absolute())  # such as a log
-    return rows, ends
+    return rows, ends, frame.columns
 
 
 def feature_labels(household: Any, facts: HomeFeatures) -> dict[str, Label]:

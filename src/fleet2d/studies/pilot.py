@@ -133,7 +133,7 @@ class Pilot(StudyAnswers):
             return ""
         tests = (MeanEstimate(1.0, signs={kind: (n, count - n)}) for n in range(count + 1))
         clear = [max(t.signs[kind]) for t in tests if t.sign_p < MAX_P / comparisons]
-        units = f"From {count} {plural(kind)}"
+        units = f"From {count} {kind if count == 1 else plural(kind)}"
         if not clear:
             return f"{units} it can tell nothing, as even if all agree that may be chance."
         return f"{units} it tells no amounts, and which is better only if {min(clear)} agree."

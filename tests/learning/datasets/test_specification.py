@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+import fleet2d
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.learning.datasets.specification import plan_dataset
 
@@ -35,6 +36,25 @@ def test_every_run_has_its_own_seed_and_home_in_turn() -> None:
 
 def plan_source(plan: Any) -> dict[str, Any]:
     return file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
+
+
+def test_a_file_that_changes_makes_another_data_set(tmp_path: Path) -> None:
+    """The runs of a table, a persona or a floor plan that changed since were mixed with earlier ones."""
+    persona = tmp_path / "mine.yaml"
+    persona.write_text(
+        retired := (Path(fleet2d.__file__).parent / "routines/personas/retired.yaml").read_text()
+    )
+    table = tmp_path / "census.csv"
+    table.write_text(f"household,robots.astro.speed\n{persona},0.3\nretired,0.6\n")
+    source = file(train={"runs": 2, "homes": [{"synthetic": 2}], "table": str(table)})
+
+    digests = [plan_dataset(source).digest]
+    assert digests == [plan_dataset(source).digest]
+    persona.write_text(retired.replace("pace: 0.75", "pace: 0.7"))
+    digests.append(plan_dataset(source).digest)
+    table.write_text(table.read_text().replace("0.6", "0.5"))
+    digests.append(plan_dataset(source).digest)
+    assert 3 == len({*digests})
 
 
 def test_another_seed_draws_other_runs() -> None:

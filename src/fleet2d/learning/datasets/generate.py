@@ -45,7 +45,7 @@ from fleet2d.runtime.progress import progress_bar
 from fleet2d.scenario.load import load_scenario
 from fleet2d.storage.files import FolderLock, partial_file, refuse_links, write_atomically
 from fleet2d.studies.api import ExecutorName, FunctionTask, map_runs, open_crew
-from fleet2d.studies.design import home_key
+from fleet2d.studies.design import code_version, home_key
 from fleet2d.studies.executors import TaskQueue, by_home, run_tasks
 from fleet2d.studies.simulator import check_setup
 
@@ -291,7 +291,7 @@ def dataset(
     if made is not None and files != made.manifest.files:
         raise InputError(
             f"{root}: files that were lacking differ now from those that were written, by other"
-            " versions of libraries (see --verify): delete the data set, and make it again"
+            " code or versions of libraries (see --verify): delete the data set, and make it again"
         )
     return open_dataset(root)
 
@@ -343,7 +343,7 @@ def _record_shards(plan: DatasetPlan, made: Dataset) -> None:
 
 
 def _identity(plan: DatasetPlan) -> bytes:
-    return f"{plan.digest} {__version__}".encode()
+    return f"{plan.digest} {code_version()}".encode()
 
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:

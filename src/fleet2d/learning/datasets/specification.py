@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from itertools import combinations, takewhile
 from pathlib import Path
@@ -23,6 +23,7 @@ from fleet2d.routines.persona import origins_of
 from fleet2d.scenario.compose import apply_changes, assignment
 from fleet2d.scenario.load import explain, load_scenario
 from fleet2d.studies.axes import AnyAxis, Choice
+from fleet2d.studies.design import content_hash, file_hash, input_hash, scenario_content
 from fleet2d.studies.executors import Crew
 from fleet2d.studies.households import members_of, personas_of
 from fleet2d.studies.lives import (
@@ -147,8 +148,9 @@ class DatasetPlan:
         base: The scenario that all runs share.
         draws: What the runs of each split are drawn from.
         numbers: The numbers of the lives of each split that meet its conditions.
-        left_out: How many lives didn't, and why, a line for each split.
+        left_out: How many lives didn't, and why, and remarks on tables, a line for each.
         unfit: The runs that are left out, as they can't be set up, and why, by number.
+        inputs: Hashes of the files that it is made from beside its own, in order.
     """
 
     file: DatasetFile
@@ -157,13 +159,15 @@ class DatasetPlan:
     numbers: Mapping[str, Sequence[int]]
     left_out: Sequence[str] = ()
     unfit: Mapping[int, str] = field(default_factory=dict)
+    inputs: Sequence[str] = ()
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all that its content depends on, but the code."""
+        """SHA-256 of all that its content depends on, but the code of Fleet2D."""
         homes = {name: [home.changes for home in d.homes] for name, d in self.draws.items()}
         file = self.file.model_dump(mode="json", exclude={"base"})
-        text = json.dumps([file, self.base.data, homes], sort_keys=True, default=str)
+        content = [file, self.base.data, homes, self.inputs]
+        text = json.dumps(content, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def runs(self, split: str) -> Iterator[PlannedRun]:
@@ -197,20 +201,25 @@ class DatasetPlan:
         labels = {name: str(label) for name, label in life.labels.items()}
         return PlannedRun(number, split, labels, scenario)
 
-    def check(self) -> None:
+    def check(self) -> list[str]:
         """Check each household, home and varied value in a scenario, before the first run.
+
+        Returns:
+            Hashes of what files make of these scenarios, such as personas, in order.
 
         Raises:
             InputError: A scenario would be wrong.
         """
         varied = {name: axis.choices(name) for name, axis in self.file.vary.items()}
         usual = [choices[0] for choices in varied.values()]
+        hashes = set[str]()
         for split, settings in self.file.splits.items():
             draw = self.draws[split]
             first = draw.life(self.numbers[split][0])
-            people = settings.households or (first.household,)
-            firsts = [axis.choices("home")[0] for axis in settings.homes]
-            cases = [(f"homes: {home.words}", home, people[0], usual) for home in firsts]
+            people = [*settings.households] or [first.household, *draw.table_households]
+            homes = [axis.choices("home")[0] for axis in settings.homes]
+            homes += [draw.homes[place] for place in draw.homes.listed]
+            cases = [(f"homes: {home.words}", home, people[0], usual) for home in homes]
             cases += [
                 (f"households: {' + '.join(personas_of(each))}", first.home, each, usual)
                 for each in people
@@ -221,9 +230,11 @@ class DatasetPlan:
                     cases.append((f"vary.{name}: {choice.words}", first.home, people[0], values))
             for words, home, household, values in cases:
                 with errors_as(ScenarioError, f"{split}, {words}"):
-                    load_scenario(
-                        self._scenario(FleetLife(0, home, household, tuple(values), first.row))
-                    )
+                    life = FleetLife(0, home, household, tuple(values), first.row)
+                    scenario = load_scenario(self._scenario(life))
+                    hashes |= {content_hash(scenario_content(scenario)), input_hash(scenario)}
+            hashes.update(map(file_hash, draw.files))
+        return sorted(hashes)
 
     def _first_number(self, split: str) -> int:
         """Return the number of the first run of a split."""
@@ -286,9 +297,9 @@ def plan_dataset(source: str | Path | Mapping[str, Any], crew: Crew | None = Non
             if split.where:
                 asks_homes = draws[name].asks_homes
                 numbers[name] = finder.find(split.runs, needs_facts=asks_homes)
-        left_out.append(left_out_words(name, finder.left_out))
+        left_out += [*draws[name].notes, left_out_words(name, finder.left_out)]
     plan = DatasetPlan(file, Document(base), draws, numbers, [*filter(None, left_out)])
-    plan.check()
+    plan = replace(plan, inputs=plan.check())
     _check_splits(file, {name: list(draw.homes) for name, draw in draws.items()})
     return plan
 
