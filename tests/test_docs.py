@@ -19,6 +19,11 @@ from fleet2d.scenario.load import load_scenario
 
 FENCE = re.compile(r"^```(\w+)(?: title=(\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+TEXTS = [
+    pytest.param(page, id=str(page.relative_to(ROOT)))
+    for page in sorted({*PAGES, *ROOT.glob("*.md")})
+]
+"""README, docs, and the other texts of the repository."""
 
 
 @dataclass(frozen=True)
@@ -143,14 +148,14 @@ def test_command_of_a_page_exists_with_its_options(words: list[str]) -> None:
         assert load_scenario(scenario, *overrides) is not None
 
 
-@pytest.mark.parametrize("page", [pytest.param(p, id=str(p.relative_to(ROOT))) for p in PAGES])
+@pytest.mark.parametrize("page", TEXTS)
 def test_links_of_a_page_lead_somewhere(page: Path) -> None:
     links = LINK.findall(page.read_text(encoding="utf-8"))
     local = [link for link in links if not link.startswith(("http:", "https:"))]
     assert [] == [link for link in local if not (page.parent / link).exists()]
 
 
-@pytest.mark.parametrize("page", [pytest.param(p, id=str(p.relative_to(ROOT))) for p in PAGES])
+@pytest.mark.parametrize("page", TEXTS)
 def test_anchors_of_a_page_are_headings(page: Path) -> None:
     links = re.findall(r"\]\(([^)#\s]*\.md)?#([^)\s]+)\)", page.read_text(encoding="utf-8"))
     wrong = [

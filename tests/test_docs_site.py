@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 from tests.pages import DOCS, PAGES, ROOT
-from tools import gallery, site_versions
+from tools import gallery, site, site_versions
 
 KINDS = {"tutorials", "how-to", "reference", "explanation", "results"}
 NOTEBOOKS = sorted((DOCS / "tutorials").glob("*.ipynb"))
@@ -69,6 +69,13 @@ def test_each_page_is_of_one_kind_and_has_a_place_in_the_navigation() -> None:
 
 def test_navigation_names_no_page_twice() -> None:
     assert len(nav()) == len(set(nav()))
+
+
+def test_each_page_of_the_navigation_is_written_or_made() -> None:
+    pages = {**site.written_pages(), **site.generated_pages()}
+    assert all(pages.values())
+    folders = {f"{Path(uri).parent}/" for uri in pages}
+    assert set() == set(nav()) - {*pages, *folders}
 
 
 @pytest.mark.slow
@@ -142,12 +149,12 @@ def test_examples_of_docstrings_become_code() -> None:
 def test_a_version_of_the_site_joins_the_others_and_the_root_leads_to_the_newest(
     tmp_path: Path,
 ) -> None:
-    site, sites = tmp_path / "site", tmp_path / "sites"
-    for folder in (site, sites):
+    own, sites = tmp_path / "site", tmp_path / "sites"
+    for folder in (own, sites):
         folder.mkdir()
-    (site / "index.html").write_text("a page", encoding="utf-8")
+    (own / "index.html").write_text("a page", encoding="utf-8")
     for version, newest in (("dev", "dev"), ("0.9.0", "0.9.0"), ("0.10.0", "0.10.0")):
-        site_versions.add(site, sites, version)
+        site_versions.add(own, sites, version)
         assert f"url={newest}/" in (sites / "index.html").read_text(encoding="utf-8")
     listed = json.loads((sites / "versions.json").read_text(encoding="utf-8"))
     assert ["0.10.0", "0.9.0", "dev"] == [entry["version"] for entry in listed]

@@ -171,8 +171,6 @@ def component_pages() -> Iterator[tuple[str, str]]:
 def component_part(component: Any) -> str:
     """Return what a page says of a component."""
     lines = [f"## {component.type}", "", plain(component.summary), ""]
-    if component.aliases:
-        lines += [f"Also written: {', '.join(component.aliases)}.", ""]
     if component.fields:
         lines += ["| key | default | meaning |", "| --- | --- | --- |"]
         lines += [field_row(field) for field in component.fields]

@@ -2,9 +2,11 @@
 
 import re
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.scenes import Cli
 
@@ -31,18 +33,73 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
     first, *sentences = demo.sentences(family)
 
-    assert first.startswith("1 d with Ana, Ben, Cleo and Astro took ")
-    seen, metres = (family.metrics[name] for name in ("sightings", "distance"))
-    shares = [f"{name} in {100 * seen[name.lower()]:.0f} %" for name in ("Ana", "Ben", "Cleo")]
-    saw = f"Astro saw {shares[0]}, {shares[1]} and {shares[2]}"
-    assert f"{saw} of the time at home, nights included." in sentences
+    assert first.startswith("1 d of Ana, Ben, Cleo and Astro, simulated in ")
+    metres = family.metrics["distance"]
     assert f"Astro drove {metres['astro']:,.0f} m a day." in sentences
     events = family.tables["events"]["event"].to_pylist()
-    asked = f"Astro asked {events.count('asks')} times: {events.count('accepted')} accepted, "
-    (requests,) = (sentence for sentence in sentences if sentence.startswith(asked))
-    total, *parts = map(int, re.findall(r"\d+", requests))
-    assert total == sum(parts)
     assert f"Astro found Cleo in {events.count('found')} of 1 searches." in sentences
+
+
+def test_sentence_tells_how_long_each_person_was_seen_awake(family: package.Run) -> None:
+    events = family.tables["events"].to_pylist()
+    awake, seen = (np.zeros(family.manifest["steps"], bool) for _ in range(2))
+    for event in events:  # what holds from a step on holds to the end, or to what is said next
+        of_ana = event["entity"] == "ana"
+        if of_ana and event["event"] == "activity":
+            awake[event["step"] :] = event["detail"] != "sleep"
+        elif event["user"] == "ana" and event["event"] in ("user_seen", "user_lost"):
+            seen[event["step"] :] = event["event"] == "user_seen"
+    assert not any(event["entity"] == "ana" and event["event"] == "left_home" for event in events)
+
+    saw = next(sentence for sentence in demo.sentences(family) if " saw " in sentence)
+
+    share = f"{100 * seen[awake].mean():.0f} %"
+    assert re.fullmatch(
+        rf"Astro saw Ana for {share}, Ben for \d+ % and Cleo for \d+ %"
+        " of the time they were at home and awake.",
+        saw,
+    )
+
+
+def test_time_out_of_the_home_and_asleep_is_no_waking_time_at_home() -> None:
+    said = [
+        (10, "ana", "activity", None, "tv"),
+        (20, "astro", "user_seen", "ana", ""),
+        (30, "bolt", "user_seen", "ana", ""),
+        (40, "astro", "user_lost", "ana", ""),
+        (45, "astro", "user_seen", "ben", ""),
+        (50, "bolt", "user_lost", "ana", ""),
+        (60, "ana", "left_home", None, ""),
+        (80, "ana", "came_home", None, ""),
+        (90, "ana", "activity", None, "sleep"),
+    ]
+    columns = ("step", "entity", "event", "user", "detail")
+    events = [dict(zip(columns, row, strict=True)) for row in said]
+
+    assert 30 / 60 == demo._waking_share("ana", events, 100)
+    assert None is demo._waking_share("ben", events, 100)
+
+
+def test_sentences_tell_how_people_answered(family: package.Run) -> None:
+    kinds = Counter(
+        map(
+            tuple,
+            zip(
+                *(family.tables["events"][c].to_pylist() for c in ("event", "detail")), strict=True
+            ),
+        )
+    )
+    pattern = r"Astro (reminded|greeted) (\w+) (once|(\d+) times) \((\w+)\): (.*)\."
+    said = [found for s in demo.sentences(family) if (found := re.fullmatch(pattern, s))]
+
+    assert {"reminded Cleo", "greeted Ben"} <= {f"{one[1]} {one[2]}" for one in said}
+    for _, person, _, times, name, answers in (one.groups() for one in said):
+        detail = f"{name} {person.lower()}"
+        assert kinds["asks", detail] == int(times or 1)
+        assert kinds["asks", detail] == sum(map(int, re.findall(r"\d+", answers)))
+        for outcome in ("accepted", "declined", "ignored"):
+            count = kinds[outcome, detail]
+            assert (f"{count} {outcome}" in answers) == bool(count)
 
 
 def test_a_search_that_ended_at_somebody_else_is_no_find() -> None:
@@ -63,8 +120,8 @@ def test_sentence_tells_how_wrong_beliefs_were_at_first_and_at_the_end() -> None
     sentences = list(demo.sentences(run))
 
     first, last = f"{100 * errors[0]:.0f} %", f"{100 * errors[-1]:.0f} %"
-    believed = "What was believed of their rooms was wrong by"
-    assert f"{believed} {first} for Ana at first, and by {last} at the end." in sentences
+    learned = f"At first, what was learned put {first} of Ana's time into wrong rooms"
+    assert f"{learned}; in the end {last}." in sentences
 
 
 def test_sentences_leave_out_what_the_run_did_not_measure() -> None:
@@ -74,7 +131,7 @@ def test_sentences_leave_out_what_the_run_did_not_measure() -> None:
 
     (only,) = demo.sentences(run)
 
-    assert only.startswith("1 h with Ana took ")
+    assert only.startswith("1 h of Ana, simulated in ")
 
 
 @pytest.mark.usefixtures("short")

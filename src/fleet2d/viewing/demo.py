@@ -16,12 +16,22 @@ from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.runtime.events import EventKind
+from fleet2d.viewing.story import ASLEEP, plain, titled
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
-IN_WORDS = {Outcome.DEFERRED: "put off", Outcome.MISTAKEN: "asked of somebody else"}
+IN_WORDS = {Outcome.DEFERRED: "put off", Outcome.MISTAKEN: "said to somebody else"}
 """Outcomes of addressing a person whose names say too little."""
+DID = {
+    "ask": "asked",
+    "deliver": "brought something to",
+    "greet": "greeted",
+    "offer": "offered something to",
+    "patrol_report": "reported to",
+    "remind": "reminded",
+}
+"""What a robot did that carried out an interaction, by its kind."""
 
 
 def demo(
@@ -59,25 +69,53 @@ def demo(
 
 def sentences(run: "Run") -> Iterator[str]:
     """Yield what happened in a run, as far as its metrics and events tell it."""
+    users = run.manifest["entities"]["users"]
     robots = run.manifest["entities"]["robots"]
-    names = _listed([*run.manifest["entities"]["users"], *robots])
-    simulated = format_duration(timedelta(seconds=run.manifest["simulated_s"]))
+    simulated_s = run.manifest["simulated_s"]
     wall_s = sum(run.manifest["wall_s"].values())
-    speedup = run.manifest["simulated_s"] / wall_s
-    yield f"{simulated} with {names} took {wall_s:.1f} s: {speedup:,.0f} times real time."
-    seen = _result(run, "sightings")
-    if seen and robots:
-        shares = _listed([f"{name} in {100 * share:.0f} %" for name, share in seen.items()])
-        yield f"{_listed(robots)} saw {shares} of the time at home, nights included."
+    yield (
+        f"{_period(simulated_s)} of {_listed([*users, *robots])}, simulated in {wall_s:.1f} s:"
+        f" {float(f'{simulated_s / wall_s:.2g}'):,.0f} times as fast as life."
+    )
+    columns = ["step", "entity", "event", "detail", *(["user"] if users else [])]
+    events = run.tables["events"].select(columns).to_pylist()
+    if users and robots:
+        shares = {user: _waking_share(user, events, run.manifest["steps"]) for user in users}
+        seen = [f"{titled(u)} for {100 * share:.0f} %" for u, share in shares.items() if share]
+        if seen:
+            waking = "the time they were at home and awake"
+            yield f"{_listed(robots)} saw {_listed(seen)} of {waking}."
     yield from _learning(run)
     metres = _result(run, "distance")
-    events = run.tables["events"].select(["entity", "event", "detail"]).to_pylist()
     for robot in robots:
         if robot in metres:
-            yield f"{_title(robot)} drove {metres[robot]:,.0f} m a day."
-        own = [event for event in events if event["entity"] == robot]
-        yield from _requests(robot, own)
+            yield f"{titled(robot)} drove {metres[robot]:,.0f} m a day."
+        yield from _requests(run, robot, events)
         yield from _searches(robot, _rows(run, "time_to_find", ["robot", "user", "end"]))
+
+
+def _waking_share(user: str, events: Sequence[dict[str, Any]], steps: int) -> float | None:
+    """Return in which share of the steps at home and awake some robot saw a user; None: of none."""
+    is_awake = is_out = False  # until the first activity
+    seen_by = since = waking = seen = 0
+    for event in (*events, {"step": steps, "entity": user, "event": ""}):
+        is_own = event["entity"] == user
+        if not is_own and event["user"] != user:
+            continue
+        if is_awake and not is_out:
+            waking += event["step"] - since
+            seen += event["step"] - since if seen_by else 0
+        since = event["step"]
+        match event["event"]:
+            case EventKind.ACTIVITY if is_own:
+                is_awake = event["detail"] != ASLEEP
+            case EventKind.LEFT_HOME | EventKind.CAME_HOME if is_own:
+                is_out = event["event"] == EventKind.LEFT_HOME
+            case EventKind.USER_SEEN:
+                seen_by += 1
+            case EventKind.USER_LOST:
+                seen_by -= 1
+    return seen / waking if waking else None
 
 
 def _learning(run: "Run") -> Iterator[str]:
@@ -88,24 +126,27 @@ def _learning(run: "Run") -> Iterator[str]:
             errors.setdefault(row["user"], []).append(row["tv"])
     if not errors or any(len(of_user) < 2 for of_user in errors.values()):
         return
-    first = _listed([f"{100 * of_user[0]:.0f} % for {_title(u)}" for u, of_user in errors.items()])
-    last = _listed([f"{100 * of_user[-1]:.0f} %" for of_user in errors.values()])
-    believed = "What was believed of their rooms was wrong by"
-    yield f"{believed} {first} at first, and by {last} at the end."
+    first = _listed([f"{100 * own[0]:.0f} % of {titled(u)}'s" for u, own in errors.items()])
+    last = _listed([f"{100 * own[-1]:.0f} %" for own in errors.values()])
+    yield f"At first, what was learned put {first} time into wrong rooms; in the end {last}."
 
 
-def _requests(robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield how often a robot asked something of somebody, and with which answers."""
-    counts = Counter(event["event"] for event in events)
-    asked = counts[EventKind.ASKS]
-    if asked:
-        answers = {
-            IN_WORDS.get(outcome, outcome.replace("_", " ")): counts[outcome] for outcome in Outcome
-        }
+def _requests(run: "Run", robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Yield how often a robot asked each person for what it wanted, and with which answers."""
+    requests: dict[str, Counter[str]] = {}
+    for event in events:
+        if event["entity"] == robot and event["event"] in (EventKind.ASKS, *Outcome):
+            requests.setdefault(event["detail"], Counter())[event["event"]] += 1
+    for request, counts in requests.items():
+        name, _, person = request.rpartition(" ")
+        did = DID[run.manifest["scenario"]["interactions"][name]["do"]]
+        times = counts.pop(EventKind.ASKS)
+        answers = {IN_WORDS.get(kind, plain(kind)): counts[kind] for kind in Outcome}
         # A question that nobody notices has no event of its own.
-        answers["not noticed"] = asked - sum(answers.values())
+        answers["not noticed"] = times - counts.total()
         listed = ", ".join(f"{count} {word}" for word, count in answers.items() if count)
-        yield f"{_title(robot)} asked {asked} times: {listed}."
+        often = "once" if times == 1 else f"{times} times"
+        yield f"{titled(robot)} {did} {titled(person)} {often} ({plain(name)}): {listed}."
 
 
 def _searches(robot: str, searches: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -115,12 +156,24 @@ def _searches(robot: str, searches: Sequence[dict[str, Any]]) -> Iterator[str]:
         if search["robot"] == robot:
             ends.setdefault(search["user"], Counter())[search["end"]] += 1
     for user, counts in ends.items():
-        name = _title(user)
+        name = titled(user)
         found = counts[EventKind.FOUND]
-        sentence = f"{_title(robot)} found {name} in {found} of {counts.total()} searches"
+        sentence = f"{titled(robot)} found {name} in {found} of {counts.total()} searches"
         if counts["false"]:
             sentence += f", and took somebody else for {name} in {counts['false']}"
         yield f"{sentence}."
+
+
+def _period(simulated_s: float) -> str:
+    """Return a period in words if it is of whole days.
+
+    >>> _period(30 * 86_400), _period(3600)
+    ('30 days', '1 h')
+    """
+    days, rest = divmod(simulated_s, 86_400)
+    if rest or days < 2:
+        return format_duration(timedelta(seconds=simulated_s))
+    return f"{days:.0f} days"
 
 
 def _rows(run: "Run", kind: str, columns: list[str]) -> list[dict[str, Any]]:
@@ -140,15 +193,11 @@ def _result(run: "Run", kind: str) -> dict[str, Any]:
     return next(results, {})
 
 
-def _title(name: str) -> str:
-    return name[:1].upper() + name[1:]
-
-
 def _listed(names: Sequence[str]) -> str:
     """Return names as a list in words.
 
     >>> _listed(["ana", "ben", "cleo"]), _listed(["astro"])
     ('Ana, Ben and Cleo', 'Astro')
     """
-    titles = [_title(name) for name in names]
+    titles = [titled(name) for name in names]
     return " and ".join([*([", ".join(titles[:-1])] if titles[:-1] else []), *titles[-1:]])

@@ -72,7 +72,7 @@ def _requests(events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     for event in events:
         if event.event == EventKind.ACCEPTED:
             about, _, user = event.detail.rpartition(" ")
-            words = f"{_title(user)} accepts what {_title(event.entity)} asks: {_plain(about)}"
+            words = f"{titled(user)} accepts what {titled(event.entity)} asks: {plain(about)}"
             who = [event.entity, user]
             yield StoryFacts(step=event.step, title="The first yes", words=words, who=who)
             return
@@ -95,11 +95,11 @@ def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFact
     if longest is not None:
         steps, event = longest
         took = _duration(timedelta(microseconds=steps * clock.step_us))
-        words = f"{_title(event.entity)} finds {_title(event.detail)} after {took}"
+        words = f"{titled(event.entity)} finds {titled(event.detail)} after {took}"
         who = [event.entity, event.detail]
         yield StoryFacts(step=event.step, title="The longest search", words=words, who=who)
         if first is not None and first is not event:
-            words = f"{_title(first.entity)} looks for {_title(first.detail)}, and finds"
+            words = f"{titled(first.entity)} looks for {titled(first.detail)}, and finds"
             who = [first.entity, first.detail]
             yield StoryFacts(step=first.step, title="The first find", words=words, who=who)
 
@@ -114,11 +114,11 @@ def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     if unseen and any(event.event == EventKind.USER_SEEN for event in events):
         lasted, step, user = max(unseen)
         if lasted >= LEAST_UNSEEN:
-            words = f"{_title(user)} is up and at home, and out of view for {_duration(lasted)}"
+            words = f"{titled(user)} is up and at home, and out of view for {_duration(lasted)}"
             yield StoryFacts(step=step, title="The longest out of view", words=words, who=[user])
     if len(nights) > 1:
         _, step, user = max(nights)
-        words = f"{_title(user)} goes to bed at {run.clock.time(step):%H:%M}"
+        words = f"{titled(user)} goes to bed at {run.clock.time(step):%H:%M}"
         yield StoryFacts(step=step, title="The latest night", words=words, who=[user])
 
 
@@ -190,15 +190,17 @@ def _failure(run: Run) -> Iterator[StoryFacts]:
     failures = [each for each in verdicts_of(run) if each.step is not None]
     if failures:
         first = min(failures, key=lambda verdict: verdict.step or 0)
-        words = f"{_title(first.name)}: {first.says}"
+        words = f"{titled(first.name)}: {first.says}"
         yield StoryFacts(step=first.step or 0, title="The first failure", words=words, who=[])
 
 
-def _title(name: str) -> str:
-    return _plain(name[:1].upper() + name[1:])
+def titled(name: str) -> str:
+    """Return the name of a body as a sentence has it."""
+    return plain(name[:1].upper() + name[1:])
 
 
-def _plain(name: str) -> str:
+def plain(name: str) -> str:
+    """Return a name without underscores."""
     return name.replace("_", " ")
 
 
