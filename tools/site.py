@@ -38,13 +38,30 @@ COPIES = {
 }
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
 FENCE_TITLE = re.compile(r"^```(\w+) title=(\S+)$", re.MULTILINE)
-# What the pages of the reference are about, in their order; others come last.
+# What the pages of the reference are about, in their order.
 KINDS = {
     "scenario": "Sections of a scenario",
     "floorplan": "Floor plans",
     "behavior": "Behaviors of people and robots",
     "algorithm": "Algorithms",
     "metric": "Metrics",
+    "object": "Objects",
+    "drive": "Drives",
+    "presence_estimator": "Estimators of presence",
+    "presence_model": "Models of presence",
+    "sight": "Methods of sight",
+    "perception_error": "Errors of perception",
+    "evidence_source": "Sources of evidence",
+    "intervention": "Interventions",
+    "interrupt": "Interrupts of plans",
+    "right_of_way": "Right of way",
+    "answers": "Answers of people",
+    "answer_part": "Parts of answers",
+    "attitude": "Attitudes of people",
+    "initiative": "Initiative of people",
+    "timing_policy": "Policies of timing",
+    "part": "Parts of components",
+    "shared": "Shared keys",
 }
 CATALOGUES = {
     "furniture": "Furniture",
@@ -137,19 +154,14 @@ def components_by_kind() -> dict[str, list[Any]]:
     """Return all components by their kind, in the order of the pages."""
     found: dict[str, list[Any]] = {kind: [] for kind in KINDS}
     for component in describe_components():
-        found.setdefault(component.kind, []).append(component)
+        found[component.kind].append(component)
     return found
-
-
-def title_of(kind: str) -> str:
-    """Return the heading of a kind of component."""
-    return KINDS.get(kind, kind.replace("_", " ").capitalize())
 
 
 def components_part() -> str:
     """Return the table of all components, and of what is no component."""
     rows = [
-        f"| [{title_of(kind)}](components/{kind}.md) | {names_of(components)} |"
+        f"| [{KINDS[kind]}](components/{kind}.md) | {names_of(components)} |"
         for kind, components in components_by_kind().items()
     ]
     rows += [f"| [{title}](components/{page}.md) | |" for page, title in CATALOGUES.items()]
@@ -165,7 +177,7 @@ def component_pages() -> Iterator[tuple[str, str]]:
     """Yield a page of each kind of component, with all keys, units and defaults."""
     for kind, components in components_by_kind().items():
         parts = "\n".join(component_part(component) for component in components)
-        yield f"reference/components/{kind}.md", f"# {title_of(kind)}\n\n{parts}"
+        yield f"reference/components/{kind}.md", f"# {KINDS[kind]}\n\n{parts}"
 
 
 def component_part(component: Any) -> str:
