@@ -1,5 +1,6 @@
 """Commands are found by their names, and are imported when they are called."""
 
+import re
 import shlex
 import subprocess
 import sys
@@ -114,6 +115,16 @@ def parse(arguments: list[str]) -> None:
         arguments = arguments[1:]
 
 
+@pytest.mark.parametrize("words", list(all_commands()), ids=" ".join)
+def test_help_names_what_a_command_takes_once_and_without_types_of_python(
+    words: tuple[str, ...], fleet2d: Cli
+) -> None:
+    _, out, _ = fleet2d(*words, "--help")
+
+    assert [] == re.findall(r"<list\[.*|\[\[.*|\{[a-z]+\}", out)
+    assert "<" not in " ".join(described(out).get("Arguments", ()))
+
+
 def test_command_of_an_installed_package_is_listed_below_the_own(
     fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,3 +180,10 @@ def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(tmp_path: Path) -> N
         tables.append([line for line in lines if line[:1] != ["stored"] and " x " not in str(line)])
     narrow, wide = ([line for line in table if "real" not in line] for table in tables)
     assert narrow == wide
+
+
+def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(tmp_path: Path) -> None:
+    words = ("bundled:paper", "simulation.duration=1 d")
+    done = process("-m", "fleet2d", "run", *words, "--out", str(tmp_path / "run"), COLUMNS="40")
+
+    assert "share of time at home" in " ".join(done.stdout.split())

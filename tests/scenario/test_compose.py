@@ -201,6 +201,14 @@ def test_extending_what_is_not_there_is_refused(
     assert message in str(caught.value)
 
 
+def test_the_former_name_of_the_papers_scenario_leads_to_its_name_of_today() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"^no scenario 'base' is bundled: write bundled:paper$"
+    ):
+        compose("bundled:base")
+    assert compose("bundled:paper").data
+
+
 @pytest.mark.parametrize("source", [None, "bundled:family", {"extends": "bundled:family"}])
 def test_bundled_scenario_is_found_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: Any

@@ -122,23 +122,26 @@ def _command(name: str, value: Any, ctx: Any) -> Any:
     else:
         app.command(name)(value)
     command = get_group(app).get_command(ctx, name)
-    _part_examples(command)
+    _set_out(command)
     return command
 
 
-def _part_examples(command: Any) -> None:
-    """Let the examples in the help of a command, and of its own commands, end it line by line."""
+def _set_out(command: Any) -> None:
+    """Let examples end the help of a command, and of its own, and names alone tell arguments."""
+    for parameter in command.params:
+        if parameter.param_type_name == "argument":
+            parameter.display_type_rich = lambda **_: ""
     command.help, _, examples = (command.help or "").partition(EXAMPLES)
     if examples:
         # After a line of a backspace alone, lines aren't wrapped.
         command.epilog = f"\b\nExamples:\n{examples}"
     for own in getattr(command, "commands", {}).values():
-        _part_examples(own)
+        _set_out(own)
 
 
 app = typer.Typer(
     cls=Commands,
-    help="Simulate weeks of a home in a fraction of a second, exactly reproducible.",
+    help="Simulate weeks in a home in seconds, and the same weeks from the same seed.",
     no_args_is_help=True,
     invoke_without_command=True,
     add_completion=False,
@@ -146,7 +149,7 @@ app = typer.Typer(
     "  fleet2d demo\n"
     "  fleet2d run bundled:paper simulation.duration.days=60 --out sixty\n"
     "  fleet2d view sixty\n\n"
-    "fleet2d COMMAND --help describes a command; docs/reference/cli.md describes all.",
+    "fleet2d COMMAND --help describes a command.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -158,7 +161,7 @@ def about(
         bool, typer.Option("--version", is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Simulate weeks of a home in a fraction of a second, exactly reproducible."""
+    """Simulate weeks in a home in seconds, and the same weeks from the same seed."""
     if version:
         typer.echo(f"fleet2d {__version__}")
         raise typer.Exit

@@ -93,7 +93,7 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
         # Where columns would be cut, lines are as long as they are, and the terminal breaks them.
         is_narrow = console.width < width + 4 + value_width + UNIT_WIDTH
         table = Table.grid(padding=(0, 2, 0, 0))
-        table.add_column(min_width=width + 2, no_wrap=is_narrow)
+        table.add_column(min_width=width + 2, no_wrap=True)
         head, *rows = block.rows
         for _ in head.values:
             table.add_column(justify="right", no_wrap=True)

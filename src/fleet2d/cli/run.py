@@ -117,7 +117,7 @@ Strict = Annotated[
 Arguments = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...",
+        metavar="SCENARIO.yaml|KEY.PATH=VALUE",
         help="A scenario (left out: the bundled family), and changes to it.",
     ),
 ]

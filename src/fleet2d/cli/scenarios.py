@@ -18,7 +18,7 @@ def validate(
     arguments: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[SCENARIO.yaml|FLOORPLAN] [KEY.PATH=VALUE]...",
+            metavar="SCENARIO.yaml|FLOORPLAN|KEY.PATH=VALUE",
             help="A scenario and changes to it, or a floor plan of any format.",
         ),
     ] = None,

@@ -9,12 +9,15 @@ from fleet2d.options import Resolution, Scale
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="A floor plan of any format.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="FLOORPLAN", help="A floor plan of any format.")
+    ],
     target: Annotated[
         Path,
         typer.Argument(
+            metavar="FILE",
             help="The file to write: .json or .yaml of our own, .geojson, .pgm with a .yaml beside"
-            " it for ROS's map_server, or .sdf for Gazebo."
+            " it for ROS's map_server, or .sdf for Gazebo.",
         ),
     ],
     resolution: Resolution = None,

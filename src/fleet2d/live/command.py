@@ -17,7 +17,7 @@ def live(
     arguments: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[SCENARIO.yaml] [KEY.PATH=VALUE]...", help="A scenario and changes to it."
+            metavar="SCENARIO.yaml|KEY.PATH=VALUE", help="A scenario and changes to it."
         ),
     ] = None,
     peers: Annotated[
@@ -32,7 +32,8 @@ def live(
     ] = None,
     speed: Annotated[float, typer.Option(min=0.0, help="Times real time; 0: unpaced.")] = 1.0,
     silence: Annotated[
-        float, typer.Option(min=0.1, help="A body stands if nothing arrived for so long [s].")
+        float,
+        typer.Option(min=0.1, help="A body stops if nothing has arrived for it for so long [s]."),
     ] = 5.0,
     keep_goals: Annotated[
         bool, typer.Option("--keep-goals", help="Keep the goals of a client that is gone.")
@@ -45,7 +46,7 @@ def live(
 ) -> None:
     """Run in real time among other programs.
 
-    They may move its bodies.
+    They may move its people and robots.
 
     Examples:
       fleet2d live home.yaml --with ws://127.0.0.1:8765

@@ -78,7 +78,8 @@ def bundled_path(name: str) -> Path:
     """
     names = sorted(path.stem for path in BUNDLED.glob("*.yaml"))
     if name not in names:
-        raise ScenarioError(f"no scenario {name!r} is bundled{suggest(name, names)}")
+        hint = ": write bundled:paper" if name == "base" else suggest(name, names)
+        raise ScenarioError(f"no scenario {name!r} is bundled{hint}")
     return BUNDLED / f"{name}.yaml"
 
 

@@ -196,10 +196,14 @@ def report(
 @studying.command()
 def power(
     location: Where,
-    metric: Annotated[str, typer.Argument(help="A number, such as ltp_error.ana.tv.")],
+    metric: Annotated[
+        str, typer.Argument(metavar="METRIC", help="A number, such as ltp_error.ana.tv.")
+    ],
     against: Annotated[
         str | None,
-        typer.Option(help="AXIS=VALUE, the reference; left out: as the study compares the metric."),
+        typer.Option(
+            metavar="AXIS=VALUE", help="The reference; left out: as the study compares the metric."
+        ),
     ] = None,
     effect: Annotated[
         float | None, typer.Option(help="The difference to detect; left out: what sizes detect.")

@@ -31,7 +31,7 @@ def test(  # noqa: PLR0913 - options of the command line
     arguments: Annotated[
         list[str],
         typer.Argument(
-            metavar="TEST... [KEY.PATH=VALUE]...",
+            metavar="TEST|KEY.PATH=VALUE",
             help="Scenarios with expectations, Python tests, folders of these, and changes to all.",
         ),
     ],

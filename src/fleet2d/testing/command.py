@@ -36,8 +36,9 @@ def falsify(
     over: Annotated[
         list[str],
         typer.Option(
+            metavar="AXES.yaml|AXIS",
             help="What varies: a YAML file of axes, or one axis, 'home={synthetic: 50}'; again"
-            " for more."
+            " for more.",
         ),
     ],
     budget: Annotated[

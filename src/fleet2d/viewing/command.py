@@ -17,7 +17,7 @@ def view(
     arguments: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="RUN_DIR...|SCENARIO.yaml [KEY.PATH=VALUE]...",
+            metavar="RUN_DIR|SCENARIO.yaml|KEY.PATH=VALUE",
             help="Stored runs, up to four; or a scenario that runs while it is watched.",
         ),
     ] = None,

@@ -66,7 +66,7 @@ Figure = Annotated[
 def show(  # noqa: PLR0913 - options of the command line
     source: Annotated[
         Path | None,
-        typer.Argument(metavar="[FLOORPLAN|RUN_DIR|PERSONA]", help="Left out: the bundled home."),
+        typer.Argument(metavar="FLOORPLAN|RUN_DIR|PERSONA", help="Left out: the bundled home."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")] = None,
     resolution: Resolution = None,

@@ -156,11 +156,13 @@ def _windows(on: Path) -> "tuple[list[Windows], list[Windows]]":
 def leaderboard(
     directory: Folder,
     task: Annotated[
-        list[str] | None, typer.Option(help="A task, several times for more; left out: all.")
+        list[str] | None,
+        typer.Option(metavar="TASK", help="A task, several times for more; left out: all."),
     ] = None,
     split: Annotated[str, typer.Option(help="The split to score on.")] = "test",
     weights: Annotated[
-        list[Path] | None, typer.Option(help="A file of weights to score, too, for rtp.")
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="A file of weights to score, too, for rtp."),
     ] = None,
     picture: Annotated[
         Path | None,
