@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fleet2d.artifacts.arrow import schema_of, spec_of
-from fleet2d.artifacts.table import Column, TableBuffer, TableSpec
+from fleet2d.artifacts.table import Column, Repeated, TableBuffer, TableSpec
 from fleet2d.errors import ArtifactError
 
 from .tables import EVERY_KIND, rows_of_every_kind
@@ -87,6 +87,28 @@ def test_append_repeats_scalars() -> None:
     assert [0.5, 0.5, 0.5, 1.5] == buffer.take()["x"].values.tolist()
 
 
+@pytest.mark.parametrize(
+    ("column", "values"),
+    [
+        (Column("c", "float64", nullable=True), np.array([0.5, np.nan, 3])),
+        (Column("c", "float64"), np.array([1, 2, 3], np.int32)),
+        (Column("c", "float64"), np.array([0.5, 2.5, 3])),
+        (Column("c", "category", categories=("a", "b"), nullable=True), np.array([-1, 1, 0])),
+        (Column("c", "bool"), np.array([True, False, True])),
+    ],
+)
+def test_repeated_values_are_stored_as_each_row_has_them(column: Column, values: Any) -> None:
+    index = np.array([0, 0, 2, 1, 1, 1, 2])
+    once, each = (TableBuffer(TableSpec("t", (column,)), limit=4) for _ in range(2))
+    batches = once.check({"c": Repeated(values, index)}), each.check({"c": values[index]})
+
+    for start in (0, 4):
+        for buffer, batch in zip((once, each), batches, strict=True):
+            buffer.fill(batch, start)
+        for some, others in zip(once.take()["c"], each.take()["c"], strict=True):
+            assert np.array_equal(some, others)
+
+
 def test_append_of_all_scalars_to_strings_adds_one_row() -> None:
     buffer = of(Column("a", "string", nullable=True), Column("b", "category"))
 
@@ -147,6 +169,8 @@ def test_deepcopy_shares_nothing() -> None:
         ({"step": np.arange(3), "x": np.array(["a"] * 3)}, "not float64"),
         ({"step": np.zeros((3, 1), int), "x": np.zeros(3)}, "2 dimensions"),
         ({"step": np.arange(3), "x": np.array([0, np.nan, 0])}, "declare it nullable"),
+        ({"step": np.arange(3), "x": Repeated(np.array([np.nan]), np.zeros(3, int))}, "nullable"),
+        ({"step": np.arange(3), "x": Repeated(np.zeros(1), np.zeros(2, int))}, "has 2 values"),
     ],
 )
 def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], message: str) -> None:

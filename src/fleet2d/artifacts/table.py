@@ -88,6 +88,32 @@ class Column:
         return self.kind == "string" or self.is_growing
 
 
+@dataclass(frozen=True, slots=True)
+class Repeated:
+    """The values of a column of which most come several times: each is stored and checked once.
+
+    Example:
+        >>> np.asarray(Repeated(np.array([0.5, 2.0]), np.array([0, 0, 1]))).tolist()
+        [0.5, 0.5, 2.0]
+
+    Attributes:
+        values: Numbers or codes, (k,).
+        index: int64 (rows,), the place among them of the value of each row.
+    """
+
+    values: NDArray[Any]
+    index: I64
+
+    def __array__(self, dtype: Any = None, *, copy: bool | None = None) -> NDArray[Any]:
+        """Return the value of each row."""
+        return self.values[self.index].astype(dtype or self.values.dtype, copy=False)
+
+    def copy_to(self, rows: NDArray[Any], start: int) -> None:
+        """Copy the values from row `start` on, as many as there are rows."""
+        index = self.index[start : start + len(rows)]
+        np.take(self.values, index, out=rows, mode="clip")  # other modes make a copy first
+
+
 Columns = dict[Column, Any]
 """Columns and their values, which make a table and rows of it."""
 LAYER_PREFIX = "layer."
@@ -229,8 +255,10 @@ class Batch(NamedTuple):
 
     Attributes:
         rows: Number of rows.
-        values: Of each column an array or a list, (rows,), or a scalar that stands for all rows.
-        valid: Of each column which values are not missing, bool (rows,), or True for all.
+        values: Of each column an array or a list, (rows,), or a scalar that stands for all rows; or
+            `Repeated`, with 0 for missing ones.
+        valid: Of each column which values are not missing, bool (rows,), `Repeated`, or True for
+            all.
     """
 
     rows: int
@@ -270,7 +298,8 @@ class TableBuffer:
         """Convert columns to the table's types; the buffer is not changed yet.
 
         Args:
-            columns: One array per column, all of one length; a scalar stands for all rows.
+            columns: One array, or `Repeated`, per column, all of one length; a scalar stands for
+                all rows.
 
         Raises:
             ArtifactError: A column is missing, unknown, of another length or type, out of range,
@@ -282,8 +311,10 @@ class TableBuffer:
         valid: dict[str, Any] = {}
         rows = -1
         for column in self.spec.columns:
+            given = columns[column.name]
+            convert = _convert_repeated if isinstance(given, Repeated) else _convert
             try:
-                values[column.name], valid[column.name] = _convert(column, columns[column.name])
+                values[column.name], valid[column.name] = convert(column, given)
             except ArtifactError as error:
                 raise ArtifactError(
                     f"table {self.spec.name!r}, column {column.name!r}: {error}"
@@ -326,6 +357,13 @@ class TableBuffer:
                     self._strings[name][a:] = values  # an interrupted call may have added some
                     continue
                 values, valid, _ = encode_words(values, self.words[name], column.nullable)
+            elif isinstance(values, Repeated):
+                values.copy_to(self._values[name][a:b], start)
+                if isinstance(valid, Repeated):
+                    valid.copy_to(self._valid[name][a:b], start)
+                elif column.nullable:
+                    self._valid[name][a:b] = valid
+                continue
             else:
                 values = values[start:stop] if np.ndim(values) else values
                 valid = valid[start:stop] if np.ndim(valid) else valid
@@ -443,6 +481,18 @@ def _convert(column: Column, values: Any) -> tuple[Any, Any]:
     return values, True if valid is None else valid
 
 
+def _convert_repeated(column: Column, values: Repeated) -> tuple[Repeated, Any]:
+    """Do the same with values of which each is given once."""
+    once, valid = _convert(column, values.values)
+    once = once.astype(DTYPES[column.kind])
+    if not column.nullable:
+        valid = True
+    elif valid is not True:
+        once[~valid] = 0
+        valid = Repeated(valid, values.index)
+    return Repeated(once, values.index), valid
+
+
 def _check_integers(column: Column, values: Any, unmasked: Any) -> Any:
     """Check the range of numbers or codes; return which codes are not -1 if that means missing."""
     dtype = DTYPES[column.kind]
@@ -482,6 +532,8 @@ def _length(values: Any) -> int:
     """Return the number of values, or -1 for a scalar."""
     if isinstance(values, np.ndarray):
         return -1 if values.ndim == 0 else len(values)
+    if isinstance(values, Repeated):
+        return len(values.index)
     return len(values) if isinstance(values, list) else -1
 
 

@@ -11,6 +11,7 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import (
@@ -20,9 +21,9 @@ from fleet2d.algorithms.observations import (
     SightingTable,
     Truth,
 )
-from fleet2d.artifacts.table import STEP, Column, Columns, TableSpec, time_column
+from fleet2d.artifacts.table import STEP, Column, Columns, Repeated, TableSpec, time_column
 from fleet2d.engine.basis import Basis, ImmutableRows
-from fleet2d.engine.cameras import Cameras
+from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.trajectories import (
     HEADING,
@@ -210,13 +211,31 @@ class Recorder:
         """Return and remove observations: so many that their columns take little memory."""
         counts = accumulate(map(len, self._observations))
         size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), None)
-        o = Observations(self.home.plan, self._rooms, self._observations[:size], self.activities)
+        seen = SightingTable.joined(self._observations[:size] or [NOTHING])
         del self._observations[:size]
+        columns: Columns = {
+            STEP: seen.step,
+            time_column(self.clock.zone): self.clock.stamps(seen.step),
+        }
+        # Most rows repeat another one at another step: all other columns are made of the others.
+        index = seen.index.astype(np.int64)
+        o = self._seen(SightingTable.of_rows(seen.distinct))
+        columns |= {c: Repeated(values, index) for c, values in self._columns_of(o).items()}
+        if self._camera_names and self.activities.are_perceived:
+            o = self._seen(seen)
+            activity = Column("activity", "category", nullable=True, description=ACTIVITY_SAID)
+            columns[activity] = o.activity.tolist()
+            columns[_true(activity)] = Truth.behind(o).activity.tolist()
+        return columns
+
+    def _seen(self, table: SightingTable) -> Observations:
+        return Observations(self.home.plan, self._rooms, [table], self.activities)
+
+    def _columns_of(self, o: Observations) -> dict[Column, NDArray[Any]]:
+        """Return what observations show at any step, column by column."""
         has_cameras = bool(self._camera_names)
         user = Column("user", "category", nullable=has_cameras, categories=self._user_names)
-        columns: Columns = {
-            STEP: o.step,
-            time_column(self.clock.zone): self.clock.stamps(o.step),
+        columns: dict[Column, NDArray[Any]] = {
             Column("robot", "category", categories=self._robot_names): o.robot,
             user: o.user,
             X: o.x,
@@ -242,10 +261,6 @@ class Recorder:
         if self._has_unknown_truth:
             known = Column("truth_known", "bool", description=TRUTH_KNOWN)
             columns[known] = t.user != UNKNOWN_TRUTH
-        if self.activities.are_perceived:
-            activity = Column("activity", "category", nullable=True, description=ACTIVITY_SAID)
-            columns[activity] = o.activity.tolist()
-            columns[_true(activity)] = t.activity.tolist()
         return columns
 
     def _cameras(self, robot: I32, camera: I8) -> I32:
