@@ -22,7 +22,7 @@ from fleet2d.algorithms.algorithm import (
     to_columns,
 )
 from fleet2d.algorithms.history import History, Log
-from fleet2d.artifacts.table import KINDS, Column, Kind, time_column
+from fleet2d.artifacts.table import KINDS, Column, Kind, TableSpec, time_column
 from fleet2d.configuration.problems import check_known
 from fleet2d.configuration.units import micros, whole_steps
 from fleet2d.engine.basis import Basis
@@ -43,6 +43,7 @@ class Learner:
         every: Steps between two updates; 0 if events update it.
         table: The name of the table of its outputs.
         kinds: The kinds of that table's columns; empty before the first output.
+        spec: That table; None before the first output.
         since: First step of its next history.
         back: Number of steps before that which it may also read.
         is_updated: Whether it has been updated.
@@ -56,6 +57,7 @@ class Learner:
     every: int
     table: str
     kinds: dict[str, Kind] = field(default_factory=dict)
+    spec: TableSpec | None = None
     since: int = 0
     back: int = 0
     is_updated: bool = False
@@ -312,15 +314,14 @@ class Learners:
         kinds = {name: KINDS[values.dtype.kind] for name, values in columns.items()}
         if not len(next(iter(columns.values()))):
             return  # without values even the kinds of the columns are unknown
-        if not learner.kinds:
+        if learner.spec is None:
             learner.kinds = kinds
+            own = (Column(name, kind) for name, kind in kinds.items())
+            time = replace(time_column(self.clock.zone), description="")
+            learner.spec = TableSpec(learner.table, (Column("step", "step"), time, *own))
         _check_kinds(learner, kinds)
-        rows = {
-            Column("step", "step"): step,
-            replace(time_column(self.clock.zone), description=""): self.clock.stamp(step),
-            **{Column(name, kind): columns[name] for name, kind in learner.kinds.items()},
-        }
-        self.store.add_rows(learner.table, rows)
+        self.store.add_table(learner.spec)  # that of a branch doesn't have it yet
+        self.store.append(learner.table, step=step, time=self.clock.stamp(step), **columns)
 
 
 def _copy(output: Any) -> Any:
