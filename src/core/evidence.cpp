@@ -1,6 +1,7 @@
 #include "evidence.hpp"
 
 #include <cstring>
+#include <utility>
 
 namespace fleet2d {
 
@@ -175,6 +176,32 @@ Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_
         }
     }
     return views;
+}
+
+WatchedViews watched_views(View<const u8, 2> shown, const PatchSightings& sightings, i64 users) {
+    const i64 bins = shown.size(), patches = shown.shape[1];
+    auto unknown = Array<i64, 2>::zeros({users > 1 ? bins : 0, patches});  // steps of anybody, less those of users
+    if (users > 1) {
+        for (i64 i = 0; i < sightings.user.size(); ++i) {
+            const i64 steps = sightings.steps[i];
+            unknown(sightings.bin[i], sightings.patch[i]) += sightings.user[i] == users - 1 ? steps : -steps;
+        }
+    }
+    auto view = Array<i64>::empty({bins});
+    std::vector<u8> views;
+    std::vector<u8> row(static_cast<std::size_t>(patches + 1)), before;
+    for (i64 t = 0; t < bins; ++t) {
+        for (i64 p = 0; p < patches; ++p) {
+            row[static_cast<std::size_t>(p)] = users > 1 && unknown(t, p) > 0 ? u8{0} : shown(t, p);
+        }
+        if (row != before) {
+            views.insert(views.end(), row.begin(), row.end());
+            before = row;
+        }
+        view[t] = static_cast<i64>(views.size()) / (patches + 1) - 1;
+    }
+    const i64 count = static_cast<i64>(views.size()) / (patches + 1);
+    return {std::move(view), Array<u8, 2>::copy_of({views.data(), {count, patches + 1}})};
 }
 
 Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users,

@@ -27,6 +27,22 @@ struct Views {
 // of a bin, and the maximum; of several robots, the one that saw most counts.
 Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_steps);
 
+// In how many steps users were perceived where: of each sighting arrays of one length.
+struct PatchSightings {
+    View<const i64> user, bin, patch, steps;
+};
+
+// What was in view in consecutive bins, each once.
+struct WatchedViews {
+    Array<i64> view;     // (bins,) the row of `views`
+    Array<u8, 2> views;  // (views, patches + 1), each other than the one before; away, the last, is never in view
+};
+
+// What was in view but for patches with an unknown person, who may be any user: those are as if unwatched. `shown`
+// (bins, patches) are parts in view. An unknown person was where anybody, the last of `users`, was perceived in more
+// steps than all other users together; with one user only, everybody is the same person.
+WatchedViews watched_views(View<const u8, 2> shown, const PatchSightings& sightings, i64 users);
+
 // The probabilities of a person's places in consecutive stretches of bins.
 struct Chain {
     View<const f64, 2> places;  // (stretches, places) probability of each place, away last

@@ -39,20 +39,27 @@ struct SightingCounts {
 
 // Count the steps at which each user was perceived in each room, once however often.
 //
-// `step` (n,) is in order of time, from the beginning of the first bin; `user` (n,) is below 0 for somebody unknown,
-// `room` (n,) below 0 for none. `shape` is (bins, users + 1, rooms); its last user is anybody.
-inline SightingCounts list_sightings(View<const i64> step, View<const i64> user, View<const i64> room, i64 bin_steps,
-                                     std::array<i64, 3> shape) {
+// `step` (n,) is in order of time, from the beginning of the first bin. Most sightings repeat another one at another
+// step: `index` (n,) is the number of each among the distinct ones, of which `user` (k,) is below 0 for somebody
+// unknown, and `room` (k,) below 0 for none. `shape` is (bins, users + 1, rooms); its last user is anybody.
+inline SightingCounts list_sightings(View<const i64> step, View<const i32> index, View<const i64> user,
+                                     View<const i64> room, i64 bin_steps, std::array<i64, 3> shape) {
     struct Entry {
         i64 user, bin, room, steps, last;  // the step that was counted last
     };
     std::vector<Entry> entries;
     const auto [bins, users, rooms] = shape;
     auto newest = Array<i64, 2>::filled({users, rooms}, -1);  // entry
+    i64 bin = -1, begin = 0;                                  // of the bin
     for (i64 i = 0; i < step.size(); ++i) {
-        const i64 at = step[i], where = room[i], bin = floor_div(at, bin_steps);
-        if (where < 0 || bin < 0 || bin >= bins) continue;
-        for (const i64 who : {user[i], users - 1}) {
+        const i64 at = step[i], where = room[index[i]];
+        if (bin < 0 || at < begin || at - begin >= bin_steps) {
+            bin = floor_div(at, bin_steps);
+            if (bin >= bins) bin = -1;
+            begin = std::max(bin, i64{0}) * bin_steps;
+        }
+        if (bin < 0 || where < 0) continue;
+        for (const i64 who : {user[index[i]], users - 1}) {
             if (who < 0) continue;
             i64& number = newest(who, where);
             if (number < 0 || entries[static_cast<std::size_t>(number)].bin != bin) {

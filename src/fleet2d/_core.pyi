@@ -1167,14 +1167,15 @@ def advance(probability: numpy.typing.NDArray[numpy.float64], transition: numpy.
         float64 (states,).
     """
 
-def list_sightings(step: numpy.typing.NDArray[numpy.int64], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, bins: int, users: int, rooms: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
+def list_sightings(step: numpy.typing.NDArray[numpy.int64], index: numpy.typing.NDArray[numpy.int32], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, bins: int, users: int, rooms: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     Count the steps at which each user was perceived in each room, each step once, where that isn't 0.
 
     Args:
         step: int64 (n,), in order of time, from the beginning of the first bin.
-        user: int64 (n,), below 0 for somebody unknown.
-        room: int64 (n,), below 0 for none.
+        index: int32 (n,), the number of each sighting among the distinct ones.
+        user: int64 (k,), of each distinct one, below 0 for somebody unknown.
+        room: int64 (k,), likewise, below 0 for none.
         bin_steps: Steps of a bin.
         bins: How many bins there are.
         users: How many users there are, and one more for anybody.
@@ -1211,6 +1212,25 @@ def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.ND
     Returns:
         Shares of the cells in view, averaged over the steps: float64 (bins, rooms), and (bins, patches); at most at
         one step: float64 (bins, patches); and that in parts of 255: uint8 (bins, patches).
+    """
+
+def watched_views(shown: numpy.typing.NDArray[numpy.uint8], user: numpy.typing.NDArray[numpy.int64], bin: numpy.typing.NDArray[numpy.int64], patch: numpy.typing.NDArray[numpy.int64], steps: numpy.typing.NDArray[numpy.int64], users: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.uint8]]:
+    """
+    Return what was in view but for patches with an unknown person, who may be any user.
+
+    An unknown person was where anybody was perceived in more steps than all users together; nowhere with one user.
+
+    Args:
+        shown: uint8 (bins, patches), the part of each patch in view.
+        user: int64 (n,), who was perceived; the last of `users` is anybody.
+        bin: int64 (n,).
+        patch: int64 (n,).
+        steps: int64 (n,), in how many steps.
+        users: How many users there are, and one more for anybody.
+
+    Returns:
+        The number of the view in each bin, int64 (bins,), and the views, each other than the one before: uint8 (views,
+        patches + 1), the last column 0.
     """
 
 def sum_places(chains: tuple[Any, ...], unknown: numpy.typing.NDArray[numpy.bool_], users: int, first: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.float64]:
@@ -1267,6 +1287,18 @@ class Legs:
 
         Returns:
             time, x, y, heading and away at the end; None if no way leads there, or an end isn't strictly inside.
+        """
+
+    def visit(self, time: int, x: int, y: int, heading: int, routes: Routes, stops: numpy.typing.NDArray[numpy.int64], speed: float, turn_rate: float, headings: int, stay: int) -> tuple[int, int, int, int, int] | None:
+        """
+        Walk the shortest ways from stop to stop, int64 (n, 2), at home; at each turn and stay.
+
+        Args:
+            headings: By how many headings it turns at each stop.
+            stay: How long it stays then [us].
+
+        Returns:
+            time, x, y, heading and away at the end; None, without a breakpoint, if no way leads to one of them.
         """
 
     def settle(self, time: int, x: int, y: int, heading: int, at_x: int, at_y: int, at_heading: int, speed: float, turn_rate: float) -> tuple[int, int, int, int, int]:

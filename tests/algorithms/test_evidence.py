@@ -9,6 +9,7 @@ from tests.scenes import TESTS, everything, run
 
 from fleet2d import Algorithm, History, Present
 from fleet2d.algorithms.evidence import SightingCounts, steps_of_bin
+from fleet2d.algorithms.observations import PlacedSightings
 from fleet2d.errors import ComponentError
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_evidence"
@@ -45,9 +46,10 @@ class Unsaid(Algorithm):
         return {"bins": len(history.evidence)}
 
 
-def columns(rows: list[tuple[int, int, int]]) -> Any:
-    """Return observations of (step, user, room) as columns."""
-    return np.array(rows, np.int64).reshape(-1, 3).T.copy()
+def sightings(rows: list[tuple[int, int, int]]) -> PlacedSightings:
+    """Return observations of (step, user, room)."""
+    step, user, room = np.array(rows, np.int64).reshape(-1, 3).T.copy()
+    return PlacedSightings(step, np.arange(len(rows), dtype=np.int32), user, room)
 
 
 def test_bins_last_a_minute_or_a_step() -> None:
@@ -59,14 +61,14 @@ def test_bins_last_a_minute_or_a_step() -> None:
 def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone() -> None:
     rows = [(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, -1, 1), (59, 1, 0), (60, -1, 0), (120, 0, 0)]
 
-    seen = SightingCounts.of_observations(*columns(rows), 60, (2, 3, 2)).dense
+    seen = SightingCounts.of_observations(sightings(rows), 60, (2, 3, 2)).dense
 
     assert [[0, 2], [1, 0], [1, 2]] == seen[0].tolist()
     assert [[0, 0], [0, 0], [1, 0]] == seen[1].tolist()
 
 
 def test_nobody_perceived_is_evidence_of_zeros() -> None:
-    assert 0 == SightingCounts.of_observations(*columns([]), 60, (3, 2, 2)).dense.sum()
+    assert 0 == SightingCounts.of_observations(sightings([]), 60, (3, 2, 2)).dense.sum()
 
 
 def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:

@@ -93,6 +93,32 @@ def test_legs_equal_lists(seed: int) -> None:
     assert [np.dtype(t) for t in ("i8", "i8", "i8", "i8", "u1")] == [c.dtype for c in columns]
 
 
+@pytest.mark.parametrize("headings", [0, -700, TURN])
+def test_visits_equal_ways_turns_and_stays_one_by_one(headings: int) -> None:
+    routes = routes_of(home_of([ROOM]))
+    stops = np.array([[300, 3000], [3000, 2900], [3000, 2900], [700, 800]])
+    legs, twin = Legs(), InLists()
+    begin = twin.now
+
+    end = legs.visit(*begin[:-1], routes, stops, SPEED, TURN_RATE, headings, 1_500)
+
+    for stop in stops.tolist():
+        twin.walk(routes.find(*twin.now[1:3], *stop))
+        twin.turn(headings)
+        twin.rows.append([twin.now[0] + 1_500, *twin.now[1:]])
+    assert twin.now == list(end or ())
+    assert twin.rows[1:] == legs.rows().tolist()
+
+
+def test_if_a_stop_is_out_of_reach_nothing_is_visited() -> None:
+    legs = Legs()
+    in_pillar = np.array([[300, 3000], [1900, 1900]])
+    routes = routes_of(home_of([ROOM]))
+
+    assert legs.visit(0, 100, 200, 7, routes, in_pillar, SPEED, TURN_RATE, TURN, 0) is None
+    assert not len(legs)
+
+
 def test_copies_go_on_by_themselves() -> None:
     legs = Legs()
     legs.mark(1, 2, 3, 4, 0)

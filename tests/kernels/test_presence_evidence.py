@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from fleet2d.algorithms.presence.belief import with_anyone
-from fleet2d.kernels import F64, I64, Bool, PeoplePlaces, gather_views, sum_places
+from fleet2d.kernels import (
+    F64,
+    I64,
+    Bool,
+    PeoplePlaces,
+    gather_views,
+    sum_places,
+    watched_views,
+)
 
 
 def views(seed: int, robots: int) -> tuple[I64, ...]:
@@ -50,6 +58,28 @@ def test_half_a_part_is_rounded_to_the_even_one() -> None:
     *_, parts = gather_views(cells, room, size, size, 1)
 
     assert [0, 2, 2, 254] == parts[:, 0].tolist()
+
+
+@pytest.mark.parametrize("users", [1, 2, 4])
+@pytest.mark.parametrize("seed", range(4))
+def test_patches_with_an_unknown_person_are_not_watched(seed: int, users: int) -> None:
+    random = np.random.default_rng(seed)
+    shown = random.integers(0, 3, (12, 4)).astype(np.uint8)[random.integers(0, 12, 40)]
+    user, bin_, patch = (random.integers(0, size, 60) for size in (users, 40, 4))
+    steps = random.integers(1, 5, 60)
+
+    view, views = watched_views(shown, user, bin_, patch, steps, users)
+
+    expected = np.zeros((40, 5), np.uint8)
+    for t, p in np.ndindex(shown.shape):
+        here = (bin_ == t) & (patch == p)
+        anybody, known = (steps[here & (user == users - 1)], steps[here & (user < users - 1)])
+        is_unknown = users > 1 and anybody.sum() > known.sum()
+        expected[t, p] = 0 if is_unknown else shown[t, p]
+    assert np.array_equal(expected, views[view])
+    assert np.array_equal(np.diff(view), (expected[1:] != expected[:-1]).any(axis=1))
+    assert 0 == view[0]
+    assert len(views) == view[-1] + 1
 
 
 def values(chains: F64, unknown: Bool, users: int) -> F64:

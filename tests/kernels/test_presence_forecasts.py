@@ -31,15 +31,16 @@ def test_sightings_are_the_steps_with_each_user_in_each_room(seed: int) -> None:
     random = np.random.default_rng(seed)
     users, rooms, bins, bin_steps = 2, 3, 4, 5
     step = np.sort(random.integers(-5, 25, 60))  # some before the first bin, some behind the last
-    user, room = random.integers(-1, users, 60), random.integers(-1, rooms, 60)
+    index = random.integers(0, 20, 60).astype(np.int32)
+    user, room = random.integers(-1, users, 20), random.integers(-1, rooms, 20)
     shape = (bins, users + 1, rooms)
 
-    *where, counts = list_sightings(step, user, room, bin_steps, *shape)
+    *where, counts = list_sightings(step, index, user, room, bin_steps, *shape)
 
     assert list(zip(*where, strict=True)) == sorted(set(zip(*where, strict=True)))
     seen = np.zeros(shape, np.int64)
     seen[where[1], where[0], where[2]] = counts
-    rows = list(zip(step.tolist(), user.tolist(), room.tolist(), strict=True))
+    rows = list(zip(step.tolist(), user[index].tolist(), room[index].tolist(), strict=True))
     for at, who, where in np.ndindex(seen.shape):
         steps = {s for s, u, r in rows if r == where and who in (u, users)}
         assert sum(s // bin_steps == at for s in steps) == seen[at, who, where]

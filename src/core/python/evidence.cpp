@@ -98,6 +98,35 @@ Returns:
     Shares of the cells in view, averaged over the steps: float64 (bins, rooms), and (bins, patches); at most at
     one step: float64 (bins, patches); and that in parts of 255: uint8 (bins, patches).)");
     m.def(
+        "watched_views",
+        [](View<const u8, 2> shown, View<const i64> user, View<const i64> bin, View<const i64> patch,
+           View<const i64> steps, i64 users) {
+            const i64 count = user.size();
+            require(bin.size() == count && patch.size() == count && steps.size() == count,
+                    "user, bin, patch and steps must have one length");
+            require(all_in_range(bin, 0, shown.size()) && all_in_range(patch, 0, shown.shape[1]),
+                    "bin and patch must be those of `shown`");
+            require(all_in_range(steps, 0, i64{1} << 31), "steps must be 0 or more, and below 2**31");
+            WatchedViews watched = watched_views(shown, {user, bin, patch, steps}, users);
+            return std::make_tuple(std::move(watched.view), std::move(watched.views));
+        },
+        "shown"_a, "user"_a, "bin"_a, "patch"_a, "steps"_a, "users"_a, Unlocked(),
+        R"(Return what was in view but for patches with an unknown person, who may be any user.
+
+An unknown person was where anybody was perceived in more steps than all users together; nowhere with one user.
+
+Args:
+    shown: uint8 (bins, patches), the part of each patch in view.
+    user: int64 (n,), who was perceived; the last of `users` is anybody.
+    bin: int64 (n,).
+    patch: int64 (n,).
+    steps: int64 (n,), in how many steps.
+    users: How many users there are, and one more for anybody.
+
+Returns:
+    The number of the view in each bin, int64 (bins,), and the views, each other than the one before: uint8 (views,
+    patches + 1), the last column 0.)");
+    m.def(
         "sum_places",
         [](const Chains& chains, View<const bool, 2> unknown, i64 users, View<const i64> first) {
             const std::vector<Chain> all = split(chains);

@@ -18,6 +18,10 @@ void add_checked(Legs& legs, View<const i64, 2> rows) {
     }
 }
 
+void check_turn(i64 headings) {
+    require(-(i64{1} << 40) < headings && headings < i64{1} << 40, "headings must be within 2**40 of 0");
+}
+
 }  // namespace
 
 void bind_legs(nb::module_& m) {
@@ -35,7 +39,7 @@ void bind_legs(nb::module_& m) {
         .def(
             "turn",
             [](Legs& self, i64 time, i64 x, i64 y, i64 heading, i64 away, i64 headings, f64 turn_rate) {
-                require(-(i64{1} << 40) < headings && headings < i64{1} << 40, "headings must be within 2**40 of 0");
+                check_turn(headings);
                 require(turn_rate > 0, "turn_rate must be above 0");
                 return plain(self.turn(checked(time, x, y, heading, away), headings, turn_rate));
             },
@@ -79,6 +83,41 @@ Returns:
 
 Returns:
     time, x, y, heading and away at the end; None if no way leads there, or an end isn't strictly inside.)")
+        .def(
+            "visit",
+            [](Legs& self, i64 time, i64 x, i64 y, i64 heading, Routes& routes, View<const i64, 2> stops, f64 speed,
+               f64 turn_rate, i64 headings, i64 stay) -> std::optional<MomentRow> {
+                Moment now = checked(time, x, y, heading, 0);
+                check_rates(speed, turn_rate);
+                check_turn(headings);
+                require(stops.shape[1] == 2, "stops must be (n, 2)");
+                require(0 <= stay && stay <= LATEST, "stay must be 0 or more, and at most 2**61 us");
+                std::vector<std::vector<Point>> ways;
+                Point from{x, y};
+                for (i64 i = 0; i < stops.size(); ++i) {
+                    const Point stop{stops(i, 0), stops(i, 1)};
+                    const nb::gil_scoped_release unlocked;
+                    ways.push_back(routes.find(from, stop));
+                    if (ways.back().empty()) return {};
+                    from = stop;
+                }
+                for (const std::vector<Point>& way : ways) {
+                    now = self.turn(self.walk(now, rows_of(way), speed, turn_rate), headings, turn_rate);
+                    now = checked(now.time + stay, now.x, now.y, now.heading, 0);
+                    self.mark(now);
+                }
+                return plain(now);
+            },
+            "time"_a, "x"_a, "y"_a, "heading"_a, "routes"_a, "stops"_a, "speed"_a, "turn_rate"_a, "headings"_a,
+            "stay"_a,
+            R"(Walk the shortest ways from stop to stop, int64 (n, 2), at home; at each turn and stay.
+
+Args:
+    headings: By how many headings it turns at each stop.
+    stay: How long it stays then [us].
+
+Returns:
+    time, x, y, heading and away at the end; None, without a breakpoint, if no way leads to one of them.)")
         .def(
             "settle",
             [](Legs& self, i64 time, i64 x, i64 y, i64 heading, i64 at_x, i64 at_y, i64 at_heading, f64 speed,

@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from fleet2d.algorithms.observations import NOWHERE, frozen
+from fleet2d.algorithms.observations import NOWHERE, PlacedSightings, frozen
 from fleet2d.floorplan.plan import FloorPlan, read_only
 from fleet2d.kernels import (
     F64,
@@ -171,23 +171,22 @@ class SightingCounts(NamedTuple):
 
     @classmethod
     def of_observations(
-        cls, step: I64, user: I64, place: I64, bin_steps: int, shape: tuple[int, int, int]
+        cls, seen: PlacedSightings, bin_steps: int, shape: tuple[int, int, int]
     ) -> Self:
         """Count observations; several of a user in a place at one step count once.
 
         Args:
-            step: int64 (n,), ascending, step of each observation since the first bin began.
-            user: int64 (n,), row of the recognized user, below 0 if not recognized.
-            place: int64 (n,), where the user was perceived.
+            seen: The observations, with steps since the first bin began.
             bin_steps: Steps of a bin.
             shape: Numbers of bins, of users + 1, and of places.
 
         Example:
             >>> zero = np.array([0])
-            >>> SightingCounts.of_observations(zero, zero, zero, 1, (1, 2, 1)).dense.tolist()
+            >>> seen = PlacedSightings(zero, zero.astype(np.int32), zero, zero)
+            >>> SightingCounts.of_observations(seen, 1, (1, 2, 1)).dense.tolist()
             [[[1], [1]]]
         """
-        return cls(*list_sightings(step, user, place, bin_steps, *shape), shape)
+        return cls(*list_sightings(*seen, bin_steps, *shape), shape)
 
     def between(self, begin: int, end: int) -> Self:
         """Return the counts of the bins `begin` to `end` - 1."""
@@ -312,6 +311,8 @@ class Evidence:
     @property
     def days(self) -> list[Self]:
         """The evidence of each day."""
+        if len(self) and self.day[0] == self.day[-1]:
+            return [self]
         ends = [*(np.flatnonzero(np.diff(self.day)) + 1).tolist(), len(self)]
         return [self.between(a, b) for a, b in pairwise([0, *ends]) if a < b]
 
@@ -332,7 +333,7 @@ def gather(
     bin_steps: int,
     patches: Patches,
     cells: I64,
-    observed: tuple[I64, I64, I64],
+    observed: PlacedSightings,
     users: int,
 ) -> Evidence:
     """Return the evidence of consecutive bins, with read-only arrays.
@@ -344,21 +345,17 @@ def gather(
         patches: The patches of the rooms.
         cells: int64 (bins, robots, 2, patches), number of cells of each patch in view of each
             robot: the sum over the steps of the bin, and the maximum.
-        observed: The observations in order: step, row of the recognized user (below 0 if not
-            recognized), and patch, int64 (n,) each.
+        observed: The observations in order, by patches.
         users: Number of users.
     """
     watched, by_patch, shown, shown_255 = gather_views(
         cells, patches.room, patches.cells, patches.room_cells, bin_steps
     )
-    step, user, patch = observed
     size = len(cells), users + 1
-    in_patches = SightingCounts.of_observations(
-        step - begin, user, patch, bin_steps, (*size, len(patches.room))
-    )
-    in_rooms = SightingCounts.of_observations(
-        step - begin, user, patches.room[patch], bin_steps, (*size, len(patches.first))
-    )
+    seen = observed._replace(step=observed.step - begin)
+    in_patches = SightingCounts.of_observations(seen, bin_steps, (*size, len(patches.room)))
+    seen = seen._replace(place=patches.room[seen.place])
+    in_rooms = SightingCounts.of_observations(seen, bin_steps, (*size, len(patches.first)))
     day, minute = times_of_bins(clock, begin, bin_steps, len(cells))
     of_patches = PatchEvidence(
         patches.room, patches.cells, by_patch, shown, shown_255, in_patches, patches.island

@@ -372,8 +372,7 @@ class Log:
             bins = bins.copy()
             bins[:blank] = 0
         seen = self.observations(first + max(blank, 0) * self.bin_steps, end)
-        patch = seen.room_in(self._nearest_patches).astype(np.int64)
-        observed = (seen.step, seen.user.astype(np.int64), patch)
+        observed = seen.placed_in(self._nearest_patches)
         users = self.activities.users
         from fleet2d.algorithms.evidence import gather  # few algorithms need it
 

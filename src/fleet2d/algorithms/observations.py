@@ -99,6 +99,22 @@ class SightingTable:
         return rows
 
 
+class PlacedSightings(NamedTuple):
+    """When and where users were perceived; as in `SightingTable`, what was seen is stored once.
+
+    Attributes:
+        step: int64 (n,), when each became known.
+        number: int32 (n,), that of each among the distinct ones.
+        user: int64 (k,), the recognized user of each distinct one, below 0 if not recognized.
+        place: int64 (k,), the room or the patch where each was perceived.
+    """
+
+    step: I64
+    number: I32
+    user: I64
+    place: I64
+
+
 @dataclass(frozen=True)
 class ActivitySense:
     """How one camera perceives activities.
@@ -290,12 +306,17 @@ class Observations:
     @cached_property
     def room(self) -> I16:
         """Room of the perceived position, or the nearest room: int16 (n,)."""
-        return self.room_in(self._rooms)
-
-    def room_in(self, rooms: "NearestRooms") -> I16:
-        """Return the nearest of some rooms, or patches, to each perceived position: int16 (n,)."""
         distinct = self._all.distinct
-        return self._spread(rooms.of(distinct[:, Column.X], distinct[:, Column.Y]))
+        return self._spread(self._rooms.of(distinct[:, Column.X], distinct[:, Column.Y]))
+
+    def placed_in(self, rooms: "NearestRooms | None") -> PlacedSightings:
+        """Return the sightings by the nearest of some rooms, or patches; None: all by one place."""
+        seen = self._all
+        user = seen.distinct[:, Column.IDENTITY]
+        place = np.zeros(len(user), np.int64)
+        if rooms is not None:
+            place[:] = rooms.of(seen.distinct[:, Column.X], seen.distinct[:, Column.Y])
+        return PlacedSightings(seen.step, seen.index, user, place)
 
     @cached_property
     def heading(self) -> F64:

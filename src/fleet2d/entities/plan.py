@@ -1,6 +1,6 @@
 """Plans: the timed paths that behaviors return, followed until they are over or interrupted."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import partial
 from typing import Annotated, Any, NamedTuple, Self
@@ -140,6 +140,35 @@ class Plan:
             raise NoWayError(f"{body.path}: there is no way to {at} for a body of its radius")
         self._walk(route)
         return self
+
+    def visit(self, stops: Sequence[LatticePoint], turns: float, dwell: timedelta) -> Self:
+        """Go to lattice points in turn; at each of them turn on the spot, and stay.
+
+        Raises:
+            NoWayError: There is no way to one of them, or none at present.
+        """
+        for number, stop in enumerate(stops):
+            if number == 1 and self._visit_all(stops[1:], turns, dwell):
+                break
+            self.go_to_point(*stop)
+            self.turn_by(turns)
+            self.stay(dwell)
+        return self
+
+    def _visit_all(self, stops: Sequence[LatticePoint], turns: float, dwell: timedelta) -> bool:
+        """Visit points by shortest ways without an object in them, if that is all."""
+        body = self.body
+        routes = body.space.shortest
+        is_driven = body.drive is not None or body.slows
+        places = [self.position, *stops]
+        if routes is None or is_driven or any(map(body.home.approach_of, places)):
+            return False
+        now = self.time_us, self.x, self.y, self.heading
+        way = routes, np.array(stops, np.int64), body.speed, body.turn_rate
+        end = self.legs.visit(*now, *way, round(turns * TURN), micros(dwell))
+        if end is not None:
+            self.time_us, self.x, self.y, self.heading, _ = end
+        return end is not None
 
     def _go_shortest(self, space: Space, x: int, y: int, off: LatticePoint | None) -> bool:
         """Step `off` an object and walk a shortest route, if that is all; return whether it was."""

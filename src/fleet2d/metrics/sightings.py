@@ -8,7 +8,7 @@ import numpy as np
 from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import I64, UNKNOWN_TRUTH
+from fleet2d.kernels import I64, UNKNOWN_TRUTH, list_sightings
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import HOUR_S
 
@@ -33,18 +33,18 @@ class Sightings(Metric):
     def update(self, history: History, state: Present) -> Any:
         """Count detections by step."""
         observations = history.observations
-        order = np.argsort(observations.user, kind="stable")  # of one user still in order of step
-        index = observations.user[order]
-        step = observations.step[order]
-        first = np.append(True, (index[1:] != index[:-1]) | (step[1:] != step[:-1]))[: len(step)]
-        known = index[first & (index >= 0)]
-        steps_seen = np.bincount(known, minlength=len(state.users)).tolist()
-        for user, seen in zip(state.users, steps_seen, strict=True):
-            if user in history.log.untracked and seen:
-                steps = step[first & (index == state.users.index(user))] - history.first
-                seen = int((~history.poses(user).away[steps]).sum())
+        seen = observations.placed_in(None)
+        seen = seen._replace(step=seen.step - history.first)
+        users = len(state.users)
+        rows, _, _, steps = list_sightings(*seen, len(history), 1, users + 1, 1)
+        steps_seen = dict(zip(rows.tolist(), steps.tolist(), strict=True))
+        for row, user in enumerate(state.users):
+            in_view = steps_seen.get(row, 0)
+            if user in history.log.untracked and in_view:
+                at = np.unique(observations.step[observations.user == row]) - history.first
+                in_view = int((~history.poses(user).away[at]).sum())
             counts = self.steps.setdefault(user, [0, 0])
-            counts[0] += seen
+            counts[0] += in_view
             counts[1] += int(history.poses(user).time_in_rooms[:-1].sum())
 
     def result(self) -> dict[str, Any]:

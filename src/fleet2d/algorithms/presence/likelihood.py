@@ -168,7 +168,7 @@ class Likelihood(Estimator):
         """Process the next bins of evidence."""
         for day in evidence.days:
             part, people = self.add(day)
-            hours, sums = self._by_hour(people.follow(part), part, day.sightings.unknown)
+            hours, sums = self._by_hour(people.follow(part), part, self.unknown[-1])
             self.counts.add_hours(self.counts.today * 24 + hours, sums)
 
     def add(self, evidence: Evidence) -> tuple[DayEvidence, People]:

@@ -19,6 +19,7 @@ from fleet2d.kernels import (
     follow_people,
     merge_bins,
     smooth_people,
+    watched_views,
 )
 
 # Mean length of a stay before anything was learned, and of the first and last of several stages.
@@ -31,21 +32,22 @@ LONGEST_STAGE = 240.0
 def day_evidence(evidence: Evidence) -> DayEvidence:
     """Return the evidence of bins of one day."""
     sightings = evidence.by_patch.sightings
-    # An unknown person may be any user, so a patch with one counts as unwatched.
-    shown = evidence.by_patch.shown_255
-    watched = np.zeros((len(shown), shown.shape[1] + 1), np.uint8)  # away, the last, never is
-    watched[:, :-1] = np.where(sightings.unknown, np.uint8(0), shown)
-    return DayEvidence(evidence.minute, *distinct(watched), *sightings[:-1])
+    _, users, _ = sightings.shape
+    watched = watched_views(evidence.by_patch.shown_255, *sightings[:-1], users)
+    return DayEvidence(evidence.minute, *watched, *sightings[:-1])
 
 
 def joined(parts: Sequence[DayEvidence]) -> DayEvidence:
     """Return consecutive parts of a day as one."""
     first = np.cumsum([0, *(len(part.minute) for part in parts)]).tolist()
-    views = np.concatenate([part.views[part.view] for part in parts])
+    first_view = np.cumsum([0, *(len(part.views) for part in parts)]).tolist()
+    number, views = distinct(np.concatenate([part.views for part in parts]))
+    view = [part.view + begin for part, begin in zip(parts, first_view, strict=False)]
     moved = [part._replace(bin=part.bin + begin) for part, begin in zip(parts, first, strict=False)]
     minute, _, _, *sightings = (np.concatenate(column) for column in zip(*moved, strict=True))
     order = np.argsort(sightings[0], kind="stable")
-    return DayEvidence(minute, *distinct(views), *(column[order] for column in sightings))
+    own = (column[order] for column in sightings)
+    return DayEvidence(minute, number[np.concatenate(view)], views, *own)
 
 
 def between(day: DayEvidence, begin: int, end: int) -> DayEvidence:

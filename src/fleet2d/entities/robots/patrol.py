@@ -111,16 +111,19 @@ class Patrol(Behavior):
         if self.order == "random":
             stops = now.random("order").shuffled(stops)
         plan = now.plan()
-        has_stop = False
-        for stop in stops:
-            if now.actor.may_block_routes and not plan.reaches(*stop):
-                continue  # in a later round its door may be open, or its costs lower
-            plan.go_to_point(*stop)
-            if self.look_around:
-                plan.turn_by(1.0)
-            plan.stay(self.dwell)
-            has_stop = True
-        return plan if has_stop else plan.stay(self.dwell)
+        turns = 1.0 if self.look_around else 0.0
+        if not now.actor.may_block_routes:
+            return plan.visit(stops, turns, self.dwell) if stops else plan.stay(self.dwell)
+        # In a later round a door may be open that is shut at present, or costs lower.
+        reached = [stop for stop in stops if self._visits(plan, stop, turns)]
+        return plan if reached else plan.stay(self.dwell)
+
+    def _visits(self, plan: Plan, stop: LatticePoint, turns: float) -> bool:
+        """Visit a stop, if there is a way to it."""
+        if not plan.reaches(*stop):
+            return False
+        plan.visit([stop], turns, self.dwell)
+        return True
 
 
 class ScheduledVisit(Settings):
