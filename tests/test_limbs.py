@@ -61,10 +61,12 @@ def without(copy: Path, missing: Sequence[str]) -> Iterator[None]:
     away.mkdir()
     for limb in missing:
         (copy / "fleet2d" / limb).rename(away / limb)
-    yield
-    for limb in missing:
-        (away / limb).rename(copy / "fleet2d" / limb)
-    away.rmdir()
+    try:
+        yield
+    finally:
+        for limb in missing:
+            (away / limb).rename(copy / "fleet2d" / limb)
+        away.rmdir()
 
 
 def process(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
@@ -76,7 +78,7 @@ def process(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]"
         env={"PYTHONPATH": os.pathsep.join([str(folder), *libraries]), "HOME": str(folder)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=900,  # a machine that does much else is slow, not wrong
         check=False,
     )
 
