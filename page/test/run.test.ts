@@ -43,6 +43,14 @@ describe("a stored run", () => {
     });
   });
 
+  it.each(Object.keys(expected.poses))("has the room of %s at every step in the lane", (name) => {
+    const [track, lane] = [run.tracks.get(name)!, run.roomsOf(name)];
+    for (let step = 0; step < run.clock.steps; step++) {
+      const us = step * run.clock.stepUs;
+      if (valueAt(lane, us) !== roomOf(track, run.home, us)) expect.fail(`another room at step ${step}`);
+    }
+  });
+
   it("has the visible regions that Python finds", () => {
     const walls = new Walls(held.walls[openWalls()]!);
     for (const region of expected.regions) {

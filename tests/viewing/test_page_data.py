@@ -4,6 +4,8 @@ import base64
 import io
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,21 @@ def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> 
     )
     assert not re.search(r'(src|href)="(?!data:)', outside)
     assert "default-src 'none'" in outside
+
+
+def test_first_picture_waits_for_no_pandas(run_dir: Path) -> None:
+    # Importing it takes longer than all else that a month's first picture needs of the server.
+    work = f"""
+import sys
+from pathlib import Path
+from fleet2d.viewing.served_runs import ServedRuns
+runs = ServedRuns([Path({str(run_dir)!r})])
+runs.preload()
+assert runs.data(0).postures["use"] is not None
+print("pandas" in sys.modules)
+"""
+    ended = subprocess.run([sys.executable, "-c", work], capture_output=True, text=True, check=True)
+    assert "False" == ended.stdout.strip()
 
 
 def test_decisions_that_were_not_stored_are_those_of_the_run(run_dir: Path) -> None:

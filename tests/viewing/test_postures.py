@@ -2,6 +2,7 @@
 
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pyarrow as pa
 import pytest
 
 import fleet2d
+from fleet2d.floorplan.placed_objects import UsePlace
 from fleet2d.viewing.postures import USED_WITHIN_M, Postures, postures_of
 
 HOME = {"simulation": {"start": "2026-01-05", "duration": "20 h", "seed": 3}}
@@ -59,6 +61,28 @@ def test_postures_are_in_order_and_within_the_run(run: Any) -> None:
         assert row["posture"] in ("sit", "lie")
         last[row["user"]] = row["end_us"]
     assert set(last) == set(run.manifest["entities"]["users"])
+
+
+def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then() -> None:
+    rows = [(0, 0, "track", 2.0), (60, 60, "track", 2.0), (65, 90, "planned", 8.0), (65, 65, "track", 3.0)]  # fmt: skip
+    step, at_s, kind, x = zip(*rows, strict=True)
+    start = np.datetime64("2026-01-05", "us")
+    columns = {"entity": ["ana"] * 4, "y": [1.0] * 4, "away": [False] * 4, "kind": kind, "x": x}
+    time = pa.array(start + np.array(at_s) * np.timedelta64(1, "s"), pa.timestamp("us"))
+    manifest = {
+        "start": "2026-01-05T00:00:00", "step_us": 1_000_000, "steps": 100,
+        "entities": {"users": ["ana"]},
+    }  # fmt: skip
+    frames = pa.table({**columns, "step": pa.array(step, pa.int64()), "time": time})
+    run: Any = SimpleNamespace(tables={"key_frames": frames}, manifest=manifest)
+    chair = SimpleNamespace(name="chair", uses=[UsePlace(x=2, y=1, heading=0, posture="sit")])
+    plan: Any = SimpleNamespace(objects=[chair])
+
+    table = postures_of(run, plan)
+
+    assert [(0, 60_000_000)] == list(
+        zip(table["time_us"].to_pylist(), table["end_us"].to_pylist(), strict=True)
+    )
 
 
 @pytest.mark.parametrize(

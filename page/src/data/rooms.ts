@@ -19,26 +19,26 @@ export function roomOf(track: Track, home: Home, us: number): number {
  */
 export function roomStretches(track: Track, home: Home, clock: Clock): Stretches {
   if (track.empty) return { from: [], to: [], value: [] };
-  const steps = new Set<number>([0]);
-  const add = (us: number): void => {
-    const step = Math.ceil(us / clock.stepUs);
-    if (step < clock.steps) steps.add(step);
-  };
-  for (const us of track.stands()) add(us);
-  for (const [from, to] of track.moves()) {
-    for (let us = from; us <= to; us += clock.stepUs) add(us);
-    add(to);
-  }
-  const ordered = Float64Array.from(steps).sort();
   const moments: number[] = [];
   const rooms: number[] = [];
   let last = Number.NaN;
-  for (const step of ordered) {
-    const room = roomOf(track, home, step * clock.stepUs);
-    if (room === last) continue;
+  track.follow(stepsOfChange(track, clock), clock.stepUs, (step, x, y, away) => {
+    const room = away ? AWAY : home.roomAt(x, y);
+    if (room === last) return;
     moments.push(step * clock.stepUs);
     rooms.push(room);
     last = room;
-  }
+  });
   return stretchesOf(moments, rooms, clock.endUs);
+}
+
+/** The steps at which the body may come to another room, in order. */
+function stepsOfChange(track: Track, { stepUs, steps }: Clock): number[] {
+  const found = [0];
+  let last = 0;
+  for (const [from, to] of track.changes()) {
+    const end = Math.min(steps - 1, Math.ceil(to / stepUs));
+    for (let step = Math.max(last + 1, Math.ceil(from / stepUs)); step <= end; step++) found.push((last = step));
+  }
+  return found;
 }

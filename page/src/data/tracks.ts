@@ -133,14 +133,40 @@ export class Track {
     }
   }
 
-  /** The moments at which the body begins to stand somewhere, or to be away [us]. */
-  *stands(): Generator<number> {
+  /**
+   * Stretches of time in which the place of the body may change, in order: moments at which it begins to stand
+   * somewhere, or to be away, and the time between two of them if it moves.
+   */
+  *changes(): Generator<readonly [number, number]> {
     for (let piece = 0; piece < this.begins.length; piece++) {
-      yield this.froms[piece]!;
-      const until = this.froms[piece + 1] ?? Infinity;
-      for (let i = this.begins[piece]!; i < this.ends[piece]!; i++) {
-        if (this.time[i]! < until) yield this.time[i]!;
+      const [from, until, end] = [this.froms[piece]!, this.froms[piece + 1] ?? Infinity, this.ends[piece]!];
+      yield [from, from];
+      for (let i = this.begins[piece]!; i < end && this.time[i]! < until; i++) {
+        const next = i + 1;
+        const moves = next < end && (this.x[i] !== this.x[next] || this.y[i] !== this.y[next]);
+        const since = Math.max(this.time[i]!, from);
+        const to = moves ? Math.min(this.time[next]!, until) : since;
+        if (to >= since) yield [since, to];
       }
+    }
+  }
+
+  /** Tell where the body is at each of some steps, which are in order. */
+  follow(steps: readonly number[], stepUs: number, tell: (step: number, x: number, y: number, away: boolean) => void): void {
+    let [piece, i] = [0, this.begins[0]!];
+    for (const step of steps) {
+      const us = step * stepUs;
+      while (piece + 1 < this.froms.length && this.froms[piece + 1]! <= us) i = this.begins[++piece]!;
+      const end = this.ends[piece]!;
+      while (i + 1 < end && this.time[i + 1]! <= us) i++;
+      let [x, y] = [this.x[i]!, this.y[i]!];
+      if (this.time[i]! <= us && i + 1 < end) {
+        const elapsed = us - this.time[i]!;
+        const duration = this.time[i + 1]! - this.time[i]!;
+        x = interpolate(x, this.x[i + 1]! - x, elapsed, duration);
+        y = interpolate(y, this.y[i + 1]! - y, elapsed, duration);
+      }
+      tell(step, x, y, this.away[i] === 1);
     }
   }
 

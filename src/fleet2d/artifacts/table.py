@@ -553,7 +553,12 @@ def categories(column: Any) -> tuple[I64, list[str]]:
         ([0, -1, 1, 0], ['ana', 'bob'])
     """
     encoded = column.cast("string").combine_chunks().dictionary_encode()
-    numbers = encoded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
+    codes = encoded.indices  # `to_numpy` would import pandas where that is installed
+    valid, content = codes.buffers()
+    numbers = np.frombuffer(content, np.int32, len(codes), 4 * codes.offset).astype(np.int64)
+    if codes.null_count:
+        bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")
+        numbers[bits[codes.offset :][: len(codes)] == 0] = -1
     return numbers, encoded.dictionary.to_pylist()
 
 

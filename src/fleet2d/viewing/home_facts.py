@@ -289,15 +289,16 @@ def _home_events(run: Run) -> list[tuple[int, str, str, str]]:
     """Return step, entity, event and detail of the events that change the home, in order."""
     if "events" not in run.tables:
         return []
-    from pyarrow import array, compute
+    from pyarrow import compute
+
+    from fleet2d.artifacts.arrow import string_array
 
     try:
         table = run.tables["events"]
     except ArtifactError:  # the run's notes say that it is damaged
         return []
     events = compute.cast(table["event"], "string")
-    rows = table.filter(
-        compute.is_in(events, array([EventKind.OPENED, EventKind.SHUT, EventKind.MOVED]))
-    )
+    kinds = string_array([EventKind.OPENED, EventKind.SHUT, EventKind.MOVED])
+    rows = table.filter(compute.is_in(events, kinds))
     columns = ("step", "entity", "event", "detail")
     return [tuple(row.values()) for row in rows.select(columns).to_pylist()]

@@ -172,6 +172,8 @@ class PageData:
         int32; heading [1/4096 turn], int16; whether it is away, and whether it begins a piece that
         was planned, uint8.
         """
+        from fleet2d.artifacts.arrow import values_of
+
         run = self.run
         table = self._poses() if self._walks_every_us else run.tables[KEY_FRAMES]
         entity, names = categories(table["entity"])
@@ -185,21 +187,20 @@ class PageData:
         home = self.facts["home"]
         origin = home["origin_units"]
         units = home["units_per_m"]
-        start = run.clock.stamp(0)
-        time = (table["time"].to_numpy().astype("M8[us]") - start).astype(np.float64)
-        x, y = (
-            np.floor(table[axis].to_numpy() * units + 0.5) - origin[i]
-            for i, axis in enumerate("xy")
+        start = run.clock.stamp(0).astype(np.int64)
+        time, *xy, heading, step, away = (
+            values_of(table[name]) for name in ("time", "x", "y", "heading", "step", "away")
         )
-        heading = np.floor(table["heading"].to_numpy() * (TURN / math.tau) + 0.5).astype(np.int64)
+        x, y = (np.floor(xy[i] * units + 0.5) - origin[i] for i in range(2))
+        heading = np.floor(heading * (TURN / math.tau) + 0.5).astype(np.int64)
         planned = kind == (kinds.index("planned") if "planned" in kinds else len(kinds))
         parts: list[tuple[str, Any]] = [
-            ("<f8", time),
+            ("<f8", time - start),
             ("<i4", x),
             ("<i4", y),
-            ("<i4", table["step"].to_numpy()),
+            ("<i4", step),
             ("<i2", heading % TURN),
-            ("u1", table["away"].to_numpy()),
+            ("u1", away),
             ("u1", planned),
         ]
         content = [values[order].astype(kind).tobytes() for kind, values in parts]

@@ -24,27 +24,16 @@ USED_WITHIN_M = 0.16
 KEY_FRAMES = "key_frames"
 
 
-SCHEMA = {
-    "step": "int64",
-    "time_us": "int64",
-    "end_us": "int64",
-    "user": "string",
-    "posture": "string",
-    "object": "string",
-    "x": "float64",
-    "y": "float64",
-    "heading": "float64",
-}
+NAMES = ("step", "time_us", "end_us", "user", "posture", "object", "x", "y", "heading")
 
 
-class PostureStay(NamedTuple):
-    """A stretch of time [us since the start] that a user spends at one place [m] at home."""
+class Stays(NamedTuple):
+    """The stretches of time [us since the start] that a user spends at one place [m] at home."""
 
-    user: str
-    begin_us: int
-    end_us: int
-    x: float
-    y: float
+    user: int
+    begin_us: I64
+    end_us: I64
+    places: F64
 
 
 def postures_of(run: Run, plan: FloorPlan) -> Any:
@@ -66,31 +55,29 @@ def postures_of(run: Run, plan: FloorPlan) -> Any:
     """
     import pyarrow as pa
 
-    step_us = run.manifest["step_us"]
+    from fleet2d.artifacts.arrow import number_array, string_array
+
     rests = [
         (item.name, use) for item in plan.objects for use in item.uses if use.posture != "stand"
     ]
-    rows: list[tuple[Any, ...]] = []
     places = np.array([(use.x, use.y) for _, use in rests]).reshape(-1, 2)
-    for stay in _stays(run) if rests else ():
-        far = np.hypot(*(places - (stay.x, stay.y)).T)
-        nearest = int(np.argmin(far))
-        if far[nearest] >= USED_WITHIN_M:
-            continue
-        name, use = rests[nearest]
-        step = -(-stay.begin_us // step_us)
-        at = (use.x, use.y, use.heading)
-        # Who turns around on furniture stays on it.
-        if rows and rows[-1][2:4] == (stay.begin_us, stay.user) and rows[-1][5:] == (name, *at):
-            step, begin_us, *_ = rows.pop()
-            stay = stay._replace(begin_us=begin_us)
-        rows.append((step, stay.begin_us, stay.end_us, stay.user, use.posture, name, *at))
-    columns = zip(*rows, strict=True) if rows else ([] for _ in SCHEMA)
+    users = run.manifest["entities"]["users"]
+    stays = [_rests_of(stay, places) for stay in _stays(run)] if rests else []
+    user, use, begin_us, end_us = (
+        np.concatenate([np.zeros(0, np.int64), *(stay[i] for stay in stays)]) for i in range(4)
+    )
+    names, uses = zip(*rests, strict=True) if rests else ((), ())
+    poses = np.array([(use.x, use.y, use.heading) for use in uses]).reshape(-1, 3)[use].T
     arrays = [
-        pa.array(list(column), getattr(pa, kind)())
-        for column, kind in zip(columns, SCHEMA.values(), strict=True)
+        number_array(-(-begin_us // run.manifest["step_us"]), pa.int64()),
+        number_array(begin_us, pa.int64()),
+        number_array(end_us, pa.int64()),
+        string_array([users[number] for number in user.tolist()]),
+        string_array([uses[number].posture for number in use.tolist()]),
+        string_array([names[number] for number in use.tolist()]),
+        *(number_array(values, pa.float64()) for values in poses),
     ]
-    return pa.table(arrays, names=list(SCHEMA))
+    return pa.table(arrays, names=NAMES)
 
 
 class Postures:
@@ -122,73 +109,84 @@ def posture_facts(run: Run, plan: FloorPlan) -> PostureFacts:
         ArtifactError: The key frames are damaged.
     """
     table = postures_of(run, plan)
-    uses: dict[tuple[float, ...], int] = {}
-    facts = PostureFacts(uses=[], user=[], use=[], from_us=[], to_us=[])
-    for row in table.to_pylist():
-        key = (row["x"], row["y"], row["heading"])
-        if key not in uses:
-            uses[key] = len(uses)
-            x, y, heading = key
-            facts["uses"].append(UseFacts(x=x, y=y, heading=heading, posture=row["posture"]))
-        facts["user"].append(row["user"])
-        facts["use"].append(uses[key])
-        facts["from_us"].append(row["time_us"])
-        facts["to_us"].append(row["end_us"])
-    return facts
+    columns = (table[name].to_pylist() for name in ("x", "y", "heading", "posture"))
+    keys = list(zip(*columns, strict=True))
+    numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    return PostureFacts(
+        uses=[
+            UseFacts(x=x, y=y, heading=heading, posture=posture)
+            for x, y, heading, posture in numbers
+        ],
+        user=table["user"].to_pylist(),
+        use=[numbers[key] for key in keys],
+        from_us=table["time_us"].to_pylist(),
+        to_us=table["end_us"].to_pylist(),
+    )
 
 
-def _stays(run: Run) -> Iterator[PostureStay]:
+def _stays(run: Run) -> Iterator[Stays]:
     """Yield the stays of each user at home, in order."""
     if KEY_FRAMES not in run.tables:
         return
+    from fleet2d.artifacts.arrow import values_of
+
     table = run.tables[KEY_FRAMES]
     entity, names = categories(table["entity"])
     kind, kinds = categories(table["kind"])
-    start = np.datetime64(run.manifest["start"], "us")
+    planned = kinds.index("planned") if "planned" in kinds else len(kinds)
+    start = np.datetime64(run.manifest["start"], "us").astype(np.int64)
     step_us = run.manifest["step_us"]
-    keys = _Keys(
-        time_us=(table["time"].to_numpy().astype("M8[us]") - start).astype(np.int64),
-        holds_us=table["step"].to_numpy() * step_us,
-        begins=kind == (kinds.index("planned") if "planned" in kinds else len(kinds)),
-        x=table["x"].to_numpy(),
-        y=table["y"].to_numpy(),
-        away=table["away"].to_numpy(),
-        end_us=run.manifest["steps"] * step_us,
-    )
-    for user in run.manifest["entities"]["users"]:
-        if user in names:
-            yield from _stays_of(user, np.flatnonzero(entity == names.index(user)), keys)
+    columns = (values_of(table[name]) for name in ("time", "step", "x", "y", "away"))
+    time, step, x, y, away = columns
+    for user, name in enumerate(run.manifest["entities"]["users"]):
+        if name not in names:
+            continue
+        rows = np.flatnonzero(entity == names.index(name))
+        keys = _Keys(
+            time_us=time[rows] - start,
+            holds_us=step[rows] * step_us,
+            is_last=kind[rows] == planned,
+            places=np.stack([x[rows], y[rows]], axis=-1),
+            away=away[rows],
+        )
+        yield _stays_of(user, keys, run.manifest["steps"] * step_us)
 
 
 class _Keys(NamedTuple):
-    """Key frames: when each is reached, and from when its piece holds [us since the start].
+    """Key frames of a body: when each is reached, and from when on it holds [us since the start].
 
-    `begins` says which begin a piece that was planned.
+    `is_last` says which are the ends of movements that were interrupted: the next piece of key
+    frames begins after them.
     """
 
     time_us: I64
     holds_us: I64
-    begins: Bool
-    x: F64
-    y: F64
+    is_last: Bool
+    places: F64
     away: Bool
-    end_us: int
 
 
-def _stays_of(user: str, rows: I64, keys: _Keys) -> Iterator[PostureStay]:
-    """Yield the stays of a user; a piece of key frames holds until the next one begins."""
-    firsts = np.flatnonzero(keys.begins[rows] | (np.arange(len(rows)) == 0)).tolist()
-    for first, end in zip(firsts, [*firsts[1:], len(rows)], strict=True):
-        piece = rows[first:end].tolist()
-        since = int(keys.holds_us[piece[0]])
-        until = int(keys.holds_us[rows[end]]) if end < len(rows) else keys.end_us
-        for row, following in zip(piece, [*piece[1:], None], strict=True):
-            x, y = float(keys.x[row]), float(keys.y[row])
-            stay_ends = until
-            if following is not None:
-                if (x, y) != (keys.x[following], keys.y[following]):
-                    continue
-                stay_ends = min(int(keys.time_us[following]), until)
-            begin = max(int(keys.time_us[row]), since)
-            if stay_ends > begin and not keys.away[row]:
-                yield PostureStay(user, begin, stay_ends, x, y)
+def _stays_of(user: int, keys: _Keys, end_us: int) -> Stays:
+    """Return the stays of a user; a piece of key frames holds until the next one begins."""
+    begins = np.append(True, keys.is_last[:-1])
+    piece = np.cumsum(begins) - 1
+    since = keys.holds_us[begins]
+    until = np.append(since[1:], end_us)[piece]
+    follows = ~np.append(begins[1:], True)
+    moves = follows & (np.roll(keys.places, -1, axis=0) != keys.places).any(axis=1)
+    begin = np.maximum(keys.time_us, since[piece])
+    end = np.where(follows, np.minimum(np.roll(keys.time_us, -1), until), until)
+    stays = ~moves & ~keys.away & (end > begin)
+    return Stays(user, begin[stays], end[stays], keys.places[stays])
+
+
+def _rests_of(stays: Stays, rests: F64) -> tuple[I64, I64, I64, I64]:
+    """Return user, place to rest, begin and end of a user's stays where one sits or lies."""
+    far = np.hypot(*(stays.places[:, None] - rests).transpose(2, 0, 1))
+    use = far.argmin(axis=1)
+    near = far.min(axis=1) < USED_WITHIN_M
+    use, begin, end = use[near], stays.begin_us[near], stays.end_us[near]
+    # Who turns around on furniture stays on it.
+    begins = np.append(True, (begin[1:] != end[:-1]) | (use[1:] != use[:-1]))[: len(use)]
+    ends = np.append(begins[1:], True)[: len(use)]
+    return np.full(np.count_nonzero(begins), stays.user), use[begins], begin[begins], end[ends]

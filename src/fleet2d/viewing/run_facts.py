@@ -179,6 +179,8 @@ def sightings_of(run: Run) -> list[SightingFacts]:
     """
     if "observations" not in run.tables:
         return []
+    from fleet2d.artifacts.arrow import values_of
+
     gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
     lanes: dict[tuple[str, str], SightingFacts] = {}
     robots: dict[str, None] = {}  # in the order in which they appear, as users
@@ -188,7 +190,7 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         user, user_names = categories(batch["user"])
         robots |= dict.fromkeys(robot_names)
         users |= dict.fromkeys(user_names)
-        step = batch["step"].to_numpy()
+        step = values_of(batch["step"])
         false = _are_false(batch)
         names = [*user_names, ""]
         lane = robot * len(names) + user % len(names)  # the last one is of an unknown user
@@ -221,12 +223,14 @@ def _are_false(table: Any) -> Bool:
     """Return which observations are of something else than the user that the robot took it for."""
     import pyarrow.compute as pc
 
+    from fleet2d.artifacts.arrow import values_of
+
     if "true_user" not in table.column_names:
         return np.zeros(table.num_rows, np.bool_)
     user, true_user = (pc.cast(table[name], "string") for name in ("user", "true_user"))
     is_mistaken = pc.fill_null(pc.not_equal(user, true_user), False)
-    false: Bool = pc.or_(pc.is_null(true_user), is_mistaken).to_numpy()
-    return false & table["truth_known"].to_numpy() if "truth_known" in table.column_names else false
+    false: Bool = values_of(pc.or_(pc.is_null(true_user), is_mistaken)).astype(bool)
+    return false & values_of(table["truth_known"]) if "truth_known" in table.column_names else false
 
 
 def _extend(lane: SightingFacts, step: I64, false: Bool, gap: int) -> None:

@@ -3,10 +3,12 @@
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from pyarrow import array, compute
+from pyarrow import compute
 
+from fleet2d.artifacts.arrow import string_array, values_of
+from fleet2d.artifacts.table import categories
 from fleet2d.errors import ArtifactError
 from fleet2d.runs.run import Run
 from fleet2d.runs.verdicts import verdicts_of
@@ -24,6 +26,7 @@ KINDS = (
     EventKind.USER_LOST,
     EventKind.USER_SEEN,
 )
+SIGHTINGS = (EventKind.USER_SEEN, EventKind.USER_LOST)
 ASLEEP = "sleep"
 EVENING_H = 20
 """A night begins at this hour: who goes to bed at one is later than who goes at eleven."""
@@ -63,8 +66,17 @@ def _events_of(run: Run) -> list[StoredEvent]:
     table = run.tables["events"]
     if "user" not in table.schema.names:  # nobody lives there
         return []
-    rows = table.filter(compute.is_in(compute.cast(table["event"], "string"), array(KINDS)))
-    return [StoredEvent(*row.values()) for row in rows.select(StoredEvent._fields).to_pylist()]
+    rows = table.filter(compute.is_in(compute.cast(table["event"], "string"), string_array(KINDS)))
+    columns = [_words(rows[name]) for name in StoredEvent._fields[1:]]
+    steps = values_of(rows["step"]).tolist()
+    return list(map(StoredEvent._make, zip(steps, *columns, strict=True)))
+
+
+def _words(column: Any) -> list[Any]:
+    """Return the words of a column; None where one is missing."""
+    codes, names = categories(column)
+    words = [*names, None]
+    return [words[code] for code in codes.tolist()]
 
 
 def _requests(events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
@@ -106,11 +118,19 @@ def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFact
 
 def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     """Yield who was out of view longest, awake and at home, and who went to bed latest."""
+    of_user: dict[str | None, list[StoredEvent]] = {
+        user: [] for user in run.manifest["entities"]["users"]
+    }
+    for event in events:
+        subject = event.user if event.event in SIGHTINGS else event.entity
+        if subject in of_user:
+            of_user[subject].append(event)
+    clock = run.clock
     unseen: list[tuple[timedelta, int, str]] = []
     nights: list[tuple[float, int, str]] = []
-    for user in run.manifest["entities"]["users"]:
-        unseen += _unseen(run, user, events)
-        nights += _nights(run.clock, user, events)
+    for user, own in of_user.items():
+        unseen += _unseen(clock, user, own)
+        nights += _nights(clock, user, own)
     if unseen and any(event.event == EventKind.USER_SEEN for event in events):
         lasted, step, user = max(unseen)
         if lasted >= LEAST_UNSEEN:
@@ -123,20 +143,20 @@ def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
 
 
 def _unseen(
-    run: Run, user: str, events: Sequence[StoredEvent]
+    clock: Clock, user: str, own: Sequence[StoredEvent]
 ) -> Iterator[tuple[timedelta, int, str]]:
     """Yield how long a user was out of view, awake and at home, and since when."""
     is_asleep = True  # until the first activity
     is_out = False
     seen_by = 0
     since: int | None = None
-    for event in events:
-        if event.entity == user and event.event == EventKind.ACTIVITY:
-            is_asleep = event.detail == ASLEEP
-        elif event.entity == user and event.event in (EventKind.LEFT_HOME, EventKind.CAME_HOME):
-            is_out = event.event == EventKind.LEFT_HOME
-        elif event.user == user and event.event in (EventKind.USER_SEEN, EventKind.USER_LOST):
+    for event in own:
+        if event.event in SIGHTINGS:
             seen_by += 1 if event.event == EventKind.USER_SEEN else -1
+        elif event.event == EventKind.ACTIVITY:
+            is_asleep = event.detail == ASLEEP
+        elif event.event in (EventKind.LEFT_HOME, EventKind.CAME_HOME):
+            is_out = event.event == EventKind.LEFT_HOME
         else:
             continue
         counts = not is_asleep and not is_out and seen_by == 0
@@ -144,15 +164,15 @@ def _unseen(
             since = event.step
         elif not counts and since is not None:
             steps = event.step - since
-            yield timedelta(microseconds=steps * run.clock.step_us), since, user
+            yield timedelta(microseconds=steps * clock.step_us), since, user
             since = None
 
 
 def _nights(
-    clock: Clock, user: str, events: Sequence[StoredEvent]
+    clock: Clock, user: str, own: Sequence[StoredEvent]
 ) -> Iterator[tuple[float, int, str]]:
     """Yield when a user went to bed, in hours since the evening began: once a night, to sleep."""
-    activities = [e for e in events if e.entity == user and e.event == EventKind.ACTIVITY]
+    activities = [event for event in own if event.event == EventKind.ACTIVITY]
     nights = set()
     for event, following in pairwise(activities):
         lasts = timedelta(microseconds=(following.step - event.step) * clock.step_us)
