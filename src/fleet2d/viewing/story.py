@@ -118,9 +118,7 @@ def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFact
 
 def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     """Yield who was out of view longest, awake and at home, and who went to bed latest."""
-    of_user: dict[str | None, list[StoredEvent]] = {
-        user: [] for user in run.manifest["entities"]["users"]
-    }
+    of_user: dict[str, list[StoredEvent]] = {u: [] for u in run.manifest["entities"]["users"]}
     for event in events:
         subject = event.user if event.event in SIGHTINGS else event.entity
         if subject in of_user:
