@@ -4,8 +4,10 @@ import { useSignal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useRef } from "preact/hooks";
 import { copyLink } from "./address";
+import type { VerdictFacts } from "./contract";
 import { DAY_US } from "./data/clock";
 import type { Run } from "./data/run";
+import { title } from "./data/words";
 import { KEYS } from "./keyboard";
 import { connected } from "./live/feed";
 import { Icon } from "./Icon";
@@ -69,10 +71,12 @@ function Header() {
   const length = days >= 2 ? `${Math.round(days)} days` : `${(days * 24).toFixed(1)} h`;
   return (
     <header>
+      <span class="brand" title={`Fleet2D ${facts.version}`}>
+        <Icon name="robot" />
+      </span>
       <h1>{state.runs.value.map((entry) => entry.facts.title).join(" · ")}</h1>
       <p>
-        {length} in {facts.home.name.slice(0, 24)}, seed {facts.seed ?? "–"}
-        {facts.digest ? `, digest ${facts.digest.slice(0, 8)}` : ""}
+        {[length, title(facts.home.name.slice(0, 24)), `seed ${facts.seed ?? "–"}`, facts.digest?.slice(0, 8)].filter(Boolean).join(" · ")}
         {!["complete", "failed"].includes(facts.status) && !state.live.value ? <strong> {facts.status}</strong> : ""}
       </p>
       {state.runs.value.map((entry, i) => (
@@ -141,7 +145,9 @@ function Tools() {
 
 /** What became of the run and its expectations: failures and violations are red, and the first thing to see. */
 function Verdicts({ run, title }: { run: Run; title: string }) {
-  const { verdict: words, verdicts, status } = run.facts;
+  const { verdict, verdicts, status } = run.facts;
+  // Beside another run there is room for the numbers only.
+  const words = title && verdicts.length > 0 ? countsOf(verdicts) : verdict;
   const first = verdicts[0]?.step ?? null;
   if (status !== "failed" && first === null) return words ? <p class="verdict">{title + words}</p> : null;
   const us = (first ?? 0) * run.clock.stepUs;
@@ -153,6 +159,12 @@ function Verdicts({ run, title }: { run: Run; title: string }) {
       {[status === "failed" ? "the run failed" : "", words].filter(Boolean).join("; ")}
     </button>
   );
+}
+
+/** How many expectations are violated, held, or neither. */
+function countsOf(verdicts: readonly VerdictFacts[]): string {
+  const outcomes = [...new Set(verdicts.map(({ outcome }) => outcome))];
+  return outcomes.map((outcome) => `${verdicts.filter((verdict) => verdict.outcome === outcome).length} ${outcome}`).join(", ");
 }
 
 const CONNECTION_LOST = "The connection to the simulation is lost, and tried again: if that lasts, start fleet2d run --live again, and reload the page.";

@@ -108,7 +108,7 @@ function SpeedChoice() {
   );
 }
 
-/** The whole run on one line, by how much people move; a click goes there. */
+/** The whole run on one line: how much people move, its story and violations; a click goes there. */
 function Overview({ run }: { run: Run }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const cursor = useRef<HTMLSpanElement>(null);
@@ -190,13 +190,14 @@ function drawOverview(context: CanvasRenderingContext2D, run: Run, width: number
     const tall = (share / most) * (height - 8);
     context.fillRect(x(us), height - tall - 1, Math.max(1, x(us + cell) - x(us) - 0.7), tall);
   });
-  for (const verdict of run.facts.verdicts) {
-    if (verdict.step === null) continue;
+  const dot = (step: number, color: string): void => {
     context.beginPath();
-    context.arc(x(verdict.step * clock.stepUs), 4, 3, 0, 2 * Math.PI);
-    context.fillStyle = colors.value.alarm;
+    context.arc(x(step * clock.stepUs), 4, 3, 0, 2 * Math.PI);
+    context.fillStyle = color;
     context.fill();
-  }
+  };
+  for (const { step } of run.facts.story) dot(step, colors.value.viewEdge);
+  for (const { step } of run.facts.verdicts) if (step !== null) dot(step, colors.value.alarm);
   const [left, right] = [x(Math.max(begin, clock.dayStart(today))), x(Math.min(end, clock.dayStart(today + 1)))];
   context.strokeStyle = colors.value.text;
   context.lineWidth = 1.5;

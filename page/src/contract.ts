@@ -408,7 +408,8 @@ export const LOOK = {
         "shower",
         "bath",
         "dress",
-        "medication"
+        "medication",
+        "freshen_up"
       ]
     },
     {
@@ -456,6 +457,7 @@ export const LOOK = {
       "color": "#b5957d",
       "activities": [
         "fetch",
+        "pick_up",
         "put_away",
         "tidy",
         "check_door",

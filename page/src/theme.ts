@@ -112,6 +112,11 @@ export function bodyColor(color: string, inDark = dark.value): string {
   return bright < 110 ? mix(color, "#ffffff", 0.55) : color;
 }
 
+/** A body's colour below white words. */
+export function pillColor(color: string): string {
+  return mix(color, "#000000", 0.08);
+}
+
 /** A room's colour on the plan. */
 export function roomColor(pale: string, deep: string, inDark = dark.value): string {
   return inDark ? mix(deep, DARK.ground, 0.72) : pale;

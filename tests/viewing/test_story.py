@@ -131,7 +131,9 @@ def test_beliefs_have_settled_where_the_error_stays_near_its_last_value() -> Non
     settled = told(ltp_error=table)["The beliefs have settled"]
 
     assert 30 * HOUR == settled["step"]
-    assert "ltp_error stays below 22 % from here, and ends at 20 %" == settled["words"]
+    assert (
+        "They are wrong by less than 22 % from here on, and by 20 % at the end" == settled["words"]
+    )
 
 
 def test_run_without_events_has_no_story() -> None:

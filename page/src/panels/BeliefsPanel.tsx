@@ -16,6 +16,11 @@ export function BeliefsPanel() {
   );
 }
 
+function beliefText(run: Run, name: string): string {
+  const [algorithm, user] = name.split("/") as [string, string];
+  return `${algorithm.replaceAll("_", " ")} of ${run.label(user)}`;
+}
+
 function BeliefsOf({ run, title }: { run: Run; title: string }) {
   void run.version.value;
   const names = beliefNames(run);
@@ -24,8 +29,9 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
   const color = bodyColor(run.body(comparison.user)?.color ?? "#0077bb");
   const { believed, truth } = comparison;
   const [believedPercents, truePercents] = [believed && percents(believed), truth && percents(truth)];
+  const labels = [...run.home.labels, "Out of home"];
   const rows = [...run.facts.home.rooms.map((room) => room.name), "away"]
-    .map((name, i) => ({ name, isNow: comparison.now.has(i), believed: believed?.[i] ?? 0, truth: truth?.[i] ?? 0, percents: [believedPercents?.[i], truePercents?.[i]] }))
+    .map((name, i) => ({ name, label: labels[i], isNow: comparison.now.has(i), believed: believed?.[i] ?? 0, truth: truth?.[i] ?? 0, percents: [believedPercents?.[i], truePercents?.[i]] }))
     .filter((row) => row.isNow || row.percents.some((percent) => percent));
   return (
     <div>
@@ -40,7 +46,7 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
         >
           {names.map((name) => (
             <option key={name} value={name}>
-              {name.replace("/", " of ")}
+              {beliefText(run, name)}
             </option>
           ))}
         </select>
@@ -55,7 +61,7 @@ function BeliefsOf({ run, title }: { run: Run; title: string }) {
             <tr key={row.name} data-room={row.name} data-believed={row.believed} data-truth={row.truth}>
               <th scope="row">
                 {row.isNow ? <span aria-label="is here now">● </span> : ""}
-                {row.name.replaceAll("_", " ")}
+                {row.label}
               </th>
               <td class="bar">
                 <span class="believed" style={{ width: `${100 * row.believed}%`, background: color }} />

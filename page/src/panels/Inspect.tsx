@@ -5,9 +5,10 @@ import { useEffect } from "preact/hooks";
 import { durationText } from "../data/clock";
 import type { EventRow } from "../data/events";
 import type { Run } from "../data/run";
+import { AWAY } from "../data/rooms";
 import { lastAtMost } from "../data/search";
 import { valueAt } from "../data/stretches";
-import { title } from "../data/words";
+import { doing, title } from "../data/words";
 import * as state from "../state";
 import { bodyState } from "./Now";
 import { Terms } from "./Terms";
@@ -36,6 +37,10 @@ function labelOf(run: Run, name: string): string {
   return run.home.labels[run.home.roomIndex(name)] ?? title(name);
 }
 
+function placeText(run: Run, room: number): string {
+  return room === AWAY ? "Out of home" : run.home.roomLabel(room);
+}
+
 /** The facts that are known. */
 function Facts({ rows }: { rows: [string, string][] }) {
   return <Terms rows={rows.filter(([, value]) => value)} />;
@@ -50,9 +55,9 @@ function BodyView({ run, name }: { run: Run; name: string }) {
   const decision = run.decisions?.at(name, us);
   const rows: [string, string][] = [
     ["kind", body.robot ? "robot" : "user"],
-    ["room", now?.room ?? "not stored"],
+    ["room", now ? placeText(run, now.away ? AWAY : run.home.roomIndex(now.room)) : "not stored"],
     ["since", now ? since(run, name, us) : ""],
-    ["activity", now?.activity ?? ""],
+    ["activity", now?.activity ? doing(now.activity) : ""],
     ["behavior", decision ? decision.behavior.replaceAll("_", " ") || "none" : ""],
     ["why", decision?.reason.replaceAll("_", " ") ?? ""],
     ["decided", decision ? `${run.clock.text(decision.us)}, ${durationText(us - decision.us)} ago` : ""],
@@ -75,7 +80,7 @@ function BodyView({ run, name }: { run: Run; name: string }) {
           state.followed.value = state.followed.value === name ? "" : name;
         }}
       >
-        {state.followed.value === name ? "Follow no longer" : `Follow ${name}`}
+        {state.followed.value === name ? "Follow no longer" : `Follow ${run.label(name)}`}
       </button>
       <Facts rows={rows} />
       {!run.decisions && run.path !== "" && <p class="hint">The run is repeated to find out which behavior decided, and why …</p>}
@@ -104,7 +109,7 @@ function nextPlace(run: Run, name: string, us: number): string {
   const lane = run.roomsOf(name);
   const i = lastAtMost(lane.from, us) + 1;
   if (i >= lane.from.length) return "";
-  return `${run.home.roomName(lane.value[i]!)} in ${durationText(lane.from[i]! - us)}`;
+  return `${placeText(run, lane.value[i]!)} in ${durationText(lane.from[i]! - us)}`;
 }
 
 export function History({ run, rows, us }: { run: Run; rows: readonly EventRow[]; us: number }) {
@@ -163,7 +168,7 @@ function RoomView({ run, name }: { run: Run; name: string }) {
           ["kind", room.type.replaceAll("_", " ")],
           ["area", `${room.area_m2.toFixed(1)} m²`],
           ["light", run.hasLights ? (run.unlitAt(us).includes(index) ? "off" : "on") : ""],
-          ["here now", occupants.map((body) => body.name).join(", ") || "nobody"],
+          ["here now", occupants.map((body) => run.label(body.name)).join(", ") || "nobody"],
         ]}
       />
     </div>

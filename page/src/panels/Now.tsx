@@ -1,6 +1,7 @@
 /** Everybody at the moment: room, place, activity, who is seen. */
 
 import type { BodyFacts } from "../contract";
+import { iconOf } from "../data/activities";
 import { durationText } from "../data/clock";
 import { isFalse } from "../data/observations";
 import { AWAY, roomOf } from "../data/rooms";
@@ -11,7 +12,7 @@ import { doing, title } from "../data/words";
 import { Icon } from "../Icon";
 import { playReel } from "../player";
 import * as state from "../state";
-import { bodyColor } from "../theme";
+import { pillColor } from "../theme";
 import { Thumbnail } from "../timeline/Hover";
 import { Differences } from "./Differences";
 import { Tiles } from "./Tiles";
@@ -97,7 +98,9 @@ function BodyRow({ run, body, us }: { run: Run; body: BodyFacts; us: number }) {
     <tr data-body={body.name} data-x={now?.x} data-y={now?.y} data-heading={now?.headingDeg} data-room={now?.room} data-away={now?.away}>
       <th scope="row">
         <button type="button" class="link" onClick={() => state.select(body.name, run)}>
-          <span class={body.robot ? "chip robot" : "chip"} style={{ background: bodyColor(body.color) }} />
+          <span class={body.robot ? "avatar robot" : "avatar"} style={{ background: pillColor(body.color) }}>
+            <Icon name={body.robot ? "robot" : now?.away ? "bag" : iconOf(now?.activity ?? "")} size={17} />
+          </span>
           {run.label(body.name)}
         </button>
       </th>
@@ -139,6 +142,7 @@ function Expectations({ run }: { run: Run }) {
             ) : (
               <button type="button" class="link" onClick={() => state.goTo(step * run.clock.stepUs)}>
                 {title(name)}
+                <small>{says}</small>
               </button>
             )}
             <small>{outcome}</small>

@@ -173,12 +173,12 @@ function drawWays(context: Context, scene: Scene): void {
     const walked = tracks.filter((track) => track.movesWithin(Math.max(0, us - BEHIND_US), us));
     for (let i = 0; i < FADES && walked.length > 0; i++) {
       const from = us - (BEHIND_US * (FADES - i)) / FADES;
-      context.globalAlpha = 0.6 * ((i + 1) / FADES);
-      context.lineWidth = (look === "selected" ? 4 : 3) * ((i + 2) / (FADES + 1));
+      context.globalAlpha = (look === "selected" ? 0.7 : 0.5) * ((i + 1) / FADES) ** 1.5;
+      context.lineWidth = (look === "selected" ? 4 : 2.5) * ((i + 2) / (FADES + 1));
       const ways = walked.map((track) => track.way(Math.max(0, from), Math.max(0, from + BEHIND_US / FADES)));
       strokeLines(context, scene.frame, ways);
     }
-    context.globalAlpha = 0.7;
+    context.globalAlpha = 0.5;
     context.lineWidth = 1.5;
     context.lineCap = "butt";
     context.setLineDash([2, 4]);

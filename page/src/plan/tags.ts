@@ -1,9 +1,11 @@
 /** Who is who: a pill beside each body with its name. Bodies on one spot share one: "Ana +9". */
 
 import type { BodyFacts } from "../contract";
+import { iconOf } from "../data/activities";
 import type { Run } from "../data/run";
 import type { Pose } from "../data/tracks";
-import { mix } from "../theme";
+import { type IconName, PATHS } from "../Icon";
+import { pillColor } from "../theme";
 import { bodyRadius, figureDisc } from "./bodies";
 import type { Frame } from "./frame";
 import { type Box, overlap } from "./labels";
@@ -17,6 +19,9 @@ const SOFT = 8;
 /** Bodies nearer to each other than this share of a radius are on one spot. */
 const TOGETHER = 0.8;
 const EDGE = 2;
+/** What somebody does is told by an icon before the name [px]. */
+const ICON = 13;
+const ICON_WIDE = 16;
 /** The foot of a plan has a line of words, and the scale [px]. */
 const FOOT = 20;
 
@@ -30,6 +35,14 @@ export interface TagScene {
   width: number;
   height: number;
   selected: string;
+}
+
+interface Tag {
+  stack: Stack;
+  words: string;
+  icon: IconName | null;
+  /** Where it is; null where there is no place. */
+  box: Box | null;
 }
 
 /** Bodies on one spot [px]; the first one names it. */
@@ -50,15 +63,15 @@ export class Tags {
   /** Draw a tag for each body for which there is a place; return how many bodies have none. */
   draw(context: Context, scene: TagScene): number {
     let hidden = 0;
-    for (const { box, stack, words } of this.placed(context, scene)) {
-      if (box) this.drawPill(context, box, words, stack.bodies[0]!.color);
-      else hidden += stack.bodies.length;
+    for (const tag of this.placed(context, scene)) {
+      if (tag.box) this.drawPill(context, tag.box, tag);
+      else hidden += tag.stack.bodies.length;
     }
     return hidden;
   }
 
   /** The box of each tag that covers neither a body nor another tag or name; null where there is none. */
-  placed(context: Context, scene: TagScene): { stack: Stack; words: string; box: Box | null }[] {
+  placed(context: Context, scene: TagScene): Tag[] {
     const stacks = stacksOf(scene);
     const taken: Box[] = [...scene.names];
     for (const { x, y, radius } of stacks) taken.push([x - radius, y - radius, x + radius, y + radius]);
@@ -68,14 +81,15 @@ export class Tags {
     return stacks.map((stack) => {
       const name = stack.bodies[0]!.name;
       const words = stack.bodies.length > 1 ? `${scene.run.label(name)} +${stack.bodies.length - 1}` : scene.run.label(name);
-      const places = placesBeside(stack, this.width(context, words));
+      const icon = iconFor(scene, stack);
+      const places = placesBeside(stack, this.width(context, words) + (icon ? ICON_WIDE : 0));
       const before = this.last.get(name) ?? 0;
       const at = isFree(places[before]!) ? before : places.findIndex(isFree);
-      if (at < 0) return { stack, words, box: null };
+      if (at < 0) return { stack, words, icon, box: null };
       this.last.set(name, at);
       const box = places[at]!;
       taken.push(box);
-      return { stack, words, box };
+      return { stack, words, icon, box };
     });
   }
 
@@ -88,11 +102,12 @@ export class Tags {
     return width;
   }
 
-  private drawPill(context: Context, [left, top, right]: Box, words: string, color: string): void {
+  private drawPill(context: Context, [left, top, right]: Box, { words, icon, stack }: Tag): void {
     const ratio = window.devicePixelRatio || 1;
-    const key = `${words} ${color} ${ratio}`;
+    const { color } = stack.bodies[0]!;
+    const key = `${words} ${icon} ${color} ${ratio}`;
     let pill = this.pills.get(key);
-    if (!pill) this.pills.set(key, (pill = pillOf(words, color, right - left, ratio)));
+    if (!pill) this.pills.set(key, (pill = pillOf(words, icon, color, right - left, ratio)));
     context.drawImage(pill, Math.round(left) - SOFT, Math.round(top) - SOFT, pill.width / ratio, pill.height / ratio);
   }
 }
@@ -112,6 +127,14 @@ function stacksOf(scene: TagScene): Stack[] {
   return stacks;
 }
 
+/** What one person does; a crowd on one spot does different things. */
+function iconFor({ run, us }: TagScene, { bodies }: Stack): IconName | null {
+  const [body] = bodies;
+  if (bodies.length > 1 || !body || body.robot) return null;
+  const activity = run.events.last(body.name, "activity", us)?.detail;
+  return activity ? iconOf(activity) : null;
+}
+
 /** Above, below, right, left, further above and below, and at the corners. */
 function placesBeside({ x, y, radius }: Stack, wide: number): Box[] {
   const at = (left: number, top: number): Box => [left, top, left + wide, top + TALL];
@@ -129,7 +152,7 @@ function placesBeside({ x, y, radius }: Stack, wide: number): Box[] {
   ];
 }
 
-function pillOf(words: string, color: string, wide: number, ratio: number): HTMLCanvasElement {
+function pillOf(words: string, icon: IconName | null, color: string, wide: number, ratio: number): HTMLCanvasElement {
   const canvas = document.createElement("canvas");
   canvas.width = Math.ceil((wide + 2 * SOFT) * ratio);
   canvas.height = Math.ceil((TALL + 2 * SOFT) * ratio);
@@ -141,12 +164,19 @@ function pillOf(words: string, color: string, wide: number, ratio: number): HTML
   context.shadowOffsetY = 1.5 * ratio;
   context.beginPath();
   context.roundRect(SOFT, SOFT, wide, TALL, TALL / 2);
-  context.fillStyle = mix(color, "#000000", 0.08);
+  context.fillStyle = pillColor(color);
   context.fill();
   context.restore();
   context.font = FONT;
   context.textBaseline = "middle";
   context.fillStyle = "#ffffff";
-  context.fillText(words, SOFT + 7, SOFT + TALL / 2 + 0.5);
+  context.fillText(words, SOFT + 7 + (icon ? ICON_WIDE : 0), SOFT + TALL / 2 + 0.5);
+  if (!icon) return canvas;
+  context.translate(SOFT + 7, SOFT + (TALL - ICON) / 2);
+  context.scale(ICON / 16, ICON / 16);
+  context.lineCap = context.lineJoin = "round";
+  context.lineWidth = 1.7;
+  context.strokeStyle = "#ffffff";
+  context.stroke(new Path2D(PATHS[icon]));
   return canvas;
 }

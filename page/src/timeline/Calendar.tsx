@@ -11,7 +11,7 @@ import { Crowd } from "./crowd";
 import { type Strip, stripsOf } from "./days";
 import { type Hovered, Hover } from "./Hover";
 import { drawMonth } from "./month";
-import { type Days as DayRange, GAP, HEAD, LEFT, Sheet } from "./sheet";
+import { type Days as DayRange, GAP, HEAD, LEFT, roomyHeight, Sheet } from "./sheet";
 
 /** With more people, a row shows how many do what. */
 const MOST_STRIPS = 8;
@@ -41,6 +41,12 @@ const days = computed<DayRange>(() => {
 /** What a crowd does; null where everybody has a strip. */
 const crowd = computed(() => (shown.value.length > MOST_STRIPS ? new Crowd(shown.value, state.run.value!.clock, days.value) : null));
 
+/** For how many strips a row has room. */
+const stripCount = computed(() => (crowd.value ? MOST_STRIPS : shown.value.length));
+
+/** Whether robots ever had any of them in view. */
+const tellsView = computed(() => shown.value.some((strip) => strip.seen.from.length > 0));
+
 /** Who is in the calendar, and what its colours stand for. */
 export function CalendarHead() {
   return (
@@ -52,7 +58,7 @@ export function CalendarHead() {
             <span class="swatch" style={{ background: color }} /> {words}
           </li>
         ))}
-        {!crowd.value && shown.value.some((strip) => strip.seen.from.length > 0) && (
+        {!crowd.value && tellsView.value && (
           <li>
             <span class="swatch seen" /> In view
           </li>
@@ -97,7 +103,7 @@ export function Calendar() {
     );
   }
   return (
-    <section class="calendar" aria-label="Calendar">
+    <section class="calendar" aria-label="Calendar" style={{ "--days": `${roomyHeight(days.value.count, stripCount.value)}px` }}>
       <Days run={state.run.value!} />
     </section>
   );
@@ -114,8 +120,7 @@ function Days({ run }: { run: Run }) {
   const sheetOf = (drawn: Element, box: Element): Sheet => {
     const [width] = sizeOf(drawn);
     const [, height] = sizeOf(box);
-    const count = crowd.value ? MOST_STRIPS : shown.value.length;
-    return new Sheet(width, height, box.scrollTop, days.value, count, clock);
+    return new Sheet(width, height, box.scrollTop, days.value, stripCount.value, tellsView.value, clock);
   };
   useEffect(() => {
     const [drawn, box] = [canvas.current!, scroller.current!];

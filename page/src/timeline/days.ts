@@ -59,7 +59,8 @@ function activityStrip(run: Run, name: string): Shown {
     }
     push(begin, end, code.get(row.detail)!);
   });
-  const kinds = new Map(words.map((word) => [kindOf(word).name, kindOf(word).color]));
+  const shown = [...new Set(value)].filter((what) => what !== out).sort((a, b) => a - b).map((what) => kindOf(words[what]!));
+  const kinds = new Map(shown.map((kind) => [kind.name, kind.color]));
   if (gone.length > 0) kinds.set(OUT.name, colors.value.hatch);
   return {
     stretches: { from, to, value },

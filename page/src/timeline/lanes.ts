@@ -2,6 +2,7 @@
 
 import type { Answer } from "../data/ask";
 import { type BeliefSeries, percents } from "../data/beliefs";
+import { kindOf } from "../data/activities";
 import type { Clock } from "../data/clock";
 import type { Run, Switches } from "../data/run";
 import type { BodyFacts, EventKind } from "../contract";
@@ -200,7 +201,7 @@ function activityLane(run: Run, name: string, prefix: string, group: Group): Lan
     };
   };
   const place = { id: `${prefix}${name}/activity`, label: `${run.label(name)} does`, subject: name, group, height: 16 };
-  return stretchLane(place, stretches, (value) => wordColor(words[value] ?? ""), (value) => words[value] ?? "");
+  return stretchLane(place, stretches, (value) => kindOf(words[value] ?? "").color, (value) => words[value] ?? "");
 }
 
 /** Which behavior of a body decided, and why. */

@@ -13,6 +13,8 @@ type Context = CanvasRenderingContext2D;
 
 const HOURS = [0, 3, 6, 9, 12, 15, 18, 21, 24];
 const BAR = 56;
+/** Below lower strips, when people were in view would only be noise [px]. */
+const LEAST_WITH_VIEW = 5;
 /** The bar of the time in view is full at so many hours a person. */
 const MOST_IN_VIEW_H = 4;
 
@@ -56,18 +58,20 @@ function drawStrips(context: Context, clock: Clock, strips: readonly Strip[], sh
   const end = clock.dayStart(day + 1);
   const height = sheet.tall / Math.max(1, strips.length);
   strips.forEach((strip, k) => {
-    const y = sheet.top(day) + k * height;
+    const y = sheet.top(day) + Math.round(k * height);
+    const tall = Math.round((k + 1) * height) - Math.round(k * height) - (height < LEAST_WITH_VIEW ? 0 : 0.6);
     const { from, to, value } = strip.stretches;
     for (let i = firstAtLeast(to, begin + 1); i < from.length && from[i]! < end; i++) {
       const left = sheet.x(from[i]!, day);
       context.fillStyle = strip.color(value[i]!);
-      context.fillRect(left, y, Math.max(0.6, sheet.x(to[i]!, day) - left), height - 0.6);
+      context.fillRect(left, y, Math.max(0.6, sheet.x(to[i]!, day) - left), tall);
     }
+    if (height < LEAST_WITH_VIEW) return; // the bar at the end of the row tells it
     context.fillStyle = colors.value.viewEdge;
     const { seen } = strip;
     for (let i = firstAtLeast(seen.to, begin + 1); i < seen.from.length && seen.from[i]! < end; i++) {
       const left = sheet.x(seen.from[i]!, day);
-      context.fillRect(left, y + height - 1.6, Math.max(1, sheet.x(seen.to[i]!, day) - left), 1.4);
+      context.fillRect(left, y + tall - 1, Math.max(1, sheet.x(seen.to[i]!, day) - left), 1.4);
     }
   });
 }

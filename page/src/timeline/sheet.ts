@@ -6,6 +6,7 @@ import type { Clock } from "../data/clock";
 export const HEAD = 22;
 export const LEFT = 96;
 export const RIGHT = 118;
+const FOOT = 4;
 const NARROW_RIGHT = 8;
 const NARROW = 700;
 /** Pixels between two rows. */
@@ -21,6 +22,15 @@ export interface Days {
   count: number;
 }
 
+function mostRow(strips: number): number {
+  return Math.max(MOST_ROW, strips * MOST_ROW_OF_STRIP);
+}
+
+/** The height that the rows of some days take where there is room. */
+export function roomyHeight(days: number, strips: number): number {
+  return HEAD + days * mostRow(strips) + FOOT;
+}
+
 export class Sheet {
   readonly rowHeight: number;
 
@@ -30,15 +40,17 @@ export class Sheet {
     readonly scrolled: number,
     readonly days: Days,
     strips: number,
+    /** Whether robots may have had people in view. */
+    private readonly tellsView: boolean,
     private readonly clock: Clock,
   ) {
     // All days are seen at once where they fit; else one scrolls.
-    const fitting = Math.floor((height - HEAD - 4) / days.count);
-    this.rowHeight = Math.max(LEAST_ROW, Math.min(Math.max(MOST_ROW, strips * MOST_ROW_OF_STRIP), fitting));
+    const fitting = Math.floor((height - HEAD - FOOT) / days.count);
+    this.rowHeight = Math.max(LEAST_ROW, Math.min(mostRow(strips), fitting));
   }
 
   get hasTotals(): boolean {
-    return this.width >= NARROW;
+    return this.tellsView && this.width >= NARROW;
   }
 
   /** The width of a day. */
@@ -53,7 +65,7 @@ export class Sheet {
 
   /** The height of all rows. */
   get whole(): number {
-    return HEAD + this.days.count * this.rowHeight + 4;
+    return HEAD + this.days.count * this.rowHeight + FOOT;
   }
 
   top(day: number): number {

@@ -68,7 +68,7 @@ ACTIVITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
         "Sleep": ("#4c5788", ("sleep", "nap")),
         "Care": (
             "#74aeb8",
-            ("toilet", "wash_hands", "wash", "shower", "bath", "dress", "medication"),
+            ("toilet", "wash_hands", "wash", "shower", "bath", "dress", "medication", "freshen_up"),
         ),
         "Meals": (
             "#cf8344",
@@ -81,7 +81,7 @@ ACTIVITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
         ),
         "Chores": (
             "#b5957d",
-            ("fetch", "put_away", "tidy", "check_door", "laundry", "clean", "iron"),
+            ("fetch", "pick_up", "put_away", "tidy", "check_door", "laundry", "clean", "iron"),
         ),
         "Sport": ("#2f6b55", ("sport", "exercise")),
     }
