@@ -668,7 +668,7 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
         pictures = {page.locator(".plan canvas.top").screenshot()}
         page.keyboard.press("End")
         until(page, lambda: light.inner_text() == "off")
-        page.wait_for_selector(".label >> text=living_room_1 light")
+        page.wait_for_selector(".label >> text=Living room light")
         add_new_picture(page, pictures)
         page.click("#tab-layers")
         for name in ("slows", "lights"):
@@ -820,7 +820,7 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
         page.click("text=Put ana")
         page.mouse.click(*place_in(page, 0, "Living room"))
         page.click(".live >> text=Step")
-        page.wait_for_selector("[data-inspected=ana] >> text=living_room_1")
+        page.wait_for_selector("[data-inspected=ana] >> text=Living room")
         page.select_option("select[aria-label='Speed of the simulation']", "0")
         page.click("button.play")
         page.wait_for_selector("html[data-ended='1']", timeout=60_000)

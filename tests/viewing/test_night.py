@@ -25,7 +25,7 @@ def opacity_of_rooms(run: fleet2d.Run, step: int) -> dict[str, float]:
     """How dark the light is that lies on each room at a step."""
     stage = Stage(run, 0, run.manifest["steps"], figure=Figure(), stride=60)
     stage.show(step)
-    light, *_ = stage.body_artists
+    light, _ = stage.light_artists
     assert isinstance(light, AxesImage)
     veil = light.get_array()
     assert veil is not None

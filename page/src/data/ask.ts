@@ -85,8 +85,7 @@ export function ask(run: Run, question: string, nearUs: number, other: Run | nul
 /** The events that have all of some words, as whole words and whole names, in any order. */
 export function withWords(run: Run, rows: readonly EventRow[], words: string): EventRow[] {
   const names = namesOf(run);
-  const units = names.units(words);
-  return rows.filter((row) => names.has(row, units));
+  return rows.filter(names.having(names.units(words)));
 }
 
 /** What can follow the words so far: names, rooms and kinds of events. */
@@ -252,7 +251,7 @@ class Question {
       : clipped(found.filter((span) => isFitting(span.to - span.from)), from, to);
     const spans = which ? (which === "last" ? all.slice(-1) : all.slice(0, 1)) : all;
     if (spans.length === 0) return { spans, words: "never" };
-    const total = filled(union([spans]), from, to);
+    const total = spans.some((span) => span.to > span.from) ? filled(union([spans]), from, to) : 0;
     const noun = part.slice(0, -1) || "time";
     const count = `${spans.length} ${noun}${spans.length === 1 ? "" : "s"}`;
     if (this.wanted === "longest" || this.wanted === "shortest") return this.extreme(spans);
@@ -366,16 +365,19 @@ class Question {
 
   /** An activity lasts until the next of that body, a blocked way until the next event of that robot but a sighting. */
   private happened(units: readonly string[]): Span[] {
-    const { rows } = this.run.events;
+    const { rows, texts } = this.run.events;
+    const isWanted = this.names.having(units);
+    const words = texts.map((text) => `${text.entity && this.run.label(text.entity)} ${shownText(text)}`.trim());
     const spans: Span[] = [];
+    const activityEnds = new Map<string, number>();
     const ends = new Map<string, number>();
     for (let i = rows.length - 1; i >= 0; i--) {
       const row = rows[i]!;
-      const activity = `${row.entity}/activity`;
-      const end = row.event === "activity" ? activity : row.event === "way_blocked" ? row.entity : null;
-      const to = end === null ? row.us : (ends.get(end) ?? this.knownUs);
-      if (this.names.has(row, units)) spans.push({ from: row.us, to, words: `${row.entity && this.run.label(row.entity)} ${shownText(row)}`.trim() });
-      if (row.event === "activity") ends.set(activity, row.us);
+      if (isWanted(row)) {
+        const next = row.event === "activity" ? activityEnds : row.event === "way_blocked" ? ends : null;
+        spans.push({ from: row.us, to: next ? (next.get(row.entity) ?? this.knownUs) : row.us, words: words[row.text]! });
+      }
+      if (row.event === "activity") activityEnds.set(row.entity, row.us);
       if (!SIGHTS.has(row.event)) ends.set(row.entity, row.us);
     }
     return spans.reverse();

@@ -2,7 +2,7 @@
 
 import type { EventKind } from "../contract";
 import type { Clock } from "./clock";
-import type { Table } from "./parquet";
+import type { Table, Words } from "./parquet";
 import { firstAtLeast, lastAtMost } from "./search";
 
 export interface EventRow {
@@ -14,7 +14,12 @@ export interface EventRow {
   event: EventKind;
   user: string;
   detail: string;
+  /** Which of the different texts of events it has: few of them recur all the time. */
+  text: number;
 }
+
+/** What an event says, without when. */
+export type EventText = Pick<EventRow, "entity" | "event" | "user" | "detail">;
 
 export class Events {
   readonly us: number[] = [];
@@ -22,16 +27,30 @@ export class Events {
   private readonly byKind = new Map<EventKind, number[]>();
   private readonly byEntity = new Map<string, number[]>();
   private readonly byBoth = new Map<string, number[]>();
+  /** The different texts of events. */
+  readonly texts: EventText[] = [];
+  private readonly byText = new Map<string, number>();
 
-  add(step: number, us: number, entity: string, event: string, user: string, detail: string): void {
+  add(step: number, us: number, entity: string, event: string, user: string, detail: string, text = this.textOf(entity, event, user, detail)): void {
     const index = this.rows.length;
     this.us.push(us);
     const kind = event as EventKind;
-    this.rows.push({ index, us, step, entity, event: kind, user, detail });
+    this.rows.push({ index, us, step, entity, event: kind, user, detail, text });
     file(this.byKind, kind, index);
     file(this.byEntity, entity, index);
     file(this.byBoth, `${entity}/${event}`, index);
     if (user && user !== entity) file(this.byEntity, user, index);
+  }
+
+  /** The number of a text. */
+  textOf(entity: string, event: string, user: string, detail: string): number {
+    const key = `${entity}/${event}/${user}/${detail}`;
+    let number = this.byText.get(key);
+    if (number === undefined) {
+      number = this.texts.push({ entity, event: event as EventKind, user, detail }) - 1;
+      this.byText.set(key, number);
+    }
+    return number;
   }
 
   get kinds(): EventKind[] {
@@ -93,7 +112,7 @@ function file<Key>(index: Map<Key, number[]>, key: Key, row: number): void {
 }
 
 /** An event in words, without who and when. */
-export function shownText(row: EventRow): string {
+export function shownText(row: EventText): string {
   return [row.event, row.user, row.detail].filter(Boolean).join(" ").replaceAll("_", " ");
 }
 
@@ -104,10 +123,15 @@ export async function readEvents(table: Table, clock: Clock): Promise<Events> {
   const event = await table.words("event");
   const user = table.has("user") ? await table.words("user") : null;
   const detail = await table.words("detail");
+  const columns = [entity, event, user, detail];
+  const textOfCodes = new Map<number, number>();
   for (let i = 0; i < steps.length; i++) {
-    const word = (column: { codes: Int32Array; words: string[] } | null): string =>
-      column ? (column.words[column.codes[i]!] ?? "") : "";
-    events.add(steps[i]!, steps[i]! * clock.stepUs, word(entity), word(event), word(user), word(detail));
+    const word = (column: Words | null): string => (column ? (column.words[column.codes[i]!] ?? "") : "");
+    const words = [word(entity), word(event), word(user), word(detail)] as const;
+    const code = columns.reduce((sum, column) => (column ? sum * (column.words.length + 1) + column.codes[i]! + 1 : sum), 0);
+    let text = textOfCodes.get(code);
+    if (text === undefined) textOfCodes.set(code, (text = events.textOf(...words)));
+    events.add(steps[i]!, steps[i]! * clock.stepUs, ...words, text);
   }
   return events;
 }

@@ -1,6 +1,6 @@
 /** Whole names in what is typed: upper and lower case, and `_` and a space, are alike. */
 
-import type { EventRow } from "./events";
+import type { EventRow, EventText } from "./events";
 import { AWAY } from "./rooms";
 import type { Run } from "./run";
 
@@ -27,8 +27,8 @@ export class Names {
   /** The most words that the name of a body has. */
   private readonly longest: number;
   private readonly known = new Set<string>();
-  private readonly ofTexts = new Map<string, ReadonlySet<string>>();
-  private rowsRead = 0;
+  /** The words of each text of the events that were read. */
+  private readonly ofTexts: ReadonlySet<string>[] = [];
 
   constructor(private readonly run: Run) {
     const { doors, rooms } = run.facts.home;
@@ -45,8 +45,12 @@ export class Names {
 
   /** Learn the words of the events that were read since. */
   readEvents(): this {
-    const { rows } = this.run.events;
-    for (; this.rowsRead < rows.length; this.rowsRead++) this.unitsOf(rows[this.rowsRead]!).forEach((unit) => this.known.add(unit));
+    const { texts } = this.run.events;
+    while (this.ofTexts.length < texts.length) {
+      const units = this.unitsOf(texts[this.ofTexts.length]!);
+      this.ofTexts.push(units);
+      units.forEach((unit) => this.known.add(unit));
+    }
     return this;
   }
 
@@ -75,18 +79,14 @@ export class Names {
     return units.filter(Boolean);
   }
 
-  /** The words of an event; few events have different ones. */
-  private unitsOf({ entity, event, user, detail }: EventRow): ReadonlySet<string> {
-    const key = `${entity}/${event}/${user}/${detail}`;
-    let units = this.ofTexts.get(key);
-    if (!units) this.ofTexts.set(key, (units = new Set([entity, event, user, detail].flatMap((text) => this.units(text)))));
-    return units;
+  private unitsOf({ entity, event, user, detail }: EventText): ReadonlySet<string> {
+    return new Set([entity, event, user, detail].flatMap((text) => this.units(text)));
   }
 
-  /** Whether an event has all of some words. */
-  has(row: EventRow, units: readonly string[]): boolean {
-    const ofRow = this.unitsOf(row);
-    return units.every((unit) => ofRow.has(unit));
+  /** Tell of events whether they have all of some words. */
+  having(units: readonly string[]): (row: EventRow) => boolean {
+    const have = this.ofTexts.map((ofText) => units.every((unit) => ofText.has(unit)));
+    return (row) => have[row.text]!;
   }
 
   isKnown(unit: string): boolean {

@@ -2,7 +2,7 @@
 
 import re
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
@@ -138,6 +138,8 @@ X264 = {
 ROWS_BETWEEN = 16  # equal rows between two parts of a picture that have changed
 # A GIF or WebP is written from pictures that are all in memory.
 MAX_PICTURES = 3_000
+# Pictures of the home in its light that are kept: drawing one takes as long as ten of its bodies.
+MAX_LIT = 24
 # Pictures that wait to be encoded: only their changed parts are kept.
 MAX_WAITING = 16
 
@@ -219,14 +221,38 @@ def stage_of(run: Run, first: int, end: int, stride: int, height: int = HEIGHT_P
     return Stage(run, first, end, figure=figure, stride=stride)
 
 
+class LitHome:
+    """The home without bodies, and its pictures in the lights that were drawn last."""
+
+    def __init__(self, stage: Stage) -> None:
+        """Take the home as it is drawn now, without light."""
+        canvas: Any = stage.figure.canvas
+        self._stage = stage
+        self._canvas = canvas
+        self._dark = canvas.copy_from_bbox(stage.figure.bbox)
+        self._lit: dict[object, Any] = {}
+
+    def restore(self, draw: Callable[[Sequence[Artist]], None]) -> None:
+        """Draw the home in the light of the stage, by a function that draws artists."""
+        key = self._stage.light_key
+        if key in self._lit:
+            self._canvas.restore_region(self._lit[key])
+            return
+        self._canvas.restore_region(self._dark)
+        draw(self._stage.light_artists)
+        if len(self._lit) == MAX_LIT:
+            del self._lit[next(iter(self._lit))]
+        self._lit[key] = self._canvas.copy_from_bbox(self._stage.figure.bbox)
+
+
 def draw_frames(stage: Stage, first: int, moments: I64) -> Iterator[tuple[int, U8]]:
     """Yield the number and the pixels of some frames of a film."""
     canvas: Any = stage.figure.canvas
-    for artist in (*stage.body_artists, *stage.clock_artists):
+    for artist in (*stage.light_artists, *stage.body_artists, *stage.clock_artists):
         artist.set_animated(True)
     canvas.draw()
-    background = canvas.copy_from_bbox(stage.figure.bbox)
-    scene = background
+    home = LitHome(stage)
+    scene = canvas.copy_from_bbox(stage.figure.bbox)
     width, height = canvas.get_width_height()
     stamps = TextStamps(width, height, stage.figure.dpi)
 
@@ -240,7 +266,7 @@ def draw_frames(stage: Stage, first: int, moments: I64) -> Iterator[tuple[int, U
 
     for moment in moments.tolist():
         if stage.show(first + moment * stage.stride):
-            canvas.restore_region(background)
+            home.restore(draw)
             draw(stage.body_artists)
             scene = canvas.copy_from_bbox(stage.figure.bbox)
         else:

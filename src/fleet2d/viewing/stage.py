@@ -28,7 +28,7 @@ from fleet2d.runtime.local_time import rules_of
 from fleet2d.viewing.contract import BodyFacts
 from fleet2d.viewing.home_facts import WallsHistory
 from fleet2d.viewing.look import body_label, room_labels
-from fleet2d.viewing.night import Light
+from fleet2d.viewing.night import Key, Light
 from fleet2d.viewing.pictures.charts import AskedTime, asked_of
 from fleet2d.viewing.pictures.floorplan import LETTER_WIDTH, floorplan_axes, points_per_m
 from fleet2d.viewing.pictures.life import (
@@ -237,13 +237,18 @@ class Stage:
 
     @property
     def body_artists(self) -> list[Artist]:
-        """The light, and the artists of bodies, of their paths and views, as they are drawn."""
-        return [
-            self._light.image,
-            self._light.walls,
-            *self._collections,
-            *(body.name for body in self.bodies),
-        ]
+        """The artists of bodies, of their paths and views, as they are drawn over the light."""
+        return [*self._collections, *(body.name for body in self.bodies)]
+
+    @property
+    def light_artists(self) -> list[Artist]:
+        """The artists of the light, which changes less often than bodies move."""
+        return [self._light.image, self._light.walls]
+
+    @property
+    def light_key(self) -> Key:
+        """What the light that is shown depends on."""
+        return self._light.key
 
     @property
     def clock_artists(self) -> list[Artist]:

@@ -198,7 +198,8 @@ def _learning(run: Run) -> Iterator[StoryFacts]:
         settled -= 1
     if 0 < settled < len(errors) - 1:
         below = f"{100 * SETTLED * last:.0f} %"
-        words = f"They are wrong by less than {below} from here on, and by {100 * last:.0f} % at the end"
+        end = f"{100 * last:.0f} % at the end"
+        words = f"They are wrong by less than {below} from here on, and by {end}"
         title = "The beliefs have settled"
         yield StoryFacts(step=errors[settled][0], title=title, words=words, who=[])
 
