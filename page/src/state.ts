@@ -19,7 +19,7 @@ export type Theme = "auto" | "light" | "dark";
 export const runs = signal<Run[]>([]);
 /** The moment that is shown [us since the start]. */
 export const moment = signal(0);
-/** The moment that words are about [us]: while time passes it follows several times a second, else at once. */
+/** The moment that words are about [us]: it follows the moment that is shown, but only several times a second. */
 export const told = signal(0);
 /** The part of the run that the timeline shows [us]. */
 export const range = signal<[number, number]>([0, 1]);
@@ -78,9 +78,23 @@ export const answer = computed<Answer | null>(() => {
 export const foundTimes = computed<readonly number[]>(() => foundEvents.value.map((row) => row.us));
 
 const SHORTEST_US = 10e6;
-/** While time passes, words change at most this often [ms]: nobody reads faster. */
+/** Words change at most this often [ms] while time passes, and while somebody scrubs: nobody reads faster. */
 const TOLD_MS = 200;
+const SCRUBBED_MS = 60;
 let toldAt = 0;
+let toldLater: ReturnType<typeof setTimeout> | undefined;
+
+/** Let words be about the moment that is shown: at once, or soon if they have just changed. */
+function tell(): void {
+  clearTimeout(toldLater);
+  const wait = toldAt + (playing.peek() ? TOLD_MS : SCRUBBED_MS) - performance.now();
+  if (wait > 0) {
+    if (!playing.peek()) toldLater = setTimeout(tell, wait);
+    return;
+  }
+  told.value = moment.peek();
+  toldAt = performance.now();
+}
 
 /**
  * Show a moment everywhere. While time passes it may lie between two steps; else it is that of a step, so that what
@@ -94,11 +108,7 @@ export function goTo(us: number): void {
   const at = playing.value ? inside : Math.floor(inside / stepUs) * stepUs;
   batch(() => {
     moment.value = at;
-    const now = performance.now();
-    if (!playing.value || now - toldAt > TOLD_MS) {
-      told.value = at;
-      toldAt = now;
-    }
+    tell();
     const [from, to] = range.value;
     if (at < from || at > to) setRange(at - (to - from) / 2, at + (to - from) / 2);
   });

@@ -9,6 +9,7 @@ import type { BodyFacts, EventKind } from "../contract";
 import { type EventRow, shownText } from "../data/events";
 import { firstAtLeast, lastAtMost } from "../data/search";
 import { differences, type Stretches, valueAt } from "../data/stretches";
+import { title } from "../data/words";
 import { chosenBelief, errorsOf } from "../plan/beliefs";
 import { bodyColor, colors, dark, mix, PALETTE } from "../theme";
 import { type Series, readSeries } from "../data/metrics";
@@ -370,8 +371,8 @@ function switchLanes(run: Run, prefix: string): Lane[] {
   const lit = run.hasLights ? rooms.filter((room) => run.lightEvents(room.name).us.length > 0) : [];
   const { door, viewEdge } = colors.value;
   return [
-    ...doors.map(({ name, open }) => lane(name, `${name} shut`, ["shut", "open"], 0, door, open, () => run.doorEvents(name))),
-    ...lit.map(({ name }) => lane(name, `${name} light`, ["light off", "light on"], 1, viewEdge, !run.facts.starts_unlit, () => run.lightEvents(name))),
+    ...doors.map(({ name, open }) => lane(name, `${title(name)} shut`, ["shut", "open"], 0, door, open, () => run.doorEvents(name))),
+    ...lit.map(({ name }) => lane(name, `${run.home.roomLabel(run.home.roomIndex(name))} light`, ["light off", "light on"], 1, viewEdge, !run.facts.starts_unlit, () => run.lightEvents(name))),
   ];
 }
 

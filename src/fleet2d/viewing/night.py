@@ -151,11 +151,12 @@ def _events(run: Run) -> list[dict[str, Any]]:
     """Return the activities of people and the switches of lights, in order."""
     if "events" not in run.tables:
         return []
-    import pyarrow as pa
     from pyarrow import compute
 
+    from fleet2d.artifacts.arrow import string_array
+
     table = run.tables["events"].select(["step", "entity", "event", "detail"])
-    kinds = pa.array([EventKind.ACTIVITY, *SWITCHES])
+    kinds = string_array([EventKind.ACTIVITY, *SWITCHES])
     rows: list[dict[str, Any]] = table.filter(
         compute.is_in(compute.cast(table["event"], "string"), kinds)
     ).to_pylist()

@@ -483,7 +483,8 @@ def _observations(part: Run) -> tuple[I64, NDArray[Any], F64]:
     """Return the steps of robots' observations, in order, the robots, and the places (n, 2) [m]."""
     if "observations" not in part.tables:
         return np.zeros(0, np.int64), np.zeros(0, object), np.zeros((0, 2))
+    from fleet2d.artifacts.arrow import values_of
+
     table = part.tables["observations"]
-    robots = table["robot"].cast("string").to_numpy(zero_copy_only=False)
-    places = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
-    return table["step"].to_numpy(), robots, places
+    places = np.stack([values_of(table["x"]), values_of(table["y"])], axis=1)
+    return values_of(table["step"]), values_of(table["robot"]), places
