@@ -22,7 +22,7 @@ from fleet2d.logs.log import (
     Reading,
     in_order,
     log_lines,
-    parse_time,
+    parse_local_time,
     since,
 )
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_US
@@ -255,7 +255,7 @@ def _rows(path: Path) -> list[_Row]:
                 f"{path}, line {number}: expected a start time, an end time, and an activity or a"
                 f" sensor with its type and place, got {one_line(text)!r}"
             )
-        begin, end = (parse_time(" ".join(match[i].split()), path, number) for i in (1, 2))
+        begin, end = (parse_local_time(" ".join(match[i].split()), path, number) for i in (1, 2))
         rows.append(_Row(begin, end, match[3].split(), number))
     if not rows:
         raise LogError(f"{path} holds no reading: is it the right file?")

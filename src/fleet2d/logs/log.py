@@ -370,6 +370,23 @@ def parse_time(text: str, path: Path, line: int, *, day_first: bool | None = Non
     return moment.replace(tzinfo=_zone(match[14]))
 
 
+def parse_local_time(
+    text: str, path: Path, line: int, *, day_first: bool | None = None
+) -> datetime:
+    """Read a time of a layout that has the times of the home's clock, likewise.
+
+    Raises:
+        LogError: as `parse_time`, or the time has an offset.
+    """
+    moment = parse_time(text, path, line, day_first=day_first)
+    if moment.tzinfo is not None:
+        raise LogError(
+            f"{path}, line {line}: {one_line(text.strip())!r} has an offset, and this layout has"
+            " times of the home's clock: write those, without offset"
+        )
+    return moment
+
+
 def _zone(text: str | None) -> timezone | None:
     if text is None:
         return None

@@ -1,5 +1,6 @@
 """Options of `fleet2d fit persona`: labels of sensors, silences, residents and time zones of a log."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,21 @@ def test_a_week_without_the_person_is_left_out_with_the_reason(tmp_path: Path) -
     (tmp_path / "holiday").write_text("\n".join(lines + later) + "\n")
     told = fit_routine(tmp_path / "holiday", tmp_path / "persona.yaml")
     assert any("days are left out: the night before or after them isn't" in x for x in told)
+
+
+def test_days_that_begin_before_midnight_are_left_out(tmp_path: Path) -> None:
+    """Who slept in the afternoon, as in a log whose clock jumped, got up at -4:10, with a traceback."""
+    lines = events(tmp_path).path.read_text().splitlines()
+    later = [
+        re.sub("-0(.) (..)", lambda t: f"-1{t[1]} {int(t[2]) + 12:02}", line)
+        for line in lines
+        if int(line[11:13]) < 12
+    ]
+    earlier = [re.sub("-0(.) ", lambda t: f"-0{int(t[1]) + 4} ", line) for line in lines]
+    (tmp_path / "jump").write_text("\n".join(lines + earlier + later) + "\n")
+    told = fit_routine(tmp_path / "jump", tmp_path / "persona.yaml")
+    assert any("or they begin before midnight" in x for x in told)
+    assert "-4:" not in (tmp_path / "persona.yaml").read_text()
 
 
 def test_too_few_days_are_counted_with_what_is_missing(tmp_path: Path) -> None:

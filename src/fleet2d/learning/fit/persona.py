@@ -171,7 +171,7 @@ def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
     if left_out > 2:  # the first and the last
         notes.append(
             f"{left_out} of {len(timeline.minutes)} days are left out: the night before or after"
-            " them isn't in the log"
+            " them isn't in the log, or they begin before midnight"
         )
     unknown = float(np.mean(timeline.seconds[[day.number for day in days]] < 0)) if days else 0.0
     if unknown > MUCH_UNKNOWN:

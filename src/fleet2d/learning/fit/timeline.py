@@ -286,7 +286,10 @@ def sleep_states(timeline: Timeline) -> set[int]:
 
 
 def find_days(timeline: Timeline) -> list[LivedDay]:
-    """Return the days whose night before and night after are known, at home or away."""
+    """Return the days whose night before and night after are known, at home or away.
+
+    Days that begin before midnight are left out, as a persona gets up on the date of its day.
+    """
     flat = timeline.minutes.ravel()
     asleep = np.isin(flat, list(sleep_states(timeline)))
     nights = _nights(asleep, len(timeline.minutes))
@@ -297,6 +300,8 @@ def find_days(timeline: Timeline) -> list[LivedDay]:
         if before is None or after is None or before[1] >= after[0]:
             continue
         midnight = number * DAY_MINUTES
+        if before[1] < midnight:
+            continue
         awake = _runs(flat, before[1], after[0], midnight)
         night = _runs(flat, after[0], after[1], midnight)
         up = tuple(r for r in night if not asleep[midnight + r.begin])

@@ -17,7 +17,15 @@ from typing import NamedTuple
 
 from fleet2d.bounds import one_line
 from fleet2d.logs.layouts.clock import by_clock
-from fleet2d.logs.log import ActivityLog, LogError, Reading, in_order, log_lines, parse_time, since
+from fleet2d.logs.log import (
+    ActivityLog,
+    LogError,
+    Reading,
+    in_order,
+    log_lines,
+    parse_local_time,
+    since,
+)
 from fleet2d.runtime.local_time import Zone
 
 ON = frozenset({"ON", "OPEN", "PRESENT", "START"})
@@ -78,7 +86,7 @@ def read_casas(path: Path, *, sort: bool = False, zone: Zone | None = None) -> A
     sensor is the label.
 
     Raises:
-        LogError: A line is damaged, or times run backwards.
+        LogError: A line is damaged, times run backwards, or nothing switches on.
     """
     readings: list[Reading] = []
     others: Counter[str] = Counter()
@@ -93,7 +101,7 @@ def read_casas(path: Path, *, sort: bool = False, zone: Zone | None = None) -> A
                 f"{path}, line {number}: expected date, time, sensor (or room and sensor), ON or"
                 f" OFF, and activity, got {one_line(text)!r}"
             )
-        moment = parse_time(f"{event.day} {event.time}", path, number)
+        moment = parse_local_time(f"{event.day} {event.time}", path, number)
         first_day = first_day or moment.date()
         activity = event.activity if has_rooms else _activity(event.activity, under_way)
         if event.value.upper() in ON:
@@ -101,11 +109,14 @@ def read_casas(path: Path, *, sort: bool = False, zone: Zone | None = None) -> A
             readings.append(Reading(at, at, event.label, activity, number))
         elif event.value.upper() not in OFF:
             others[event.value] += 1
+    values = one_line(", ".join(sorted(others)[:5]), 200)
+    if not readings:
+        words = f", got {values}" if others else ""
+        raise LogError(f"{path}: no sensor switches on in it; expected ON and OFF{words}")
     readings, notes = by_clock(readings, first_day, zone, path)
     readings, order_notes = in_order(readings, path, sort=sort)
     notes += order_notes
     if others:
-        values = one_line(", ".join(sorted(others)[:5]), 200)
         notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")
     if under_way:
         notes.append(f"activities without an end: {one_line(', '.join(under_way), 200)}")

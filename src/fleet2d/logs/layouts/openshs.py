@@ -20,7 +20,7 @@ from fleet2d.logs.log import (
     Reading,
     in_order,
     log_lines,
-    parse_time,
+    parse_local_time,
     since,
 )
 from fleet2d.runtime.local_time import Zone
@@ -60,7 +60,7 @@ def read_openshs(path: Path, *, sort: bool = False, zone: Zone | None = None) ->
                 f"{path}, line {line}: expected {len(head)} values, 0 or 1 for sensors, got"
                 f" {one_line(','.join(row))!r}"
             )
-        moment = parse_time(row[time_at], path, line, day_first=False)
+        moment = parse_local_time(row[time_at], path, line, day_first=False)
         first_day = first_day or moment.date()
         at = since(first_day, moment)
         activity = row[activity_at].strip()
