@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <initializer_list>
 
 #include "lattice.hpp"
 #include "poses.hpp"
@@ -38,10 +39,29 @@ inline i64 count_together(View<const i64> begin, View<const i16> room, View<cons
     return count;
 }
 
-// The summed length of the moves from pose to pose [lattice units].
-inline f64 sum_moves(const Poses& poses) {
+// The length of a move of `length` that may lead through a portal, which has no length itself [lattice units]. Each row
+// of `portals` has the ends (x, y) and (x, y) of one, and how far from them bodies stand.
+inline f64 without_portal(f64 length, i64 x, i64 y, i64 to_x, i64 to_y, View<const i64, 2> portals) {
+    for (i64 p = 0; p < portals.shape[0]; ++p) {
+        for (const i64 one : {0, 2}) {
+            const i64 near_x = portals(p, one), near_y = portals(p, one + 1);
+            const i64 far_x = portals(p, 2 - one), far_y = portals(p, 3 - one);
+            const f64 in = distance(x, y, near_x, near_y), out = distance(far_x, far_y, to_x, to_y);
+            if (in >= distance(x, y, far_x, far_y) || out >= distance(near_x, near_y, to_x, to_y)) continue;
+            const f64 reach = static_cast<f64>(portals(p, 4));
+            length = std::min(length, std::max(in - reach, 0.0) + std::max(out - reach, 0.0));
+        }
+    }
+    return length;
+}
+
+// The summed length of the moves from pose to pose [lattice units], with portals as above.
+inline f64 sum_moves(const Poses& poses, View<const i64, 2> portals) {
     f64 total = 0;
-    for (i64 j = 1; j < poses.x.size(); ++j) total += distance(poses.x[j - 1], poses.y[j - 1], poses.x[j], poses.y[j]);
+    for (i64 j = 1; j < poses.x.size(); ++j) {
+        const i64 x = poses.x[j - 1], y = poses.y[j - 1], to_x = poses.x[j], to_y = poses.y[j];
+        total += without_portal(distance(x, y, to_x, to_y), x, y, to_x, to_y, portals);
+    }
     return total;
 }
 

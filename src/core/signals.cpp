@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "lattice.hpp"
+#include "measure.hpp"
 
 namespace fleet2d {
 namespace {
@@ -75,7 +76,7 @@ OwnedStretched distances_to_shape(const Window& window, i64 body, View<const i64
     return distances;
 }
 
-OwnedStretched speeds(const Window& window, i64 body, View<const i64> before) {
+OwnedStretched speeds(const Window& window, i64 body, View<const i64> before, View<const i64, 2> portals) {
     OwnedStretched speeds;
     const i64 begin = window.start[body];
     bool is_known = before.size() > 0;
@@ -83,7 +84,8 @@ OwnedStretched speeds(const Window& window, i64 body, View<const i64> before) {
     for (i64 run = begin; run < window.start[body + 1]; ++run) {
         const i64 step = window.step[run], dx = window.x[run] - x, dy = window.y[run] - y;
         const bool is_there = is_known && away == 0 && window.away[run] == 0;
-        speeds.append(step, is_there ? root(dx * dx + dy * dy) : 0.0);
+        const f64 length = is_there ? root(dx * dx + dy * dy) : 0.0;
+        speeds.append(step, without_portal(length, x, y, window.x[run], window.y[run], portals));
         if (window.run_end(body, run) > step + 1) speeds.append(step + 1, 0.0);
         x = window.x[run], y = window.y[run], away = window.away[run], is_known = true;
     }

@@ -36,8 +36,9 @@ OwnedStretched distances_between(const Window& window, i64 body, i64 other);
 OwnedStretched distances_to_shape(const Window& window, i64 body, View<const i64, 2> edges);
 
 // The speed of a body [lattice units a step]: at each step the way from the step before, 0 at a step before which
-// the body was nowhere. `before` is where it was at the step before the window, (x, y, away), or empty.
-OwnedStretched speeds(const Window& window, i64 body, View<const i64> before);
+// the body was nowhere. `before` is where it was at the step before the window, (x, y, away), or empty; `portals` are
+// as `without_portal` has them.
+OwnedStretched speeds(const Window& window, i64 body, View<const i64> before, View<const i64, 2> portals);
 
 // The greatest value of a signal in the steps t + low to t + high, for each t; before the first step the signal
 // counts as `before`, from the end on as `after`.

@@ -720,9 +720,14 @@ def count_together(begin: numpy.typing.NDArray[numpy.int64], room: numpy.typing.
         steps: Number of steps.
     """
 
-def sum_moves(poses: tuple[Any, ...]) -> float:
+def sum_moves(poses: tuple[Any, ...], portals: numpy.typing.NDArray[numpy.int64]) -> float:
     """
     Return the summed length of the moves from pose to pose [lattice units].
+
+    Args:
+        poses: The poses.
+        portals: int64 (m, 5), the ends of portals, which have no length: x, y, x, y, and how far from them bodies stand
+            [lattice units].
     """
 
 class ViewQueryColumn(enum.IntEnum):
@@ -1760,7 +1765,7 @@ def distances_to_shape(window: Window, body: int, edges: numpy.typing.NDArray[nu
         infinite while the body is away.
     """
 
-def speeds(window: Window, body: int, before: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
+def speeds(window: Window, body: int, before: numpy.typing.NDArray[numpy.int64], portals: numpy.typing.NDArray[numpy.int64]) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.float64]]:
     """
     Return how far a body comes in each step: at a step, the way from the step before.
 
@@ -1768,6 +1773,7 @@ def speeds(window: Window, body: int, before: numpy.typing.NDArray[numpy.int64])
         window: The motion of the bodies.
         body: Number of the body.
         before: int64 (3,), x, y and away at the step before the window; (0,) if there was none.
+        portals: int64 (m, 5), as for `sum_moves`.
 
     Returns:
         The steps at which it changes, int64 (n,), and the way of each step from then on [lattice units], float64 (n,).

@@ -46,6 +46,31 @@ def test_storeys_are_one_part_for_people_and_two_for_robots(tmp_path: Path) -> N
     assert frozenset(range(4)) == people.rooms_of(0)
 
 
+@pytest.mark.parametrize("period", ["1 s", "1 h"])
+def test_stairs_are_no_way_through_the_plan(tmp_path: Path, period: str) -> None:
+    """Who went upstairs covered the metres between two storeys in the plan, at 26 m/s."""
+    far = [[[x + 22 * (x >= 8), y] for x, y in ring] for ring in HOUSE["free"]]
+    rooms = [HOUSE["rooms"][0], {"type": "bedroom", "polygon": far[1]}]
+    stairs = {**STAIRS, "end": [30.5, 3.5]}
+    plan = house(tmp_path, free=far, rooms=rooms, portals=[stairs])
+    stays = [{"at": "08:00", "place": "living_room", "dwell": "5 min"}, {"place": "bedroom"}]
+    scenario = {
+        "simulation": {"start": "2026-01-05T08:00", "duration": "1 h", "seed": 1},
+        "floorplan": {"type": "native", "path": str(plan)},
+        "users": {"ana": {"type": "schedule", "days": [{"on": "daily", "items": stays}]}},
+        "metrics": {"distance": {"period": period}},
+        "expect": {
+            "walks": "always(speed(ana) < 2 m/s)",
+            "climbs": "eventually(room(ana) == bedroom)",
+        },
+    }
+    done = fleet2d.run(scenario)
+    assert {"walks": True, "climbs": True} == {
+        n: v["holds"] for n, v in done.manifest["expectations"].items()
+    }
+    assert 5 < done.metrics["distance"]["ana"] / 24 < 20
+
+
 def test_furniture_on_the_stairs_bars_them(tmp_path: Path) -> None:
     box = {"type": "box", "footprint": [[3, 2], [5, 2], [5, 4], [3, 4]]}
     home = Home(load_floorplan(house(tmp_path, objects=[box])))

@@ -1,11 +1,12 @@
 """Rooms of places, time together and lengths of ways, against NumPy and plain loops."""
 
-from math import hypot
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.reference import signals as slow
 
 from fleet2d.kernels import SUB, Poses, count_together, rooms_at, sum_moves
 
@@ -21,12 +22,17 @@ def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at: list)
     assert np.array_equal(ROOMS[row, column], rooms_at(ROOMS, x, y))
 
 
-@given(places)
-def test_path_length_equals_a_plain_loop(at: list) -> None:
+coordinate = st.integers(-200, 600)
+portals = st.lists(st.tuples(*[coordinate] * 4, st.integers(0, 90)), max_size=2)
+
+
+@given(places, portals)
+def test_path_length_equals_a_plain_loop(at: list, links: list) -> None:
     x, y = np.array(at, np.int64).reshape(-1, 2).T.copy()
     poses = Poses(x, y, np.zeros_like(x), np.zeros(len(x), np.uint8))
-    way = sum(hypot(x[i] - x[i - 1], y[i] - y[i - 1]) for i in range(1, len(x)))
-    assert abs(way - sum_moves(poses)) <= 1e-9 * max(way, 1)
+    way = sum(slow.move_length((*a, False), (*b, False), links) for a, b in pairwise(at))
+    rows = np.array(links, np.int64).reshape(-1, 5)
+    assert abs(way - sum_moves(poses, rows)) <= 1e-9 * max(way, 1)
 
 
 rooms_by_step = st.integers(1, 40).flatmap(

@@ -79,16 +79,22 @@ def test_distances_to_a_shape_equal_each_step(tracks: list[Track], boxes: list[s
     assert dense(distances_to_shape(window, 0, rows)) == pytest.approx(expected)
 
 
-@given(bodies, st.integers(1, STEPS - 1))
-def test_speeds_go_on_from_window_to_window(tracks: list[Track], cut: int) -> None:
+portals = st.lists(st.tuples(spot, spot, spot, spot, st.integers(0, 9)), max_size=2)
+
+
+@given(bodies, st.integers(1, STEPS - 1), portals)
+def test_speeds_go_on_from_window_to_window(
+    tracks: list[Track], cut: int, links: list[slow.Portal]
+) -> None:
     timelines = timelines_of(tracks)
     poses = poses_of(timelines.window(0, STEPS), 0)
     x, y, away = poses[cut - 1]
     nothing = np.zeros(0, np.int64)
-    first = speeds(timelines.window(0, cut), 0, nothing)
-    second = speeds(timelines.window(cut, STEPS), 0, np.array([x, y, away], np.int64))
+    rows = np.array(links, np.int64).reshape(-1, 5)
+    first = speeds(timelines.window(0, cut), 0, nothing, rows)
+    second = speeds(timelines.window(cut, STEPS), 0, np.array([x, y, away], np.int64), rows)
     together = dense(first, cut) + dense((second[0] - cut, second[1]), STEPS - cut)
-    assert [slow.speed(poses, step) for step in range(STEPS)] == together
+    assert [slow.speed(poses, step, links) for step in range(STEPS)] == together
 
 
 @given(values, st.integers(-6, 6), st.integers(0, 9), value, value)

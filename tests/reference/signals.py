@@ -6,6 +6,8 @@ from math import inf, sqrt
 Edge = tuple[int, int, int, int]
 Pose = tuple[int, int, bool]
 """x, y, away."""
+Portal = tuple[int, int, int, int, int]
+"""The x and y of its ends, and how far from them bodies stand."""
 
 
 def distance(one: Pose, other: Pose) -> float:
@@ -37,11 +39,22 @@ def _to_edge(x: int, y: int, edge: Edge) -> float:
     return sqrt((x - x0 - share * (x1 - x0)) ** 2 + (y - y0 - share * (y1 - y0)) ** 2)
 
 
-def speed(poses: Sequence[Pose], step: int) -> float:
+def speed(poses: Sequence[Pose], step: int, portals: Sequence[Portal] = ()) -> float:
     """Return how far a body came in a step."""
     if not step or poses[step][2] or poses[step - 1][2]:
         return 0.0
-    return distance(poses[step], poses[step - 1])
+    return move_length(poses[step - 1], poses[step], portals)
+
+
+def move_length(begin: Pose, end: Pose, portals: Sequence[Portal]) -> float:
+    """Return the length of a move, which may be through a portal from the one to the other end."""
+    lengths = [distance(begin, end)]
+    for x0, y0, x1, y1, reach in portals:
+        for one, other in (((x0, y0, False), (x1, y1, False)), ((x1, y1, False), (x0, y0, False))):
+            before, after = distance(begin, one), distance(end, other)
+            if before < distance(begin, other) and after < distance(end, one):
+                lengths.append(max(before - reach, 0) + max(after - reach, 0))
+    return min(lengths)
 
 
 def sliding_max(

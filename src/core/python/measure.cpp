@@ -53,11 +53,18 @@ Args:
     steps: Number of steps.)");
     m.def(
         "sum_moves",
-        [](const Poses& poses) {
+        [](const Poses& poses, View<const i64, 2> portals) {
             check_poses(poses);
-            return sum_moves(poses);
+            check_portals(portals);
+            return sum_moves(poses, portals);
         },
-        "poses"_a, Unlocked(), "Return the summed length of the moves from pose to pose [lattice units].");
+        "poses"_a, "portals"_a, Unlocked(),
+        R"(Return the summed length of the moves from pose to pose [lattice units].
+
+Args:
+    poses: The poses.
+    portals: int64 (m, 5), the ends of portals, which have no length: x, y, x, y, and how far from them bodies stand
+        [lattice units].)");
 }
 
 }  // namespace fleet2d

@@ -1,5 +1,6 @@
 #include "../signals.hpp"
 
+#include "poses.hpp"
 #include "subjects.hpp"
 #include "timelines.hpp"
 
@@ -79,20 +80,22 @@ Returns:
     infinite while the body is away.)");
     m.def(
         "speeds",
-        [](const Window& window, i64 body, View<const i64> before) {
+        [](const Window& window, i64 body, View<const i64> before, View<const i64, 2> portals) {
             check_body(window, body);
             require(before.size() == 0 || before.size() == 3, "before must be (x, y, away), or empty");
             require(before.size() == 0 || all_in_range(before, -FARTHEST_SIGNAL, FARTHEST_SIGNAL),
                     "bodies must be within 2**28 lattice units");
-            return arrays_of(speeds(window, body, before));
+            check_portals(portals);
+            return arrays_of(speeds(window, body, before, portals));
         },
-        "window"_a, "body"_a, "before"_a, Unlocked(),
+        "window"_a, "body"_a, "before"_a, "portals"_a, Unlocked(),
         R"(Return how far a body comes in each step: at a step, the way from the step before.
 
 Args:
     window: The motion of the bodies.
     body: Number of the body.
     before: int64 (3,), x, y and away at the step before the window; (0,) if there was none.
+    portals: int64 (m, 5), as for `sum_moves`.
 
 Returns:
     The steps at which it changes, int64 (n,), and the way of each step from then on [lattice units], float64 (n,).)");

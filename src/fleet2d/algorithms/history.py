@@ -7,6 +7,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import dist
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -177,10 +178,20 @@ class BodyPoses:
 
     @cached_property
     def distance(self) -> float:
-        """Distance travelled from the first to the last step [m]."""
+        """Distance travelled from the first to the last step, but through portals [m]."""
         runs = self._runs
-        moved = sum_moves(Poses(runs.x, runs.y, runs.heading, runs.away))
-        return moved / self._home.plan.lattice.units_per_m
+        plan = self._home.plan
+        poses = Poses(runs.x, runs.y, runs.heading, runs.away)
+        return sum_moves(poses, plan.portal_ends) / plan.lattice.units_per_m
+
+    def distance_from(self, place: tuple[float, float]) -> float:
+        """Return the distance of the first step from a place before it, but through portals [m]."""
+        plan = self._home.plan
+        if not plan.portals:
+            return dist(place, self.at(0))
+        x, y = plan.lattice.to_lattice([place, self.at(0)]).T.copy()
+        poses = Poses(x, y, np.zeros_like(x), np.zeros(2, np.uint8))
+        return sum_moves(poses, plan.portal_ends) / plan.lattice.units_per_m
 
 
 class SensorRow(NamedTuple):

@@ -192,9 +192,10 @@ class _Motion(Measurement):
         """Return the speed over a block of steps [m/s]."""
         row, last_pose, steps_per_s = gauge.memory
         window = block.bodies.window(block.first, block.end)
-        start, way = speeds(window, row, last_pose)
+        plan = block.home.plan
+        start, way = speeds(window, row, last_pose, plan.portal_ends)
         gauge.memory = row, _pose(block.bodies.pose_at(row, block.end - 1)), steps_per_s
-        metres = way / block.home.plan.lattice.units_per_m
+        metres = way / plan.lattice.units_per_m
         return Trace(start, metres * steps_per_s, block.end)
 
 
@@ -204,6 +205,8 @@ def _pose(pose: Any) -> I64:
 
 class speed(_Motion, NumberSignal):
     """The speed of a body: the distance from its position at the step before, per step [m/s].
+
+    It is 0 while somebody passes from the one end of stairs or a lift to the other.
 
     Positions are whole lattice units, so that a step may be a little longer than the body's own
     speed, or its speed in a slow area, allows: such a step is at that speed.

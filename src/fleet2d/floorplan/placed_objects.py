@@ -96,6 +96,10 @@ POSTURES: tuple[Posture, ...] = ("stand", "sit", "lie")
 Point = tuple[float, float]
 
 
+# How far from the end of a portal a body may have to stand [m].
+PORTAL_REACH_M = 1.0
+
+
 @dataclass(frozen=True)
 class Portal:
     """Stairs or a lift, by which people get from one part of the free space to another.

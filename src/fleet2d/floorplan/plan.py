@@ -32,6 +32,7 @@ from fleet2d.floorplan.mesh import (
     snap_polygon,
 )
 from fleet2d.floorplan.placed_objects import (
+    PORTAL_REACH_M,
     PlacedObject,
     Portal,
     UsePlace,
@@ -433,6 +434,14 @@ class FloorPlan:
         """Area of the free space on the lattice [m²], exact and independent of cells."""
         units2 = sum_in_order(polygon.area for polygon in self.polygons)
         return float(units2) / self.lattice.units_per_m**2
+
+    @cached_property
+    def portal_ends(self) -> I64:
+        """The ends of each portal, and how far from them bodies stand: int64 (n, 5) [lattice]."""
+        reach = round(PORTAL_REACH_M * self.lattice.units_per_m)
+        to_lattice = self.lattice.to_lattice
+        rows = [[*to_lattice(p.start), *to_lattice(p.end), reach] for p in self.portals]
+        return read_only(np.array(rows, np.int64).reshape(-1, 5))
 
     @cached_property
     def sight_polygons(self) -> Sequence[Polygon]:

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice, LatticePoint
 from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
-from fleet2d.floorplan.placed_objects import PlacedObject, Portal, UsePlace
+from fleet2d.floorplan.placed_objects import PORTAL_REACH_M, PlacedObject, Portal, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, cells_of, read_only
 from fleet2d.kernels import (
     CELL_CENTRE,
@@ -42,8 +42,6 @@ ROUNDING = 3
 ESCAPE_ATTEMPTS = 200
 # The free cells nearest to a point are sought so many rows and columns round it first.
 NEAR_CELLS = 16
-# How far from the end of a portal a body may have to stand [m].
-PORTAL_REACH_M = 1.0
 SECOND_US = 1_000_000
 # Number of results that a space caches of each of its searches.
 CACHED_ROUTES = 4096

@@ -25,7 +25,10 @@ MAX_PLACES = 4
 
 
 class Distance(Metric):
-    """Metres that each body covers per day, as the sum of its moves from step to step."""
+    """Metres that each body covers per day, as the sum of its moves from step to step.
+
+    The way through stairs or a lift doesn't count.
+    """
 
     unit = "m a day"
     least = {"": 0}
@@ -40,7 +43,7 @@ class Distance(Metric):
         """Add up the moves."""
         for name in (*state.users, *state.robots):
             poses = history.poses(name)
-            between = dist(self.last[name], poses.at(0)) if name in self.last else 0.0
+            between = poses.distance_from(self.last[name]) if name in self.last else 0.0
             self.metres[name] = self.metres.get(name, 0.0) + between + poses.distance
             self.last[name] = poses.at(-1)
         self.days += history.days
@@ -82,7 +85,7 @@ class Travel(Metric):
         for robot in state.robots:
             poses = history.poses(robot)
             standing = self.standing.get(robot, (poses.at(0), 0))
-            between = dist(standing[0], poses.at(0))
+            between = poses.distance_from(standing[0])
             self.metres[robot] = self.metres.get(robot, 0.0) + between + poses.distance
             self.relocations.setdefault(robot, 0)
             changes = np.flatnonzero((np.diff(poses.xy, axis=0) != 0).any(axis=1)) + 1
