@@ -495,6 +495,101 @@ def group_places(floor: tuple[Any, ...], occupied: numpy.typing.NDArray[numpy.bo
         and column.
     """
 
+INNER_WALL: int = 2
+
+DEEPEST_STRIP: int = 240
+
+def squarest_rooms(trees: tuple[Any, ...], areas: numpy.typing.NDArray[numpy.float64], sides: numpy.typing.NDArray[numpy.int64], mouths: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the rooms of the tree that makes them squarest in a rectangle, the first if tied.
+
+    Args:
+        trees: The trees, `Divisions`.
+        areas: Gross area of each room, float64 (rooms,) [units²].
+        sides: The rectangle x0, y0, x1, y1, int64 (4,) [units].
+        mouths: Ends of corridors at a side of it, at which no wall should end, int64 (n, 4).
+
+    Returns:
+        Room and sides of each box, int64 (n, 5).
+    """
+
+def is_promising(boxes: numpy.typing.NDArray[numpy.int64], limits: numpy.typing.NDArray[numpy.float64]) -> bool:
+    """
+    Return whether rooms could fit at another scale: none is far too narrow or too long.
+
+    Args:
+        boxes: Room and sides of each box, int64 (n, 5) [units].
+        limits: Least shorter side [units] and largest ratio of the sides of each room, float64
+            (rooms, 2).
+    """
+
+def strip_rooms(slots: numpy.typing.NDArray[numpy.int64], areas: numpy.typing.NDArray[numpy.float64], length: int, least: int, most: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return rooms side by side along x, from 0 on, with their front at y = 0.
+
+    Args:
+        slots: A room, the one behind it or -1, and how much deeper than the others they are, int64 (n, 3).
+        areas: Gross area of each room, float64 (rooms,) [units²].
+        length: Their length [units].
+        least: Least depth [units].
+        most: Largest depth [units].
+
+    Returns:
+        Room and sides of each box, int64 (n, 5); none if no such depth has that length.
+    """
+
+def row_rooms(slots: numpy.typing.NDArray[numpy.int64], areas: numpy.typing.NDArray[numpy.float64], corridor: tuple[Any, ...], length: int, least: int, most: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the rooms of a strip above a corridor that begins at y = 0; see `strip_rooms`.
+
+    Args:
+        slots: As of `strip_rooms`.
+        areas: Gross area of each room, float64 (rooms,) [units²].
+        corridor: The corridor, a `CorridorRule`.
+        length: The length of both [units].
+        least: Least depth of the strip [units].
+        most: Its largest depth [units].
+
+    Returns:
+        Room and sides of each box, int64 (n, 5), those of the corridor last; none if they don't fit.
+    """
+
+def wing_rooms(front: numpy.typing.NDArray[numpy.int64], back: numpy.typing.NDArray[numpy.int64], areas: numpy.typing.NDArray[numpy.float64], corridor: tuple[Any, ...], back_depth: int, least: int, most: int) -> tuple[numpy.typing.NDArray[numpy.int64], int]:
+    """
+    Return the rooms of a wing: a strip below a corridor that begins at y = 0, and one above.
+
+    Args:
+        front: The slots of the strip below it, as of `strip_rooms`.
+        back: Those of the strip above it.
+        areas: Gross area of each room, float64 (rooms,) [units²].
+        corridor: The corridor, a `CorridorRule`.
+        back_depth: Depth of the strip above it [units].
+        least: Least depth of the strip below it [units].
+        most: Its largest depth [units].
+
+    Returns:
+        Room and sides of each box, int64 (n, 5), and the depth of the strip below; none if they don't
+        fit together.
+    """
+
+def squarest_depth(front: numpy.typing.NDArray[numpy.int64], back: numpy.typing.NDArray[numpy.int64], areas: numpy.typing.NDArray[numpy.float64], corridor: tuple[Any, ...], depths: numpy.typing.NDArray[numpy.int64], least: int, most: int, limits: numpy.typing.NDArray[numpy.float64]) -> int:
+    """
+    Return which depth of the strip above makes the rooms of a wing squarest, the first if tied.
+
+    Args:
+        front: As of `wing_rooms`.
+        back: As of `wing_rooms`.
+        areas: As of `wing_rooms`.
+        corridor: As of `wing_rooms`.
+        depths: The depths to try, int64 (n,) [units].
+        least: As of `wing_rooms`.
+        most: As of `wing_rooms`.
+        limits: As of `is_promising`.
+
+    Returns:
+        The index of the depth; -1 if none makes promising rooms.
+    """
+
 def leg_cost(cost: numpy.typing.NDArray[numpy.int32], ax: int, ay: int, bx: int, by: int) -> float:
     """
     Return the cost of a straight leg [percent times lattice units]; infinite if it is blocked.

@@ -144,6 +144,24 @@ class GroupRule(NamedTuple):
     far: int  # distance from doors beyond which more distance earns no points [cells]
 
 
+class Divisions(NamedTuple):
+    """Trees by which rectangles are cut into rooms; their nodes stand in preorder."""
+
+    nodes: (
+        I64  # (nodes, 2) room and percent of its area; of a cut -1 (along y) or -2, and its parts
+    )
+    starts: I64  # (trees,) the first node of each tree
+
+
+class CorridorRule(NamedTuple):
+    """A corridor along a strip of rooms of a synthetic home."""
+
+    hall: int  # index of the hallway
+    width: int  # its gross width [units]
+    suite: bool  # whether the last room of the strip ends the corridor, and is as much deeper
+    closet: int  # a small room at its end, or -1
+
+
 class Lenses(NamedTuple):
     """The constants of a robot's cameras; int64 (cameras,) unless noted otherwise."""
 

@@ -24,11 +24,13 @@ from fleet2d.kernels import (
     BatteryState,
     Breakpoints,
     Corners,
+    CorridorRule,
     CoverageRecord,
     CoverageSetup,
     DayEvidence,
     DetectionRule,
     Distances,
+    Divisions,
     ErrorTables,
     GroupRule,
     Lenses,
@@ -248,6 +250,10 @@ ERRS = Perception.model_validate(
 USERS = 2
 STEPS = 9
 POINTS = np.array([[100, 100], [300, 900], [-5, 2**29], [500, 300]])
+AREAS = np.array([3000.0, 4000.0, 2000.0])
+LIMITS = np.array([[20.0, 3.0]] * 3)
+SLOTS = np.array([[0, -1, 0], [1, 2, 10]])
+WING = (SLOTS.copy(), SLOTS[::-1].copy(), AREAS)
 MASK = np.array([[1, 1, 0, 1], [0, 1, 0, 1], [1, 1, 1, 1]], bool)
 COSTS = np.array([[0, 100, -1, 5], [1000, 0, -1, 0], [0, 0, 0, 20]], np.int32)
 KEY = 2**64 - 3
@@ -504,6 +510,24 @@ CALLS: dict[str, Args] = {
     "squared_distance": lambda: (MASK.copy(),),
     "corner_sums": lambda: (MASK.copy(),),
     "group_places": lambda: (floor(), ~MASK, GroupRule(1, 1, 1, 0, 40, 20, 3)),
+    "squarest_rooms": lambda: (
+        Divisions(np.array([[-2, 2], [0, 100], [1, 60]]), np.zeros(1, np.int64)),
+        AREAS.copy(),
+        np.array([0, 0, 90, 60]),
+        np.array([[0, 0, 0, 20]]),
+    ),
+    "is_promising": lambda: (np.array([[0, 0, 0, 60, 50]]), LIMITS.copy()),
+    "strip_rooms": lambda: (SLOTS.copy(), AREAS.copy(), 100, 20, 240),
+    "row_rooms": lambda: (SLOTS.copy(), AREAS.copy(), CorridorRule(2, 24, 0, -1), 100, 20, 240),
+    "wing_rooms": lambda: (*WING, CorridorRule(2, 24, 1, 1), 60, 44, 124),
+    "squarest_depth": lambda: (
+        *WING,
+        CorridorRule(2, 24, 0, -1),
+        np.array([56, 90]),
+        44,
+        124,
+        LIMITS.copy(),
+    ),
     "box_sums": lambda: (COSTS.astype(np.int64), 1),
     "climb": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.astype(np.int64)),
     "walking_distance": lambda: (MASK.copy(), np.array([[0, 0], [2, 3]])),

@@ -18,6 +18,7 @@ NB_MODULE(_core, m) {
     bind_masks(m);
     bind_fields(m);
     bind_furniture(m);
+    bind_layouts(m);
     bind_taut(m);
     bind_region(m);
     bind_visible_cells(m);

@@ -1,11 +1,13 @@
 """Layouts of synthetic homes: rooms in groups, in wings, as rectangles."""
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from math import fsum, sqrt
+
+import numpy as np
 
 from fleet2d.homes.synthetic.program import Brief, Choices
 from fleet2d.homes.synthetic.slicing import (
@@ -14,8 +16,8 @@ from fleet2d.homes.synthetic.slicing import (
     UNITS_PER_M,
     UNITS_PER_M2,
     WALL,
+    Areas,
     Box,
-    Corridor,
     Cut,
     LayoutRequest,
     Leaf,
@@ -24,24 +26,25 @@ from fleet2d.homes.synthetic.slicing import (
     Strip,
     Tree,
     Wall,
+    Ways,
     Wing,
-    choose_squarest,
+    are_promising,
     gross_area,
-    is_promising,
-    slenderness,
-    tree_area,
+    limits_of,
+    row,
 )
+from fleet2d.kernels import CorridorRule
 from fleet2d.runtime.determinism import sum_in_order
 
 RoomGroup = list[Slot]
 """Slots that stay next to each other in this order."""
-Areas = Mapping[int, float]
-"""Areas of rooms by their index."""
 Placing = Callable[[Areas], list[Box]]
 """Places the rooms of a plan by their gross areas [units²]; MisfitError: they do not fit."""
 
 # Minimum depth of the core [units].
 MIN_CORE_DEPTH = 70
+# Minimum depth of a column of rooms beside the core [units].
+MIN_COLUMN_DEPTH = 40
 # Times that a part of a layout is drawn before it is given up.
 TRIES = 3
 # Length of rows, squared, over the area of their rooms [%].
@@ -53,14 +56,14 @@ class Service:
     """A block of garage and what is beside it.
 
     Attributes:
-        trees: Ways to divide it.
+        ways: Ways to divide it.
         width: Its width, where the core is high enough [units].
         whole: Whether it is as high as the core in any case.
         at_high: Whether it is flush with the core's high side, else with its low one.
         out: How far it stands out there [units].
     """
 
-    trees: list[Tree]
+    ways: Ways
     width: int
     whole: bool
     at_high: bool
@@ -68,7 +71,7 @@ class Service:
 
     def boxes(self, areas: Areas, right: int, low: int, high: int) -> list[Box]:
         """Return its rooms left of a core between two heights [units]."""
-        area = tree_area(self.trees[0], areas)
+        area = self.ways.area(areas)
         height = min(int(area / self.width + 0.5), high - low)
         if self.whole or height > high - low - 20:
             height = high - low
@@ -76,7 +79,7 @@ class Service:
             low, high = (low, high + self.out) if self.at_high else (low - self.out, high)
         low, high = (high - height, high) if self.at_high else (low, low + height)
         width = int(area / height + 0.5)
-        return choose_squarest(self.trees, areas, (right - width, low, right, high))
+        return self.ways.squarest(areas, (right - width, low, right, high))
 
 
 class Sketch:
@@ -96,7 +99,7 @@ class Sketch:
         self.request, self.choices = request, choices
         self.briefs = list(request.briefs)
         self.areas = {i: brief.area for i, brief in enumerate(self.briefs)}  # [m²]
-        self.gross = {i: gross_area(area) for i, area in self.areas.items()}
+        self.gross = np.array([gross_area(area) for area in self.areas.values()])
         self.of_kind: defaultdict[str, list[int]] = defaultdict(list)
         for i, brief in enumerate(self.briefs):
             self.of_kind[brief.kind].append(i)
@@ -205,7 +208,7 @@ class Sketch:
         if not others:
             trees = [garage]
         return Service(
-            choices.shuffled(trees),
+            Ways(choices.shuffled(trees)),
             choices.between(72, 130),
             self.request.outline is not None,
             choices.chance(50),
@@ -237,18 +240,20 @@ class Sketch:
             fore, aft = self._strips(sides, outline, bool(entry))
             rooms = [self.areas[slot[0]] for slot in aft.slots if len(slot) == 1]
             middle = fsum(rooms) / len(rooms) if rooms else 14.0
-            corridor = Corridor(hall, self.request.corridor + WALL, suite, closet)
-            fitting = []
-            for percent in (78, 90, 102, 114):
-                depth = int(UNITS_PER_M * sqrt(middle) * percent / 100)
-                wing = Wing(fore, aft, corridor, min(max(depth, 56), 112))
-                with suppress(MisfitError):
-                    boxes = wing.place(self.gross).boxes
-                    if is_promising(boxes, self.briefs):
-                        fitting.append((slenderness(boxes), wing))
-            if fitting:
-                return min(fitting, key=lambda scored: scored[0])[1]
+            corridor = self._corridor(hall, suite, closet)
+            depths = [
+                min(max(int(UNITS_PER_M * sqrt(middle) * percent / 100), 56), 112)
+                for percent in (78, 90, 102, 114)
+            ]
+            wing = Wing(fore, aft, corridor)
+            depth = wing.squarest_depth(self.gross, depths, limits_of(self.briefs))
+            if depth is not None:
+                return replace(wing, back_depth=depth)
         raise MisfitError
+
+    def _corridor(self, hall: int, suite: bool, closet: int | None) -> CorridorRule:
+        width = self.request.corridor + WALL
+        return CorridorRule(hall, width, suite, -1 if closet is None else closet)
 
     def _strips(
         self, sides: Sequence[Sequence[RoomGroup]], outline: str | None, entry: bool
@@ -310,7 +315,7 @@ class Sketch:
     def inline(self) -> Placing:
         """Core in the middle, a wing in line with it, the service block on its other side."""
         wing = self.wing(self.private, self.add_hallway(), self.request.outline)
-        core = self.core_trees()
+        core = Ways(self.core_trees())
         below, above = self._offsets(self.request.outline)
         service = self.service_block()
         mouth = (0, 0, 0, wing.corridor.width)
@@ -319,7 +324,7 @@ class Sketch:
             rooms = wing.place(areas)
             low, high = rooms.low - below, rooms.high + above
             left = -_core_width(core, areas, high - low)
-            boxes = rooms.boxes + choose_squarest(core, areas, (left, low, 0, high), [mouth])
+            boxes = rooms.boxes + core.squarest(areas, (left, low, 0, high), [mouth])
             return boxes + (service.boxes(areas, left, low, high) if service else [])
 
         return place
@@ -352,7 +357,7 @@ class Sketch:
         outline = self.request.outline
         choices = self.choices
         wing = self.wing(self.private, self.add_hallway(), outline)
-        core = self.core_trees()
+        core = Ways(self.core_trees())
         service = self.service_block()
         at = {"L": choices.choice((0, 100)), "T": 50}.get(outline or "")
         if at is None:
@@ -362,7 +367,7 @@ class Sketch:
 
         def place(areas: Areas) -> list[Box]:
             rooms = wing.place(areas)
-            area = tree_area(core[0], areas)
+            area = core.area(areas)
             depth = max(rooms.high - rooms.low, 1)
             length = max(int(area / height + 0.5), depth if outline == "rectangle" else 0)
             left = rooms.low + (depth - length) * at // 100
@@ -370,7 +375,7 @@ class Sketch:
             if high < MIN_CORE_DEPTH:
                 raise MisfitError
             boxes = [box.turned() for box in rooms.boxes]
-            boxes += choose_squarest(core, areas, (left, -high, left + length, 0), [mouth])
+            boxes += core.squarest(areas, (left, -high, left + length, 0), [mouth])
             return boxes + (service.boxes(areas, left, -high, 0) if service else [])
 
         return place
@@ -388,7 +393,7 @@ class Sketch:
         halls = self.add_hallway(), self.add_hallway()
         first = self.wing([main, *others[:half]], halls[0], plain)
         second = self.wing(others[half:], halls[1], plain, is_main=False)
-        core = self.core_trees()
+        core = Ways(self.core_trees())
         shape = {"T": "bar", "U": "court"}.get(outline or "", outline)
         below, above = self._offsets(shape)
         as_core = choices.chance(50) if shape is None else shape in ("rectangle", "L")
@@ -401,7 +406,7 @@ class Sketch:
             left = -_core_width(core, areas, high - low)
             other = next(box for box in west if box.room == halls[1])
             mouths = [(0, 0, 0, first.corridor.width), (left, other.y0, left, other.y1)]
-            boxes = east.boxes + choose_squarest(core, areas, (left, low, 0, high), mouths)
+            boxes = east.boxes + core.squarest(areas, (left, low, 0, high), mouths)
             return boxes + [box.mirrored().moved(left, 0) for box in west]
 
         return place
@@ -421,20 +426,17 @@ class Sketch:
             column = replace(column, bays=tuple(-30 * (i == at) for i in range(len(slots))))
         elif outline is None and choices.chance(35):
             column = self._add_bays(column)
-        core = self.core_trees()
+        core = Ways(self.core_trees())
         service = self.service_block()
         ratio = choices.between(62, 110)
         below, above = self._offsets(outline)
 
         def place(areas: Areas) -> list[Box]:
-            height = int(sqrt(fsum(areas.values()) * 100 / (1.45 * ratio)))
+            height = int(sqrt(fsum(areas) * 100 / (1.45 * ratio)))
             low, high = -below, height + above
             left = -_core_width(core, areas, high - low)
-            boxes = choose_squarest(core, areas, (left, low, 0, high))
-            depth = column.depth(areas, height)
-            if depth < 40:
-                raise MisfitError
-            boxes += [box.turned() for box in column.boxes(areas, height, depth)]
+            boxes = core.squarest(areas, (left, low, 0, high))
+            boxes += [box.turned() for box in column.boxes(areas, height, MIN_COLUMN_DEPTH)]
             return boxes + (service.boxes(areas, left, low, high) if service else [])
 
         return place
@@ -447,41 +449,42 @@ class Sketch:
         halls = [self.add_hallway() for _ in range(count)]
         strips = self._row_strips(count)
         choices = self.choices
-        core = self.core_trees()
+        trees = self.core_trees()
         service = self.service_block()
         if service is not None:
-            pairs = [(tree, service.trees[choices.below(len(service.trees))]) for tree in core]
-            core = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
-        width = self.request.corridor + WALL
+            blocks = service.ways.trees
+            pairs = [(tree, blocks[choices.below(len(blocks))]) for tree in trees]
+            trees = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
+        core = Ways(trees)
         closets = [self.closet, None]
         suites = [closet is None and choices.chance(65) for closet in closets]
         corridors = [
-            Corridor(hall, width, suite and len(strip.slots) > 1, closet)
+            self._corridor(hall, suite and len(strip.slots) > 1, closet)
             for hall, suite, closet, strip in zip(halls, suites, closets, strips, strict=False)
         ]
 
         def place(ratio: int, areas: Areas) -> list[Box]:
-            length = int(sqrt(fsum(areas.values()) * ratio / 100))
-            depth = int(tree_area(core[0], areas) / length + 0.5)
+            length = int(sqrt(fsum(areas) * ratio / 100))
+            depth = int(core.area(areas) / length + 0.5)
             if depth < MIN_CORE_DEPTH:
                 raise MisfitError
             first, *others = (
-                _row(strip, corridor, areas, length)
+                row(strip, corridor, areas, length)
                 for strip, corridor in zip(strips, corridors, strict=True)
             )
             boxes = [box.moved(0, depth) for box in first]
             boxes += [box.flipped() for other in others for box in other]
-            return boxes + choose_squarest(core, areas, (0, 0, length, depth))
+            return boxes + core.squarest(areas, (0, 0, length, depth))
 
         # Most other lengths make a strip too shallow or too deep.
-        total = fsum(self.gross.values())
+        total = fsum(self.gross)
         strip_areas = [strip.area(self.gross) for strip in strips]
         low = max(strip_areas) / MAX_DEPTH
         high = min(strip_areas) / MIN_DEPTH
         ratios = [r for r in LENGTH_RATIOS if low <= sqrt(total * r / 100) <= high]
         for ratio in choices.shuffled(ratios)[:TRIES]:
             with suppress(MisfitError):
-                if is_promising(place(ratio, self.gross), self.briefs):
+                if are_promising(place(ratio, self.gross), self.briefs):
                     return partial(place, ratio)
         raise MisfitError
 
@@ -515,7 +518,7 @@ def _strip(groups: Sequence[RoomGroup]) -> Strip:
     return Strip(slots, (0,) * len(slots))
 
 
-def _core_width(core: list[Tree], areas: Areas, depth: int) -> int:
+def _core_width(core: Ways, areas: Areas, depth: int) -> int:
     """Return the width of a core of a depth [units].
 
     Raises:
@@ -523,7 +526,7 @@ def _core_width(core: list[Tree], areas: Areas, depth: int) -> int:
     """
     if depth < MIN_CORE_DEPTH:
         raise MisfitError
-    return int(tree_area(core[0], areas) / depth + 0.5)
+    return int(core.area(areas) / depth + 0.5)
 
 
 def _fit_wing(wing: Wing, areas: Areas, low: int, high: int) -> list[Box]:
@@ -540,17 +543,6 @@ def _fit_wing(wing: Wing, areas: Areas, low: int, high: int) -> list[Box]:
         raise MisfitError
     moved = [box.moved(0, shift) for box in rooms.boxes]
     return [box._replace(y1=high) if box.y1 == rooms.high + shift else box for box in moved]
-
-
-def _row(strip: Strip, corridor: Corridor, areas: Areas, length: int) -> list[Box]:
-    """Return a corridor from y = 0 on and the strip of rooms above it."""
-    if corridor.suite:
-        strip = strip.deepened_at_end(corridor.width)
-    depth = strip.depth(areas, length)
-    if not MIN_DEPTH <= depth <= MAX_DEPTH:
-        raise MisfitError
-    hallway, above = corridor.beside(strip.boxes(areas, length, depth), areas)
-    return above + hallway
 
 
 # Share of the home's clear area that is in rooms; the rest is in door gaps.
@@ -639,9 +631,9 @@ def _place_at_scale(sketch: Sketch, placing: Placing) -> RoomLayout:
     target = sketch.request.area_m2 * UNITS_PER_M2 * ROOMS_SHARE
     factor = 1.0
     for _ in range(ROUNDS):
-        areas = {i: gross_area(brief.area * factor) for i, brief in enumerate(briefs) if brief.area}
+        areas = np.array([gross_area(b.area * factor) if b.area else 0.0 for b in briefs])
         boxes = placing(areas)
-        if not is_promising(boxes, briefs):
+        if not are_promising(boxes, briefs):
             break
         area = sum_in_order(box.clear_area for box in boxes)
         if abs(area - target) <= TOLERANCE * target:

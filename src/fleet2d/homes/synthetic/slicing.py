@@ -1,23 +1,44 @@
 """Rectangles on a raster of 5 cm, the walls between them, and how they are cut into rooms."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
 from math import fsum, sqrt
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from fleet2d.errors import FloorPlanError
 from fleet2d.homes.synthetic.program import SIZES, Brief
+from fleet2d.kernels import (
+    DEEPEST_STRIP,
+    F64,
+    I64,
+    INNER_WALL,
+    CorridorRule,
+    Divisions,
+    is_promising,
+    row_rooms,
+    squarest_depth,
+    squarest_rooms,
+    strip_rooms,
+    wing_rooms,
+)
 
 UNIT_M = 0.05
 UNITS_PER_M = 20  # units per metre
 UNITS_PER_M2 = UNITS_PER_M * UNITS_PER_M
-WALL = 2  # 0.10 m: an inner wall
+WALL = INNER_WALL  # 0.10 m
 OUTER_WALL = 6  # 0.30 m: the depth of the front door's reveal
 
 
 Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 [units]."""
+
+
+Areas = F64
+"""Gross areas of rooms by their index [units²], float64 (rooms,)."""
 
 
 class MisfitError(FloorPlanError):
@@ -170,12 +191,6 @@ def turn_boxes(boxes: Sequence[Box], orientation: int) -> list[Box]:
     return [box.moved(-x0, -y0) for box in oriented]
 
 
-# Penalty, in slenderness, for a corridor that ends at the wall between two rooms.
-MOUTH_PENALTY = 3.0
-# Minimum width of a slot: a bathroom at the end of a deep strip gets larger, not narrower [units].
-MIN_SLOT_WIDTH = 35.0
-
-
 class Leaf(NamedTuple):
     """A room, or a share of it [%] where it is made of several rectangles."""
 
@@ -202,82 +217,64 @@ def gross_area(area_m2: float) -> float:
     return float(clear + 2.1 * WALL * sqrt(clear) + WALL * WALL)
 
 
-def tree_area(tree: Tree, areas: Mapping[int, float]) -> float:
+def tree_area(tree: Tree, areas: Areas) -> float:
     """Return the gross area of all rooms of a tree [units²]."""
     if isinstance(tree, Leaf):
         return areas[tree.room] * tree.percent / 100
     return fsum(tree_area(part, areas) for part in tree.parts)
 
 
-def slice_tree(
-    tree: Tree, areas: Mapping[int, float], x0: int, y0: int, x1: int, y1: int
-) -> list[Box]:
-    """Return the rooms of a tree in a rectangle, in proportion to their areas."""
-    if isinstance(tree, Leaf):
-        return [Box(tree.room, x0, y0, x1, y1)]
-    low, high = (x0, x1) if tree.across else (y0, y1)
-    boxes: list[Box] = []
-    spans = divide_span([tree_area(part, areas) for part in tree.parts], low, high)
-    for part, (start, end) in zip(tree.parts, spans, strict=True):
-        if tree.across:
-            boxes += slice_tree(part, areas, start, y0, end, y1)
-        else:
-            boxes += slice_tree(part, areas, x0, start, x1, end)
-    return boxes
+class Ways:
+    """Ways to divide a rectangle among the same rooms.
 
-
-def choose_squarest(
-    trees: Sequence[Tree],
-    areas: Mapping[int, float],
-    sides: Rectangle,
-    mouths: Sequence[Rectangle] = (),
-) -> list[Box]:
-    """Return the rooms of the tree that makes them squarest, the first if tied.
-
-    Args:
-        trees: The trees to choose from.
-        areas: Gross areas of the rooms [units²].
-        sides: The rectangle (x0, y0, x1, y1) [units].
-        mouths: Ends of corridors at a side of the rectangle [units]: no wall should end there.
+    Attributes:
+        trees: The trees, each with all the rooms.
     """
 
-    def penalty(boxes: list[Box]) -> float:
-        return slenderness(boxes) + MOUTH_PENALTY * _blocked_mouths(boxes, mouths)
+    def __init__(self, trees: Sequence[Tree]) -> None:
+        """Take the trees."""
+        self.trees = trees
 
-    return min((slice_tree(tree, areas, *sides) for tree in trees), key=penalty)
+    @cached_property
+    def _table(self) -> Divisions:
+        """The trees as the core reads them."""
+        nodes: list[tuple[int, int]] = []
+        starts = []
+        for tree in self.trees:
+            starts.append(len(nodes))
+            _add_nodes(tree, nodes)
+        return Divisions(np.array(nodes, np.int64), np.array(starts, np.int64))
+
+    def area(self, areas: Areas) -> float:
+        """Return the gross area of all their rooms [units²]."""
+        return tree_area(self.trees[0], areas)
+
+    def squarest(
+        self, areas: Areas, sides: Rectangle, mouths: Sequence[Rectangle] = ()
+    ) -> list[Box]:
+        """Return the rooms of the tree that makes them squarest, the first if tied.
+
+        Args:
+            areas: Gross areas of the rooms [units²].
+            sides: The rectangle (x0, y0, x1, y1) [units].
+            mouths: Ends of corridors at a side of the rectangle [units]: no wall should end there.
+        """
+        ends = np.array(mouths, np.int64).reshape(-1, 4)
+        return _boxes(squarest_rooms(self._table, areas, np.array(sides, np.int64), ends))
 
 
-def _blocked_mouths(boxes: Sequence[Box], mouths: Sequence[Rectangle]) -> int:
-    """Return how many corridors do not end at a single room."""
-    return sum(
-        not any(b.x0 <= x0 and x1 <= b.x1 and b.y0 <= y0 and y1 <= b.y1 for b in boxes)
-        for x0, y0, x1, y1 in mouths
-    )
+def _add_nodes(tree: Tree, nodes: list[tuple[int, int]]) -> None:
+    """Add the nodes of a tree in preorder, as `Divisions` has them."""
+    if isinstance(tree, Leaf):
+        nodes.append(tree)
+        return
+    nodes.append((-2 if tree.across else -1, len(tree.parts)))
+    for part in tree.parts:
+        _add_nodes(part, nodes)
 
 
-def slenderness(boxes: Sequence[Box]) -> float:
-    """Return how far rooms are from squares: 0 where no side is over 1.2 times the other."""
-    total = 0.0
-    for _, x0, y0, x1, y1 in boxes:
-        width, height = x1 - x0 - WALL, y1 - y0 - WALL
-        if width > height:
-            ratio = width / height if height > 0 else 99.0
-        else:
-            ratio = height / max(width, 1)
-        if ratio > 1.2:
-            total += (ratio - 1.2) * (ratio - 1.2)
-    return total
-
-
-def divide_span(sizes: Sequence[float], low: int, high: int) -> list[tuple[int, int]]:
-    """Divide [low, high] in proportion to sizes, without gaps."""
-    total = fsum(sizes)
-    ends = [low]
-    reached = 0.0
-    for size in sizes:
-        reached += size
-        ends.append(low + int((high - low) * reached / total + 0.5))
-    return list(pairwise(ends))
+def _boxes(rows: I64) -> list[Box]:
+    return [Box._make(row) for row in rows.tolist()]
 
 
 @dataclass(frozen=True)
@@ -292,116 +289,55 @@ class Strip:
     slots: tuple[Slot, ...]
     bays: tuple[int, ...]
 
-    def area(self, areas: Mapping[int, float]) -> float:
+    def area(self, areas: Areas) -> float:
         """Return the area of its rooms [units²]."""
         return fsum(areas[room] for slot in self.slots for room in slot)
 
-    def widths(self, areas: Mapping[int, float], depth: float) -> list[float]:
-        """Return the widths of its slots [units] at a depth [units]."""
-        return _slot_widths(self._sizes(areas), depth)
+    @cached_property
+    def table(self) -> I64:
+        """Its slots as the core reads them: room, the one behind it or -1, and bay."""
+        rows = [
+            (slot[0], slot[1] if len(slot) > 1 else -1, bay)
+            for slot, bay in zip(self.slots, self.bays, strict=True)
+        ]
+        return np.array(rows, np.int64)
 
-    def _sizes(self, areas: Mapping[int, float]) -> list[tuple[float, int]]:
-        """Return the gross area [units²] and the bay of each slot."""
-        sizes = []
-        for slot, bay in zip(self.slots, self.bays, strict=True):
-            size = areas[slot[0]]
-            if len(slot) > 1:
-                size += areas[slot[1]]
-            sizes.append((size, bay))
-        return sizes
-
-    def depth(self, areas: Mapping[int, float], length: float) -> int:
-        """Return the depth [units] at which it has a length [units]; 0 for none below 12 m."""
-        depth = self.area(areas) / length if not any(self.bays) else 0.0
-        low, high = max(20, 20 - min(self.bays)), 240
-        if depth:
-            return int(depth + 0.5) if low <= depth <= high else 0
-        sizes = self._sizes(areas)
-        if fsum(_slot_widths(sizes, low)) < length:
-            return 0
-        while high - low > 1:
-            middle = (low + high) // 2
-            if fsum(_slot_widths(sizes, middle)) > length:
-                low = middle
-            else:
-                high = middle
-        return high
-
-    def boxes(self, areas: Mapping[int, float], length: int, depth: int) -> list[Box]:
+    def boxes(self, areas: Areas, length: int, least: int) -> list[Box]:
         """Return its rooms along x, from 0 on, with their front at y = 0.
 
         Args:
             areas: Gross areas of the rooms [units²].
             length: Its length [units].
-            depth: Its depth [units].
+            least: Its least depth [units].
+
+        Raises:
+            MisfitError: It would have to be less deep.
         """
-        boxes: list[Box] = []
-        spans = divide_span(self.widths(areas, depth), 0, length)
-        for slot, bay, (x0, x1) in zip(self.slots, self.bays, spans, strict=True):
-            back = depth + bay
-            if len(slot) == 1:
-                boxes.append(Box(slot[0], x0, 0, x1, back))
-                continue
-            first = areas[slot[0]]
-            second = areas[slot[1]]
-            middle = int(back * first / (first + second) + 0.5)
-            boxes += [Box(slot[0], x0, 0, x1, middle), Box(slot[1], x0, middle, x1, back)]
-        return boxes
-
-    def deepened_at_end(self, depth: int) -> "Strip":
-        """Return the strip with its last slot as much deeper [units]."""
-        return replace(self, bays=(*self.bays[:-1], self.bays[-1] + depth))
+        return _fitting(strip_rooms(self.table, areas, length, least, DEEPEST_STRIP))
 
 
-def _slot_widths(sizes: Sequence[tuple[float, int]], depth: float) -> list[float]:
-    """Return the widths of slots of some gross areas and bays at a depth [units]."""
-    return [max(size / (depth + bay), MIN_SLOT_WIDTH) for size, bay in sizes]
+def _fitting(rows: I64) -> list[Box]:
+    """Return the boxes that the core placed.
+
+    Raises:
+        MisfitError: There are none.
+    """
+    if not len(rows):
+        raise MisfitError
+    return _boxes(rows)
 
 
 MIN_DEPTH = 44
 MAX_DEPTH = 124
-# How much of the corridor the last room of the front strip needs for its door [units].
-REACH = 25
 
 
-@dataclass(frozen=True)
-class Corridor:
-    """A corridor along a strip of rooms.
+def row(strip: Strip, corridor: CorridorRule, areas: Areas, length: int) -> list[Box]:
+    """Return the strip of rooms above a corridor from y = 0 on, and the corridor with its closet.
 
-    Attributes:
-        hall: Index of the hallway.
-        width: Its gross width [units].
-        suite: Whether the last room of the strip ends the corridor, and is as much deeper.
-        closet: A small room at the end of the corridor, or None.
+    Raises:
+        MisfitError: They do not fit together.
     """
-
-    hall: int
-    width: int
-    suite: bool
-    closet: int | None = None
-
-    def beside(self, strip: list[Box], areas: Mapping[int, float]) -> tuple[list[Box], list[Box]]:
-        """Return the corridor from y = 0 on, with its closet, and the strip of rooms above it.
-
-        Args:
-            strip: The rooms along x, with their front at y = 0.
-            areas: Gross areas of the rooms [units²].
-
-        Raises:
-            MisfitError: There is no space for a corridor.
-        """
-        above = [box.moved(0, self.width) for box in strip]
-        length = end = strip[-1].x1
-        if self.suite:
-            end = strip[-1].x0
-            above = [new if new.x0 < end else old for old, new in zip(strip, above, strict=True)]
-        hallway: list[Box] = []
-        if self.closet is not None:
-            end -= min(max(int(areas[self.closet] / self.width + 0.5), 24), 52)
-            hallway = [Box(self.closet, end, 0, length, self.width)]
-        if end < 24:
-            raise MisfitError
-        return [*hallway, Box(self.hall, 0, 0, end, self.width)], above
+    return _fitting(row_rooms(strip.table, areas, corridor, length, MIN_DEPTH, MAX_DEPTH))
 
 
 @dataclass(frozen=True)
@@ -417,10 +353,10 @@ class Wing:
 
     front: Strip
     back: Strip
-    corridor: Corridor
-    back_depth: int
+    corridor: CorridorRule
+    back_depth: int = 0
 
-    def place(self, areas: Mapping[int, float]) -> "PlacedWing":
+    def place(self, areas: Areas) -> "PlacedWing":
         """Place the wing's rooms.
 
         Args:
@@ -429,19 +365,24 @@ class Wing:
         Raises:
             MisfitError: They do not fit together.
         """
-        width = self.corridor.width
-        is_suite = self.corridor.suite
-        back = self.back.deepened_at_end(width) if is_suite else self.back
-        length = int(fsum(back.widths(areas, self.back_depth)) + 0.5)
-        depth = self.front.depth(areas, length)
-        if not MIN_DEPTH <= depth <= MAX_DEPTH:
-            raise MisfitError
-        front = [box.flipped() for box in self.front.boxes(areas, length, depth)]
-        strip = back.boxes(areas, length, self.back_depth)
-        if is_suite and front[-1].x0 > strip[-1].x0 - REACH:
-            return replace(self, corridor=replace(self.corridor, suite=False)).place(areas)
-        hallway, above = self.corridor.beside(strip, areas)
-        return PlacedWing([*front, *hallway, *above], -depth, width + self.back_depth)
+        strips = self.front.table, self.back.table
+        rows, depth = wing_rooms(
+            *strips, areas, self.corridor, self.back_depth, MIN_DEPTH, MAX_DEPTH
+        )
+        return PlacedWing(_fitting(rows), -depth, self.corridor.width + self.back_depth)
+
+    def squarest_depth(self, areas: Areas, depths: Sequence[int], limits: F64) -> int | None:
+        """Return the depth of the back strip at which its rooms are squarest, or None.
+
+        Args:
+            areas: Gross areas of the rooms [units²].
+            depths: Depths to try [units].
+            limits: What `limits_of` returns.
+        """
+        strips = self.front.table, self.back.table
+        tried = np.array(depths, np.int64)
+        best = squarest_depth(*strips, areas, self.corridor, tried, MIN_DEPTH, MAX_DEPTH, limits)
+        return None if best < 0 else depths[best]
 
 
 class PlacedWing(NamedTuple):
@@ -475,12 +416,16 @@ class LayoutRequest:
     outline: str | None
 
 
-def is_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:
+def are_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:
     """Return whether the rooms could fit at another scale: none is far too narrow or too long."""
-    for room, x0, y0, x1, y1 in boxes:
-        width, height = x1 - x0 - WALL, y1 - y0 - WALL
-        short, long = (width, height) if width < height else (height, width)
-        size = SIZES[briefs[room].kind]
-        if short < 0.88 * UNITS_PER_M * size.side or long > 1.6 * size.slender * short:
-            return False
-    return True
+    return is_promising(np.array(boxes, np.int64), limits_of(briefs))
+
+
+def limits_of(briefs: Sequence[Brief]) -> F64:
+    """Return the least shorter side [units] and the largest ratio of sides of rooms that fit."""
+    return np.array([_LIMITS[brief.kind] for brief in briefs])
+
+
+_LIMITS = {
+    kind: (0.88 * UNITS_PER_M * size.side, 1.6 * size.slender) for kind, size in SIZES.items()
+}

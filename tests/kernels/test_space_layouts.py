@@ -1,0 +1,147 @@
+"""Rooms of synthetic homes in rectangles and strips: the kernels beside slow, obvious twins."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.reference import layouts as slow
+from tests.strategies import quick
+
+from fleet2d.kernels import (
+    F64,
+    I64,
+    CorridorRule,
+    Divisions,
+    is_promising,
+    row_rooms,
+    squarest_depth,
+    squarest_rooms,
+    strip_rooms,
+    wing_rooms,
+)
+
+ROOMS = 12
+LIMITS = np.array([(24.0, 3.0)] * ROOMS)
+
+
+def areas_of(seed: int) -> F64:
+    return np.random.default_rng(seed).uniform(900, 9000, ROOMS)
+
+
+def add_tree(rng: np.random.Generator, depth: int, nodes: list[tuple[int, int]]) -> None:
+    if depth == 0 or rng.random() < 0.3:
+        nodes.append((int(rng.integers(ROOMS)), int(rng.choice([37, 63, 100]))))
+        return
+    parts = int(rng.integers(1, 4))
+    nodes.append((int(rng.choice([-1, -2])), parts))
+    for _ in range(parts):
+        add_tree(rng, depth - 1, nodes)
+
+
+def trees_of(seed: int) -> Divisions:
+    rng = np.random.default_rng(seed)
+    nodes: list[tuple[int, int]] = []
+    starts = []
+    for _ in range(int(rng.integers(1, 6))):
+        starts.append(len(nodes))
+        add_tree(rng, 3, nodes)
+    return Divisions(np.array(nodes, np.int64), np.array(starts, np.int64))
+
+
+def slots_of(seed: int, bays: bool) -> I64:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 6))
+    rooms = rng.permutation(10)[: 2 * count].reshape(2, count)
+    behind = np.where(rng.random(count) < 0.3, rooms[1], -1)
+    bay = rng.integers(-30, 34, count) if bays else np.zeros(count, np.int64)
+    return np.stack([rooms[0], behind, bay], axis=1)
+
+
+corridors = st.builds(
+    CorridorRule,
+    hall=st.just(11),
+    width=st.integers(20, 34),
+    suite=st.booleans(),
+    closet=st.sampled_from([-1, 10]),
+)
+seeds = st.integers(0, 2**20)
+
+
+@quick
+@given(seeds, st.integers(60, 300), st.integers(40, 200), st.booleans())
+def test_squarest_rooms_equal_the_slow_ones(seed: int, width: int, height: int, ends: bool) -> None:
+    trees, areas = trees_of(seed), areas_of(seed)
+    sides = np.array([-5, 3, width - 5, height + 3])
+    mouths = np.array([(-5, 20, -5, 44), (30, 3, 52, 3)] if ends else []).reshape(-1, 4)
+    mouths = mouths.astype(np.int64)
+
+    expected = slow.squarest_rooms(trees, areas, sides, mouths)
+    assert expected.tolist() == squarest_rooms(trees, areas, sides, mouths).tolist()
+
+
+@quick
+@given(seeds, st.integers(35, 500), st.booleans(), corridors)
+def test_strips_and_rows_equal_the_slow_ones(
+    seed: int, length: int, bays: bool, corridor: CorridorRule
+) -> None:
+    slots, areas = slots_of(seed, bays), areas_of(seed)
+
+    asked = (length, 20, 240)
+    expected = slow.strip_rooms(slots, areas, *asked)
+    assert expected.tolist() == strip_rooms(slots, areas, *asked).tolist()
+    expected = slow.row_rooms(slots, areas, corridor, *asked)
+    assert expected.tolist() == row_rooms(slots, areas, corridor, *asked).tolist()
+
+
+@quick
+@given(seeds, seeds, st.booleans(), corridors)
+def test_wings_equal_the_slow_ones(
+    front_seed: int, back_seed: int, bays: bool, corridor: CorridorRule
+) -> None:
+    areas = areas_of(front_seed)
+    strips = slots_of(front_seed, bays), slots_of(back_seed, bays)
+    depths = np.array([56, 70, 84, 110])
+
+    for depth in depths.tolist():
+        expected, deep = slow.wing_rooms(*strips, areas, corridor, depth, 44, 124)
+        found, found_deep = wing_rooms(*strips, areas, corridor, depth, 44, 124)
+        assert (expected.tolist(), deep) == (found.tolist(), found_deep)
+        assert slow.is_promising(expected, LIMITS) == is_promising(found, LIMITS)
+    asked = (areas, corridor, depths, 44, 124, LIMITS)
+    assert slow.squarest_depth(*strips, *asked) == squarest_depth(*strips, *asked)
+
+
+def test_wings_of_every_kind_occur() -> None:
+    made = []
+    for seed in range(200):
+        corridor = CorridorRule(11, 24, bool(seed % 2), -1 if seed % 3 else 10)
+        strips = slots_of(seed, bool(seed % 5)), slots_of(seed + 1, bool(seed % 5))
+        depth = 60 + seed % 40
+        made.append(len(wing_rooms(*strips, areas_of(seed), corridor, depth, 44, 124)[0]))
+
+    assert 0 < sum(map(bool, made)) < len(made)
+
+
+def test_wrong_trees_and_slots_are_refused() -> None:
+    areas = areas_of(0)
+    sides, mouths = np.array([0, 0, 90, 90]), np.zeros((0, 4), np.int64)
+    starts = np.zeros(1, np.int64)
+
+    for nodes, message in (
+        ([(-1, 2), (0, 100)], "end within nodes"),
+        ([(ROOMS, 100)], "indices of areas"),
+        ([(0, 0)], "1 to 100 %"),
+        ([(-3, 1), (0, 100)], "a cut must be"),
+        ([(-1, 1)] * 70 + [(0, 100)], "64 nodes deep"),
+    ):
+        trees = Divisions(np.array(nodes, np.int64), starts)
+        with pytest.raises(ValueError, match=message):
+            squarest_rooms(trees, areas, sides, mouths)
+    with pytest.raises(ValueError, match="above 0"):
+        strip_rooms(np.array([(0, -1, 0)]), np.zeros(1), 100, 20, 240)
+    back = np.array([(1, -1, -60)])
+    corridor = CorridorRule(11, 24, False, -1)
+    with pytest.raises(ValueError, match="deeper than 0"):
+        wing_rooms(np.array([(0, -1, 0)]), back, areas, corridor, 50, 44, 124)
+    with pytest.raises(ValueError, match="indices of limits"):
+        is_promising(np.array([(ROOMS, 0, 0, 9, 9)]), LIMITS)
