@@ -467,13 +467,80 @@ def shrink(
     octagon = _octagon(radius)
     shrunk: list[Polygon] = []
     for polygon in polygons:
+        moved = _with_walls_moved(polygon, octagon)
+        if moved is not None:
+            if len(blocked):
+                rest = shapely.difference(moved, shapely.union_all(blocked))
+                shrunk += _snapped_parts(rest)
+            else:
+                shrunk.append(moved)
+            continue
         grown = [_grow_walls(np.asarray(r.coords), octagon) for r in shapely.get_rings(polygon)]
         grown.append(np.array(blocked, np.object_))
         rest = shapely.difference(polygon, shapely.union_all(np.concatenate(grown)))
-        for part in shapely.get_parts(rest):
-            if part.geom_type == "Polygon" and part.area > 0:
-                shrunk += snap_polygon(part).polygons
+        shrunk += _snapped_parts(rest)
     return shrunk
+
+
+def _snapped_parts(shape: BaseGeometry) -> list[Polygon]:
+    """Return the parts of a shape that have an area, on the lattice."""
+    parts = shapely.get_parts(shape)
+    sound = [part for part in parts if part.geom_type == "Polygon" and part.area > 0]
+    return [polygon for part in sound for polygon in snap_polygon(part).polygons]
+
+
+def _with_walls_moved(polygon: Polygon, octagon: I64) -> Polygon | None:
+    """Return a polygon whose sides are parallel to the axes, shrunk by an octagon, side by side.
+
+    None if a side would vanish, or sides would cross: there only the shapes can tell what is left.
+    """
+    rings = []
+    for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
+        corners = shapely.get_coordinates(ring)[:-1]
+        ways = np.sign(np.roll(corners, -1, axis=0) - corners)
+        is_corner = (ways != np.roll(ways, 1, axis=0)).any(axis=1)
+        moved = _ring_with_walls_moved(corners[is_corner], ways[is_corner], octagon)
+        if moved is None:
+            return None
+        rings.append(moved)
+    shape = Polygon(rings[0], rings[1:])
+    return shape if shape.is_valid else None
+
+
+def _ring_with_walls_moved(corners: F64, ways: F64, octagon: I64) -> F64 | None:
+    """Return a ring whose walls are moved to their left; see `_with_walls_moved`.
+
+    Args:
+        corners: Its corners, float64 (n, 2).
+        ways: The way of the wall from each corner: -1, 0 or 1 along x and y.
+        octagon: The octagon.
+    """
+    reach, half = octagon[0].tolist()
+    x, y = ways.T
+    turn = np.roll(x, 1) * y - np.roll(y, 1) * x
+    if not len(corners) or (turn == 0).any() or (x * y != 0).any():
+        return None
+    # Where the outline turns right the octagon goes round, farther than the wall.
+    at_start = np.where(turn > 0, -reach, half)
+    at_end = np.roll(at_start, -1)
+    ends = np.roll(corners, -1, axis=0)
+    lengths = np.abs(ends - corners).sum(axis=1)
+    # A step that is lower than the slanted side of the octagon is hidden behind that.
+    hidden = lengths + at_start + at_end <= 0
+    is_low = hidden & (turn != np.roll(turn, -1))
+    rises = is_low & (turn > 0)
+    falls = np.roll(is_low & (turn < 0), 1)
+    at_end = np.where(np.roll(rises, -1), -half - np.roll(lengths, -1), at_end)
+    at_start = np.where(falls, -half - np.roll(lengths, 1), at_start)
+    left = lengths + at_start + at_end
+    if (hidden & np.roll(hidden, 1)).any() or ((left <= 0) & ~is_low).any():
+        return None
+    inwards = reach * np.stack([-y, x], axis=1)
+    first = corners + inwards - at_start[:, None] * ways
+    last = ends + inwards + at_end[:, None] * ways
+    # Where it turns left, a side begins where the one before it ends.
+    kept = np.stack([(turn < 0) | falls, np.ones_like(is_low)], axis=1) & ~is_low[:, None]
+    return np.asarray(np.stack([first, last], axis=1)[kept])
 
 
 def _octagon(radius: float) -> I64:
