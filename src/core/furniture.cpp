@@ -1,6 +1,7 @@
 #include "furniture.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace fleet2d {
 namespace {
@@ -50,6 +51,24 @@ Array<i32, 2> empty_sums(View<const bool, 2> mask, View<const bool, 2> occupied)
     return result;
 }
 
+// The smallest box of all cells of a mask.
+CellBox extent_of(View<const bool, 2> mask) {
+    const auto [rows, columns] = mask.shape;
+    i64 row = rows, end_row = 0, column = columns, end_column = 0;
+    for (i64 i = 0; i < rows; ++i) {
+        const View<const bool> cells = mask[i];
+        const bool* const first = std::find(cells.begin(), cells.end(), true);
+        if (first == cells.end()) continue;
+        row = std::min(row, i);
+        end_row = i + 1;
+        column = std::min(column, first - cells.begin());
+        end_column = std::max(
+            end_column, columns - (std::find(std::reverse_iterator(cells.end()), std::reverse_iterator(first), true) -
+                                   std::reverse_iterator(cells.end())));
+    }
+    return {row, column, std::max(end_row - row, i64{0}), std::max(end_column - column, i64{0})};
+}
+
 // Finds the places of one group in one room.
 class PlaceFinder {
 public:
@@ -58,13 +77,17 @@ public:
           group_(group),
           shape_(floor.holds.shape),
           holds_(empty_sums(floor.holds, occupied)),
-          whole_(empty_sums(floor.whole, occupied)) {}
+          whole_(empty_sums(floor.whole, occupied)),
+          extent_(extent_of(floor.holds)) {}
 
     // Append the places in the window turned by `turn`; returns the new number of places.
     i64 append_places(int turn, Array<i64, 2>& places, i64 count) const {
         const i64 rows = turn % 2 == 0 ? shape_[0] : shape_[1], columns = turn % 2 == 0 ? shape_[1] : shape_[0];
-        for (i64 row = 0; row + group_.depth + group_.front <= rows; ++row) {
-            for (i64 column = 0; column + group_.width <= columns; ++column) {
+        const CellBox extent = unturned(extent_, (TURNS - turn) % TURNS, {rows, columns});  // turned, in fact
+        const i64 last_row = std::min(extent.row + extent.high, rows - group_.front) - group_.depth;
+        const i64 last_column = extent.column + extent.wide - group_.width;
+        for (i64 row = extent.row; row <= last_row; ++row) {
+            for (i64 column = extent.column; column <= last_column; ++column) {
                 if (!is_possible(turn, row, column)) continue;
                 places.grow(count + 1, count);
                 const View<i64> place = places.view()[count++];
@@ -102,6 +125,7 @@ private:
     const GroupRule& group_;
     std::array<i64, 2> shape_;
     Array<i32, 2> holds_, whole_;  // corner_sums of the cells that aren't occupied
+    CellBox extent_;               // the cells that furniture may cover
 };
 
 }  // namespace

@@ -1,7 +1,12 @@
 #include "line_of_sight.hpp"
 
+#include <algorithm>
+#include <functional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
+
+#include "lattice.hpp"
 
 namespace fleet2d {
 namespace {
@@ -165,6 +170,37 @@ i64 vertices_seen_from_vertex(const Mesh& mesh, const Fans& fans, i64 vertex, Vi
         }
     }
     return count;
+}
+
+Array<i64, 2> nearest_cells_in_sight(const Mesh& mesh, View<const bool, 2> cells, i64 x, i64 y, i64 reach, i64 most,
+                                     i64 wanted) {
+    const auto [rows, columns] = cells.shape;
+    const auto first = [](i64 least) { return std::max(floor_div(least, SUB), i64{0}); };
+    const auto end = [](i64 greatest, i64 count) { return std::min(floor_div(greatest, SUB) + 1, count); };
+    using Candidate = std::pair<i64, i64>;  // squared distance, and the cell's number
+    std::vector<Candidate> queue;
+    for (i64 row = first(y - reach); row < end(y + reach, rows); ++row) {
+        for (i64 column = first(x - reach); column < end(x + reach, columns); ++column) {
+            if (!cells(row, column)) continue;
+            const i64 dx = column * SUB + CELL_CENTRE - x, dy = row * SUB + CELL_CENTRE - y;
+            if (dx * dx + dy * dy <= reach * reach) queue.emplace_back(dx * dx + dy * dy, row * columns + column);
+        }
+    }
+    std::ranges::make_heap(queue, std::greater());
+    const i64 triangle = locate(mesh, x, y);
+    auto found = Array<i64, 2>::empty({wanted, 2});
+    i64 count = 0;
+    for (i64 tried = 0; tried < most && count < wanted && !queue.empty(); ++tried) {
+        std::ranges::pop_heap(queue, std::greater());
+        const i64 row = queue.back().second / columns, column = queue.back().second % columns;
+        queue.pop_back();
+        const i64 px = column * SUB + CELL_CENTRE, py = row * SUB + CELL_CENTRE;
+        if (!line_of_sight(mesh, x, y, triangle, px, py)) continue;
+        found(count, 0) = row;
+        found(count++, 1) = column;
+    }
+    found.truncate(count);
+    return found;
 }
 
 }  // namespace fleet2d

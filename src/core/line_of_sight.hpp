@@ -12,6 +12,11 @@ namespace fleet2d {
 // on a wall sees nothing and isn't seen. `triangle` holds q (see locate); OUTSIDE is allowed.
 bool line_of_sight(const Mesh& mesh, i64 qx, i64 qy, i64 triangle, i64 px, i64 py);
 
+// The cells of a mask (rows, columns) whose centres are visible from a point and at most `reach` away, (n, 2) rows and
+// columns: at most `wanted` of them, nearest first and of equally near ones the first, among the `most` nearest.
+Array<i64, 2> nearest_cells_in_sight(const Mesh& mesh, View<const bool, 2> cells, i64 x, i64 y, i64 reach, i64 most,
+                                     i64 wanted);
+
 // The stack of cones of sight, and scratch space for the walls that pieces end at. Create one for each
 // thread and mesh.
 struct Scratch {

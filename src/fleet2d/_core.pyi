@@ -242,6 +242,23 @@ def line_of_sight(mesh: Mesh, qx: int, qy: int, triangle: int, px: int, py: int)
 def line_of_sight(mesh: Mesh, qx: int, qy: int, px: int, py: int) -> bool:
     """Return whether p is visible from q, wherever q is; see the other form."""
 
+def nearest_cells_in_sight(mesh: Mesh, cells: numpy.typing.NDArray[numpy.bool_], x: int, y: int, reach: int, most: int, wanted: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the cells of a mask whose centres are visible from a point, nearest first.
+
+    Args:
+        mesh: Free space.
+        cells: The mask, bool (rows, columns).
+        x: The point [lattice units].
+        y: The point [lattice units].
+        reach: Largest distance of a centre from it [lattice units].
+        most: So many of the nearest cells are looked at.
+        wanted: So many are returned at most.
+
+    Returns:
+        Rows and columns, int64 (n, 2); of equally near cells the first in the mask comes first.
+    """
+
 def build_fans(mesh: Mesh) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.int32]]:
     """
     List the triangles around each vertex.

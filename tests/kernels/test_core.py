@@ -497,6 +497,7 @@ CALLS: dict[str, Args] = {
     "camera_pose": lambda: (lenses(), 1, 100, 100, 5, SECOND),
     "points_in_view": lambda: (MESH, lenses(), 0, 1, 100, 100, 5, 70, 30),
     "line_of_sight": lambda: (MESH, 100, 100, 0, 300, 900),
+    "nearest_cells_in_sight": lambda: (MESH, MASK.copy(), 100, 100, 300, 9, 3),
     "build_fans": lambda: (MESH,),
     "vertices_seen_from_point": lambda: (MESH, 100, 100),
     "vertices_seen_from_vertex": lambda: (MESH, 3),

@@ -11,6 +11,7 @@ import numpy as np
 from fleet2d.kernels import I64, Bool
 
 Point = tuple[int, int]
+CELL, CELL_CENTRE = 64, 33
 
 
 def cross(ax: int, ay: int, bx: int, by: int) -> int:
@@ -168,3 +169,19 @@ class _Turn:
         if self.half != other.half:
             return self.half < other.half
         return cross(self.x, self.y, other.x, other.y) > 0
+
+
+def nearest_cells_in_sight(
+    walls: I64, cells: Bool, eye: Point, reach: int, most: int, wanted: int
+) -> list[tuple[int, int]]:
+    """Sort all cells of the mask by their distance, and look at those that are near enough."""
+    near = []
+    for row, column in np.argwhere(cells).tolist():
+        x, y = CELL * column + CELL_CENTRE, CELL * row + CELL_CENTRE
+        away = (x - eye[0]) ** 2 + (y - eye[1]) ** 2
+        if away <= reach**2:
+            near.append((away, row, column, x, y))
+    near = sorted(near)[:most]
+    places = np.array([cell[3:] for cell in near], np.int64).reshape(-1, 2)
+    seen = visible(walls, np.array(eye), places)
+    return [cell[1:3] for cell, is_seen in zip(near, seen, strict=True) if is_seen][:wanted]

@@ -39,6 +39,30 @@ Args:
     m.def("line_of_sight", &sees, "mesh"_a, "qx"_a, "qy"_a, "px"_a, "py"_a,
           "Return whether p is visible from q, wherever q is; see the other form.");
     m.def(
+        "nearest_cells_in_sight",
+        [](const Mesh& mesh, View<const bool, 2> cells, i64 x, i64 y, i64 reach, i64 most, i64 wanted) {
+            constexpr i64 limit = i64{1} << 20;
+            check_point(x, y);
+            require(cells.shape[0] <= limit && cells.shape[1] <= limit, "cells must have at most 2**20 rows and columns");
+            require(0 <= reach && reach <= limit, "reach must be in 0 to 2**20");
+            require(0 <= wanted && wanted <= most && most <= limit, "wanted must be in 0 to most, that at most 2**20");
+            return nearest_cells_in_sight(mesh, cells, x, y, reach, most, wanted);
+        },
+        "mesh"_a, "cells"_a, "x"_a, "y"_a, "reach"_a, "most"_a, "wanted"_a, Unlocked(),
+        R"(Return the cells of a mask whose centres are visible from a point, nearest first.
+
+Args:
+    mesh: Free space.
+    cells: The mask, bool (rows, columns).
+    x: The point [lattice units].
+    y: The point [lattice units].
+    reach: Largest distance of a centre from it [lattice units].
+    most: So many of the nearest cells are looked at.
+    wanted: So many are returned at most.
+
+Returns:
+    Rows and columns, int64 (n, 2); of equally near cells the first in the mask comes first.)");
+    m.def(
         "build_fans",
         [](const Mesh& mesh) {
             Fans fans = build_fans(mesh);

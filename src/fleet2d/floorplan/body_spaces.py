@@ -108,8 +108,9 @@ class BodySpace:
         ends = (columns.start, rows.start, columns.stop, rows.stop)
         frame = [end * UNITS_PER_CELL for end in ends]
         inside = shapely.clip_by_rect(self._parts, *frame)
-        removed = [shape for shape in self._removed if shape.intersects(shapely.box(*frame))]
-        if removed:
+        removed = np.array(self._removed, np.object_)
+        removed = removed[shapely.intersects(removed, shapely.box(*frame))]
+        if len(removed):
             inside = shapely.difference(inside, shapely.union_all(removed))
         parts = shapely.get_parts(inside).tolist()
         return _NearSpace(window, [part for part in parts if part.geom_type == "Polygon"])

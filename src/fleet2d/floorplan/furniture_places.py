@@ -494,18 +494,25 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
         rooms = np.ascontiguousarray(np.rot90(plan.room_of_cell, turn))
         can_stand = np.ascontiguousarray(np.rot90(standing, turn))
         free = np.ascontiguousarray(np.rot90(plan.free, turn))
-        zone = np.zeros_like(free)
         border = np.zeros_like(free)
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
         crossed[1:] &= can_stand[1:] & can_stand[:-1]
-        near = crossed | cells_after(crossed, beside, 1) | cells_after(crossed, -beside, 1)
-        seeds = border & near
-        seeds |= np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn)
-        for _ in range(reach):
-            zone |= seeds
-            seeds[1:] = seeds[:-1] & free[1:]
-            seeds[0] = False
+        seeds = np.array(np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn))
+        rows = np.flatnonzero(crossed.any(axis=1))
+        across = crossed[rows]
+        near = across | cells_after(across, beside, 1) | cells_after(across, -beside, 1)
+        seeds[rows] |= border[rows] & near
+        # Each column is on its own, and few have seeds.
+        columns = np.flatnonzero(seeds.any(axis=0))
+        before, open_before = (np.ascontiguousarray(mask[:, columns]) for mask in (seeds, free))
+        reached = before.copy()
+        for _ in range(reach - 1):
+            before[1:] = before[:-1] & open_before[1:]
+            before[0] = False
+            reached |= before
+        zone = np.zeros_like(free)
+        zone[:, columns] = reached
         cells |= np.rot90(zone, -turn)
     if plan.entrance is not None:
         xs, ys = plan.lattice.centre_axes()

@@ -2,9 +2,10 @@
 
 import heapq
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from fleet2d.kernels import (
     label_triangles,
     line_of_sight,
     locate,
+    nearest_cells_in_sight,
     rasterize_cells,
     strictly_inside,
     walking_distance,
@@ -543,12 +545,14 @@ def _ring_with_walls_moved(corners: F64, ways: F64, octagon: I64) -> F64 | None:
     return np.asarray(np.stack([first, last], axis=1)[kept])
 
 
+@lru_cache(64)
 def _octagon(radius: float) -> I64:
     """Return the corners of the octagon that approximates a body."""
     a = 2 * math.ceil((radius + ROUNDING) / 2)
     # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
     b = 2 * math.ceil(a * 0.41421357 / 2)
-    return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+    corners = [(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)]
+    return read_only(np.array(corners))
 
 
 def grow_shape(corners: F64, radius: float) -> BaseGeometry:
@@ -586,10 +590,11 @@ def grow_boxes(boxes: I64, radius: float) -> NDArray[np.object_]:
         boxes: Least x and y, and greatest, int64 (n, 4) [lattice].
         radius: The radius of the body [lattice].
     """
-    octagon = _octagon(radius)
-    x = np.where(octagon[:, 0] > 0, boxes[:, 2, None], boxes[:, 0, None])
-    y = np.where(octagon[:, 1] > 0, boxes[:, 3, None], boxes[:, 1, None])
-    return np.asarray(shapely.polygons(np.stack([x, y], axis=2) + octagon))
+    return np.asarray(shapely.polygons(boxes[:, _BOX_CORNERS] + _octagon(radius)))
+
+
+# Which x and which y of a box is the middle of each corner of an octagon's way round it.
+_BOX_CORNERS = np.array([(2, 3), (2, 3), (0, 3), (0, 3), (0, 1), (0, 1), (2, 1), (2, 1)])
 
 
 # What an area may lack of that of its hull, by rounding.
@@ -617,8 +622,8 @@ STAND_REACH = 0.35
 SIT_REACH = 1.6
 # Number of cells that are tried for a way onto a piece of furniture, nearest first.
 ATTEMPTS = 600
-# So many of them are put in order at first.
-FIRST_ATTEMPTS = 16
+# So many of them in sight are sought at first.
+FIRST_ATTEMPTS = 6
 # What snapping of the grown footprint may add [lattice].
 SLACK = 8
 HALF = UNITS_PER_CELL // 2
@@ -691,14 +696,15 @@ def _upright_rectangle(footprint: Polygon) -> F64 | None:
 
     None for another shape.
     """
-    corners = shapely.get_coordinates(footprint)
+    corners = shapely.get_coordinates(footprint).tolist()
     if len(corners) != 5:
         return None
-    low = corners.min(axis=0)
-    high = corners.max(axis=0)
-    at_low = corners == low
-    turns = at_low[:-1] != at_low[1:]
-    if not (at_low | (corners == high)).all() or not (turns.sum(axis=1) == 1).all():
+    xs, ys = zip(*corners, strict=True)
+    low, high = (min(xs), min(ys)), (max(xs), max(ys))
+    if not set(xs) <= {low[0], high[0]} or not set(ys) <= {low[1], high[1]}:
+        return None
+    # Each side leads along one axis.
+    if any((x == after_x) == (y == after_y) for (x, y), (after_x, after_y) in pairwise(corners)):
         return None
     return np.array([low, high])
 
@@ -783,37 +789,16 @@ def nearest_standing(
     if not strictly_inside(plan.mesh, x, y):
         return None
     units = int(reach * lattice.units_per_m) + HALF
-    rows, columns = _window(lattice, (x - units, y - units), (x + units, y + units))
-    cells = cells_of(standing[rows, columns]) + np.array([rows.start, columns.start])
-    away = lattice.squared_distances(cells, (x, y))
-    is_near = away <= units * units
-    triangle = locate(plan.mesh, x, y)
-    for row, column in _nearest_first(cells[is_near], away[is_near]):
-        centre = lattice.cell_centre(row, column)
-        if not line_of_sight(plan.mesh, x, y, triangle, *centre):
-            continue
-        step = LineString([(use.x, use.y), lattice.xy_of(*centre)])
-        if not shapely.intersects(step, obstacles).any():
-            return row, column
-    return None
-
-
-def _nearest_first(cells: I64, away: I64) -> Iterator[LatticePoint]:
-    """Yield the nearest cells (row, column) in order, of equally near ones the first.
-
-    Args:
-        cells: int64 (n, 2).
-        away: How far each is, int64 (n,).
-    """
     tried = 0
-    # Mostly one of the first will do, so the others are sorted only if it doesn't.
-    for most in (min(FIRST_ATTEMPTS, len(cells)), min(ATTEMPTS, len(cells))):
-        if tried == most:
-            return
-        is_near = away <= np.partition(away, most - 1)[most - 1]
-        order = np.argsort(away[is_near], kind="stable")[tried:most]
-        yield from map(tuple, cells[is_near][order].tolist())
-        tried = most
+    # Mostly one of the first will do, so others are sought only if none does.
+    for wanted in (FIRST_ATTEMPTS, ATTEMPTS):
+        cells = nearest_cells_in_sight(plan.mesh, standing, x, y, units, ATTEMPTS, wanted)
+        for row, column in cells[tried:].tolist():
+            step = LineString([(use.x, use.y), lattice.xy_of(*lattice.cell_centre(row, column))])
+            if not shapely.intersects(step, obstacles).any():
+                return row, column
+        tried = wanted
+    return None
 
 
 def _window(lattice: Lattice, low: Sequence[int], high: Sequence[int]) -> Window:

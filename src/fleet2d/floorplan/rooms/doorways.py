@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
@@ -201,9 +202,14 @@ def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] |
 
     A way that passes beside the corner at `end`, as along a slanted wall, ends there.
     """
-    hits = shapely.get_coordinates(shapely.intersection(polygon.boundary, LineString([start, far])))
+    corners, ring_of = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
+    begins, ends = corners[:-1], corners[1:]
+    least, most = np.minimum(start, far), np.maximum(start, far)
+    is_near = ((np.minimum(begins, ends) <= most) & (np.maximum(begins, ends) >= least)).all(axis=1)
+    is_near &= ring_of[:-1] == ring_of[1:]
+    sides = shapely.linestrings(np.stack([begins[is_near], ends[is_near]], axis=1))
+    hits = shapely.get_coordinates(shapely.intersection(sides, LineString([start, far])))
     nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))] if len(hits) else end
-    corners = shapely.get_coordinates(polygon)
     away = np.maximum(*np.abs(corners - nearest).T)
     if away.min() <= CORNER_DISTANCE:
         x, y = corners[np.argmin(away)].tolist()
@@ -236,6 +242,9 @@ def _with_corner(polygon: Polygon, point: F64) -> tuple[Polygon, bool]:
 
     beside = walls_near(point - CORNER_DISTANCE, point + CORNER_DISTANCE)
     beside = beside if len(beside) else np.arange(len(sides))
+    wall = _wall_through(low, high, beside, point)
+    if wall is not None:
+        return _with_inserted(rings, corners, ring_of, int(first[wall]), point), True
     lines = shapely.linestrings(sides[beside])
     wall = int(beside[np.argmin(shapely.distance(lines, shapely.Point(point)))])
     ends = sides[wall]
@@ -251,10 +260,33 @@ def _with_corner(polygon: Polygon, point: F64) -> tuple[Polygon, bool]:
         and shapely.relate_pattern(shapely.linestrings(sides[others]), swept, _INSIDE_APART).all()
         and not shapely.intersects(shapely.points(loose), swept).any()
     )
-    number = ring_of[first[wall]]
-    place = first[wall] + 1 - np.searchsorted(ring_of, number)
+    return _with_inserted(rings, corners, ring_of, int(first[wall]), point), bool(is_alone)
+
+
+def _wall_through(low: F64, high: F64, beside: I64, point: F64) -> int | None:
+    """Return the wall along an axis that a point is on, if it meets only the two next to it.
+
+    Args:
+        low: Least x and y of each wall, float64 (n, 2).
+        high: Greatest x and y.
+        beside: Walls near the point.
+        point: The point (x, y).
+    """
+    on = beside[((low[beside] <= point) & (point <= high[beside])).all(axis=1)]
+    if len(on) != 1 or (low[on] < high[on]).sum() != 1:
+        return None
+    meets = ((low <= high[on]) & (high >= low[on])).all(axis=1)
+    return int(on[0]) if meets.sum() == 3 else None
+
+
+def _with_inserted(
+    rings: NDArray[np.object_], corners: F64, ring_of: I64, before: int, point: F64
+) -> Polygon:
+    """Return the polygon of some rings with a further corner after one of theirs."""
+    number = ring_of[before]
+    place = before + 1 - np.searchsorted(ring_of, number)
     rings[number] = shapely.linearrings(np.insert(corners[ring_of == number], place, point, axis=0))
-    return shapely.polygons(rings[0], rings[1:]), bool(is_alone)
+    return shapely.polygons(rings[0], rings[1:])
 
 
 def rooms_beside(lattice: Lattice, room_of_place: I16, segment: Segment) -> tuple[int, int]:

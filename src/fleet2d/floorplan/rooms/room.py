@@ -218,6 +218,9 @@ def _inside(free: Bool, window: tuple[slice, slice], shape: Polygon | MultiPolyg
     """Return which free cells of a window have their centre inside a shape."""
     inside = free.copy()
     if not shape.equals(shapely.box(*shape.bounds)):
+        upright = _inside_upright(free.shape, window, shape)
+        if upright is not None:
+            return inside & upright
         y, x = np.nonzero(inside)
         centre_x = (x + window[1].start) * UNITS_PER_CELL + TO_CENTRE
         centre_y = (y + window[0].start) * UNITS_PER_CELL + TO_CENTRE
@@ -227,6 +230,27 @@ def _inside(free: Bool, window: tuple[slice, slice], shape: Polygon | MultiPolyg
         shapely.prepare(shape)
         inside[y, x] = shapely.contains_xy(shape, centre_x, centre_y)
     return inside
+
+
+def _inside_upright(
+    size: tuple[int, ...], window: tuple[slice, slice], shape: Polygon | MultiPolygon
+) -> Bool | None:
+    """Return the cells of a window with their centre inside a shape with sides along the axes.
+
+    None for another shape. Each upright side turns the inside out for the cells to its right.
+    """
+    corners, ring = shapely.get_coordinates(shapely.get_rings(shape), return_index=True)
+    sides = np.stack([corners[:-1], corners[1:]], axis=1)[ring[:-1] == ring[1:]]
+    is_upright = sides[:, 0, 0] == sides[:, 1, 0]
+    if not (is_upright | (sides[:, 0, 1] == sides[:, 1, 1])).all():
+        return None
+    upright = np.sort(sides[is_upright], axis=1)
+    first = np.array([window[1].start, window[0].start])
+    cells = (upright.astype(np.int64) - TO_CENTRE) // UNITS_PER_CELL + 1 - first
+    turns = np.zeros((size[0], size[1] + 1), np.bool_)
+    for (column, low), (_, high) in np.maximum(cells, 0).tolist():
+        turns[low:high, min(column, size[1])] ^= True
+    return np.logical_xor.accumulate(turns[:, :-1], axis=1)
 
 
 def _is_met_more_along_x(shape: Polygon | MultiPolygon) -> bool:
