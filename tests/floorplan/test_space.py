@@ -2,6 +2,7 @@
 
 import copy
 import math
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -11,16 +12,26 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 from tests.meshed_homes import plan_files, walls_of
 from tests.reference.line_of_sight import visible
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
-from tests.strategies import homes, quick, seeds
+from tests.strategies import homes, quick, rectilinear_homes, seeds
 from tests.thorough import some
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.space import ROUNDING, PointDistances, Space, grow_polygons, grow_shape
+from fleet2d.floorplan.space import (
+    ROUNDING,
+    PointDistances,
+    Space,
+    _grow_walls,
+    _octagon,
+    _with_walls_moved,
+    grow_polygons,
+    grow_shape,
+)
 from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280
@@ -437,3 +448,44 @@ def test_distances_of_points_are_the_same_measured_from_the_places_and_from_the_
     for place in map(centre, rows, columns):  # free and not
         assert np.array_equal(distances.of(place), space.distances(place, points))
     assert np.isinf([distances.of(place) for place in map(centre, rows, columns)]).any()
+
+
+def moved_and_grown(
+    polygons: list[Polygon], radius: float
+) -> Iterator[tuple[Polygon | None, BaseGeometry]]:
+    """Yield what is left of each polygon by moving its walls, and by growing them."""
+    for polygon in polygons:
+        rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(polygon)]
+        walls = np.concatenate([_grow_walls(ring, _octagon(radius)) for ring in rings])
+        rest = shapely.difference(polygon, shapely.union_all(walls))
+        yield _with_walls_moved(polygon, _octagon(radius)), rest
+
+
+@quick
+@given(rectilinear_homes(), st.integers(4, 300))
+def test_walls_are_moved_as_far_as_they_grow(polygons: list[Polygon], radius: int) -> None:
+    for moved, rest in moved_and_grown(polygons, radius):
+        assert moved is None or moved.equals(rest)
+
+
+@pytest.mark.parametrize("step", [2, 40, 128, 186, 188, 400])
+@pytest.mark.parametrize("low", [False, True])
+def test_steps_in_walls_are_hidden_by_what_stands_beside_them(step: int, low: bool) -> None:
+    corners = [(0, 0), (4000, 0), (4000, 3000), (2000, 3000 + step), (0, 3000 + step)]
+    if low:
+        corners = [(x, 3000 + step - y if y >= 3000 else y) for x, y in corners]
+        corners = [(x, y + 3000 if i > 1 else y) for i, (x, y) in enumerate(corners)]
+    upright = [*corners[:3], (2000, corners[2][1]), *corners[3:]]
+    ((moved, rest),) = moved_and_grown([Polygon(upright)], 320)
+
+    assert moved is not None
+    assert moved.equals(rest)
+
+
+def test_walls_are_not_moved_through_each_other() -> None:
+    narrow = shapely.union_all([shapely.box(0, 0, 999, 999), shapely.box(998, 400, 1999, 500)])
+    slanted = Polygon([(0, 0), (4000, 0), (4000, 3000)])
+    for polygon in (narrow, slanted):
+        ((moved, rest),) = moved_and_grown([polygon], 100)
+        assert moved is None
+        assert not rest.is_empty

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given
+from hypothesis import strategies as st
 from shapely.geometry import Polygon
 from tests.meshed_homes import (
     Home,
@@ -18,11 +19,20 @@ from tests.meshed_homes import (
     transformed,
     turns,
 )
+from tests.reference.line_of_sight import nearest_cells_in_sight as nearest_slowly
 from tests.reference.line_of_sight import vertices_seen, visible, visible_exactly
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import build_fans, vertices_seen_from_point, vertices_seen_from_vertex
-from fleet2d.kernels import I64, Bool, Mesh, line_of_sight, locate, pairs_in_sight
+from fleet2d.kernels import (
+    I64,
+    Bool,
+    Mesh,
+    line_of_sight,
+    locate,
+    nearest_cells_in_sight,
+    pairs_in_sight,
+)
 
 EYES, POINTS = 2, 24
 
@@ -183,6 +193,21 @@ def test_nobody_right_behind_the_middle_of_a_long_wall_is_seen(length: int, thic
             point = (middle + offset, 512 + thickness + behind)
             assert not sees(home, (middle, 400), point)
             assert not sees(home, point, (middle + offset, 511))
+
+
+@quick
+@given(homes(), seeds(), st.integers(0, 700), st.integers(0, 40))
+def test_nearest_cells_in_sight_equal_the_slow_ones(
+    polygons: list[Polygon], seed: int, reach: int, most: int
+) -> None:
+    home = home_of(polygons)
+    rng = np.random.default_rng(seed)
+    cells = rng.random((home.rows, home.columns)) < 0.8
+    for eye in awkward_points(home, rng, EYES):
+        wanted = int(rng.integers(0, most + 1))
+        expected = nearest_slowly(home.walls, cells, tuple(eye.tolist()), reach, most, wanted)
+        found = nearest_cells_in_sight(home.mesh, cells, *eye.tolist(), reach, most, wanted)
+        assert expected == list(map(tuple, found.tolist()))
 
 
 @quick

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from tests.strategies import quick, rectilinear_homes
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
@@ -8,6 +10,7 @@ from fleet2d.floorplan.rooms.room import (
     TO_CENTRE,
     LabelledRegion,
     Room,
+    _inside_upright,
     _is_met_more_along_x,
     assign_rooms,
     cells_in,
@@ -154,6 +157,20 @@ def test_polygons_take_the_cells_inside_them() -> None:
     x, y = LATTICE.centre_axes()
     expected = FREE & ((x[None, :] + y[:, None]) < 3 * LATTICE.units_per_m)
     assert np.array_equal(expected, room_of_cell == rooms["loggia_1"].index)
+
+
+@quick
+@given(rectilinear_homes())
+def test_upright_shapes_have_the_cells_inside_them(polygons: list[shapely.Polygon]) -> None:
+    shape = shapely.MultiPolygon(polygons)
+    window = slice(1, 9), slice(2, 14)
+    y, x = np.mgrid[window]
+
+    for part in (shape, polygons[0]) if polygons else ():
+        expected = shapely.contains_xy(part, x * 64 + 33, y * 64 + 33)
+        assert np.array_equal(expected, _inside_upright(expected.shape, window, part))
+    triangle = shapely.Polygon([(0, 0), (300, 0), (0, 300)])
+    assert _inside_upright((8, 12), window, triangle) is None
 
 
 def test_own_names_stay_and_numbering_skips_them() -> None:

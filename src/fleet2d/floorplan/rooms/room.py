@@ -239,7 +239,8 @@ def _inside_upright(
 
     None for another shape. Each upright side turns the inside out for the cells to its right.
     """
-    corners, ring = shapely.get_coordinates(shapely.get_rings(shape), return_index=True)
+    rings = shapely.get_rings(shapely.get_parts(shape))
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
     sides = np.stack([corners[:-1], corners[1:]], axis=1)[ring[:-1] == ring[1:]]
     is_upright = sides[:, 0, 0] == sides[:, 1, 0]
     if not (is_upright | (sides[:, 0, 1] == sides[:, 1, 1])).all():
