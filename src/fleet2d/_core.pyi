@@ -607,6 +607,22 @@ def squarest_depth(front: numpy.typing.NDArray[numpy.int64], back: numpy.typing.
         The index of the depth; -1 if none makes promising rooms.
     """
 
+def move_walls(ring: numpy.typing.NDArray[numpy.int64], reach: int, half: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return an outline whose walls along the axes are moved to their left, into the free space.
+
+    Where it turns right, an octagon goes round the corner.
+
+    Args:
+        ring: Its corners, each once, int64 (n, 2) [lattice units].
+        reach: Distance of the octagon's straight sides from its middle [lattice units].
+        half: Half the length of these sides [lattice units].
+
+    Returns:
+        Its corners, int64 (m, 2); none if a wall is slanted, or if one but a step that the octagon
+        hides would vanish.
+    """
+
 def leg_cost(cost: numpy.typing.NDArray[numpy.int32], ax: int, ay: int, bx: int, by: int) -> float:
     """
     Return the cost of a straight leg [percent times lattice units]; infinite if it is blocked.

@@ -517,6 +517,7 @@ CALLS: dict[str, Args] = {
         np.array([0, 0, 90, 60]),
         np.array([[0, 0, 0, 20]]),
     ),
+    "move_walls": lambda: (np.array([[0, 0], [90, 0], [90, 60], [0, 60]]), 9, 4),
     "is_promising": lambda: (np.array([[0, 0, 0, 60, 50]]), LIMITS.copy()),
     "strip_rooms": lambda: (SLOTS.copy(), AREAS.copy(), 100, 20, 240),
     "row_rooms": lambda: (SLOTS.copy(), AREAS.copy(), CorridorRule(2, 24, 0, -1), 100, 20, 240),

@@ -43,7 +43,8 @@ Args:
         [](const Mesh& mesh, View<const bool, 2> cells, i64 x, i64 y, i64 reach, i64 most, i64 wanted) {
             constexpr i64 limit = i64{1} << 20;
             check_point(x, y);
-            require(cells.shape[0] <= limit && cells.shape[1] <= limit, "cells must have at most 2**20 rows and columns");
+            require(cells.shape[0] <= limit && cells.shape[1] <= limit,
+                    "cells must have at most 2**20 rows and columns");
             require(0 <= reach && reach <= limit, "reach must be in 0 to 2**20");
             require(0 <= wanted && wanted <= most && most <= limit, "wanted must be in 0 to most, that at most 2**20");
             return nearest_cells_in_sight(mesh, cells, x, y, reach, most, wanted);

@@ -32,6 +32,7 @@ from fleet2d.kernels import (
     label_triangles,
     line_of_sight,
     locate,
+    move_walls,
     nearest_cells_in_sight,
     rasterize_cells,
     strictly_inside,
@@ -496,53 +497,15 @@ def _with_walls_moved(polygon: Polygon, octagon: I64) -> Polygon | None:
 
     None if a side would vanish, or sides would cross: there only the shapes can tell what is left.
     """
+    reach, half = octagon[0].tolist()
     rings = []
     for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
-        corners = shapely.get_coordinates(ring)[:-1]
-        ways = np.sign(np.roll(corners, -1, axis=0) - corners)
-        is_corner = (ways != np.roll(ways, 1, axis=0)).any(axis=1)
-        moved = _ring_with_walls_moved(corners[is_corner], ways[is_corner], octagon)
-        if moved is None:
-            return None
-        rings.append(moved)
+        corners = shapely.get_coordinates(ring)[:-1].astype(np.int64)
+        rings.append(move_walls(corners, reach, half))
+    if not all(map(len, rings)):
+        return None
     shape = Polygon(rings[0], rings[1:])
     return shape if shape.is_valid else None
-
-
-def _ring_with_walls_moved(corners: F64, ways: F64, octagon: I64) -> F64 | None:
-    """Return a ring whose walls are moved to their left; see `_with_walls_moved`.
-
-    Args:
-        corners: Its corners, float64 (n, 2).
-        ways: The way of the wall from each corner: -1, 0 or 1 along x and y.
-        octagon: The octagon.
-    """
-    reach, half = octagon[0].tolist()
-    x, y = ways.T
-    turn = np.roll(x, 1) * y - np.roll(y, 1) * x
-    if not len(corners) or (turn == 0).any() or (x * y != 0).any():
-        return None
-    # Where the outline turns right the octagon goes round, farther than the wall.
-    at_start = np.where(turn > 0, -reach, half)
-    at_end = np.roll(at_start, -1)
-    ends = np.roll(corners, -1, axis=0)
-    lengths = np.abs(ends - corners).sum(axis=1)
-    # A step that is lower than the slanted side of the octagon is hidden behind that.
-    hidden = lengths + at_start + at_end <= 0
-    is_low = hidden & (turn != np.roll(turn, -1))
-    rises = is_low & (turn > 0)
-    falls = np.roll(is_low & (turn < 0), 1)
-    at_end = np.where(np.roll(rises, -1), -half - np.roll(lengths, -1), at_end)
-    at_start = np.where(falls, -half - np.roll(lengths, 1), at_start)
-    left = lengths + at_start + at_end
-    if (hidden & np.roll(hidden, 1)).any() or ((left <= 0) & ~is_low).any():
-        return None
-    inwards = reach * np.stack([-y, x], axis=1)
-    first = corners + inwards - at_start[:, None] * ways
-    last = ends + inwards + at_end[:, None] * ways
-    # Where it turns left, a side begins where the one before it ends.
-    kept = np.stack([(turn < 0) | falls, np.ones_like(is_low)], axis=1) & ~is_low[:, None]
-    return np.asarray(np.stack([first, last], axis=1)[kept])
 
 
 @lru_cache(64)

@@ -1,0 +1,34 @@
+"""Walls that are moved into the free space: the kernel beside its slow twin."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.geometry import Polygon
+from tests.reference import moved_walls as slow
+from tests.strategies import homes, quick
+
+from fleet2d.kernels import move_walls
+
+
+@quick
+@given(homes(), st.integers(0, 300), st.sampled_from([0.0, 0.41, 1.0]))
+def test_moved_walls_equal_the_slow_ones(polygons: list[Polygon], reach: int, part: float) -> None:
+    half = int(part * reach)
+    for polygon in polygons:
+        for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
+            corners = shapely.get_coordinates(ring)[:-1].astype(np.int64)
+            expected = slow.move_walls(corners, reach, half)
+            assert expected.tolist() == move_walls(corners, reach, half).tolist()
+
+
+def test_walls_of_a_room_move_inwards_and_those_of_a_pillar_outwards() -> None:
+    room = np.array([(0, 0), (50, 0), (100, 0), (100, 80), (0, 80)])
+    inner = [[90, 10], [90, 70], [10, 70], [10, 10]]
+    assert sorted(inner) == sorted(move_walls(room, 10, 4).tolist())
+    assert 8 == len(move_walls(room[::-1].copy(), 10, 4))
+    assert 0 == len(move_walls(room, 40, 16))
+    assert 0 == len(move_walls(np.array([(0, 0), (9, 9), (0, 9)]), 1, 0))
+    with pytest.raises(ValueError, match="half must be"):
+        move_walls(room, 4, 5)
