@@ -276,6 +276,20 @@ def test_a_battery_that_runs_empty_is_reported() -> None:
     assert 0 == result["lowest"]
 
 
+def test_a_battery_that_a_script_charges_again_is_empty_no_longer() -> None:
+    """It counted as empty to the end of the run, though the robot drove on."""
+    empty = content("1 d")
+    empty["robots"]["astro"]["behaviors"] = [{"type": "dock", "threshold": 0.01}, "meander"]
+    empty["robots"]["astro"]["battery"] = {**BATTERY, "charger": [7.0, 6.0]}
+    steps, died = 6000, next(step for step, _, detail in events(run(empty)) if detail == "0.0 %")
+    at = f"{died + 500} s"
+    empty["script"] = [{"at": at, "battery": "astro", "charge": "100 %"}]
+    stored = run(empty)
+    last = [step for step, _, detail in events(stored) if detail == "0.0 %"][1:]
+    expected = 500 + sum(steps - step for step in last)
+    assert stored.metrics["battery"]["astro"]["empty"] == pytest.approx(expected / steps)
+
+
 @pytest.mark.parametrize("name", [*METRICS, "detections"])
 def test_every_number_of_the_closing_table_has_a_unit(stored: Run, name: str) -> None:
     metric = lookup("metric", name)

@@ -116,7 +116,7 @@ class BatteryUse(Metric):
     they happen at decisions, after a change of 5 %, when the robot docks, and when it is empty.
     `dockings` counts `docks`. `charging` is the share of the run's steps from a `docks` to the
     `charged` after it, or to the end of the run; a robot at its charger charges at other times,
-    too. `empty` is the share of steps with an empty battery, from which on the robot stands still.
+    too. `empty` is the share of steps with an empty battery, until a script charges it again.
     """
 
     unit = "share of time"
@@ -130,6 +130,7 @@ class BatteryUse(Metric):
         self.docked_at: dict[str, int] = {}
         self.charging: dict[str, int] = {}  # steps
         self.empty_at: dict[str, int] = {}
+        self.empty: dict[str, int] = {}  # steps, up to the last charge
         self.steps = 0
         self.step_s = 1.0
 
@@ -142,6 +143,9 @@ class BatteryUse(Metric):
                 self.lowest[name] = min(self.lowest.get(name, 1.0), level)
                 if event.event == EventKind.BATTERY and level == 0:
                     self.empty_at.setdefault(name, event.step)
+                elif name in self.empty_at:
+                    steps = event.step - self.empty_at.pop(name)
+                    self.empty[name] = self.empty.get(name, 0) + steps
             if event.event == EventKind.DOCKS:
                 self.dockings[name] = self.dockings.get(name, 0) + 1
                 self.docked_at[name] = event.step
@@ -161,8 +165,9 @@ class BatteryUse(Metric):
                 "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / DAY_S),
                 "charging": (self.charging.get(name, 0) + present) / self.steps,
             }
-            if name in self.empty_at:
-                numbers[name]["empty"] = (self.steps - self.empty_at[name]) / self.steps
+            empty = self.empty.get(name, 0) + self.steps - self.empty_at.get(name, self.steps)
+            if empty:
+                numbers[name]["empty"] = empty / self.steps
         return numbers
 
 
