@@ -143,6 +143,8 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
         (["simulation.speedup=.inf"], "simulation.speedup: expected a finite number, got inf"),
         (["users.9x=drift"], "users.9x: the name '9x' must be letters"),
         (["robots.ana=drift"], "robots.ana: there is a user named 'ana' already"),
+        (["users.unknown=drift"], "users.unknown: there is a word for people named 'unknown' already"),
+        (["users.anyone=drift"], "users.anyone: there is a word for people named 'anyone' already: choose"),
         (["floorplan=null"], "floorplan: missing, and has no default"),
         (["floorplan.path=gone.json"], "floorplan.path: no such file"),
         (["users.ana.sped=1"], "users.ana.sped: unknown key 'sped': did you mean 'speed'? Allowed "

@@ -52,6 +52,9 @@ from fleet2d.runtime.clock import Clock, Sun
 from fleet2d.runtime.local_time import Zone, rules_of, span_us, zone_of
 from fleet2d.sight.camera import SightSettings
 
+# What expectations call people by, and sightings, results and messages somebody not known.
+WORDS_FOR_PEOPLE = ("anyone", "everyone", "nobody", "unknown")
+
 
 def _read_expected(value: Any) -> Any:
     from fleet2d.expectations.parse import read_expected
@@ -284,12 +287,13 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        nouns: dict[str, str] = {}
+        nouns = dict.fromkeys(WORDS_FOR_PEOPLE, "a word for people")
         for section, noun in (("users", "a user"), ("robots", "a robot"), ("objects", "an object")):
             for name in getattr(self, section):
                 if name in nouns:
                     raise problem_at(
-                        (section, name), f"there is {nouns[name]} named {name!r} already"
+                        (section, name),
+                        f"there is {nouns[name]} named {name!r} already: choose another name",
                     )
                 nouns[name] = noun
         return self
