@@ -61,6 +61,12 @@ def house_of(seed: int) -> House:
     return generate(seed, Wishes(), Style())
 
 
+def test_seed_whose_first_areas_fit_into_no_layout_gets_another_area() -> None:
+    # 480 layouts of 386, 292, 394 and 277 m2 were drawn in vain for it: the data set that trains
+    # the model `learned` has this home, and couldn't be made.
+    assert Synthetic(seed=1022).load().rooms_of_type("bedroom")
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_home_is_in_one_part_for_a_body_and_every_room_can_be_reached_by_doorways(
     seed: int,

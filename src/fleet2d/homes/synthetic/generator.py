@@ -425,8 +425,9 @@ SHAFT_ROOM_SIDE = 34
 SHAFT_CLEARANCE = 12
 # Ranges of the width of corridors [units], and their weights.
 CORRIDORS = (((20, 24), 40), ((25, 28), 40), ((29, 32), 20))
-# … and at most this many.
+# … and at most this many; where the area is free, this many times as many, of other areas.
 MAX_LAYOUTS = 480
+FREE_AREAS = 4
 # Layouts drawn in vain before a new list of rooms is drawn, and before what was not requested is.
 PATIENCE = 20
 REDRAW = 80
@@ -488,7 +489,8 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     plain = Choices(seed, "outline").chance(PLAIN_PERCENT)
     candidates: list[_Candidate] = []
     briefs: list[Brief] = []
-    for number in range(MAX_LAYOUTS):
+    most = MAX_LAYOUTS if wishes.area_m2 else FREE_AREAS * MAX_LAYOUTS
+    for number in range(most):
         if number % PATIENCE == 0 and not candidates:
             if number and number % REDRAW == 0:
                 # The area stays at first, so that large homes don't get rarer.
@@ -518,7 +520,7 @@ def generate(seed: int, wishes: Wishes, style: Style) -> House:
     for best in sorted(candidates, key=lambda candidate: candidate.cost):
         with suppress(MisfitError):
             return _finish(best, Choices(seed, "doors"), style)
-    raise NoLayoutError(_failure(decided, style))
+    raise NoLayoutError(_failure(decided, style, most))
 
 
 def _tastes(choices: Choices, style: Style) -> Prices:
@@ -707,11 +709,11 @@ def _approachable(wall: Wall, boxes: Sequence[Box]) -> bool:
     return not any(overlap(ground, box.sides) for box in boxes)
 
 
-def _failure(wishes: Wishes, style: Style) -> str:
+def _failure(wishes: Wishes, style: Style, layouts: int) -> str:
     numbers = f"{wishes.bedrooms} bedrooms and {wishes.bathrooms} bathrooms"
     shape = f" and the outline {style.outline}" if style.outline else ""
     return (
         f"no synthetic home of {wishes.area_m2:g} m2 with {numbers}{shape} was found in"
-        f" {MAX_LAYOUTS} layouts: ask for more or less area, other numbers of rooms, another"
+        f" {layouts} layouts: ask for more or less area, other numbers of rooms, another"
         " floorplan.outline, or take another seed"
     )
